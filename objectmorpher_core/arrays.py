@@ -1,0 +1,20 @@
+"""Names of the array types, and the one way to make an array of the document read-only."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+Mask = npt.NDArray[np.bool_]
+RGB = npt.NDArray[np.uint8]  # (H, W, 3)
+Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]  # (H, W, 3), the photo's own bit depth
+
+
+def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
+    """A contiguous, read-only view of `array`: a slip that would change the document raises."""
+    array = np.ascontiguousarray(array, dtype=dtype).view()
+    array.setflags(write=False)
+    return array

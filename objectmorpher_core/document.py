@@ -1,0 +1,284 @@
+"""The document: everything that is saved and undone. Immutable; compare parts with `is`.
+
+What a change invalidates is written once, in the `with_*` methods of `EditObject`:
+photo -> everything; mask -> matte, lifted, plate; lifted -> handles, pose. Placement, handles
+and pose invalidate nothing that is stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .arrays import F32, F64, Mask, Pixels, frozen
+from .camera import Camera
+from .gaussians import Gaussians
+from .image import Picture
+from .rotations import turn_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """The opened photo: its upright pixels, its camera, and the very bytes of its file."""
+
+    picture: Picture
+    camera: Camera
+    source: bytes  # the file as it was opened; a session carries it
+    name: str  # file name without folder
+
+    @property
+    def pixels(self) -> Pixels:
+        """(H, W, 3) upright RGB, u8 or u16."""
+        return self.picture.pixels
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) px."""
+        return self.picture.pixels.shape[1], self.picture.pixels.shape[0]
+
+
+@dataclass(frozen=True)
+class Click:
+    """A point that belongs to the object, or does not."""
+
+    x: float  # image px
+    y: float
+    is_foreground: bool = True
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """What the user said about which object is meant. `is_subject`: the photo's salient subject."""
+
+    clicks: tuple[Click, ...] = ()
+    box: tuple[float, float, float, float] | None = None  # x0, y0, x1, y1 px
+    is_subject: bool = False
+
+    @property
+    def is_empty(self) -> bool:
+        return not self.clicks and self.box is None and not self.is_subject
+
+
+@dataclass(frozen=True, eq=False)
+class Matte:
+    """Soft cut-out of an object inside a crop of the photo; alpha is 0 outside the crop.
+
+    `foreground` is the object's own colour, freed of the background, and continued beyond the
+    object so that sampling near the edge never meets the background.
+    """
+
+    left: int  # px, crop's corner in the photo
+    top: int
+    alpha: F32  # (h, w) in [0, 1]
+    foreground: F32  # (h, w, 3) sRGB in [0, 1], straight
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "alpha", frozen(self.alpha, np.float32))
+        object.__setattr__(self, "foreground", frozen(self.foreground, np.float32))
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1 px of the crop in the photo."""
+        height, width = self.alpha.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoTexture:
+    """What each Gaussian carries of the photo (DESIGN section 3)."""
+
+    u0: F32  # (N, 2) px, its rest mean in the photo
+    visibility: F32  # (N,) in [0, 1], 1 = its surface was seen in the photo
+    solidity: F32  # (N,) in [0, 1], its alpha where the matte cannot be carried along
+
+    def __post_init__(self) -> None:
+        for name in ("u0", "visibility", "solidity"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedObject:
+    """An object lifted to 3D, registered to the photo."""
+
+    gaussians: Gaussians
+    texture: PhotoTexture
+    control_points: F32  # (M, 3) object frame; saved, because handles name them by index
+    world_from_object: F64  # (4, 4) similarity at rest: the registration to the photo
+    spacing: float  # object units, mean distance of neighbouring Gaussians on the surface
+    backend: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
+        object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+
+    @property
+    def diameter(self) -> float:
+        """Largest distance between two control points, object units (paper's D_scene)."""
+        p = self.control_points.astype(np.float64)
+        squares = (p * p).sum(1)
+        gaps = squares[:, None] + squares[None, :] - 2 * p @ p.T
+        return float(np.sqrt(max(gaps.max(), 0.0)))
+
+    @property
+    def scale(self) -> float:
+        """World units per object unit."""
+        return float(np.cbrt(np.linalg.det(self.world_from_object[:3, :3])))
+
+    @property
+    def centre(self) -> F64:
+        """(3,) world; centre of the bounding box in camera axes at rest."""
+        points = self.world_points(self.gaussians.means)
+        return 0.5 * (points.min(0) + points.max(0))
+
+    def world_points(self, points: np.ndarray) -> F64:
+        """Object-frame points (..., 3) in the world, at rest."""
+        return points @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
+
+    def object_points(self, points: np.ndarray) -> F64:
+        """World points (..., 3) in the object frame, at rest."""
+        shifted = points - self.world_from_object[:3, 3]
+        return shifted @ np.linalg.inv(self.world_from_object[:3, :3]).T
+
+
+@dataclass(frozen=True, eq=False)
+class Handle:
+    """A point of the rest surface and where it must be."""
+
+    control_point: int  # nearest control point; two handles never share one
+    point: F64  # (3,) object frame, the surface point that was clicked
+    target: F64  # (3,) object frame; equal to `point` for a pin that was never dragged
+    is_pin: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", frozen(self.point, np.float64))
+        object.__setattr__(self, "target", frozen(self.target, np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """The deformed control points: paper's p'_i and R_i."""
+
+    points: F64  # (M, 3) object frame
+    rotations: F64  # (M, 3, 3)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points, np.float64))
+        object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the whole object went (DESIGN section 6): scale, then turn, then move."""
+
+    move: tuple[float, float] = (0.0, 0.0)  # px, of the centre's picture
+    depth: float = 0.0  # object diameters away from the camera
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # degrees: yaw, pitch, roll
+    scale: float = 1.0
+
+    @property
+    def is_identity(self) -> bool:
+        return self == Placement()
+
+    def matrix(self, lifted: LiftedObject, camera: Camera) -> F64:
+        """World-from-world motion (4, 4) of the object that was at rest.
+
+        Raises ValueError where the object would pass behind the camera.
+        """
+        centre = lifted.centre
+        depth = centre[2] + self.depth * lifted.diameter * lifted.scale
+        if depth <= 1e-3 * centre[2]:
+            raise ValueError(f"a depth of {self.depth:g} diameters is behind the camera")
+        target = camera.unproject(camera.project(centre) + np.array(self.move), depth)
+        linear = turn_matrix(*self.turn) * self.scale
+        motion = np.eye(4)
+        motion[:3, :3] = linear
+        motion[:3, 3] = target - linear @ centre
+        return motion
+
+
+@dataclass(frozen=True, eq=False)
+class DeformSettings:
+    """How the control points move together. The defaults are ours; the rest are ablations."""
+
+    mode: str = "arap"  # or "laplacian"
+    links: str = "geodesic"  # or "euclidean"
+    is_faithful: bool = False  # the paper as printed: three iterations, Eq. 5
+
+
+@dataclass(frozen=True, eq=False)
+class EditObject:
+    """One object of the photo and everything that was done to it."""
+
+    name: str
+    prompt: Prompt = Prompt()
+    mask: Mask | None = None  # (H, W)
+    matte: Matte | None = None
+    lifted: LiftedObject | None = None
+    handles: tuple[Handle, ...] = ()
+    has_auto_anchors: bool = True
+    deform: DeformSettings = field(default_factory=DeformSettings)
+    pose: Pose | None = None  # None: at rest
+    placement: Placement = Placement()
+    is_visible: bool = True
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether the object is anywhere else than in the photo."""
+        return self.lifted is not None and (
+            self.pose is not None or not self.placement.is_identity or not self.is_visible
+        )
+
+    def with_mask(self, mask: Mask | None, prompt: Prompt) -> EditObject:
+        """A new mask: matte, lift, handles, pose and placement are gone."""
+        mask = None if mask is None else frozen(mask, np.bool_)
+        return EditObject(self.name, prompt=prompt, mask=mask, deform=self.deform)
+
+    def with_lifted(self, matte: Matte, lifted: LiftedObject) -> EditObject:
+        """A new lift: handles and pose named the old one's control points and are gone."""
+        return replace(self, matte=matte, lifted=lifted, handles=(), pose=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """The photo without its objects: inpainted pixels, and where they are."""
+
+    left: int  # px, crop's corner in the photo
+    top: int
+    pixels: Pixels  # (h, w, 3) the photo's bit depth
+    hole: Mask  # (h, w) True where `pixels` are invented; elsewhere they are the photo's
+    backend: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(self.pixels))
+        object.__setattr__(self, "hole", frozen(self.hole, np.bool_))
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1 px of the crop in the photo."""
+        height, width = self.hole.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """All that is saved and undone."""
+
+    photo: Photo
+    objects: tuple[EditObject, ...] = ()
+    plate: Plate | None = None  # None: not made yet for these masks
+    backends: tuple[tuple[str, str], ...] = ()  # stage -> backend used
+    seed: int = 0
+
+    def with_object(self, k: int, changed: EditObject) -> Document:
+        """Object `k` replaced; the plate stays only where the mask did."""
+        if k == len(self.objects):
+            return replace(self, objects=(*self.objects, changed), plate=None)
+        plate = self.plate if changed.mask is self.objects[k].mask else None
+        objects = tuple(changed if i == k else o for i, o in enumerate(self.objects))
+        return replace(self, objects=objects, plate=plate)
+
+    def with_backend(self, stage: str, name: str) -> Document:
+        """Records which backend of a stage made what the document holds."""
+        others = tuple((s, n) for s, n in self.backends if s != stage)
+        return replace(self, backends=(*others, (stage, name)))

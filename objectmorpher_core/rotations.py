@@ -1,0 +1,54 @@
+"""Unit quaternions (w, x, y, z), rotation matrices, and the axis turns of `--turn`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import F64
+
+
+def matrices_from_quats(quats: np.ndarray) -> np.ndarray:
+    """Rotation matrices (N, 3, 3) of quaternions (N, 4) wxyz, which need not be unit."""
+    w, x, y, z = (quats / np.linalg.norm(quats, axis=1, keepdims=True)).T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        axis=1,
+    )
+
+
+def quats_from_matrices(matrices: np.ndarray) -> np.ndarray:
+    """Unit quaternions (N, 4) wxyz, w >= 0, of rotation matrices (N, 3, 3).
+
+    The largest of the four components is found first and the others follow from it, so no
+    rotation loses digits (Shepperd 1978).
+    """
+    m = matrices
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], 1)
+    a, b, c = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
+    xy, xz, yz = m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1]
+    candidates = np.stack(  # row r: the quaternion times 4 q_r
+        [
+            np.stack([squares[:, 0], a, b, c], 1),
+            np.stack([a, squares[:, 1], xy, xz], 1),
+            np.stack([b, xy, squares[:, 2], yz], 1),
+            np.stack([c, xz, yz, squares[:, 3]], 1),
+        ],
+        axis=1,
+    )
+    quats = candidates[np.arange(len(m)), squares.argmax(1)]
+    quats = quats / np.linalg.norm(quats, axis=1, keepdims=True)
+    return np.where(quats[:, :1] < 0, -quats, quats)
+
+
+def turn_matrix(yaw: float, pitch: float, roll: float) -> F64:
+    """R_z(roll) R_x(pitch) R_y(yaw) (3, 3), degrees, right-handed, camera axes."""
+    (cy, cx, cz), (sy, sx, sz) = (f(np.radians([yaw, pitch, roll])) for f in (np.cos, np.sin))
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_z @ about_x @ about_y
