@@ -14,7 +14,11 @@ Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]  # (H, W, 3), the photo'
 
 
 def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
-    """A contiguous, read-only view of `array`: a slip that would change the document raises."""
+    """A contiguous, read-only view of `array`: a slip that would change the document raises.
+
+    Compiled kernels take only frozen arrays, too: numba compiles anew for each mixture of
+    writable and read-only arguments, and that costs seconds.
+    """
     array = np.ascontiguousarray(array, dtype=dtype).view()
     array.setflags(write=False)
     return array

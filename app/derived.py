@@ -1,0 +1,259 @@
+"""What is computed from the document and never saved; remembered by identity (ARCHITECTURE 1).
+
+The heavy modules of the core are imported when the first object is lifted, or by `warm_up`.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import cv2
+import numpy as np
+
+from objectmorpher_core import edits
+from objectmorpher_core.arrays import F32, F64, Mask
+from objectmorpher_core.document import Document, EditObject, Photo, Pose
+
+from .view import View
+
+if TYPE_CHECKING:
+    from objectmorpher_core.puppet import Puppet, SurfacePoint
+    from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+
+T = TypeVar("T")
+
+KEPT = 6  # results remembered of each kind
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A place in the picture, and how far away."""
+
+    xy: F64  # (2,) image px
+    depth: float  # world units along z
+    diameter: float  # of the object, world units
+
+    def moved(self, delta: np.ndarray, diameters: float) -> Spot:
+        """`delta` (2,) image px and so many object diameters away."""
+        depth = max(self.depth + diameters * self.diameter, 0.05 * self.depth)
+        return replace(self, xy=self.xy + delta, depth=depth)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectFrame:
+    """The box around an object in the picture."""
+
+    corners: F64  # (4, 2) image px: left top, right top, right bottom, left bottom
+    centre: F64  # (2,) image px, of the placed object
+    radius: float  # image px, of the ring around it
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A rendered object on the canvas."""
+
+    left: int  # canvas px
+    top: int
+    rgba: F32  # (h, w, 4) premultiplied sRGB
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """All that depends on the lifted object only."""
+
+    puppet: Puppet
+    texture: TextureLevels
+
+
+class Memo:
+    """The last few results of one function, by the identity of what they came from."""
+
+    def __init__(self) -> None:
+        self._results: OrderedDict[tuple[int, ...], tuple[tuple[Any, ...], Any]] = OrderedDict()
+
+    def __call__(self, build: Callable[[], T], *sources: Any) -> T:
+        key = tuple(id(s) for s in sources)
+        if key not in self._results:
+            # The sources are held, so that no other object can get their ids.
+            self._results[key] = (sources, build())
+            while len(self._results) > KEPT:
+                self._results.popitem(last=False)
+        self._results.move_to_end(key)
+        return self._results[key][1]
+
+
+class Derived:
+    """Solver, posed Gaussians and rendered layers of the document's objects."""
+
+    def __init__(self) -> None:
+        self._shapes, self._posed, self._layers = Memo(), Memo(), Memo()
+        self._shares, self._contours = Memo(), Memo()
+        self._view_key: tuple[float, ...] = ()
+
+    def share(self, mask: Mask) -> float:
+        """Share of the photo that a mask covers."""
+        return self._shares(lambda: float(mask.mean()), mask)
+
+    def contours(self, mask: Mask) -> tuple[F32, ...]:
+        """A mask's outlines, each (N, 2) image px."""
+        return self._contours(lambda: _outlines(mask), mask)
+
+    def shape(self, photo: Photo, thing: EditObject) -> Shape:
+        """Solver, poser and texture; a fraction of a second the first time."""
+        return self._shapes(lambda: _build_shape(photo, thing), thing.lifted, thing.deform)
+
+    def posed(self, document: Document, k: int) -> PosedSplats:
+        """Object `k`'s Gaussians where the edit has put them, world."""
+        thing = document.objects[k]
+        puppet = self.shape(document.photo, thing).puppet
+        return self._posed(
+            lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
+    def solved(self, document: Document, k: int, start: Pose | None) -> Document:
+        """The document with object `k` in the pose that its handles ask for."""
+        thing = document.objects[k]
+        if not thing.handles:
+            return edits.set_pose(document, k, None)
+        deformer = self.shape(document.photo, thing).puppet.deformer
+        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start)
+        return edits.set_pose(document, k, solution.pose)
+
+    def anchors(self, document: Document, k: int) -> F64:
+        """Where the automatic anchors are seen: (A, 2) image px."""
+        thing = document.objects[k]
+        deformer = self.shape(document.photo, thing).puppet.deformer
+        index = deformer.anchors(thing.handles, thing.has_auto_anchors)
+        points = thing.pose.points if thing.pose else deformer.points
+        return self.project(document, k, points[index])
+
+    def control_points(self, document: Document, k: int) -> F64:
+        """Where the control points are seen: (M, 2) image px."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        points = thing.pose.points if thing.pose else thing.lifted.control_points
+        return self.project(document, k, points)
+
+    # Between the object's frame and the picture
+
+    def _world(self, document: Document, k: int, points: np.ndarray) -> F64:
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        motion = thing.placement.matrix(thing.lifted, document.photo.camera)
+        return thing.lifted.world_points(points) @ motion[:3, :3].T + motion[:3, 3]
+
+    def project(self, document: Document, k: int, points: np.ndarray) -> F64:
+        """Image px (..., 2) of object-frame points (..., 3), after the placement."""
+        return document.photo.camera.project(self._world(document, k, points))
+
+    def spot(self, document: Document, k: int, point: np.ndarray) -> Spot:
+        """Where an object-frame point (3,) is seen."""
+        lifted = document.objects[k].lifted
+        assert lifted is not None
+        world = self._world(document, k, np.asarray(point))
+        xy = document.photo.camera.project(world)
+        scale = document.objects[k].placement.scale
+        return Spot(xy, float(world[2]), lifted.diameter * lifted.scale * scale)
+
+    def object_point(self, document: Document, k: int, spot: Spot) -> F64:
+        """The object-frame point (3,) that is seen at a spot."""
+        world = document.photo.camera.unproject(spot.xy, spot.depth)
+        return self.unplaced(document, k, world)
+
+    def unplaced(self, document: Document, k: int, world: np.ndarray) -> F64:
+        """Object-frame position (3,) of a world point, the placement taken back."""
+        thing = document.objects[k]
+        return self.shape(document.photo, thing).puppet.unplaced(world, thing.placement)
+
+    def frame(self, document: Document, k: int) -> ObjectFrame:
+        """The box of the posed and placed object."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        xy = self.control_points(document, k)
+        (x0, y0), (x1, y1) = xy.min(0), xy.max(0)
+        camera = document.photo.camera
+        motion = thing.placement.matrix(thing.lifted, camera)
+        centre = camera.project(motion[:3, :3] @ thing.lifted.centre + motion[:3, 3])
+        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        radius = 0.62 * float(np.hypot(x1 - x0, y1 - y0))
+        return ObjectFrame(corners, centre, radius)
+
+    # The picture
+
+    def surface_at(self, document: Document, k: int, xy: np.ndarray) -> SurfacePoint | None:
+        """The surface of object `k` at image px `xy`, or None beside it."""
+        thing = document.objects[k]
+        shape = self.shape(document.photo, thing)
+        at = (float(xy[0]), float(xy[1]))
+        return shape.puppet.pick(at, thing.pose, thing.placement, shape.texture)
+
+    def layers(self, document: Document, view: View) -> tuple[Layer, ...]:
+        """The moved objects as the canvas shows them, back to front."""
+        key = (view.left, view.top, view.zoom, view.width, view.height)
+        if key != self._view_key:
+            self._layers, self._view_key = Memo(), key
+        moved = [
+            k for k, o in enumerate(document.objects) if o.lifted and o.is_moved and o.is_visible
+        ]
+        depths = {k: float(np.median(self.posed(document, k).means[:, 2])) for k in moved}
+        layers = [self._layer(document, k, view) for k in sorted(moved, key=lambda k: -depths[k])]
+        return tuple(layer for layer in layers if layer is not None)
+
+    def _layer(self, document: Document, k: int, view: View) -> Layer | None:
+        thing, camera = document.objects[k], document.photo.camera
+        splats = self.posed(document, k)
+
+        def build() -> Layer | None:
+            from objectmorpher_core.raster import tiles
+
+            xy = view.canvas_from_image(camera.project(splats.means[splats.means[:, 2] > 0]))
+            margin = 8 + 4 * splats.gap * camera.focal / np.median(splats.means[:, 2]) * view.zoom
+            low = np.floor(xy.min(0) - margin).astype(int).clip(0, (view.width, view.height))
+            high = np.ceil(xy.max(0) + margin).astype(int).clip(0, (view.width, view.height))
+            if (high <= low).any():
+                return None
+            box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+            texture = self.shape(document.photo, thing).texture
+            seen = tiles.render(splats, texture, view.camera(camera, box), camera)
+            return Layer(box[0], box[1], np.dstack([seen.color, seen.alpha]))
+
+        return self._layers(build, splats)
+
+
+def _build_shape(photo: Photo, thing: EditObject) -> Shape:
+    from objectmorpher_core.puppet import puppet_of
+    from objectmorpher_core.raster.posed import build_levels
+
+    assert thing.matte is not None
+    matte = thing.matte
+    x0, y0, x1, y1 = matte.box
+    texture = build_levels(
+        matte.foreground, matte.alpha, matte.left, matte.top, photo.pixels[y0:y1, x0:x1]
+    )
+    return Shape(puppet_of(thing, photo.camera), texture)
+
+
+def _outlines(mask: Mask) -> tuple[F32, ...]:
+    """Along the pixels' edges, corners cut: half a pixel of rounding makes the line quiet."""
+    # At twice the size, so that the outline runs around pixels and not through their centres.
+    doubled = np.repeat(np.repeat(mask.view(np.uint8), 2, axis=0), 2, axis=1)
+    found, _ = cv2.findContours(doubled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    outlines = []
+    for contour in found:
+        if len(contour) < 8:
+            continue
+        points = (contour[:, 0].astype(np.float32) + 0.5) / 2
+        smooth = (np.roll(points, 1, 0) + points + np.roll(points, -1, 0)) / 3
+        simple = cv2.approxPolyDP(smooth.astype(np.float32)[:, None], 0.25, True)[:, 0]
+        outlines.append(simple)
+    return tuple(outlines)
+
+
+def warm_up() -> None:
+    """Imports what the first lift needs, in a quiet moment."""
+    from objectmorpher_core import puppet
+
+    assert puppet

@@ -1,0 +1,123 @@
+"""The line at the bottom: hint or message left; job, zoom and size right."""
+
+from __future__ import annotations
+
+import time
+
+from imgui_bundle import ImVec2, imgui
+
+from ..editor import Editor
+from .layout import Rect
+from .panes import edge, pane
+from .theme import Icon, theme
+from .widgets import icon_button, small_text, tooltip
+
+JOB_DELAY = 0.15  # s; a job that is faster shows no bar
+BAR = 120.0  # points
+BAR_HEIGHT = 6.0
+
+
+def draw_status(editor: Editor, rect: Rect, hint: str) -> None:
+    with pane("##status", rect, padding=(12, 0)), small_text():
+        imgui.set_cursor_pos_y((rect.height - imgui.get_font_size()) / 2)
+        right = rect.width - theme.pt(12) - _facts_width(editor)
+        _draw_facts(editor, rect, right)
+        right = _draw_job(editor, rect, right)
+        _draw_text(editor, rect, hint, right)
+        edge((rect.x, rect.y + 0.5), (rect.x + rect.width, rect.y + 0.5))
+
+
+def _line_y(rect: Rect) -> float:
+    return (rect.height - imgui.get_font_size()) / 2
+
+
+def _facts(editor: Editor) -> str:
+    size = editor.photo_size
+    if size is None:
+        return ""
+    zoom = editor.view.zoom * 100
+    megapixels = size[0] * size[1] / 1e6
+    return f"{zoom:.0f} %   ·   {size[0]} × {size[1]}   ·   {megapixels:.1f} MP"
+
+
+def _facts_width(editor: Editor) -> float:
+    return imgui.calc_text_size(_facts(editor)).x
+
+
+def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_colored(theme.vec("secondary"), _facts(editor))
+
+
+def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
+    """Name, bar, share and Cancel; the left end of what it drew."""
+    job = editor.jobs.current
+    if job is None or time.monotonic() - job.started < JOB_DELAY:
+        return right
+    side = rect.height - theme.pt(4)
+    text = job.title if not job.note else f"{job.title}: {job.note}"
+    share = f"{100 * job.fraction:.0f} %"
+    gap = theme.pt(8)
+    x = right - theme.pt(16) - side
+    imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
+    if icon_button(Icon.CLOSE, "cancel", "Cancel", None, side / theme.scale):
+        editor.jobs.cancel(job.kind)
+    x -= imgui.calc_text_size("100 %").x + gap
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_unformatted(share)
+    x -= theme.pt(BAR) + gap
+    middle = rect.y + rect.height / 2
+    _draw_bar(rect.x + x, middle, job.fraction)
+    x -= imgui.calc_text_size(text).x + gap
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_unformatted(text)
+    return x - gap
+
+
+def _draw_bar(x: float, middle: float, fraction: float) -> None:
+    draw = imgui.get_window_draw_list()
+    half = theme.pt(BAR_HEIGHT) / 2
+    width = theme.pt(BAR)
+    top, bottom = middle - half, middle + half
+    draw.add_rect_filled(ImVec2(x, top), ImVec2(x + width, bottom), theme.u32("pressed"), half)
+    filled = max(width * min(max(fraction, 0.0), 1.0), 2 * half)
+    draw.add_rect_filled(ImVec2(x, top), ImVec2(x + filled, bottom), theme.u32("accent"), half)
+
+
+def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
+    """The message until something else is done, else the hint."""
+    message = editor.message
+    start = imgui.get_cursor_screen_pos()
+    imgui.push_clip_rect(
+        ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True
+    )
+    imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
+    if message is None:
+        imgui.text_colored(theme.vec("secondary"), hint)
+    else:
+        role = "error" if message.is_error else "text"
+        icon = Icon.WARNING if message.is_error else Icon.INFO
+        imgui.text_colored(theme.vec(role if message.is_error else "accent"), icon)
+        imgui.same_line(0, theme.pt(6))
+        imgui.text_colored(theme.vec(role), message.text)
+        if message.is_error:
+            _draw_error_buttons(editor)
+    imgui.pop_clip_rect()
+    imgui.set_cursor_screen_pos(start)
+
+
+def _draw_error_buttons(editor: Editor) -> None:
+    message = editor.message
+    assert message is not None
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(6, 0))
+    if message.details:
+        imgui.same_line(0, theme.pt(12))
+        if imgui.button("Copy details"):
+            imgui.set_clipboard_text(message.details)
+        tooltip(message.details[-600:])
+    imgui.same_line(0, theme.pt(8))
+    if imgui.button("Dismiss"):
+        editor.message = None
+    imgui.pop_style_var()
+
+

@@ -1,0 +1,194 @@
+"""Buttons, fields and texts that the panels are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+
+from imgui_bundle import ImVec2, imgui
+
+from .theme import FIELD, PRIMARY, SMALL_SIZE, Icon, theme
+
+LABEL_WIDTH = 72.0  # points, of the names left of the fields
+STEPPER = 24.0  # points, width of a field's - and + buttons
+
+
+class Kind(Enum):
+    """How much a button asks for attention."""
+
+    PRIMARY = "primary"
+    PLAIN = "plain"
+    QUIET = "quiet"  # no frame until hovered
+
+
+@contextmanager
+def small_text() -> Iterator[None]:
+    imgui.push_font(None, SMALL_SIZE)
+    yield
+    imgui.pop_font()
+
+
+@contextmanager
+def bold_text(size: float = 0.0) -> Iterator[None]:
+    imgui.push_font(theme.bold, size)
+    yield
+    imgui.pop_font()
+
+
+def tooltip(text: str) -> None:
+    """For the last item, shown after a moment; over greyed-out items too."""
+    flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
+    if imgui.is_item_hovered(flags):
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(theme.pt(260))
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+        imgui.pop_style_var()
+
+
+def button(
+    label: str, kind: Kind = Kind.PLAIN, why_not: str | None = None, width: float = -1.0
+) -> bool:
+    """A text button; `why_not` greys it out and is its tooltip. `width` in points, -1 fills."""
+    height = PRIMARY if kind is Kind.PRIMARY else FIELD
+    across = theme.pt(width) if width > 0 else width
+    roles = _ROLES[kind]
+    columns = ("button", "button_hovered", "button_active", "text")
+    for column, role in zip(columns, roles, strict=True):
+        alpha = 0.0 if role == "none" else 1.0
+        shown = theme.vec("panel" if role == "none" else role, alpha)
+        imgui.push_style_color(getattr(imgui.Col_, column), shown)
+    imgui.begin_disabled(why_not is not None)
+    if kind is Kind.PRIMARY:
+        imgui.push_font(theme.bold, 0.0)
+    is_pressed = imgui.button(label, ImVec2(across, theme.pt(height)))
+    if kind is Kind.PRIMARY:
+        imgui.pop_font()
+    imgui.end_disabled()
+    imgui.pop_style_color(len(columns))
+    if why_not is not None:
+        tooltip(why_not)
+    return is_pressed
+
+
+_ROLES = {
+    Kind.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
+    Kind.PLAIN: ("raised", "hovered", "pressed", "text"),
+    Kind.QUIET: ("none", "hovered", "pressed", "text"),
+}
+
+
+def icon_button(
+    icon: str, name: str, hint: str, why_not: str | None = None, side: float = FIELD
+) -> bool:
+    """A square button with an icon; `name` is its id, `hint` its tooltip."""
+    imgui.push_style_color(imgui.Col_.button, theme.vec("panel", 0.0))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    imgui.begin_disabled(why_not is not None)
+    is_pressed = imgui.button(f"{icon}##{name}", theme.size(side, side))
+    imgui.end_disabled()
+    imgui.pop_style_var()
+    imgui.pop_style_color()
+    tooltip(hint if why_not is None else f"{hint}\n{why_not}")
+    return is_pressed
+
+
+def heading(text: str) -> None:
+    """The title of a group in a panel."""
+    with bold_text():
+        imgui.text_unformatted(text)
+
+
+def note(text: str) -> None:
+    """Secondary text, wrapped."""
+    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+
+
+def gap(points: float) -> None:
+    """Vertical space between groups, on top of the item spacing."""
+    imgui.dummy(ImVec2(0, theme.pt(max(points - 8, 0))))
+
+
+def rule() -> None:
+    """A line between groups, 12 points above and below."""
+    gap(8)
+    top = imgui.get_cursor_screen_pos()
+    width = imgui.get_content_region_avail().x
+    pad = imgui.get_style().window_padding.x
+    line = theme.u32("line")
+    imgui.get_window_draw_list().add_line(
+        ImVec2(top.x - pad, top.y + 0.5), ImVec2(top.x + width + pad, top.y + 0.5), line, 1.0
+    )
+    imgui.dummy(ImVec2(0, theme.pt(4)))
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that a field shows."""
+
+    name: str
+    format: str  # "%.1f°"
+    speed: float  # per point that the pointer is dragged
+    step: float  # of the - and + buttons
+    rest: float = 0.0  # what a double-click on the name goes back to
+    low: float = 0.0  # no limits where low == high
+    high: float = 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a field did in this frame."""
+
+    value: float
+    is_changed: bool = False
+    is_done: bool = False  # the change is complete: one step for undo
+
+
+def number_field(number: Number, value: float) -> Change:
+    """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
+    changed = Change(value)
+    imgui.push_id(number.name)
+    imgui.align_text_to_frame_padding()
+    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
+    imgui.text_unformatted(number.name)
+    imgui.pop_style_color()
+    if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+        changed = Change(number.rest, is_changed=value != number.rest, is_done=True)
+    tooltip("Double-click resets it")
+    imgui.same_line(theme.pt(LABEL_WIDTH))
+    field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
+    imgui.set_next_item_width(field)
+    flags = imgui.SliderFlags_.always_clamp if number.low < number.high else 0
+    is_changed, new = imgui.drag_float(
+        "##value", value, number.speed, number.low, number.high, number.format, int(flags)
+    )
+    if is_changed or imgui.is_item_deactivated_after_edit():
+        changed = Change(new, is_changed, imgui.is_item_deactivated_after_edit())
+    for sign, icon in ((-1, Icon.MINUS), (1, Icon.PLUS)):
+        imgui.same_line(0, theme.pt(2))
+        if _stepper(icon):
+            stepped = value + sign * number.step
+            if number.low < number.high:
+                stepped = min(max(stepped, number.low), number.high)
+            changed = Change(stepped, True, True)
+    imgui.pop_id()
+    return changed
+
+
+def _stepper(icon: str) -> bool:
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    imgui.push_font(None, SMALL_SIZE - 3)
+    is_pressed = imgui.button(
+        icon, ImVec2(theme.pt(STEPPER), imgui.get_frame_height_with_spacing())
+    )
+    imgui.pop_font()
+    imgui.pop_style_var()
+    return is_pressed

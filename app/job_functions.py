@@ -1,0 +1,80 @@
+"""What runs in the worker process: plain values in, plain values out.
+
+The heavy modules are imported inside, so that the window, which only names these functions,
+starts without them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Prompt
+from objectmorpher_core.progress import Progress
+
+WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which backend does a stage, and its random seed."""
+
+    backend: str
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A photo and what of it is meant."""
+
+    pixels: Pixels
+    camera: Camera
+    mask: Mask
+
+
+def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
+    """The mask of what the prompt means, and the backend that made it."""
+    from objectmorpher_core.pipeline import segment_photo
+
+    return segment_photo(pixels, prompt, choice.backend, progress=progress, seed=choice.seed)
+
+
+def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matte, LiftedObject]:
+    """The masked object's soft cut-out and its 3D Gaussians, about `count` of them."""
+    from objectmorpher_core.pipeline import lift_mask
+
+    return lift_mask(cut.pixels, cut.camera, cut.mask, choice.backend, count, progress, choice.seed)
+
+
+def inpaint(pixels: Pixels, hole: Mask, choice: Choice, progress: Progress) -> Plate:
+    """The photo without its objects."""
+    from objectmorpher_core.pipeline import make_plate
+
+    return make_plate(pixels, hole, choice.backend, progress=progress, seed=choice.seed)
+
+
+def write_picture(document: Document, path: Path, quality: int, progress: Progress) -> None:
+    """Renders the edited photo and writes it in the format that the path's ending names."""
+    from objectmorpher_core.files import write_all
+    from objectmorpher_core.image import encode_picture
+    from objectmorpher_core.pipeline import export
+
+    progress(0.1, "rendering")
+    picture = export(document)
+    progress(0.7, "encoding")
+    data = encode_picture(picture, path.suffix, quality)
+    progress(0.95, "writing")
+    write_all({path: data})
+
+
+def write_session(document: Document, path: Path, progress: Progress) -> None:
+    """Saves the document as an .omorph file."""
+    from objectmorpher_core.files import write_all
+    from objectmorpher_core.session_file import encode_session
+
+    progress(0.1, "packing")
+    data = encode_session(document)
+    progress(0.9, "writing")
+    write_all({path: data})

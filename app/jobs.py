@@ -1,0 +1,270 @@
+"""One worker process for everything that takes longer than a frame (ARCHITECTURE section 5).
+
+The window starts a job and goes on; `poll` delivers the answer on the main thread. A job function
+takes plain values and a keyword `progress`, and knows nothing of this module. Of one kind only the
+newest request counts. Cancelling asks first and ends the process after `PATIENCE`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import multiprocessing
+import os
+import queue
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event
+from typing import Any
+
+from objectmorpher_core.progress import Cancelled
+
+from .wire import Reader, Writer
+
+log = logging.getLogger(__name__)
+
+PATIENCE = 2.0  # s between asking a job to stop and ending its process
+REPORT_EVERY = 0.03  # s between two progress messages
+
+
+@dataclass(frozen=True)
+class JobError:
+    """Why a job failed."""
+
+    name: str  # the exception's type, or "Crash"
+    sentence: str  # for the status line
+    trace: str  # for "Details" and the log
+
+
+@dataclass(eq=False)
+class Job:
+    """A request, and how far it is."""
+
+    title: str  # "Lifting the object"
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    done: Callable[[Any], None]
+    failed: Callable[[JobError], None]
+    cancelled: Callable[[], None]
+    kind: str
+    fraction: float = 0.0
+    note: str = ""
+    started: float = 0.0  # s, monotonic
+    stop_asked: float | None = None  # s, monotonic
+    number: int = field(default=0)
+
+
+class Worker:
+    """The process, its pipe and the two threads that keep the pipe from blocking a frame."""
+
+    def __init__(self, warm: tuple[str, ...], wake: Callable[[], None]) -> None:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        self.stop: Event = context.Event()
+        self.answers: queue.SimpleQueue[tuple[str, int, Any]] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.process = context.Process(
+            target=_work, args=(theirs, self.stop, warm), daemon=True, name="objectmorpher-worker"
+        )
+        self.process.start()
+        theirs.close()
+        self._connection = ours
+        self._wake = wake
+        for target in (self._write, self._read):
+            threading.Thread(target=target, daemon=True).start()
+
+    def send(self, job: Job) -> None:
+        self._requests.put((job.number, job.function, job.arguments))
+
+    def close(self) -> None:
+        """Ends the process, whatever it does."""
+        self._requests.put(None)
+        self.process.kill()
+        self.process.join()
+
+    def _write(self) -> None:
+        writer = Writer(self._connection)
+        while (request := self._requests.get()) is not None:
+            try:
+                writer.write(request)
+            except OSError:  # the process is gone; the reader says so
+                return
+            except Exception as error:  # a value that cannot be pickled: our mistake, said as data
+                trace = traceback.format_exc()
+                self._deliver(
+                    "failed", request[0], JobError(type(error).__name__, str(error), trace)
+                )
+
+    def _read(self) -> None:
+        reader = Reader(self._connection)
+        try:
+            while True:
+                self._deliver(*reader.read())
+        except (EOFError, OSError):
+            self._deliver("gone", -1, None)
+
+    def _deliver(self, what: str, number: int, value: Any) -> None:
+        self.answers.put((what, number, value))
+        self._wake()
+
+
+class Jobs:
+    """What runs, what waits, and the answers."""
+
+    def __init__(self, warm: tuple[str, ...] = (), wake: Callable[[], None] = lambda: None) -> None:
+        """`warm`: modules the worker imports at once. `wake` is called from another thread."""
+        self._warm, self._wake = warm, wake
+        self._worker = Worker(warm, wake)
+        self._waiting: dict[str, Job] = {}  # kind -> newest request, in the order they came
+        self._count = 0
+        self.current: Job | None = None
+
+    def start(
+        self,
+        title: str,
+        function: Callable[..., Any],
+        *arguments: Any,
+        done: Callable[[Any], None],
+        failed: Callable[[JobError], None],
+        cancelled: Callable[[], None] = lambda: None,
+        kind: str = "",
+    ) -> None:
+        """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
+
+        A request of the same `kind` that waits or runs is replaced; its answer never comes.
+        """
+        self._count += 1
+        kind = kind or function.__name__
+        job = Job(title, function, arguments, done, failed, cancelled, kind, number=self._count)
+        self._waiting.pop(kind, None)
+        self._waiting[kind] = job
+        if self.current is not None and self.current.kind == kind:
+            self._ask_to_stop(self.current)
+        self._send_next()
+
+    def is_busy(self, kind: str) -> bool:
+        """Whether a request of this kind waits or runs."""
+        current = self.current
+        runs = current is not None and current.kind == kind and current.stop_asked is None
+        return runs or kind in self._waiting
+
+    @property
+    def is_idle(self) -> bool:
+        return self.current is None and not self._waiting
+
+    def cancel(self, kind: str | None = None) -> None:
+        """Stops the running and waiting requests of a kind, or all."""
+        for job in [j for j in self._waiting.values() if kind in (None, j.kind)]:
+            del self._waiting[job.kind]
+            job.cancelled()
+        if self.current is not None and kind in (None, self.current.kind):
+            self._ask_to_stop(self.current)
+
+    def poll(self) -> bool:
+        """Delivers answers; once a frame, on the main thread. Whether anything changed."""
+        is_changed = False
+        while not self._worker.answers.empty():
+            self._take(*self._worker.answers.get())
+            is_changed = True
+        job = self.current
+        if job and job.stop_asked is not None and time.monotonic() - job.stop_asked > PATIENCE:
+            log.info("%s did not stop when asked; restarting the worker", job.title)
+            self._restart()
+            self._finish(job, job.cancelled)
+            is_changed = True
+        return is_changed
+
+    def close(self) -> None:
+        self._waiting.clear()
+        self._worker.close()
+
+    def _ask_to_stop(self, job: Job) -> None:
+        if job.stop_asked is None:
+            job.stop_asked = time.monotonic()
+            self._worker.stop.set()
+
+    def _send_next(self) -> None:
+        if self.current is None and self._waiting:
+            job = self.current = self._waiting.pop(next(iter(self._waiting)))
+            job.started = time.monotonic()
+            self._worker.stop.clear()
+            self._worker.send(job)
+
+    def _restart(self) -> None:
+        self._worker.close()
+        self._worker = Worker(self._warm, self._wake)
+
+    def _take(self, what: str, number: int, value: Any) -> None:
+        job = self.current
+        if what == "gone":
+            self._restart()
+            if job is not None:
+                sentence = f"{job.title} stopped: the worker process ended unexpectedly"
+                self._finish(job, lambda: job.failed(JobError("Crash", sentence, sentence)))
+        elif job is None or number != job.number:
+            return  # an answer of a process that was ended
+        elif what == "progress":
+            job.fraction, job.note = value
+        elif what == "cancelled" or job.stop_asked is not None:
+            self._finish(job, job.cancelled)
+        elif what == "failed":
+            log.error("%s failed: %s\n%s", job.title, value.sentence, value.trace)
+            self._finish(job, lambda: job.failed(value))
+        else:
+            log.info("%s took %.2f s", job.title, time.monotonic() - job.started)
+            self._finish(job, lambda: job.done(value))
+
+    def _finish(self, job: Job, tell: Callable[[], None]) -> None:
+        self.current = None
+        is_replaced = job.kind in self._waiting
+        if not is_replaced:  # a replaced request is not the user's question any more
+            tell()
+        self._send_next()
+
+
+def _work(connection: Connection, stop: Event, warm: tuple[str, ...]) -> None:
+    """The worker's main loop; ends with the pipe."""
+    _lower_priority()
+    for module in warm:
+        importlib.import_module(module)
+    reader, writer = Reader(connection), Writer(connection)
+    while True:
+        try:
+            number, function, arguments = reader.read()
+        except (EOFError, OSError, KeyboardInterrupt):
+            return
+        try:
+            answer = function(*arguments, progress=_reporter(writer, number, stop))
+            writer.write(("done", number, answer))
+        except Cancelled:
+            writer.write(("cancelled", number, None))
+        except Exception as error:
+            sentence = str(error) or f"{function.__name__} failed ({type(error).__name__})"
+            failure = JobError(type(error).__name__, sentence, traceback.format_exc())
+            writer.write(("failed", number, failure))
+
+
+def _lower_priority() -> None:
+    """A drag must not stutter because a lift runs."""
+    if hasattr(os, "nice"):
+        os.nice(5)
+
+
+def _reporter(writer: Writer, number: int, stop: Event) -> Callable[[float, str], None]:
+    last = ""
+    last_time = 0.0
+
+    def progress(fraction: float, note: str) -> None:
+        nonlocal last, last_time
+        if stop.is_set():
+            raise Cancelled
+        now = time.monotonic()
+        if note != last or now - last_time > REPORT_EVERY:
+            last, last_time = note, now
+            writer.write(("progress", number, (float(fraction), note)))
+
+    return progress

@@ -1,0 +1,50 @@
+"""Draws the photo, the plate over it, the veil and the hatching."""
+
+from __future__ import annotations
+
+import moderngl
+
+from ..view import View
+from .scene import Scene
+from .shaders import build_program, set_uniforms
+from .textures import PictureTexture
+
+PHOTO, PLATE, MASK = range(3)  # texture units
+
+
+class PhotoPass:
+    """One rectangle over the whole canvas."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._program = build_program(context, "quad.vert", "photo.frag")
+        self._quad = context.vertex_array(self._program, [])
+        self._photo = PictureTexture(context)
+        self._plate = PictureTexture(context)
+        self._mask = PictureTexture(context)
+        set_uniforms(self._program, photo=PHOTO, plate=PLATE, mask=MASK)
+
+    def draw(self, scene: Scene, view: View) -> None:
+        """Into the current viewport, which is the canvas."""
+        self._photo.upload(scene.photo)
+        self._plate.upload(scene.plate.pixels if scene.plate else None)
+        self._mask.upload(scene.mask)
+        self._photo.use(PHOTO, view.zoom)
+        self._plate.use(PLATE, view.zoom)
+        self._mask.use(MASK, view.zoom)
+        height, width = scene.photo.shape[:2]
+        plate_box = scene.plate.box if scene.plate else (0, 0, -1, -1)
+        set_uniforms(
+            self._program,
+            canvas=(view.width, view.height),
+            box=(0, 0, view.width, view.height),
+            corner=(view.left, view.top),
+            zoom=view.zoom,
+            photo_size=(width, height),
+            plate_box=tuple(float(v) for v in plate_box),
+            split=scene.split * view.width,
+            surround=scene.surround,
+            veil=scene.veil,
+            hatch=scene.hatch,
+            unit=view.scale,
+        )
+        self._quad.render(moderngl.TRIANGLE_STRIP, 4)

@@ -1,0 +1,26 @@
+"""What is to be drawn: plain inputs. The renderer knows no editor, history or ImGui."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.document import Plate
+
+from ..derived import Layer
+
+Colour = tuple[float, float, float]  # sRGB in [0, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One picture of the canvas."""
+
+    photo: Pixels
+    surround: Colour
+    plate: Plate | None = None  # shown where there is one
+    layers: tuple[Layer, ...] = ()  # moved objects, back to front
+    mask: Mask | None = None  # what `veil` and `hatch` refer to
+    veil: float = 0.0  # share of black outside the mask
+    hatch: float = 0.0  # share of the hatching inside the mask
+    split: float = 0.0  # share of the canvas, from the left, that shows the photo as it was

@@ -1,0 +1,55 @@
+"""Pictures on the GPU, uploaded when the array is not the last one."""
+
+from __future__ import annotations
+
+import cv2
+import moderngl
+import numpy as np
+
+LINEAR = (moderngl.LINEAR, moderngl.LINEAR)
+SHARP_FROM = 4.0  # magnification from which single pixels are shown
+
+
+class PictureTexture:
+    """A picture of 1, 3 or 4 channels, 8 bits each on the GPU, with mipmaps."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._limit = int(context.info["GL_MAX_TEXTURE_SIZE"])
+        self._uploaded: np.ndarray | None = None
+        self.texture = context.texture((1, 1), 1, b"\0")
+
+    def upload(self, pixels: np.ndarray | None) -> None:
+        """`pixels` (h, w) or (h, w, channels): bool, u8 or u16; None is one black pixel."""
+        if pixels is self._uploaded:
+            return
+        self.texture.release()
+        self._uploaded = pixels
+        shown = np.zeros((1, 1), np.uint8) if pixels is None else self._fitting(_as_u8(pixels))
+        height, width = shown.shape[:2]
+        channels = 1 if shown.ndim == 2 else shown.shape[2]
+        data = np.ascontiguousarray(shown)
+        self.texture = self._context.texture((width, height), channels, data, alignment=1)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.build_mipmaps()
+
+    def use(self, unit: int, zoom: float) -> None:
+        """Binds it: single pixels at high magnification, smooth below."""
+        above = moderngl.NEAREST if zoom >= SHARP_FROM else moderngl.LINEAR
+        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, above)
+        self.texture.use(unit)
+
+    def _fitting(self, pixels: np.ndarray) -> np.ndarray:
+        """Halved until the GPU takes it."""
+        while max(pixels.shape[:2]) > self._limit:
+            size = (pixels.shape[1] // 2, pixels.shape[0] // 2)
+            pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+        return pixels
+
+
+def _as_u8(pixels: np.ndarray) -> np.ndarray:
+    if pixels.dtype == np.uint16:
+        return (pixels >> 8).astype(np.uint8)
+    if pixels.dtype == np.bool_:
+        return pixels.view(np.uint8) * np.uint8(255)
+    return pixels

@@ -1,0 +1,107 @@
+"""What the user prefers, in a TOML file of the user's own."""
+
+from __future__ import annotations
+
+import logging
+import os
+import tomllib
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+
+import platformdirs
+
+log = logging.getLogger(__name__)
+
+RECENT = 6  # files remembered
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Backends:
+    """Which backend does each stage; `auto` is the best that is available."""
+
+    segment: str = AUTO
+    lift: str = AUTO
+    inpaint: str = AUTO
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The defaults are what a first start has."""
+
+    theme: str = "dark"  # or "light"
+    scale: float = 0.0  # canvas px per point; 0: the monitor's
+    dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
+    is_motion_reduced: bool = False
+    quality: int = 95  # of JPEG and WebP exports
+    gaussians: int = 12000  # of a lifted object
+    recent: tuple[str, ...] = ()  # paths, newest first
+    backends: Backends = field(default_factory=Backends)
+
+    def with_recent(self, path: Path) -> Settings:
+        """`path` is the file opened last."""
+        name = str(path.absolute())
+        others = tuple(r for r in self.recent if r != name)
+        return replace(self, recent=(name, *others)[:RECENT])
+
+
+def settings_path() -> Path:
+    """The user's settings file; OBJECTMORPHER_SETTINGS names another one."""
+    if named := os.environ.get("OBJECTMORPHER_SETTINGS"):
+        return Path(named)
+    return Path(platformdirs.user_config_dir("objectmorpher", appauthor=False)) / "settings.toml"
+
+
+def read_settings(path: Path) -> Settings:
+    """Settings of a file. What is missing, misspelt or of another type has its default."""
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return Settings()
+    except (OSError, ValueError) as error:
+        log.warning("The settings %s cannot be read (%s); defaults are used", path.name, error)
+        return Settings()
+    backends = Backends(**_matching(Backends(), values.pop("backends", {})))
+    if isinstance(values.get("recent"), list):
+        values["recent"] = tuple(str(r) for r in values["recent"])
+    return replace(Settings(backends=backends), **_matching(Settings(), values))
+
+
+def write_settings(path: Path, settings: Settings) -> None:
+    """Writes the file; a failure is logged, for no work depends on it."""
+    lines = [f"{f.name} = {_toml(getattr(settings, f.name))}" for f in fields(settings)[:-1]]
+    lines += ["", "[backends]"]
+    lines += [f"{k} = {_toml(v)}" for k, v in asdict(settings.backends).items()]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_suffix(f".{os.getpid()}.tmp")
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        log.warning("The settings cannot be written: %s", error)
+
+
+def _matching(defaults: object, values: object) -> dict:
+    """The entries of `values` that `defaults` has, with the same type."""
+    if not isinstance(values, dict):
+        return {}
+    known = {f.name: getattr(defaults, f.name) for f in fields(defaults)}  # type: ignore[arg-type]
+    fitting = {}
+    for name, default in known.items():
+        value = values.get(name)
+        if type(default) is float and type(value) is int:
+            value = float(value)
+        if type(value) is type(default):
+            fitting[name] = value
+    return fitting
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_toml(v) for v in value) + "]"
+    return str(value)

@@ -1,0 +1,192 @@
+"""The editor's long steps: what is asked of the worker, and how its answers are taken in.
+
+An answer is dropped where the question does not stand any more, which `is` tells: the photo and
+the mask of a document never change, they are replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from objectmorpher_core import edits
+from objectmorpher_core.arrays import Mask
+from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Prompt
+
+from . import job_functions
+from .job_functions import Choice, Cut
+from .jobs import JobError
+from .view import ToolName
+
+if TYPE_CHECKING:
+    from .editor import Editor
+
+LIFT, PLATE, WRITE = "lift", "plate", "write"
+
+
+class Tasks:
+    """Segmenting, lifting, inpainting, writing."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.prompt: Prompt | None = None  # asked, not answered yet
+        self._plate: tuple[tuple[Mask | None, ...], Plate] | None = None  # of these masks
+        self._no_plate: tuple[Mask | None, ...] | None = None  # asked or failed for these masks
+
+    def forget(self) -> None:
+        """Another document is opened."""
+        self.prompt = self._plate = self._no_plate = None
+
+    def segment(self, prompt: Prompt, label: str) -> None:
+        """Asks for the mask of `prompt`; what was said before it is in it."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        editor.message = None
+        self.prompt = prompt
+        photo, k = document.photo, editor.current
+
+        def accept(answer: tuple[Mask, str]) -> None:
+            self.prompt = None
+            current = editor.document
+            if current is None or current.photo is not photo or editor.hand.is_busy:
+                return
+            mask, backend = answer
+            if k == len(current.objects):
+                current = edits.add_object(current)
+            try:
+                changed = edits.set_mask(current, k, mask, prompt).with_backend("segment", backend)
+            except ValueError as error:
+                editor.complain(str(error))
+                return
+            editor.handle = None
+            editor.view.tool = ToolName.SELECT
+            editor.apply(label, changed)
+
+        editor.jobs.start(
+            "Selecting", job_functions.segment, photo.pixels, prompt,
+            Choice(editor.settings.backends.segment, document.seed),
+            done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind="segment",
+        )  # fmt: skip
+
+    def _fail_segment(self, error: JobError) -> None:
+        self.prompt = None
+        self._editor.complain_of(error)
+
+    def _drop_prompt(self) -> None:
+        self.prompt = None
+
+    def lift(self) -> None:
+        """Asks for the current object in 3D."""
+        editor, document = self._editor, self._editor.document
+        mask, k = editor.mask, editor.current
+        if document is None or mask is None:
+            return
+        editor.message = None
+        settings = editor.settings
+
+        def accept(answer: tuple[Matte, LiftedObject]) -> None:
+            current = editor.document
+            if current is None or k >= len(current.objects) or current.objects[k].mask is not mask:
+                return
+            matte, lifted = answer
+            changed = edits.set_lifted(current, k, matte, lifted)
+            editor.handle = None
+            editor.apply("Lift object", changed)
+            editor.view.tool = ToolName.POSE
+            editor.say(f"Lifted: {len(lifted.gaussians):,} Gaussians. Now drag a point on it")
+
+        photo = document.photo
+        editor.jobs.start(
+            "Lifting the object", job_functions.lift, Cut(photo.pixels, photo.camera, mask),
+            Choice(settings.backends.lift, document.seed), settings.gaussians,
+            done=accept, failed=editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def ensure_plate(self) -> bool:
+        """Sees to it that lifted objects have a background behind them; each frame."""
+        editor, document = self._editor, self._editor.document
+        if document is None or document.plate is not None:
+            return False
+        masks = tuple(o.mask for o in document.objects)
+        if not any(o.lifted for o in document.objects):
+            return False
+        if self._plate is not None and _same(self._plate[0], masks):
+            self._add_plate(self._plate[1])
+            return True
+        if self._no_plate is not None and _same(self._no_plate, masks):
+            return False
+        self._no_plate = masks
+        self._ask_plate(document, masks)
+        return True
+
+    def _ask_plate(self, document: Document, masks: tuple[Mask | None, ...]) -> None:
+        from objectmorpher_core.pipeline import plate_hole
+
+        editor = self._editor
+
+        def accept(plate: Plate) -> None:
+            self._plate = (masks, plate)
+
+        def retry_later() -> None:
+            if self._no_plate is not None and _same(self._no_plate, masks):
+                editor.say("The background behind the object is not filled in")
+
+        editor.jobs.start(
+            "Filling in the background", job_functions.inpaint, document.photo.pixels,
+            plate_hole(document), Choice(editor.settings.backends.inpaint, document.seed),
+            done=accept, failed=editor.complain_of, cancelled=retry_later, kind=PLATE,
+        )  # fmt: skip
+
+    def fill_background(self) -> None:
+        """Asks again for a background that was cancelled or failed."""
+        self._no_plate = None
+
+    def _add_plate(self, plate: Plate) -> None:
+        """A computed addition to the current step, not a step of its own."""
+        editor = self._editor
+        assert editor.history is not None
+        editor.history.amend(edits.set_plate(editor.history.document, plate))
+        if editor.preview is not None:
+            editor.preview = edits.set_plate(editor.preview, plate)
+
+    def export(self, path: Path) -> None:
+        """Writes the edited photo."""
+        editor = self._editor
+        document = editor.history.document if editor.history else None
+        if document is None:
+            return
+        if editor.source is not None and path.absolute() == editor.source.absolute():
+            editor.complain("the export would overwrite the opened photo; choose another name")
+            return
+        editor.jobs.start(
+            f"Exporting {path.name}", job_functions.write_picture, document, path,
+            editor.settings.quality, done=lambda _: editor.say(f"Exported {path.name}"),
+            failed=editor.complain_of, kind=f"{WRITE} {path}",
+        )  # fmt: skip
+
+    def save(self, path: Path, then: Callable[[], None] | None = None) -> None:
+        """Writes the session, and goes on with `then` when it is on the disk."""
+        editor, history = self._editor, self._editor.history
+        if history is None:
+            return
+        document = history.document
+
+        def accept(_: None) -> None:
+            if editor.history is history:
+                history.mark_saved(document)
+                editor.path = path
+                editor.settings = editor.settings.with_recent(path)
+                editor.say(f"Saved {path.name}")
+                if then is not None:
+                    then()
+
+        editor.jobs.start(
+            f"Saving {path.name}", job_functions.write_session, document, path,
+            done=accept, failed=editor.complain_of, kind=f"{WRITE} {path}",
+        )  # fmt: skip
+
+
+def _same(a: tuple[Mask | None, ...], b: tuple[Mask | None, ...]) -> bool:
+    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))

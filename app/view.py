@@ -1,0 +1,100 @@
+"""What the user looks at: zoom, pan, tool and toggles. Neither saved nor undone.
+
+Canvas px: the part of the window that shows the photo, x right, y down, from its left top corner,
+in framebuffer px. Image px: the photo's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from objectmorpher_core.camera import Camera
+
+MARGIN = 24.0  # points between the fitted photo and the canvas's edge
+MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px
+KEEP_VISIBLE = 48.0  # px of the photo that panning leaves on the canvas
+
+
+class ToolName(Enum):
+    """The tools, in the order of the tool strip."""
+
+    SELECT = "Select"
+    POSE = "Pose"
+    PLACE = "Place"
+
+
+@dataclass(eq=False)
+class View:
+    """Mutable: the tools and panels write it, the window reads it each frame."""
+
+    width: int = 1  # canvas px
+    height: int = 1
+    scale: float = 1.0  # canvas px per point
+    zoom: float = 1.0  # canvas px per image px
+    left: float = 0.0  # image px at the canvas's left edge
+    top: float = 0.0
+    is_fitted: bool = True  # follows the canvas's size until the user zooms
+    tool: ToolName = ToolName.SELECT
+    is_before: bool = False  # X is held: the photo as it was
+    split: float | None = None  # share of the canvas left of the before/after line
+    has_points: bool = False  # control points and links are shown
+
+    def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:
+        """Canvas px (..., 2) of image px (..., 2)."""
+        return (np.asarray(xy, dtype=np.float64) - (self.left, self.top)) * self.zoom
+
+    def image_from_canvas(self, xy: np.ndarray | tuple[float, float]) -> np.ndarray:
+        """Image px (..., 2) of canvas px (..., 2)."""
+        return np.asarray(xy, dtype=np.float64) / self.zoom + (self.left, self.top)
+
+    def resize(self, size: tuple[int, int], scale: float, photo: tuple[int, int] | None) -> None:
+        """The canvas is `size` px now; a fitted photo of `photo` px stays fitted."""
+        if size == (self.width, self.height) and scale == self.scale:
+            return
+        centre = self.image_from_canvas((self.width / 2, self.height / 2))
+        (self.width, self.height), self.scale = size, scale
+        if photo is not None and self.is_fitted:
+            self.fit(photo)
+        else:
+            self._centre_on(centre)
+
+    def fit(self, photo: tuple[int, int]) -> None:
+        """The whole photo, with a margin; a small photo is enlarged at most four times."""
+        margin = 2 * MARGIN * self.scale
+        across = max(self.width - margin, 1) / photo[0]
+        down = max(self.height - margin, 1) / photo[1]
+        self.zoom = float(np.clip(min(across, down, 4 * self.scale), MIN_ZOOM, MAX_ZOOM))
+        self._centre_on(np.array(photo) / 2)
+        self.is_fitted = True
+
+    def set_zoom(self, zoom: float, around: tuple[float, float], photo: tuple[int, int]) -> None:
+        """Magnifies so that the image point under canvas px `around` stays there."""
+        fixed = self.image_from_canvas(around)
+        self.zoom = float(np.clip(zoom, MIN_ZOOM, MAX_ZOOM))
+        self.left, self.top = fixed - np.array(around) / self.zoom
+        self.is_fitted = False
+        self._keep_visible(photo)
+
+    def pan(self, dx: float, dy: float, photo: tuple[int, int]) -> None:
+        """Moves the picture by (dx, dy) canvas px."""
+        self.left -= dx / self.zoom
+        self.top -= dy / self.zoom
+        self.is_fitted = False
+        self._keep_visible(photo)
+
+    def camera(self, photo_camera: Camera, box: tuple[int, int, int, int] | None = None) -> Camera:
+        """The photo's camera seen through the canvas, or through `box` x0, y0, x1, y1 of it."""
+        x0, y0, x1, y1 = box or (0, 0, self.width, self.height)
+        left, top = self.left + x0 / self.zoom, self.top + y0 / self.zoom
+        return photo_camera.windowed(left, top, x1 - x0, y1 - y0, self.zoom)
+
+    def _centre_on(self, image_xy: np.ndarray) -> None:
+        self.left, self.top = image_xy - np.array([self.width, self.height]) / 2 / self.zoom
+
+    def _keep_visible(self, photo: tuple[int, int]) -> None:
+        rest = KEEP_VISIBLE * self.scale / self.zoom
+        self.left = float(np.clip(self.left, rest - self.width / self.zoom, photo[0] - rest))
+        self.top = float(np.clip(self.top, rest - self.height / self.zoom, photo[1] - rest))

@@ -1,0 +1,108 @@
+"""Values over the pipe between the window and its worker: large arrays travel once.
+
+A message is a pickle (protocol 5). Arrays and bytes above `LARGE` are sent once, under a key, and
+stay the *same object* on the other side, so that a backend can remember what it computed for a
+photo by the photo's identity. All other array buffers are sent beside the pickle and arrive
+read-only, as documents need them. Both ends are our own processes: nothing foreign is unpickled.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections import OrderedDict
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+LARGE = 1 << 20  # bytes
+KEPT = 12  # large values remembered on both sides; least recently used first out
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, file: io.BytesIO, writer: Writer, buffers: list[pickle.PickleBuffer]):
+        super().__init__(file, protocol=5, buffer_callback=buffers.append)
+        self._writer = writer
+
+    def persistent_id(self, obj: Any) -> int | None:
+        return self._writer.key(obj)
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, kept: dict[int, Any], buffers: list[bytes]):
+        super().__init__(file, buffers=buffers)
+        self._kept = kept
+
+    def persistent_load(self, pid: Any) -> Any:
+        return self._kept[pid]
+
+
+def _is_large(value: Any) -> bool:
+    if type(value) is bytes:
+        return len(value) >= LARGE
+    # A writeable array may change after it was sent; a view's pixels belong to another array.
+    return type(value) is np.ndarray and value.nbytes >= LARGE and not value.flags.writeable
+
+
+class Writer:
+    """The sending end."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._kept: OrderedDict[int, Any] = OrderedDict()  # id -> value, held so ids stay unique
+
+    def key(self, value: Any) -> int | None:
+        """The key of a large value, which is sent now if the other side lacks it."""
+        if not _is_large(value):
+            return None
+        key = id(value)
+        if key not in self._kept:
+            self._kept[key] = value
+            self._send("keep", key, value)
+        self._kept.move_to_end(key)
+        return key
+
+    def write(self, message: Any) -> None:
+        """Sends one message. Blocks until the other side has taken it in."""
+        buffers: list[pickle.PickleBuffer] = []
+        file = io.BytesIO()
+        _Pickler(file, self, buffers).dump(message)
+        self._send_parts("message", None, file.getvalue(), buffers)
+        while len(self._kept) > KEPT:
+            key, _ = self._kept.popitem(last=False)
+            self._send("drop", key, None)
+
+    def _send(self, what: str, key: int, value: Any) -> None:
+        buffers: list[pickle.PickleBuffer] = []
+        data = pickle.dumps(value, protocol=5, buffer_callback=buffers.append)
+        self._send_parts(what, key, data, buffers)
+
+    def _send_parts(
+        self, what: str, key: int | None, data: bytes, buffers: list[pickle.PickleBuffer]
+    ) -> None:
+        self._connection.send((what, key, len(buffers)))
+        self._connection.send_bytes(data)
+        for buffer in buffers:
+            self._connection.send_bytes(buffer.raw())
+
+
+class Reader:
+    """The receiving end."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._kept: dict[int, Any] = {}
+
+    def read(self) -> Any:
+        """The next message; blocks. EOFError or OSError when the other side is gone."""
+        while True:
+            what, key, count = self._connection.recv()
+            data = self._connection.recv_bytes()
+            buffers = [self._connection.recv_bytes() for _ in range(count)]
+            if what == "keep":
+                self._kept[key] = pickle.loads(data, buffers=buffers)
+            elif what == "drop":
+                del self._kept[key]
+            else:
+                return _Unpickler(io.BytesIO(data), self._kept, buffers).load()

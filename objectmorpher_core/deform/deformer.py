@@ -1,0 +1,184 @@
+"""Handles in, pose out: what is fixed, in which steps it is reached, and how each part follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import F64, I32
+from ..document import DeformSettings, Handle, LiftedObject, Pose
+from .arap import ArapSolver, Constraints, Minimum, minimise
+from .graph import Graph, build_graph
+from .skinning import Skinned, bind, faithful_linear, skin
+
+FAITHFUL_ITERATIONS = 3  # paper 3.2.2
+ITERATIONS = 200  # at most; the solve ends earlier when nothing moves
+STEP_ITERATIONS = 4  # in the sub-steps of a large move
+LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
+ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A pose and what it cost."""
+
+    pose: Pose
+    energies: tuple[float, ...]  # paper Eq. 2 after each iteration of the last sub-step
+
+
+class Deformer:
+    """Deforms one lifted object. The constructor builds its graph and binds its Gaussians."""
+
+    def __init__(self, lifted: LiftedObject, settings: DeformSettings) -> None:
+        if settings.mode not in ("arap", "laplacian"):
+            raise ValueError(f"deform must be arap or laplacian, not {settings.mode!r}")
+        self.lifted = lifted
+        self.settings = settings
+        self.points = lifted.control_points.astype(np.float64)
+        self.diameter = lifted.diameter
+        self.graph: Graph = build_graph(self.points, settings.links)
+        self.binding = bind(lifted.gaussians.means, self.points, self.graph)
+        self._solver = ArapSolver(self.points, self.graph.weights)
+        self._constrained: tuple[object, ...] = ()
+
+    def rest(self) -> Pose:
+        """The pose of the photo."""
+        return Pose(self.points, np.broadcast_to(np.eye(3), (len(self.points), 3, 3)))
+
+    def nearest_control_point(self, point: np.ndarray) -> int:
+        """Index of the control point nearest to a rest surface point (3,), object frame."""
+        return int(((self.points - point) ** 2).sum(1).argmin())
+
+    def anchors(self, handles: tuple[Handle, ...], is_automatic: bool = True) -> I32:
+        """Control points that stay where they are although nobody pinned them.
+
+        One handle alone is only a translation for ARAP, so the quarter of its part that is
+        farthest along the surface is held; with a second handle or a pin the artist has said
+        what holds.
+        """
+        if len(handles) != 1 or handles[0].is_pin or not is_automatic:
+            return np.empty(0, np.int32)
+        h = handles[0].control_point
+        distances = self.graph.geodesics[h]
+        own = np.flatnonzero(self.graph.components == self.graph.components[h])
+        count = max(1, round(ANCHORED_SHARE * len(own)))
+        farthest = own[np.argsort(-distances[own], kind="stable")[:count]]
+        return np.sort(farthest[farthest != h]).astype(np.int32)
+
+    def solve(
+        self,
+        handles: tuple[Handle, ...],
+        has_auto_anchors: bool = True,
+        start: Pose | None = None,
+        iterations: int | None = None,
+    ) -> Solution:
+        """The pose in which every handle is at its target.
+
+        With `start` the solve continues from there (a drag); without, large moves are made in
+        sub-steps from rest, so the result is a function of the handles alone.
+        """
+        if not handles:
+            return Solution(self.rest(), (0.0,))
+        anchors = self.anchors(handles, has_auto_anchors)
+        constraints, is_free = self._constrain(handles, anchors)
+        rotations = (start or self.rest()).rotations
+        if self.settings.mode == "laplacian":
+            minimum = self._laplacian(constraints, is_free)
+        elif self.settings.is_faithful:
+            minimum = minimise(self._solver, rotations, FAITHFUL_ITERATIONS, tolerance=0.0)
+        else:
+            if start is None:
+                rotations = self._approach(constraints, is_free, handles, rotations)
+            minimum = minimise(self._solver, rotations, iterations or ITERATIONS)
+        positions, rotations = self._follow(minimum.positions, minimum.rotations, is_free)
+        return Solution(Pose(positions, rotations), minimum.energies)
+
+    def skin_points(self, points: np.ndarray, pose: Pose) -> Skinned:
+        """Rest surface points (N, 3) under `pose`, with the motion's Jacobian."""
+        binding = bind(points, self.points, self.graph)
+        return skin(points, binding, self.points, pose.points, pose.rotations)
+
+    def skin_gaussians(self, pose: Pose) -> Skinned:
+        """The object's Gaussians under `pose`."""
+        means = self.lifted.gaussians.means
+        skinned = skin(means, self.binding, self.points, pose.points, pose.rotations)
+        if not self.settings.is_faithful:
+            return skinned
+        linear = faithful_linear(self.binding, self.points, pose.points, pose.rotations, self.graph)
+        return Skinned(skinned.points, linear)
+
+    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, F64]:
+        """Rows of the handles and anchors; factored again only when the set changed."""
+        count = len(self.points)
+        points = np.array([h.point for h in handles])
+        targets = np.array([h.target for h in handles])
+        rows = np.zeros((len(handles) + len(anchors), count))
+        offsets = np.zeros((len(rows), count, 3))
+        fixed = np.concatenate([targets, self.points[anchors]])
+        if self.settings.is_faithful:  # the paper constrains the control point itself
+            for i, handle in enumerate(handles):
+                rows[i, handle.control_point] = 1.0
+                fixed[i] += self.points[handle.control_point] - handle.point
+        else:
+            binding = bind(points, self.points, self.graph)
+            for i in range(len(handles)):
+                nodes = binding.control_points[i]
+                rows[i, nodes] = binding.weights[i]
+                offsets[i, nodes] = points[i] - self.points[nodes]
+        rows[np.arange(len(handles), len(rows)), anchors] = 1.0
+        touched = np.unique(self.graph.components[np.flatnonzero(rows.any(0))])
+        is_free = np.isin(self.graph.components, touched)
+        constraints = Constraints(rows, fixed, offsets)
+        key = (rows.tobytes(), is_free.tobytes())
+        if key == self._constrained:
+            self._solver.constraints = constraints
+        else:
+            self._solver.constrain(constraints, is_free)
+            self._constrained = key
+        return constraints, is_free
+
+    def _approach(
+        self,
+        constraints: Constraints,
+        is_free: F64,
+        handles: tuple[Handle, ...],
+        rotations: F64,
+    ) -> F64:
+        """Walks the targets from rest to where they belong; returns the rotations there.
+
+        From a cold start a large turn ends in a false minimum; in steps of a tenth of the
+        diameter each solve begins near its own.
+        """
+        moves = np.array([h.target - h.point for h in handles])
+        farthest = float(np.linalg.norm(moves, axis=1).max())
+        steps = int(np.clip(np.ceil(farthest / (LARGE_MOVE * self.diameter)), 1, 20))
+        shift = np.zeros_like(constraints.fixed)
+        shift[: len(moves)] = moves
+        for step in range(1, steps):
+            part = constraints.fixed - shift * (1 - step / steps)
+            self._solver.constraints = Constraints(constraints.rows, part, constraints.offsets)
+            rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
+        self._solver.constraints = constraints
+        return rotations
+
+    def _laplacian(self, constraints: Constraints, is_free: F64) -> Minimum:
+        """The ablation: Eq. 2 with R_i = identity."""
+        rotations = self.rest().rotations
+        positions = self._solver.positions(rotations)
+        return Minimum(positions, rotations, (self._solver.energy(positions, rotations),))
+
+    def _follow(self, positions: F64, rotations: F64, is_free: F64) -> tuple[F64, F64]:
+        """Parts without a handle move rigidly with the nearest part that has one."""
+        if is_free.all():
+            return positions, rotations
+        positions, rotations = positions.copy(), rotations.copy()
+        leaders = np.flatnonzero(is_free)
+        for component in np.unique(self.graph.components[~is_free]):
+            own = np.flatnonzero(self.graph.components == component)
+            gaps = ((self.points[own, None] - self.points[None, leaders]) ** 2).sum(-1)
+            leader = leaders[np.unravel_index(gaps.argmin(), gaps.shape)[1]]
+            r = rotations[leader]
+            positions[own] = positions[leader] + (self.points[own] - self.points[leader]) @ r.T
+            rotations[own] = r
+        return positions, rotations

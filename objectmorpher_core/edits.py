@@ -1,0 +1,144 @@
+"""Every change of the document, as a pure function Document -> Document."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .arrays import Mask
+from .document import (
+    DeformSettings,
+    Document,
+    EditObject,
+    Handle,
+    LiftedObject,
+    Matte,
+    Placement,
+    Plate,
+    Pose,
+    Prompt,
+)
+
+SAME_PLACE = 1e-6  # object units: two targets closer than this are one
+
+
+class EditError(ValueError):
+    """The change makes no sense; one sentence."""
+
+
+def add_object(document: Document, name: str | None = None) -> Document:
+    """A new, empty object at the end of the list."""
+    count = len(document.objects)
+    return document.with_object(count, EditObject(name or f"Object {count + 1}"))
+
+
+def remove_object(document: Document, k: int) -> Document:
+    """Without object `k`. The plate, which filled its hole, goes too."""
+    objects = tuple(o for i, o in enumerate(document.objects) if i != k)
+    return replace(document, objects=objects, plate=None)
+
+
+def set_mask(document: Document, k: int, mask: Mask | None, prompt: Prompt) -> Document:
+    """The mask (H, W) of object `k`, and what the user said to get it."""
+    if mask is not None:
+        width, height = document.photo.size
+        if mask.shape != (height, width):
+            raise EditError(f"the mask is {mask.shape}, the photo is {(height, width)}")
+        if not mask.any():
+            raise EditError("nothing is selected")
+        if mask.all():
+            raise EditError("the object covers the whole photo, there is no background left")
+    return document.with_object(k, document.objects[k].with_mask(mask, prompt))
+
+
+def set_lifted(document: Document, k: int, matte: Matte, lifted: LiftedObject) -> Document:
+    """The 3D shape of object `k`; its handles and pose are gone."""
+    changed = document.with_object(k, document.objects[k].with_lifted(matte, lifted))
+    return changed.with_backend("lift", lifted.backend)
+
+
+def nearest_control_point(lifted: LiftedObject, point: np.ndarray) -> int:
+    """Index of the control point nearest to a rest surface point (3,), object frame."""
+    return int(((lifted.control_points - point) ** 2).sum(1).argmin())
+
+
+def add_handle(
+    document: Document,
+    k: int,
+    point: np.ndarray,
+    target: np.ndarray | None = None,
+    is_pin: bool = False,
+) -> Document:
+    """A handle on the rest surface `point` (3,) of object `k`; it stays until it is dragged.
+
+    Raises EditError where another handle has the same control point and another displacement.
+    """
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before adding points to it")
+    target = np.asarray(point if target is None else target, dtype=np.float64)
+    index = nearest_control_point(item.lifted, point)
+    for other in item.handles:
+        if other.control_point == index:
+            moves = target - point, other.target - other.point
+            if np.linalg.norm(moves[0] - moves[1]) > SAME_PLACE:
+                raise EditError("two points take the same control point to different places")
+            return document
+    handle = Handle(index, np.asarray(point, dtype=np.float64), target, is_pin)
+    return document.with_object(k, replace(item, handles=(*item.handles, handle)))
+
+
+def move_handle(document: Document, k: int, h: int, target: np.ndarray) -> Document:
+    """Handle `h` of object `k` must be at `target` (3,), object frame."""
+    item = document.objects[k]
+    moved = replace(item.handles[h], target=np.asarray(target, dtype=np.float64))
+    handles = tuple(moved if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def remove_handle(document: Document, k: int, h: int) -> Document:
+    """Without handle `h` of object `k`."""
+    item = document.objects[k]
+    handles = tuple(other for i, other in enumerate(item.handles) if i != h)
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def set_pose(document: Document, k: int, pose: Pose | None) -> Document:
+    """Where the control points of object `k` are; None puts it back to rest."""
+    return document.with_object(k, replace(document.objects[k], pose=pose))
+
+
+def set_placement(document: Document, k: int, placement: Placement) -> Document:
+    """Where object `k` is as a whole. Raises EditError behind the camera or for scale <= 0."""
+    item = document.objects[k]
+    if not placement.scale > 0:
+        raise EditError(f"a scale of {placement.scale:g} is not above 0")
+    if item.lifted is not None:
+        try:
+            placement.matrix(item.lifted, document.photo.camera)
+        except ValueError as error:
+            raise EditError(str(error)) from error
+    return document.with_object(k, replace(item, placement=placement))
+
+
+def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
+    """How object `k` deforms; its pose was solved with the old settings and is gone."""
+    return document.with_object(k, replace(document.objects[k], deform=settings, pose=None))
+
+
+def set_auto_anchors(document: Document, k: int, has_auto_anchors: bool) -> Document:
+    """Whether the far end of object `k` is held when one handle is all there is."""
+    item = replace(document.objects[k], has_auto_anchors=has_auto_anchors)
+    return document.with_object(k, item)
+
+
+def set_visible(document: Document, k: int, is_visible: bool) -> Document:
+    """Hides object `k` (its background shows) or shows it."""
+    return document.with_object(k, replace(document.objects[k], is_visible=is_visible))
+
+
+def set_plate(document: Document, plate: Plate | None) -> Document:
+    """The photo without its objects."""
+    changed = replace(document, plate=plate)
+    return changed if plate is None else changed.with_backend("inpaint", plate.backend)

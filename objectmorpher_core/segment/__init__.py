@@ -1,0 +1,55 @@
+"""Clicks, a box or "the subject" -> the mask of one object (paper 3.1).
+
+A backend a file; `load()` imports the chosen one. `encode` is costly and runs once per photo,
+`segment` is cheap and runs at every click.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, Protocol
+
+from ..arrays import RGB, Mask
+from ..document import Prompt
+from ..progress import Progress
+from .selection import SelectionError
+
+__all__ = ["BACKENDS", "SelectionError", "Segmenter", "load"]
+
+
+class Segmenter(Protocol):
+    """Finds the object that a prompt means."""
+
+    name: str
+
+    def missing(self) -> str | None:
+        """Why this backend cannot run here, as a sentence for the user; None where it can."""
+
+    def encode(self, rgb: RGB, progress: Progress) -> Any:
+        """What is worth keeping of a photo (H, W, 3): plain, picklable, or None if nothing is."""
+
+    def segment(
+        self, rgb: RGB, prompt: Prompt, embedding: Any, progress: Progress, seed: int = 0
+    ) -> Mask:
+        """(H, W) bool, the object. An `embedding` of None is computed here.
+
+        The same arguments give the same mask. Raises SelectionError: one sentence.
+        """
+
+
+BACKENDS = {
+    "dino": "objectmorpher_core.segment.dino_walk:DinoWalk",
+    "subject": "objectmorpher_core.segment.subject:Subject",
+    "grabcut": "objectmorpher_core.segment.grabcut:GrabCut",
+}
+
+
+def load(name: str = "auto") -> Segmenter:
+    """The backend called `name`; "auto" is the best one for clicks that can run here."""
+    if name == "auto":
+        dino = load("dino")
+        return dino if dino.missing() is None else load("grabcut")
+    if name not in BACKENDS:
+        raise SelectionError(f"there is no segmenter {name!r}; known are {', '.join(BACKENDS)}")
+    module, _, kind = BACKENDS[name].partition(":")
+    return getattr(import_module(module), kind)()

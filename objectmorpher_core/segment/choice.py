@@ -1,0 +1,244 @@
+"""Which of the walk's outlines is the object: clicks, box and subject map -> one soft guess.
+
+Each positive click proposes outlines (`Walk.regions`), and the subject it stands on. The best has
+strong contrast across its outline, agrees with the subject map and leaves the photo's border free;
+so a click on a part chooses the whole. Negative clicks take what the walk reaches from them first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, RGB, Mask
+from ..document import Click, Prompt
+from .selection import SelectionError, box_mask
+from .walk import Region, Walk
+
+SIDE = 320  # px, the guess is a square over the whole photo, as the subject map is
+UNSURE = 0.75  # cells, how far an outline of cells may be from the true one (standard deviation)
+SURE_SALIENCE = 0.9
+SMALLEST_PART = 0.02  # x object's area
+SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
+AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
+SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller box
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Where a choice takes place."""
+
+    walk: Walk  # crosses from part to part of an object
+    inside: Mask  # (h, w) cells in the box
+    salience: F32 | None  # (SIDE, SIDE) subject map
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """One object: cells (h, w), and the piece of the subject map (SIDE, SIDE) it is on, if any."""
+
+    cells: Mask
+    subject: F32 | None
+
+
+def guess(walk: Walk, strict: Walk, rgb: RGB, prompt: Prompt, salience: F32 | None) -> F32:
+    """(SIDE, SIDE) guess in [0, 1] that a place of the photo (H, W, 3) belongs to the object.
+
+    `walk` crosses from part to part of an object, `strict` stops at the borders of parts too.
+    """
+    inside = _to_cells(box_mask(rgb.shape, prompt).astype(np.float32), walk.shape) > 0.5
+    wanted = [_cell(c, rgb, walk) for c in prompt.clicks if c.is_foreground]
+    unwanted = [_cell(c, rgb, walk) for c in prompt.clicks if not c.is_foreground]
+    for cell in wanted:
+        inside[cell] = True
+    ground = Ground(walk, inside, salience)
+    choices = [_around_click(ground, cell) for cell in wanted]
+    if prompt.is_subject:
+        choices += _subjects(ground)
+    elif not wanted:
+        choices.append(_in_box(ground))
+    cells = np.any([_settle(strict, choice) for choice in choices], axis=0)
+    subjects = [choice.subject for choice in choices if choice.subject is not None]
+    soft = _sharpen(cells, np.max(subjects, axis=0) if subjects else None)
+    kept = inside.copy()
+    for cell in unwanted:
+        kept &= ~_part(strict, cell, wanted, cells)
+    return np.minimum(soft, _soften(kept))
+
+
+def _part(strict: Walk, cell: tuple[int, int], others: list[tuple[int, int]], whole: Mask) -> Mask:
+    """(h, w) the part of `whole` that `cell` (row, column) is on, and none of the `others`.
+
+    The one whose outline has the strongest contrast inside `whole`: the border that the user sees.
+    """
+    best = Region(strict.only(cell) > 0, 0.0)
+    for region in strict.regions(strict.spread(strict.only(cell)), cell):
+        share = (region.mask & whole).sum() / whole.sum()
+        if share == 1 or any(region.mask[other] for other in others):
+            break
+        # Who corrects takes away a minor part, yet not a speck.
+        contrast = strict.contrast(region.mask, whole) * (1 - share**2)
+        if contrast > best.contrast and share > SMALLEST_PART:
+            best = Region(region.mask, contrast)
+    return best.mask
+
+
+def _subjects(ground: Ground) -> list[Choice]:
+    """The photo's subject: what hangs together with the inmost cell of each of its pieces."""
+    if ground.salience is None or ground.salience.max() <= 0.5:
+        raise SelectionError("no subject stands out in this photo: click the object")
+    salient = ((ground.salience > 0.5) & (_enlarge(ground.inside.astype(np.float32)) > 0.5)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(salient)
+    if count == 1:
+        raise SelectionError("no subject stands out in the box: click the object")
+    largest = stats[1:, cv2.CC_STAT_AREA].max()
+    choices = []
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] < SMALLEST_SUBJECT * largest:
+            continue
+        depth = cv2.distanceTransform((labels == k).astype(np.uint8), cv2.DIST_L2, 3)
+        y, x = np.unravel_index(int(depth.argmax()), depth.shape)
+        height, width = ground.walk.shape
+        choices.append(_around_click(ground, (int(y * height / SIDE), int(x * width / SIDE))))
+    return choices
+
+
+def _around_click(ground: Ground, cell: tuple[int, int]) -> Choice:
+    """The whole object that `cell` (row, column) is a part of."""
+    walk, inside = ground.walk, ground.inside
+    masks = [r.mask & inside for r in walk.regions(walk.spread(walk.only(cell)), cell)]
+    subject = other = cells = None
+    if ground.salience is not None:
+        subject = _subject_piece(ground.salience, cell, walk.shape)
+        if subject is None:
+            other = _to_cells(ground.salience, walk.shape)
+        else:
+            subject = subject * _enlarge(inside.astype(np.float32))
+            cells = _to_cells(subject, walk.shape)
+            masks.append(cells > 0.5)
+    regions = [Region(mask, walk.contrast(mask)) for mask in masks if mask.any()]
+    if not regions:
+        raise SelectionError("nothing stands out there: draw a box or add clicks")
+    best = max(regions, key=lambda region: _score(region, cells, other))
+    return Choice(best.mask, subject)
+
+
+def _in_box(ground: Ground) -> Choice:
+    """The object that a box encloses: what a walk from outside the box misses."""
+    walk, inside = ground.walk, ground.inside
+    ring = ~inside
+    if not ring.any():
+        ring[[0, -1]] = ring[:, [0, -1]] = True
+    if not inside.any():
+        raise SelectionError("the box is too small to hold an object: draw a larger one")
+    spread = walk.spread(ring.astype(np.float64))
+    levels = np.quantile(spread[inside], np.linspace(SMALLEST_IN_BOX, 1.0, 40))
+    masks = [inside & (spread <= level) for level in levels]
+    subject = cells = None
+    if ground.salience is not None:
+        subject = ground.salience * _enlarge(inside.astype(np.float32))
+        cells = _to_cells(subject, walk.shape)
+        if (cells > 0.5).sum() > SMALLEST_IN_BOX * inside.sum():
+            masks.append(cells > 0.5)
+        else:
+            cells = subject = None
+    regions = [Region(mask, walk.contrast(mask)) for mask in masks if mask.any()]
+    box = _extent(inside)
+
+    def score(region: Region) -> float:
+        left, top, right, bottom = _extent(region.mask)
+        reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
+        return reach * _score(region, cells, None)  # a box is drawn as large as its object
+
+    return Choice(max(regions, key=score).mask, subject)
+
+
+def _extent(mask: Mask) -> tuple[int, int, int, int]:
+    """left, top, right, bottom cells of what is True in `mask` (h, w)."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+
+
+def _score(region: Region, subject: F32 | None, other: F32 | None) -> float:
+    """How much a region is one whole object. `subject`: clicked; `other`: not clicked; (h, w)."""
+    mask = region.mask
+    if subject is not None:
+        both, either = np.minimum(mask, subject).sum(), np.maximum(mask, subject).sum()
+        return float(region.contrast * (both / max(either, 1e-6)) ** AGREEMENT)
+    border = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]]).mean()
+    score = region.contrast * (1 - border**2) * (1 - mask.mean() ** 2)
+    if other is not None:
+        score *= 1 - (other * mask).sum() / max(other.sum(), 1.0)
+    return float(score)
+
+
+def _subject_piece(salience: F32, cell: tuple[int, int], shape: tuple[int, int]) -> F32 | None:
+    """The subject map without what does not hang together with the click; None off the subject."""
+    y = int((cell[0] + 0.5) * SIDE / shape[0])
+    x = int((cell[1] + 0.5) * SIDE / shape[1])
+    if salience[y, x] <= 0.5:
+        return None
+    _, labels = cv2.connectedComponents((salience > 0.5).astype(np.uint8))
+    piece = (labels == labels[y, x]).astype(np.uint8)
+    fringe = cv2.dilate(piece, np.ones((9, 9), np.uint8))
+    other = (labels > 0) & (piece == 0)
+    return np.where((fringe == 1) & ~other, salience, np.where(other, 0, salience * 0.5))
+
+
+def _settle(strict: Walk, choice: Choice) -> Mask:
+    """(h, w) the chosen cells, decided anew where the subject map does not agree.
+
+    Walks from there meet either what both agree is the object, or what both agree is not.
+    """
+    if choice.subject is None:
+        return choice.cells
+    salience, soft = _to_cells(choice.subject, choice.cells.shape), _blur(choice.cells)
+    is_object = (soft > 0.9) & (salience > SURE_SALIENCE)
+    is_ground = (soft < 0.1) & (salience < 1 - SURE_SALIENCE)
+    if not (is_object.any() and is_ground.any()):
+        return choice.cells
+    return strict.settle(is_object, is_ground) > 0.5
+
+
+def _sharpen(cells: Mask, subject: F32 | None) -> F32:
+    """(SIDE, SIDE) guess from cells (h, w): the finer subject map draws the outline."""
+    soft = _soften(cells)
+    if subject is None:
+        return soft
+    # Where it contradicts whole cells it knows nothing, and does not draw their outline either.
+    wrong = np.abs(_to_cells(subject, cells.shape) - cells) > 0.6
+    wrong &= (_blur(cells) > 0.9) | (_blur(cells) < 0.1)
+    around = cv2.dilate(wrong.astype(np.uint8), np.ones((5, 5), np.uint8))
+    trust = 1 - _soften(around > 0)
+    unsure = np.clip(soft + 0.5 * trust * (subject - soft), 0.1, 0.9)
+    sure = trust > 0.5
+    is_object = (soft > 0.97) | (sure & (soft > 0.5) & (subject > SURE_SALIENCE))
+    is_ground = (soft < 0.03) | (sure & (soft < 0.5) & (subject < 1 - SURE_SALIENCE))
+    return np.where(is_object, 1, np.where(is_ground, 0, unsure)).astype(np.float32)
+
+
+def _blur(mask: Mask) -> F32:
+    """(h, w) mask of cells with an outline as unsure as the cells are coarse."""
+    image = mask.astype(np.float32)
+    return cv2.GaussianBlur(image, (0, 0), UNSURE, borderType=cv2.BORDER_REPLICATE)
+
+
+def _soften(mask: Mask) -> F32:
+    """`_blur` of the cells (h, w) at (SIDE, SIDE)."""
+    return np.clip(_enlarge(_blur(mask)), 0, 1)
+
+
+def _enlarge(cells: F32) -> F32:
+    return cv2.resize(cells, (SIDE, SIDE), interpolation=cv2.INTER_LINEAR)
+
+
+def _to_cells(image: F32, shape: tuple[int, int]) -> F32:
+    return cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+
+
+def _cell(click: Click, rgb: RGB, walk: Walk) -> tuple[int, int]:
+    """(row, column) of the cell under a click."""
+    height, width = rgb.shape[:2]
+    return int(click.y * walk.shape[0] / height), int(click.x * walk.shape[1] / width)

@@ -1,0 +1,72 @@
+"""Clicks -> object without any learned weights: a walk over colours, then GrabCut."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, RGB, Mask
+from ..document import Prompt
+from ..progress import Progress, silent
+from .choice import guess
+from .edges import cut
+from .selection import SelectionError, check_prompt
+from .subject import SubjectNet
+from .walk import Walk
+
+CELLS = 4000  # of a photo
+COLOR_STEP = 14.0  # CIELAB units; two colours this far apart are 0.5 apart in the walk
+TEMPERATURE = 0.15
+MEAN_SHIFT = (6, 12)  # cells' px and CIELAB units within which texture is one colour
+
+
+class GrabCut:
+    """Segmenter: colours only; always there."""
+
+    name = "grabcut"
+
+    def __init__(self) -> None:
+        self._subject = SubjectNet()
+
+    def missing(self) -> str | None:
+        """None: it needs nothing."""
+        return None
+
+    def encode(self, rgb: RGB, progress: Progress = silent) -> None:
+        """Nothing is worth keeping."""
+        progress(1.0, "ready")
+
+    def segment(
+        self,
+        rgb: RGB,
+        prompt: Prompt,
+        embedding: None = None,
+        progress: Progress = silent,
+        seed: int = 0,
+    ) -> Mask:
+        """(H, W) bool: the object that clicks, a box or both mean; the subject needs weights."""
+        check_prompt(rgb, prompt)
+        salience = None
+        if prompt.is_subject:
+            reason = self._subject.missing()
+            if reason is not None:
+                raise SelectionError(f"the subject cannot be found: {reason}")
+            salience = self._subject.salience(rgb)
+        progress(0.1, "walking from the clicks")
+        walk = Walk(_colors(rgb), TEMPERATURE)
+        soft = guess(walk, walk, rgb, prompt, salience)
+        progress(0.5, "cutting out the object")
+        mask = cut(rgb, soft, prompt, seed)
+        progress(1.0, "cut out the object")
+        return mask
+
+
+def _colors(rgb: RGB) -> F32:
+    """(h, w, 3) CIELAB of the photo's cells, texture smoothed away, in units of COLOR_STEP."""
+    height, width = rgb.shape[:2]
+    scale = min(1.0, (CELLS / (height * width)) ** 0.5)
+    size = (max(1, round(width * scale * 2)), max(1, round(height * scale * 2)))
+    small = cv2.pyrMeanShiftFiltering(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), *MEAN_SHIFT)
+    half = cv2.resize(small, ((size[0] + 1) // 2, (size[1] + 1) // 2), interpolation=cv2.INTER_AREA)
+    lab = cv2.cvtColor(half.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+    return lab / COLOR_STEP

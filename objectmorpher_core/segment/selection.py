@@ -1,0 +1,96 @@
+"""What every backend does alike: check the prompt, keep what it points at, fill holes."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import RGB, Mask
+from ..document import Prompt
+
+SMALL_HOLE = 0.002  # x area of the mask; smaller holes are specks, larger ones are meant
+SMALL_ISLAND = 0.02  # x area of the largest piece; smaller pieces that no click touches are specks
+
+
+class SelectionError(ValueError):
+    """Nothing sensible can be selected. The message is one sentence for the user."""
+
+
+def check_prompt(rgb: RGB, prompt: Prompt) -> None:
+    """Raises SelectionError where the prompt says nothing, or points outside the photo (H, W)."""
+    height, width = rgb.shape[:2]
+    if prompt.is_empty:
+        raise SelectionError("nothing is chosen: click the object, draw a box, or ask for the subject")
+    for click in prompt.clicks:
+        if not (0 <= click.x < width and 0 <= click.y < height):
+            at = f"the click at {click.x:g}, {click.y:g}"
+            raise SelectionError(f"{at} is outside the photo of {width} x {height} px")
+    if prompt.box is not None:
+        x0, y0, x1, y1 = prompt.box
+        if not (x0 < x1 and y0 < y1 and x1 > 0 and y1 > 0 and x0 < width and y0 < height):
+            corners = f"the box {x0:g}, {y0:g}, {x1:g}, {y1:g}"
+            raise SelectionError(f"{corners} holds nothing of the photo of {width} x {height} px")
+        clicks = [c for c in prompt.clicks if c.is_foreground]
+        outside = [c for c in clicks if not (x0 <= c.x <= x1 and y0 <= c.y <= y1)]
+        if outside:
+            at = f"the click at {outside[0].x:g}, {outside[0].y:g}"
+            raise SelectionError(f"{at} is outside the box {x0:g}, {y0:g}, {x1:g}, {y1:g}")
+    elif not prompt.is_subject and not any(c.is_foreground for c in prompt.clicks):
+        raise SelectionError("every click says what is not the object: click the object too")
+    _check_contradiction(prompt)
+
+
+def _check_contradiction(prompt: Prompt) -> None:
+    """Raises SelectionError where one pixel is said to be the object and not to be it."""
+    said: dict[tuple[int, int], bool] = {}
+    for click in prompt.clicks:
+        pixel = (int(click.x), int(click.y))
+        if said.setdefault(pixel, click.is_foreground) != click.is_foreground:
+            at = f"{click.x:g}, {click.y:g}"
+            raise SelectionError(f"the clicks at {at} say both that it is the object and is not")
+
+
+def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
+    """(H, W) True inside the prompt's box, or everywhere where there is none."""
+    inside = np.ones(shape[:2], bool)
+    if prompt.box is not None:
+        x0, y0, x1, y1 = prompt.box
+        inside[:] = False
+        inside[max(int(y0), 0) : int(np.ceil(y1)), max(int(x0), 0) : int(np.ceil(x1))] = True
+    return inside
+
+
+def keep_touched(mask: Mask, prompt: Prompt) -> Mask:
+    """The pieces (H, W) that a positive click touches; without clicks, the sizeable ones."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    if count <= 1:
+        return mask
+    clicks = [c for c in prompt.clicks if c.is_foreground]
+    kept = {int(labels[int(c.y), int(c.x)]) for c in clicks} - {0}
+    if not clicks or prompt.is_subject or (not kept and prompt.box is not None):
+        areas = stats[1:, cv2.CC_STAT_AREA]
+        kept |= {int(k) + 1 for k in np.flatnonzero(areas >= SMALL_ISLAND * areas.max())}
+    return np.isin(labels, sorted(kept))
+
+
+def fill_small_holes(mask: Mask, prompt: Prompt) -> Mask:
+    """`mask` without its small holes, except those that a negative click is in."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (~mask).astype(np.uint8), connectivity=4
+    )
+    areas = stats[:, cv2.CC_STAT_AREA]
+    small = areas < SMALL_HOLE * mask.sum()
+    small[0] = False
+    for click in prompt.clicks:
+        if not click.is_foreground:
+            small[labels[int(click.y), int(click.x)]] = False
+    return mask | small[labels] if count > 1 else mask
+
+
+def check_mask(mask: Mask) -> Mask:
+    """`mask`, or SelectionError where it is empty or covers the whole photo."""
+    if not mask.any():
+        raise SelectionError("nothing was found there: add a click or a box")
+    if mask.all():
+        raise SelectionError("the selection covers the whole photo: say what is not the object")
+    return mask

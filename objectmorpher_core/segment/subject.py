@@ -1,0 +1,106 @@
+"""The photo's salient subject: U^2-Net-p (Qin et al. 2020, "U^2-Net", arXiv 2005.09007)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+
+from .. import models
+from ..arrays import F32, RGB, Mask
+from ..document import Prompt
+from ..progress import Progress, part, silent
+from .edges import cut
+from .selection import SelectionError, box_mask, check_prompt
+
+WEIGHT = "u2netp"
+INPUT_SIDE = 320  # px, as it was trained
+MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's RGB, as it was trained
+DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class SubjectMap:
+    """How much each place of a photo belongs to its subject."""
+
+    salience: F32  # (320, 320) in [0, 1], the photo stretched to a square
+
+
+class SubjectNet:
+    """The network, loaded at its first use."""
+
+    def __init__(self) -> None:
+        self._session: Any = None
+
+    def missing(self) -> str | None:
+        """Why it cannot run, or None."""
+        if models.path(WEIGHT) is None:
+            return f"the model {WEIGHT} is not here: `objectmorpher models get {WEIGHT}`"
+        return None
+
+    def salience(self, rgb: RGB) -> F32:
+        """(320, 320) in [0, 1] for a photo (H, W, 3)."""
+        if self._session is None:
+            import onnxruntime
+
+            self._session = onnxruntime.InferenceSession(
+                str(models.path(WEIGHT)), providers=["CPUExecutionProvider"]
+            )
+        small = cv2.resize(rgb, (INPUT_SIDE, INPUT_SIDE), interpolation=cv2.INTER_AREA)
+        scaled = small.astype(np.float32) / max(int(small.max()), 1)  # as it was trained
+        pixels = ((scaled - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
+        session = self._session
+        first = session.run([session.get_outputs()[0].name], {session.get_inputs()[0].name: pixels})
+        return np.ascontiguousarray(first[0][0, 0], np.float32)
+
+
+class Subject:
+    """Segmenter: the salient subject; clicks and a box restrict and correct it."""
+
+    name = "subject"
+
+    def __init__(self) -> None:
+        self._net = SubjectNet()
+
+    def missing(self) -> str | None:
+        """Why this backend cannot run here, or None."""
+        return self._net.missing()
+
+    def encode(self, rgb: RGB, progress: Progress = silent) -> SubjectMap:
+        """The subject map of a photo (H, W, 3)."""
+        reason = self.missing()
+        if reason is not None:
+            raise SelectionError(reason)
+        progress(0.0, "looking for the subject")
+        salience = self._net.salience(rgb)
+        progress(1.0, "found the subject")
+        return SubjectMap(salience)
+
+    def segment(
+        self,
+        rgb: RGB,
+        prompt: Prompt,
+        embedding: SubjectMap | None = None,
+        progress: Progress = silent,
+        seed: int = 0,
+    ) -> Mask:
+        """(H, W) bool: the subject where the prompt points."""
+        check_prompt(rgb, prompt)
+        if embedding is None:
+            embedding = self.encode(rgb, part(progress, 0.0, 0.7))
+        progress(0.7, "cutting out the subject")
+        mask = cut(rgb, subject_guess(rgb, prompt, embedding.salience), prompt, seed)
+        progress(1.0, "cut out the subject")
+        return mask
+
+
+def subject_guess(rgb: RGB, prompt: Prompt, salience: F32) -> F32:
+    """(320, 320) guess: salience inside the box; SelectionError where there is no subject."""
+    inside = box_mask(rgb.shape, prompt).astype(np.float32)
+    size = (salience.shape[1], salience.shape[0])
+    guess = salience * cv2.resize(inside, size, interpolation=cv2.INTER_AREA)
+    if guess.max() < 0.5:
+        raise SelectionError("no subject stands out there: click the object")
+    return guess

@@ -1,0 +1,14 @@
+#version 330
+// A rendered object, px for px.
+
+uniform sampler2D layer;  // premultiplied sRGB
+uniform vec4 box;         // x0, y0, x1, y1 canvas px
+uniform float split;      // canvas px, left of which the photo is shown as it was
+
+in vec2 xy;
+out vec4 color;
+
+void main() {
+    if (xy.x < split) discard;
+    color = texture(layer, (xy - box.xy) / (box.zw - box.xy));
+}

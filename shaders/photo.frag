@@ -1,0 +1,46 @@
+#version 330
+// The photo, the plate over it, and what the selection says about it.
+
+uniform sampler2D photo;
+uniform sampler2D plate;
+uniform sampler2D mask;
+uniform vec2 corner;      // image px at the canvas's left top
+uniform float zoom;       // canvas px per image px
+uniform vec2 photo_size;  // px
+uniform vec4 plate_box;   // x0, y0, x1, y1 image px; empty where there is no plate
+uniform float split;      // canvas px, left of which the photo is shown as it was
+uniform vec3 surround;    // sRGB
+uniform float veil;       // share of black over what is outside the mask
+uniform float hatch;      // share of the hatching over the mask, where the plate is missing
+uniform float unit;       // canvas px per point
+
+in vec2 xy;
+out vec4 color;
+
+// 1 inside a box, 0 outside, a ramp of one canvas px along its border.
+float inside(vec2 point, vec4 bounds) {
+    vec2 depth = min(point - bounds.xy, bounds.zw - point) * zoom;
+    return clamp(min(depth.x, depth.y) + 0.5, 0.0, 1.0);
+}
+
+// Diagonal stripes, 8 points apart: pixels that are not there yet.
+float stripes() {
+    float phase = fract((xy.x + xy.y) / (8.0 * unit * 1.41421356));
+    return smoothstep(0.30, 0.38, phase) - smoothstep(0.62, 0.70, phase);
+}
+
+void main() {
+    vec2 point = corner + xy / zoom;  // image px
+    vec3 picture = texture(photo, point / photo_size).rgb;
+    if (xy.x >= split) {
+        vec2 in_plate = (point - plate_box.xy) / (plate_box.zw - plate_box.xy);
+        if (all(greaterThan(in_plate, vec2(0))) && all(lessThan(in_plate, vec2(1)))) {
+            picture = texture(plate, in_plate).rgb;
+        }
+        float meant = texture(mask, point / photo_size).r;
+        picture = mix(picture, vec3(0), veil * (1.0 - meant));
+        vec3 striped = mix(picture * 0.25, vec3(0.5), 0.35 * stripes());
+        picture = mix(picture, striped, hatch * meant);
+    }
+    color = vec4(mix(surround, picture, inside(point, vec4(0, 0, photo_size))), 1);
+}

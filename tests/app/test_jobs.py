@@ -1,0 +1,125 @@
+"""The worker process: answers, progress, cancelling, failures and crashes, all with a real spawn."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from app.jobs import JobError, Jobs
+import job_functions
+
+
+class Log:
+    """What a job told."""
+
+    def __init__(self) -> None:
+        self.answers: list[object] = []
+        self.errors: list[JobError] = []
+        self.cancels = 0
+
+    def cancelled(self) -> None:
+        self.cancels += 1
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Jobs]:
+    jobs = Jobs()
+    yield jobs
+    jobs.close()
+
+
+def start(jobs: Jobs, log: Log, function: Callable, *arguments: object, kind: str = "") -> None:
+    jobs.start(
+        "Test", function, *arguments, done=log.answers.append, failed=log.errors.append,
+        cancelled=log.cancelled, kind=kind,
+    )  # fmt: skip
+
+
+def run_until(jobs: Jobs, is_reached: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not is_reached():
+        assert time.monotonic() < end, "nothing came in time"
+        jobs.poll()
+        time.sleep(0.005)
+
+
+def test_an_answer_arrives_read_only(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.double, np.arange(5.0))
+    run_until(worker, lambda: bool(log.answers))
+    answer = log.answers[0]
+    assert isinstance(answer, np.ndarray)
+    np.testing.assert_array_equal(answer, 2 * np.arange(5.0))
+    assert not answer.flags.writeable
+
+
+def test_a_large_array_is_the_same_object_in_the_worker_twice(worker: Jobs) -> None:
+    photo = np.zeros((1000, 1000, 3), np.uint8)
+    photo.setflags(write=False)
+    log = Log()
+    for _ in range(2):
+        start(worker, log, job_functions.is_same_as_last_time, photo)
+        run_until(worker, lambda: worker.is_idle)
+    assert log.answers == [False, True]
+
+
+def test_progress_is_seen_while_the_job_runs(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.wait, 0.5)
+    run_until(worker, lambda: worker.current is not None and worker.current.fraction > 0.3)
+    assert worker.current is not None
+    assert worker.current.note == "waiting"
+    run_until(worker, lambda: worker.is_idle)
+    assert log.answers == ["waited"]
+
+
+def test_cancelling_stops_a_job_that_asks(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.wait, 30.0)
+    run_until(worker, lambda: worker.current is not None and worker.current.fraction > 0)
+    worker.cancel()
+    run_until(worker, lambda: worker.is_idle, seconds=1.5)
+    assert (log.answers, log.cancels) == ([], 1)
+
+
+def test_only_the_newest_request_of_a_kind_is_answered(worker: Jobs) -> None:
+    log = Log()
+    for seconds in (10.0, 9.0, 0.0):
+        start(worker, log, job_functions.wait, seconds, kind="segment")
+    run_until(worker, lambda: worker.is_idle, seconds=3)
+    assert log.answers == ["waited"]
+    assert log.cancels == 0
+
+
+def test_a_failure_is_a_sentence(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.fail)
+    run_until(worker, lambda: worker.is_idle)
+    assert [(e.name, e.sentence) for e in log.errors] == [("ValueError", "the mask is empty")]
+    assert "job_functions" in log.errors[0].trace
+
+
+def test_a_crash_is_a_failure_and_the_next_job_runs() -> None:
+    jobs = Jobs()
+    log = Log()
+    start(jobs, log, job_functions.crash)
+    start(jobs, log, job_functions.double, np.ones(1))
+    run_until(jobs, lambda: bool(log.answers))
+    assert log.errors[0].name == "Crash"
+    jobs.close()
+
+
+def test_a_job_that_does_not_listen_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.jobs.PATIENCE", 0.2)
+    jobs = Jobs()
+    log = Log()
+    start(jobs, log, job_functions.hang, 60.0)
+    jobs.cancel()
+    run_until(jobs, lambda: jobs.is_idle, seconds=3)
+    assert log.cancels == 1
+    start(jobs, log, job_functions.double, np.ones(1))
+    run_until(jobs, lambda: bool(log.answers))
+    jobs.close()

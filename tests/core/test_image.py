@@ -1,0 +1,314 @@
+"""Pictures survive the way through a file: pixels exactly, metadata too."""
+
+from __future__ import annotations
+
+import io
+import struct
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image, ImageCms, ImageOps
+
+from objectmorpher_core.image import (
+    ImageError,
+    Picture,
+    encode_mask,
+    encode_picture,
+    read_mask,
+    read_picture,
+    resized,
+    to_u8,
+)
+
+LOSSLESS = (".png", ".tif", ".webp")
+DEEP = (".png", ".tif")
+SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+GREY_PROFILE = SRGB[:16] + b"GRAY" + SRGB[20:]
+
+
+def deep(pixels: np.ndarray) -> np.ndarray:
+    """u16 pixels that really use all 16 bits."""
+    noise = np.random.default_rng(5).integers(0, 256, pixels.shape, dtype=np.uint16)
+    return pixels.astype(np.uint16) * 256 + noise
+
+
+def pil_bytes(image: Image.Image, kind: str, **options) -> bytes:
+    out = io.BytesIO()
+    image.save(out, kind, **options)
+    return out.getvalue()
+
+
+def tiff_bytes(samples: np.ndarray, **options) -> bytes:
+    out = io.BytesIO()
+    tifffile.imwrite(out, samples, **options)
+    return out.getvalue()
+
+
+def exif_block(orientation: int) -> Image.Exif:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    exif[0x010F] = "A camera"
+    exif.get_ifd(0x8769)[0xA405] = 35
+    exif.get_ifd(0x8769)[0x927C] = b"a maker's note"
+    return exif
+
+
+def pictures(rgb: np.ndarray) -> dict[str, Picture]:
+    alpha = rgb[..., 1].copy()
+    alpha[:4] = 0
+    grey = np.repeat(rgb[..., :1], 3, axis=2)
+    return {
+        "rgb": Picture(rgb),
+        "rgba": Picture(rgb, alpha=alpha),
+        "grey": Picture(grey, is_grey=True),
+        "grey alpha": Picture(grey, alpha=alpha, is_grey=True),
+    }
+
+
+def assert_same(got: Picture, expected: Picture) -> None:
+    assert got.pixels.dtype == expected.pixels.dtype
+    np.testing.assert_array_equal(got.pixels, expected.pixels)
+    assert (got.alpha is None) == (expected.alpha is None)
+    if got.alpha is not None:
+        np.testing.assert_array_equal(got.alpha, expected.alpha)
+
+
+@pytest.mark.parametrize("ending", LOSSLESS)
+@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+def test_8_bit_round_trip(ending, kind, chelsea):
+    picture = pictures(chelsea[:97, :131])[kind]
+    back = read_picture(encode_picture(picture, ending))
+    assert_same(back, picture)
+    assert back.is_grey == (picture.is_grey and ending != ".webp")  # WebP has no grey
+
+
+@pytest.mark.parametrize("ending", DEEP)
+@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+def test_16_bit_round_trip(ending, kind, chelsea):
+    picture = pictures(deep(chelsea[:97, :131]))[kind]
+    back = read_picture(encode_picture(picture, ending))
+    assert_same(back, picture)
+    assert back.is_grey == picture.is_grey
+
+
+@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+@pytest.mark.parametrize("is_deep", [False, True])
+def test_other_programs_read_our_tiff(kind, is_deep, chelsea):
+    pixels = chelsea if not is_deep else deep(chelsea)  # several strips
+    picture = pictures(pixels)[kind]
+    stored = tifffile.imread(io.BytesIO(encode_picture(picture, "tiff")))
+    colours = picture.pixels[..., :1] if picture.is_grey else picture.pixels
+    channels = [colours] if picture.alpha is None else [colours, picture.alpha[..., None]]
+    np.testing.assert_array_equal(stored, np.concatenate(channels, axis=2).squeeze())
+
+
+def test_other_programs_read_our_grey_alpha_png(chelsea):
+    picture = pictures(chelsea)["grey alpha"]
+    image = Image.open(io.BytesIO(encode_picture(picture, "png")))
+    assert image.mode == "LA"
+    np.testing.assert_array_equal(np.asarray(image)[..., 1], picture.alpha)
+
+
+@pytest.mark.parametrize("ending", [".png", ".tif", ".webp", ".jpg"])
+def test_profile_and_exif_are_kept(ending, chelsea):
+    block = exif_block(1).tobytes().removeprefix(b"Exif\0\0")
+    picture = Picture(chelsea, icc=SRGB, exif=block)
+    back = read_picture(encode_picture(picture, ending))
+    assert back.icc == SRGB
+    assert back.focal_35mm == 35.0
+    exif = Image.Exif()
+    exif.load(back.exif)
+    assert exif[0x010F] == "A camera"
+    assert exif.get_ifd(0x8769)[0x927C] == b"a maker's note"
+
+
+def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
+    picture = Picture(chelsea, is_grey=True, icc=GREY_PROFILE)
+    assert read_picture(encode_picture(picture, "png")).icc == GREY_PROFILE
+    assert read_picture(encode_picture(picture, "webp")).icc is None
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "TIFF", "WEBP", "PNG16", "TIFF16"])
+def test_orientation(orientation, kind, chelsea):
+    stored = chelsea[:60, :90]
+    exif = exif_block(orientation)
+    expected = np.asarray(ImageOps.exif_transpose(with_exif(stored, exif)))
+    if kind == "PNG16":
+        block = exif.tobytes().removeprefix(b"Exif\0\0")
+        data = encode_picture(Picture(stored.astype(np.uint16) * 257, exif=block), "png")
+    elif kind == "TIFF16":
+        tags = [(274, 3, 1, orientation, True)]
+        data = tiff_bytes(stored.astype(np.uint16) * 257, photometric="rgb", extratags=tags)
+    else:
+        lossless = {"lossless": True} if kind == "WEBP" else {}
+        data = pil_bytes(Image.fromarray(stored), kind, exif=exif, **lossless)
+    picture = read_picture(data)
+    assert picture.pixels.dtype == (np.uint16 if kind.endswith("16") else np.uint8)
+    if kind == "JPEG":
+        assert np.abs(picture.pixels.astype(int) - expected).mean() < 6  # lossy; a wrong turn: > 20
+    else:
+        np.testing.assert_array_equal(to_u8(picture.pixels), expected)
+    if picture.exif is not None:  # written and read again, it must not turn a second time
+        again = read_picture(encode_picture(picture, "png"))
+        np.testing.assert_array_equal(again.pixels, picture.pixels)
+
+
+def with_exif(pixels: np.ndarray, exif: Image.Exif) -> Image.Image:
+    return Image.open(io.BytesIO(pil_bytes(Image.fromarray(pixels), "PNG", exif=exif)))
+
+
+def test_thumbnail_of_the_unedited_photo_is_dropped():
+    # Big-endian block: orientation 6 in the first directory, a 5-byte thumbnail in the second.
+    first = struct.pack(">HHHIHHI", 1, 0x0112, 3, 1, 6, 0, 26)
+    second = struct.pack(">HHHIIHHIII", 2, 0x0201, 4, 1, 56, 0x0202, 4, 1, 5, 0)
+    block = b"MM\0*" + struct.pack(">I", 8) + first + second + b"THUMB"
+    data = pil_bytes(Image.new("RGB", (3, 2)), "JPEG", exif=b"Exif\0\0" + block)
+    picture = read_picture(data)
+    assert picture.pixels.shape == (3, 2, 3)
+    assert b"THUMB" not in picture.exif
+    assert len(picture.exif) == len(block)
+
+
+@pytest.mark.filterwarnings("ignore:Corrupt EXIF")
+def test_broken_exif_does_not_cost_the_picture():
+    for block in (b"II*\0\xff\xff\xff\xff", b"MM\0*\0\0\0\x08\xff\xff", b"nonsense", b"II"):
+        data = pil_bytes(Image.new("RGB", (3, 2)), "JPEG", exif=b"Exif\0\0" + block)
+        assert read_picture(data).pixels.shape == (2, 3, 3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"planarconfig": "separate"},
+        {"byteorder": ">"},
+        {"tile": (32, 32)},
+        {"compression": "zlib", "predictor": True},
+    ],
+)
+def test_16_bit_tiff_layouts(options, chelsea):
+    pixels = deep(chelsea[:64, :96])
+    stored = np.moveaxis(pixels, 2, 0) if "planarconfig" in options else pixels
+    data = tiff_bytes(stored, photometric="rgb", **options)
+    np.testing.assert_array_equal(read_picture(data).pixels, pixels)
+
+
+def test_16_bit_lzw_tiff_lying_on_its_side(chelsea):
+    import cv2
+
+    pixels = deep(chelsea[:64, :96])
+    data = cv2.imencode(".tif", pixels[..., ::-1], [cv2.IMWRITE_TIFF_COMPRESSION, 5])[1].tobytes()
+    np.testing.assert_array_equal(read_picture(data).pixels, pixels)
+
+
+def test_white_is_zero_tiff(chelsea):
+    grey = deep(chelsea)[..., 0]
+    picture = read_picture(tiff_bytes(grey, photometric="miniswhite"))
+    assert picture.is_grey
+    np.testing.assert_array_equal(picture.pixels[..., 0], 65535 - grey)
+
+
+def test_palette_with_transparency(chelsea):
+    palette = Image.fromarray(chelsea).quantize(16)
+    data = pil_bytes(palette, "PNG", transparency=3)
+    picture = read_picture(data)
+    np.testing.assert_array_equal(picture.alpha == 0, np.asarray(palette) == 3)
+    np.testing.assert_array_equal(picture.pixels, np.asarray(palette.convert("RGB")))
+    assert not picture.is_grey
+
+
+def test_cmyk_becomes_rgb(chelsea):
+    data = pil_bytes(Image.fromarray(chelsea).convert("CMYK"), "JPEG", quality=95)
+    picture = read_picture(data)
+    assert np.abs(picture.pixels.astype(int) - chelsea).mean() < 3
+
+
+def test_bilevel_is_grey():
+    data = pil_bytes(Image.fromarray(np.eye(9, dtype=bool)), "PNG")
+    picture = read_picture(data)
+    assert picture.is_grey
+    np.testing.assert_array_equal(picture.pixels[..., 0], np.eye(9, dtype=np.uint8) * 255)
+
+
+def test_arrays_are_read_only(chelsea):
+    picture = read_picture(encode_picture(pictures(chelsea)["rgba"], "png"))
+    for array in (picture.pixels, picture.alpha):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
+def test_to_u8_rounds_every_value():
+    values = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    np.testing.assert_array_equal(to_u8(values), np.round(values / 257).astype(np.uint8))
+    grey = Picture(np.repeat(values[..., None], 3, axis=2), is_grey=True)
+    assert_same(read_picture(encode_picture(grey, "png")), grey)
+
+
+def test_16_bit_is_rounded_for_8_bit_formats(chelsea):
+    picture = Picture(deep(chelsea))
+    back = read_picture(encode_picture(picture, "webp"))
+    np.testing.assert_array_equal(back.pixels, to_u8(picture.pixels))
+
+
+def test_jpeg_refuses_transparency_but_not_an_opaque_alpha(chelsea):
+    with pytest.raises(ImageError, match="JPEG cannot hold transparency"):
+        encode_picture(pictures(chelsea)["rgba"], "jpg")
+    opaque = np.full(chelsea.shape[:2], 255, np.uint8)
+    assert encode_picture(Picture(chelsea, alpha=opaque), ".JPG").startswith(b"\xff\xd8")
+
+
+def bad_files(rgb: np.ndarray) -> dict[str, bytes]:
+    picture = Image.fromarray(rgb)
+    jpeg, png = pil_bytes(picture, "JPEG"), pil_bytes(picture, "PNG")
+    png16, tif16 = (encode_picture(Picture(deep(rgb)), e) for e in DEEP)
+    damaged = bytearray(png16)
+    damaged[len(png16) // 2] ^= 1
+    bomb = bytearray(png)
+    bomb[16:24] = struct.pack(">II", 40000, 40000)
+    return {
+        "empty": b"",
+        "text": b"this is no image, whatever its name says",
+        "jpeg cut": jpeg[: len(jpeg) // 2],
+        "png cut": png[: len(png) // 2],
+        "png16 cut": png16[: len(png16) // 2],
+        "png16 damaged": bytes(damaged),
+        "tif16 cut": tif16[: len(tif16) // 2],
+        "tif16 head": tif16[:60],
+        "float tiff": tiff_bytes(rgb.astype(np.float32), photometric="rgb"),
+        "32-bit tiff": tiff_bytes(rgb[..., 0].astype(np.uint32), photometric="minisblack"),
+        "bomb": bytes(bomb),
+        "svg": b"<svg xmlns='http://www.w3.org/2000/svg'/>",
+    }
+
+
+@pytest.mark.parametrize("kind", list(bad_files(np.zeros((60, 80, 3), np.uint8))))
+def test_bad_files_give_one_sentence(kind, chelsea, capfd):
+    with pytest.raises(ImageError) as caught:
+        read_picture(bad_files(chelsea)[kind])
+    assert 10 < len(str(caught.value)) < 160
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+def test_unknown_ending_is_refused(chelsea):
+    with pytest.raises(ImageError, match=r"\.bmp"):
+        encode_picture(Picture(chelsea), "bmp")
+
+
+def test_masks(chelsea):
+    mask = chelsea[..., 0] > 100
+    height, width = mask.shape
+    np.testing.assert_array_equal(read_mask(encode_mask(mask), (width, height)), mask)
+    cut_out = np.dstack([np.full_like(chelsea, 255), mask * np.uint8(255)])
+    data = pil_bytes(Image.fromarray(cut_out), "PNG")
+    np.testing.assert_array_equal(read_mask(data, (width, height)), mask)
+    with pytest.raises(ImageError, match=f"{width} x {height} px, the photo 10 x 20 px"):
+        read_mask(encode_mask(mask), (10, 20))
+
+
+def test_resized_keeps_the_mean(chelsea):
+    for width, height in ((100, 60), (900, 600)):
+        small = resized(chelsea, width, height)
+        assert small.shape == (height, width, 3)
+        assert abs(small.mean() - chelsea.mean()) < 0.5
