@@ -1,0 +1,3 @@
+"""The program around objectmorpher_core: window and command line."""
+
+__version__ = "0.1.0"

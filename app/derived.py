@@ -90,12 +90,17 @@ class Derived:
 
     def __init__(self) -> None:
         self._shapes, self._posed, self._layers = Memo(), Memo(), Memo()
-        self._shares, self._contours = Memo(), Memo()
+        self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._view_key: tuple[float, ...] = ()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
         return self._shares(lambda: float(mask.mean()), mask)
+
+    def moved_mask(self, document: Document) -> Mask:
+        """Where the moved objects were in the photo."""
+        masks = [o.mask for o in document.objects if o.is_moved and o.mask is not None]
+        return self._holes(lambda: np.logical_or.reduce(masks), *masks)
 
     def contours(self, mask: Mask) -> tuple[F32, ...]:
         """A mask's outlines, each (N, 2) image px."""
@@ -136,6 +141,20 @@ class Derived:
         assert thing.lifted is not None
         points = thing.pose.points if thing.pose else thing.lifted.control_points
         return self.project(document, k, points)
+
+    def links(self, document: Document, k: int, count: int) -> list[tuple[F64, F64]]:
+        """The strongest links of each control point: pairs of image px (2,)."""
+        thing = document.objects[k]
+        graph = self.shape(document.photo, thing).puppet.deformer.graph
+        xy = self.control_points(document, k)
+        strongest = np.argsort(-graph.weights, axis=1)[:, :count]
+        pairs = {
+            (min(i, int(j)), max(i, int(j)))
+            for i, row in enumerate(strongest)
+            for j in row
+            if graph.weights[i, j] > 0
+        }
+        return [(xy[i], xy[j]) for i, j in sorted(pairs)]
 
     # Between the object's frame and the picture
 

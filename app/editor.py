@@ -399,7 +399,7 @@ class Editor:
         return self.tasks.ensure_plate() or is_changed
 
     def set_theme(self, theme: str) -> None:
-        """"dark" or "light"."""
+        """ "dark" or "light"."""
         self.settings = replace(self.settings, theme=theme)
 
     def shut_down(self) -> None:

@@ -42,6 +42,17 @@ class Filing:
         """Opens a photo or a session, after the question about unsaved changes."""
         self.guard(lambda: self._open(path))
 
+    def open_sample(self, path: Path) -> None:
+        """Opens a photo that came with the program: it is nobody's file to go back to."""
+
+        def go_on() -> None:
+            settings = self._editor.settings
+            self._open(path)
+            self._editor.source = None
+            self._editor.settings = settings
+
+        self.guard(go_on)
+
     def guard(self, then: Callable[[], None]) -> None:
         """`then`, at once where nothing would be lost, or after the user's answer."""
         self._editor.hand.abort(self._editor)

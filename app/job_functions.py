@@ -71,8 +71,9 @@ def write_picture(document: Document, path: Path, quality: int, progress: Progre
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:
     """Saves the document as an .omorph file."""
-    from objectmorpher_core.files import write_all
     from objectmorpher_core.session_file import encode_session
+
+    from objectmorpher_core.files import write_all
 
     progress(0.1, "packing")
     data = encode_session(document)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import F32, frozen
-from .rotations import matrices_from_quats
+from .rotations import matrices_from_quats, quats_from_matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +48,22 @@ class Gaussians:
         """Covariance matrices (N, 3, 3), object frame."""
         axes = matrices_from_quats(self.quats.astype(np.float64)) * self.scales[:, None, :]
         return axes @ axes.transpose(0, 2, 1)
+
+    def moved(self, means: np.ndarray, linear: np.ndarray) -> Gaussians:
+        """The Gaussians at `means` (N, 3), each deformed by `linear` (N, 3, 3): F Sigma F^T.
+
+        The axes come out in the order of their lengths, the thinnest last: local +z stays the
+        normal of a flat Gaussian.
+        """
+        covariances = linear @ self.covariances() @ linear.transpose(0, 2, 1)
+        variances, axes = np.linalg.eigh(covariances)
+        axes = axes[:, :, ::-1].copy()
+        axes[np.linalg.det(axes) < 0, :, 0] *= -1
+        normals = np.linalg.inv(linear).transpose(0, 2, 1) @ self.normals[:, :, None]
+        inward = (axes[:, :, 2] * normals[:, :, 0]).sum(1) < 0
+        axes[inward, :, 1:] *= -1  # two axes: a rotation stays a rotation
+        scales = np.sqrt(np.maximum(variances[:, ::-1], 1e-20))
+        return Gaussians(means, quats_from_matrices(axes), scales, self.opacities, self.colors)
 
     def select(self, index: np.ndarray) -> Gaussians:
         """The Gaussians at `index` (integers or booleans)."""

@@ -7,16 +7,32 @@ as the command line does.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 
-from . import compose, lift, segment
+from . import compose, edits, lift, segment
 from .arrays import Mask, Pixels
 from .camera import Camera
-from .compose.composite import hole_margin
-from .document import Document, LiftedObject, Matte, Photo, Plate, Prompt
-from .image import ImageError, read_picture, to_u8
+from .compose.composite import Composite, composite, object_texture, plate_hole
+from .document import (
+    Click,
+    DeformSettings,
+    Document,
+    LiftedObject,
+    Matte,
+    Photo,
+    Placement,
+    Plate,
+    Prompt,
+)
+from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .lift import GAUSSIANS
 from .progress import Progress, part, silent
+from .puppet import Puppet, puppet_of
+from .report import Stopwatch, build_report
+from .script import EditScript, ScriptError
 from .segment.matte import band_width, build_matte
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
@@ -102,4 +118,186 @@ def make_plate(
     return Plate(int(columns[0]), int(rows[0]), filled[inner], hole_crop, inpainter.name)
 
 
-__all__ = ["hole_margin", "lift_mask", "make_plate", "open_photo", "segment_photo"]
+def export(document: Document, puppets: dict[int, Puppet] | None = None) -> Picture:
+    """The edited photo, with everything of the file that the edit does not concern."""
+    return _picture(document, composite(document, puppets))
+
+
+def _picture(document: Document, result: Composite) -> Picture:
+    return replace(document.photo.picture, pixels=result.pixels)
+
+
+@dataclass(frozen=True, eq=False)
+class Edited:
+    """What `run_script` and `replay` make."""
+
+    document: Document
+    composite: Composite
+    picture: Picture
+    puppet: Puppet
+    energies: tuple[float, ...]
+    stopwatch: Stopwatch
+
+    def report(self) -> dict[str, Any]:
+        """The figures of DESIGN section 6, up to now."""
+        return build_report(
+            self.document, self.puppet, self.energies, self.composite, self.stopwatch
+        )
+
+
+def prompt_of(script: EditScript) -> Prompt:
+    """What the script says about which object is meant."""
+    clicks = [Click(x, y) for x, y in script.click]
+    clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
+    return Prompt(tuple(clicks), script.box, script.subject)
+
+
+def select(
+    document: Document,
+    script: EditScript,
+    mask: bytes | None = None,
+    progress: Progress = silent,
+    stopwatch: Stopwatch | None = None,
+) -> Document:
+    """The document with the script's object chosen; the bytes of a `mask` picture win.
+
+    Raises SelectionError, ImageError, EditError or ScriptError.
+    """
+    prompt = prompt_of(script)
+    if mask is None and prompt.is_empty:
+        raise ScriptError("no object is chosen: use --click, --box, --subject or --mask")
+    with (stopwatch or Stopwatch()).stage("segment"):
+        if mask is not None:
+            found, backend = read_mask(mask, document.photo.size), "mask"
+        else:
+            pixels = document.photo.pixels
+            found, backend = segment_photo(pixels, prompt, script.segment, progress, script.seed)
+    document = edits.set_mask(edits.add_object(document), 0, found, prompt)
+    return document.with_backend("segment", backend)
+
+
+def run_script(
+    data: bytes,
+    name: str,
+    script: EditScript,
+    mask: bytes | None = None,
+    progress: Progress = silent,
+    needs_plate: bool = False,
+) -> Edited:
+    """The main job: `data` (a picture file called `name`) edited as `script` says.
+
+    `mask` is the bytes of the script's mask picture. `needs_plate` makes the plate even where
+    nothing moved. Raises the one-sentence errors of the stages, all of them ValueErrors.
+    """
+    refuse_missing(script)
+    stopwatch = Stopwatch()
+    with stopwatch.stage("load"):
+        document = open_photo(data, name, script.fov, script.seed)
+    document = select(document, script, mask, part(progress, 0.0, 0.3), stopwatch)
+    with stopwatch.stage("lift"):
+        lifted = lift_mask(
+            document.photo.pixels, document.photo.camera, document.objects[0].mask,
+            script.lift, script.gaussians or GAUSSIANS, part(progress, 0.3, 0.5), script.seed,
+        )  # fmt: skip
+        document = edits.set_lifted(document, 0, *lifted)
+    settings = DeformSettings(script.deform, script.links, script.faithful)
+    document = edits.set_deform(document, 0, settings)
+    puppet = puppet_of(document.objects[0], document.photo.camera)
+    document, energies = _pose(document, puppet, script, progress, stopwatch)
+    if document.objects[0].is_moved or needs_plate:
+        with stopwatch.stage("inpaint"):
+            hole, pixels = plate_hole(document), document.photo.pixels
+            step = part(progress, 0.6, 0.85)
+            plate = make_plate(pixels, hole, script.inpaint, step, script.seed)
+            document = edits.set_plate(document, plate)
+    return _finished(document, puppet, energies, progress, stopwatch)
+
+
+def replay(document: Document, progress: Progress = silent) -> Edited:
+    """The picture of a session, as it was when the session was saved."""
+    if not document.objects or document.objects[0].lifted is None:
+        raise ScriptError("the session holds no lifted object, there is nothing to replay")
+    stopwatch = Stopwatch()
+    item = document.objects[0]
+    puppet = puppet_of(item, document.photo.camera)
+    energies = (0.0,)
+    if item.handles:
+        with stopwatch.stage("deform"):
+            energies = puppet.deformer.solve(item.handles, item.has_auto_anchors).energies
+    return _finished(document, puppet, energies, progress, stopwatch)
+
+
+def refuse_missing(script: EditScript) -> None:
+    """Raises ScriptError where the script needs a backend that is not there."""
+    if script.splats is not None:
+        raise ScriptError("--splats: the registration of imported objects is not installed")
+    if script.refine not in ("auto", "none"):
+        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: none")
+
+
+def _pose(
+    document: Document,
+    puppet: Puppet,
+    script: EditScript,
+    progress: Progress,
+    stopwatch: Stopwatch,
+) -> tuple[Document, tuple[float, ...]]:
+    """Handles, pins and placement of the script; the energies of the solve."""  # fmt: skip
+    energies: tuple[float, ...] = (0.0,)
+    document = _with_handles(document, puppet, script)
+    item = document.objects[0]
+    if any(not handle.is_pin for handle in item.handles):
+        progress(0.5, "Linking control points")
+        with stopwatch.stage("graph"):
+            deformer = puppet.deformer
+        progress(0.55, "Deforming")
+        with stopwatch.stage("deform"):
+            solution = deformer.solve(item.handles, item.has_auto_anchors)
+        energies = solution.energies
+        document = edits.set_pose(document, 0, solution.pose)
+    move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
+    scale = 1.0 if script.scale is None else script.scale
+    placement = Placement((move[0], move[1]), move[2], turn, scale)
+    return edits.set_placement(document, 0, placement), energies
+
+
+def _with_handles(document: Document, puppet: Puppet, script: EditScript) -> Document:
+    lifted, camera = puppet.lifted, document.photo.camera
+    matte = document.objects[0].matte
+    assert matte is not None
+    texture = object_texture(document.photo.pixels, matte, None)
+
+    def pick(xy: tuple[float, float], option: str) -> Any:
+        width, height = document.photo.size
+        if not (0 <= xy[0] < width and 0 <= xy[1] < height):
+            raise ScriptError(
+                f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
+            )
+        point = puppet.pick(xy, None, Placement(), texture)
+        if point is None:
+            raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
+        return point
+
+    for xy in script.pin:
+        document = edits.add_handle(document, 0, pick(xy, "--pin").rest, is_pin=True)
+    for handle in script.handle:
+        point = pick(handle.at, "--handle")
+        depth = point.depth + handle.dz * lifted.diameter * lifted.scale
+        if depth <= 0:
+            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
+        target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
+        document = edits.add_handle(document, 0, point.rest, target)
+    return document
+
+
+def _finished(
+    document: Document,
+    puppet: Puppet,
+    energies: tuple[float, ...],
+    progress: Progress,
+    stopwatch: Stopwatch,
+) -> Edited:
+    with stopwatch.stage("render"):
+        result = composite(document, {0: puppet}, part(progress, 0.85, 1.0))
+    progress(1.0, "Done")
+    return Edited(document, result, _picture(document, result), puppet, energies, stopwatch)

@@ -12,6 +12,7 @@ from .arrays import F64
 from .camera import Camera
 from .deform.deformer import Deformer
 from .document import DeformSettings, EditObject, LiftedObject, Placement, Pose
+from .gaussians import Gaussians
 from .raster import tiles
 from .raster.posed import PosedSplats, SplatPoser, TextureLevels
 from .raster.reference import Picture3D
@@ -51,6 +52,13 @@ class Puppet:
         if pose is None:
             return self._poser.rest(matrix)
         return self._poser.pose(self.deformer.skin_gaussians(pose), matrix)
+
+    def posed_gaussians(self, pose: Pose | None, placement: Placement) -> Gaussians:
+        """The object's solid Gaussians after the edit, in the photo camera's frame (y down)."""
+        splats = self.posed(pose, placement)
+        motion = splats.linear @ self.lifted.world_from_object[:3, :3]
+        moved = self.lifted.gaussians.moved(splats.means, motion)
+        return moved.select(self.lifted.texture.solidity > 0.5)
 
     def draw(
         self, pose: Pose | None, placement: Placement, texture: TextureLevels, camera: Camera

@@ -14,7 +14,7 @@ from .panel_place import draw_place
 from .panel_pose import draw_pose
 from .panes import edge, pane
 from .theme import PRIMARY, Icon, theme
-from .widgets import Kind, button, gap, heading, icon_button, note, rule
+from .widgets import Kind, button, gap, heading, icon_button, note, rule, tooltip
 
 ROW = 32.0  # points
 
@@ -105,7 +105,8 @@ def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
     imgui.set_cursor_pos(ImVec2(theme.pt(12), rect.height - foot + theme.pt(12)))
     label, command = next_step(editor)
     if command is None:
-        button(label, Kind.PRIMARY, why_not=_hint(editor))
+        button(label, Kind.WAITING)
+        tooltip(_hint(editor))
     elif button(label, Kind.PRIMARY, why_not=COMMANDS[command].why_not(editor)):
         run(editor, command)
 

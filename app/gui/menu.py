@@ -85,7 +85,7 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     if editor.document is None:
         return
     side = rect.height - theme.pt(4)
-    buttons = 2 * side + theme.pt(4 + 8)
+    buttons = 2 * side + theme.pt(4 + 12)
     name = editor.path.name if editor.path else editor.document.photo.name
     state = "" if editor.is_saved else "edited"
     if (text := imgui.calc_text_size(name).x) > rect.width * 0.4:
@@ -98,12 +98,12 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
         imgui.same_line(0, theme.pt(8))
         imgui.text_colored(theme.vec("secondary"), state)
     imgui.same_line(rect.width - buttons)
-    imgui.set_cursor_pos_y(theme.pt(2))
     points = side / theme.scale
-    for icon, name in ((Icon.UNDO, "undo"), (Icon.REDO, "redo")):
+    for i, (icon, name) in enumerate(((Icon.UNDO, "undo"), (Icon.REDO, "redo"))):
+        if i:
+            imgui.same_line(0, theme.pt(4))
+        imgui.set_cursor_pos_y(theme.pt(2))
         command = COMMANDS[name]
         hint = f"{command.label} ({command.keys})"
         if icon_button(icon, name, hint, command.why_not(editor), points):
             run(editor, name)
-        imgui.same_line(0, theme.pt(4))
-        imgui.set_cursor_pos_y(theme.pt(2))

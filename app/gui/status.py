@@ -87,10 +87,7 @@ def _draw_bar(x: float, middle: float, fraction: float) -> None:
 def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
     """The message until something else is done, else the hint."""
     message = editor.message
-    start = imgui.get_cursor_screen_pos()
-    imgui.push_clip_rect(
-        ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True
-    )
+    imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
     imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
     if message is None:
         imgui.text_colored(theme.vec("secondary"), hint)
@@ -103,7 +100,6 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
         if message.is_error:
             _draw_error_buttons(editor)
     imgui.pop_clip_rect()
-    imgui.set_cursor_screen_pos(start)
 
 
 def _draw_error_buttons(editor: Editor) -> None:
@@ -119,5 +115,3 @@ def _draw_error_buttons(editor: Editor) -> None:
     if imgui.button("Dismiss"):
         editor.message = None
     imgui.pop_style_var()
-
-

@@ -19,6 +19,7 @@ class Kind(Enum):
     """How much a button asks for attention."""
 
     PRIMARY = "primary"
+    WAITING = "waiting"  # a primary button while the next step is the user's, in the photo
     PLAIN = "plain"
     QUIET = "quiet"  # no frame until hovered
 
@@ -54,7 +55,8 @@ def button(
     label: str, kind: Kind = Kind.PLAIN, why_not: str | None = None, width: float = -1.0
 ) -> bool:
     """A text button; `why_not` greys it out and is its tooltip. `width` in points, -1 fills."""
-    height = PRIMARY if kind is Kind.PRIMARY else FIELD
+    is_tall = kind in (Kind.PRIMARY, Kind.WAITING)
+    height = PRIMARY if is_tall else FIELD
     across = theme.pt(width) if width > 0 else width
     roles = _ROLES[kind]
     columns = ("button", "button_hovered", "button_active", "text")
@@ -63,10 +65,10 @@ def button(
         shown = theme.vec("panel" if role == "none" else role, alpha)
         imgui.push_style_color(getattr(imgui.Col_, column), shown)
     imgui.begin_disabled(why_not is not None)
-    if kind is Kind.PRIMARY:
+    if is_tall:
         imgui.push_font(theme.bold, 0.0)
     is_pressed = imgui.button(label, ImVec2(across, theme.pt(height)))
-    if kind is Kind.PRIMARY:
+    if is_tall:
         imgui.pop_font()
     imgui.end_disabled()
     imgui.pop_style_color(len(columns))
@@ -77,6 +79,7 @@ def button(
 
 _ROLES = {
     Kind.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
+    Kind.WAITING: ("raised", "raised", "raised", "secondary"),
     Kind.PLAIN: ("raised", "hovered", "pressed", "text"),
     Kind.QUIET: ("none", "hovered", "pressed", "text"),
 }

@@ -27,9 +27,7 @@ def with_interface(model: bytes, images: str, output: str) -> bytes:
             parts.append(view[start:end])
             continue
         graph = view[payload:end]
-        body = [
-            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
-        ]
+        body = [graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)]
         body.append(_bytes_field(INPUT, _bytes_field(1, images.encode()) + _bytes_field(2, tensor)))
         body.append(_bytes_field(OUTPUT, _bytes_field(1, output.encode())))
         parts.append(_bytes_field(GRAPH, b"".join(body)))

@@ -21,8 +21,11 @@ SIDE = 320  # px, the guess is a square over the whole photo, as the subject map
 UNSURE = 0.75  # cells, how far an outline of cells may be from the true one (standard deviation)
 SURE_SALIENCE = 0.9
 SMALLEST_PART = 0.02  # x object's area
+MINOR = 1.5  # exponent: how much a negative click means a minor part
 SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
+LARGER = 0.03  # exponent: how much a larger region is preferred
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
+SEEDS_IN_BOX = ((0.5, 0.5), (0.5, 0.3), (0.5, 0.7), (0.3, 0.5), (0.7, 0.5))  # x its size
 SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller box
 
 
@@ -58,14 +61,18 @@ def guess(walk: Walk, strict: Walk, rgb: RGB, prompt: Prompt, salience: F32 | No
     if prompt.is_subject:
         choices += _subjects(ground)
     elif not wanted:
-        choices.append(_in_box(ground))
+        choices.append(_in_box(ground, strict))
     cells = np.any([_settle(strict, choice) for choice in choices], axis=0)
     subjects = [choice.subject for choice in choices if choice.subject is not None]
     soft = _sharpen(cells, np.max(subjects, axis=0) if subjects else None)
     kept = inside.copy()
     for cell in unwanted:
         kept &= ~_part(strict, cell, wanted, cells)
-    return np.minimum(soft, _soften(kept))
+    soft = np.minimum(soft, _soften(kept))
+    for row, column in unwanted:
+        centre = int((column + 0.5) * SIDE / walk.shape[1]), int((row + 0.5) * SIDE / walk.shape[0])
+        cv2.circle(soft, centre, SIDE // max(walk.shape), (0.0,), -1)
+    return soft
 
 
 def _part(strict: Walk, cell: tuple[int, int], others: list[tuple[int, int]], whole: Mask) -> Mask:
@@ -79,7 +86,7 @@ def _part(strict: Walk, cell: tuple[int, int], others: list[tuple[int, int]], wh
         if share == 1 or any(region.mask[other] for other in others):
             break
         # Who corrects takes away a minor part, yet not a speck.
-        contrast = strict.contrast(region.mask, whole) * (1 - share**2)
+        contrast = strict.contrast(region.mask, whole) * (1 - share) ** MINOR
         if contrast > best.contrast and share > SMALLEST_PART:
             best = Region(region.mask, contrast)
     return best.mask
@@ -89,7 +96,9 @@ def _subjects(ground: Ground) -> list[Choice]:
     """The photo's subject: what hangs together with the inmost cell of each of its pieces."""
     if ground.salience is None or ground.salience.max() <= 0.5:
         raise SelectionError("no subject stands out in this photo: click the object")
-    salient = ((ground.salience > 0.5) & (_enlarge(ground.inside.astype(np.float32)) > 0.5)).astype(np.uint8)
+    salient = ((ground.salience > 0.5) & (_enlarge(ground.inside.astype(np.float32)) > 0.5)).astype(
+        np.uint8
+    )
     count, labels, stats, _ = cv2.connectedComponentsWithStats(salient)
     if count == 1:
         raise SelectionError("no subject stands out in the box: click the object")
@@ -125,34 +134,38 @@ def _around_click(ground: Ground, cell: tuple[int, int]) -> Choice:
     return Choice(best.mask, subject)
 
 
-def _in_box(ground: Ground) -> Choice:
-    """The object that a box encloses: what a walk from outside the box misses."""
-    walk, inside = ground.walk, ground.inside
-    ring = ~inside
-    if not ring.any():
-        ring[[0, -1]] = ring[:, [0, -1]] = True
+def _in_box(ground: Ground, strict: Walk) -> Choice:
+    """The object that a box encloses: it reaches the box's sides and does not go beyond them."""
+    inside = ground.inside
     if not inside.any():
         raise SelectionError("the box is too small to hold an object: draw a larger one")
-    spread = walk.spread(ring.astype(np.float64))
-    levels = np.quantile(spread[inside], np.linspace(SMALLEST_IN_BOX, 1.0, 40))
-    masks = [inside & (spread <= level) for level in levels]
+    box = _extent(inside)
     subject = cells = None
+    regions: list[tuple[float, Mask]] = []  # leak, mask
     if ground.salience is not None:
         subject = ground.salience * _enlarge(inside.astype(np.float32))
-        cells = _to_cells(subject, walk.shape)
+        cells = _to_cells(subject, inside.shape)
         if (cells > 0.5).sum() > SMALLEST_IN_BOX * inside.sum():
-            masks.append(cells > 0.5)
+            regions.append((0.0, cells > 0.5))
         else:
             cells = subject = None
-    regions = [Region(mask, walk.contrast(mask)) for mask in masks if mask.any()]
-    box = _extent(inside)
+    for across, down in SEEDS_IN_BOX:
+        cell = int(box[1] + down * (box[3] - box[1])), int(box[0] + across * (box[2] - box[0]))
+        for walk in (ground.walk, strict):
+            for region in walk.regions(walk.spread(walk.only(cell)), cell):
+                within = region.mask & inside
+                if within.sum() > SMALLEST_IN_BOX * inside.sum():
+                    regions.append((1 - within.sum() / region.mask.sum(), within))
 
-    def score(region: Region) -> float:
-        left, top, right, bottom = _extent(region.mask)
+    def score(leak: float, mask: Mask) -> float:
+        left, top, right, bottom = _extent(mask)
         reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
-        return reach * _score(region, cells, None)  # a box is drawn as large as its object
+        whole = _score(Region(mask, ground.walk.contrast(mask)), cells, None)
+        return (1 - leak) * reach**0.5 * whole
 
-    return Choice(max(regions, key=score).mask, subject)
+    if not regions:
+        return Choice(inside, None)
+    return Choice(max(regions, key=lambda region: score(*region))[1], subject)
 
 
 def _extent(mask: Mask) -> tuple[int, int, int, int]:
@@ -171,7 +184,7 @@ def _score(region: Region, subject: F32 | None, other: F32 | None) -> float:
     score = region.contrast * (1 - border**2) * (1 - mask.mean() ** 2)
     if other is not None:
         score *= 1 - (other * mask).sum() / max(other.sum(), 1.0)
-    return float(score)
+    return float(score * mask.mean() ** LARGER)
 
 
 def _subject_piece(salience: F32, cell: tuple[int, int], shape: tuple[int, int]) -> F32 | None:

@@ -28,7 +28,7 @@ TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the clas
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
 TEMPERATURE = 0.15  # of 1 - cosine; crosses from part to part of an object
-STRICT_TEMPERATURE = 0.05  # stops at the borders of parts too
+STRICT_TEMPERATURE = 0.03  # stops at the borders of parts too
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,9 @@ class DinoWalk:
         h, w = max(1, round(height * scale)), max(1, round(width * scale))
         shrinks = h * PATCH < height
         small = cv2.resize(
-            rgb, (w * PATCH, h * PATCH), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+            rgb,
+            (w * PATCH, h * PATCH),
+            interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC,
         )
         pixels = ((small.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
         tokens = self._open().run([TOKENS], {IMAGES: pixels})[0][0, 1:].reshape(h, w, -1)

@@ -16,7 +16,8 @@ from .selection import box_mask, check_mask, fill_small_holes, keep_touched
 WORK_AREA = 300_000  # px that GrabCut sees at most
 SURE = 0.05  # a guess nearer than this to 0 or 1 is not questioned
 MARGIN = 0.08  # x crop's size, background kept around the object
-ROUNDS = 3  # of GrabCut; more change nothing visible
+PLAIN = 2  # grey levels; where all is one colour, colours decide nothing
+ROUNDS = 2  # of GrabCut; more change nothing visible
 COLORS = 5  # per colour model, cv2.grabCut's own number
 SAMPLES = 4000  # px that a colour model is started from
 CLICK_RADIUS = 2  # px of the reduced crop that a click decides
@@ -86,7 +87,8 @@ def _trimap(
 def _grabcut(rgb: RGB, trimap: np.ndarray, seed: int) -> F32:
     """(h, w) 1 where the object is."""
     is_object = (trimap == cv2.GC_FGD) | (trimap == cv2.GC_PR_FGD)
-    if is_object.all() or not is_object.any():
+    is_plain = int(rgb.max()) - int(rgb.min()) <= PLAIN
+    if is_plain or is_object.all() or not is_object.any():
         return is_object.astype(np.float32)
     background = _color_model(rgb[~is_object], seed)
     foreground = _color_model(rgb[is_object], seed)

@@ -10,13 +10,16 @@ from ..document import Prompt
 from ..progress import Progress, silent
 from .choice import guess
 from .edges import cut
-from .selection import SelectionError, check_prompt
+from .selection import SelectionError, box_mask, check_prompt
 from .subject import SubjectNet
 from .walk import Walk
 
 CELLS = 4000  # of a photo
 COLOR_STEP = 14.0  # CIELAB units; two colours this far apart are 0.5 apart in the walk
-TEMPERATURE = 0.15
+TEMPERATURE = 0.3
+STRICT_TEMPERATURE = 0.1
+BOX_SIDE = 320  # px, the square in which a box is drawn
+UNDECIDED = 0.7  # guess inside a box: colours decide
 MEAN_SHIFT = (6, 12)  # cells' px and CIELAB units within which texture is one colour
 
 
@@ -53,12 +56,22 @@ class GrabCut:
                 raise SelectionError(f"the subject cannot be found: {reason}")
             salience = self._subject.salience(rgb)
         progress(0.1, "walking from the clicks")
-        walk = Walk(_colors(rgb), TEMPERATURE)
-        soft = guess(walk, walk, rgb, prompt, salience)
+        if prompt.clicks or prompt.is_subject:
+            colors = _colors(rgb)
+            walk, strict = Walk(colors, TEMPERATURE), Walk(colors, STRICT_TEMPERATURE)
+            soft = guess(walk, strict, rgb, prompt, salience)
+        else:
+            soft = _box_guess(rgb, prompt)
         progress(0.5, "cutting out the object")
         mask = cut(rgb, soft, prompt, seed)
         progress(1.0, "cut out the object")
         return mask
+
+
+def _box_guess(rgb: RGB, prompt: Prompt) -> F32:
+    """(BOX_SIDE, BOX_SIDE) guess of a box alone: outside is ground, inside is for GrabCut."""
+    inside = box_mask(rgb.shape, prompt).astype(np.float32)
+    return UNDECIDED * cv2.resize(inside, (BOX_SIDE, BOX_SIDE), interpolation=cv2.INTER_AREA)
 
 
 def _colors(rgb: RGB) -> F32:
@@ -66,7 +79,9 @@ def _colors(rgb: RGB) -> F32:
     height, width = rgb.shape[:2]
     scale = min(1.0, (CELLS / (height * width)) ** 0.5)
     size = (max(1, round(width * scale * 2)), max(1, round(height * scale * 2)))
-    small = cv2.pyrMeanShiftFiltering(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), *MEAN_SHIFT)
+    small = cv2.pyrMeanShiftFiltering(
+        cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), *MEAN_SHIFT
+    )
     half = cv2.resize(small, ((size[0] + 1) // 2, (size[1] + 1) // 2), interpolation=cv2.INTER_AREA)
     lab = cv2.cvtColor(half.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     return lab / COLOR_STEP

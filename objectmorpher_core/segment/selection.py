@@ -8,6 +8,7 @@ import numpy as np
 from ..arrays import RGB, Mask
 from ..document import Prompt
 
+SMALLEST = 16  # px; less is no object
 SMALL_HOLE = 0.002  # x area of the mask; smaller holes are specks, larger ones are meant
 SMALL_ISLAND = 0.02  # x area of the largest piece; smaller pieces that no click touches are specks
 
@@ -20,7 +21,7 @@ def check_prompt(rgb: RGB, prompt: Prompt) -> None:
     """Raises SelectionError where the prompt says nothing, or points outside the photo (H, W)."""
     height, width = rgb.shape[:2]
     if prompt.is_empty:
-        raise SelectionError("nothing is chosen: click the object, draw a box, or ask for the subject")
+        raise SelectionError("nothing is chosen: click the object, box it, or ask for the subject")
     for click in prompt.clicks:
         if not (0 <= click.x < width and 0 <= click.y < height):
             at = f"the click at {click.x:g}, {click.y:g}"
@@ -88,9 +89,9 @@ def fill_small_holes(mask: Mask, prompt: Prompt) -> Mask:
 
 
 def check_mask(mask: Mask) -> Mask:
-    """`mask`, or SelectionError where it is empty or covers the whole photo."""
-    if not mask.any():
-        raise SelectionError("nothing was found there: add a click or a box")
+    """`mask`, or SelectionError where it is a speck or covers the whole photo."""
     if mask.all():
         raise SelectionError("the selection covers the whole photo: say what is not the object")
+    if mask.sum() < SMALLEST:
+        raise SelectionError("nothing stands out there: add a click or a box")
     return mask

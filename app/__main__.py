@@ -1,0 +1,60 @@
+"""Arguments, construction, loop: `objectmorpher` and `python -m app`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+# One BLAS thread: the solver's matrices are small, and a second thread costs more than it helps.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+SAMPLE_EDIT = ("--click", "300,215", "--turn", "18,0,0")  # what the first run does headless
+HEADLESS_OUT = Path("objectmorpher-edited.png")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the program; returns its exit code."""
+    from . import cli
+
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments and (
+        arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
+    ):
+        return cli.main(arguments)
+    options = cli.parse_window(arguments)
+    if not has_display():
+        return _edit_headless(options.file)
+    from .gui.window import run_window
+
+    return run_window(cli.window_options(options))
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here at all."""
+    if sys.platform.startswith("linux"):
+        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return True
+
+
+def _edit_headless(photo: Path | None) -> int:
+    """Without a screen: the sample edit, or a turn of the photo's subject, into a file."""
+    from . import cli
+    from .resources import resource
+
+    choice = SAMPLE_EDIT if photo is None else ("--subject", *SAMPLE_EDIT[2:])
+    photo = photo or resource(cli.SAMPLE)
+    if photo.suffix.lower() == ".omorph":
+        arguments = ["replay", str(photo), "-o", str(HEADLESS_OUT)]
+    else:
+        arguments = ["edit", str(photo), *choice, "-o", str(HEADLESS_OUT)]
+    print(f"There is no display, so this edit runs without a window:\n  {' '.join(arguments)}")
+    code = cli.main(arguments)
+    if code == 0:
+        print(f"The edited photo is {HEADLESS_OUT.resolve()}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,243 @@
+"""The command line (DESIGN section 6): subcommands, progress bars, exit codes.
+
+A failure is one sentence on stderr and a non-zero exit; nothing is then written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from objectmorpher_core.progress import Progress, silent
+
+from . import __version__
+from .options import RENDERERS, WindowOptions
+
+PROGRAM = "objectmorpher"
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+SAMPLE = "assets/samples/coffee.jpg"
+FAILED, MISUSED = 1, 2  # exit codes
+COMMANDS = ("edit", "select", "replay", "info", "models")
+
+
+class UsageError(ValueError):
+    """The command line asks for something impossible; one sentence."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose errors are one sentence."""
+
+    def error(self, message: str) -> Any:
+        sys.stderr.write(f"{PROGRAM}: {message}\n")
+        raise SystemExit(MISUSED)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs a subcommand; returns the exit code."""
+    options = build_parser().parse_args(_joined_negatives(arguments))
+    try:
+        options.run(options)
+    except KeyboardInterrupt:
+        sys.stderr.write(f"{PROGRAM}: interrupted\n")
+        return 130
+    except (ValueError, OSError, RuntimeError) as error:
+        sys.stderr.write(f"{PROGRAM}: {_sentence(error)}\n")
+        return FAILED
+    except MemoryError:
+        sys.stderr.write(f"{PROGRAM}: there is not enough memory for this photo\n")
+        return FAILED
+    return 0
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """All subcommands and their options."""
+    parser = _Parser(
+        prog=PROGRAM,
+        description="Open a photo, click an object, drag points on it in 3D, save the photo.",
+        epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
+    _add_edit(commands.add_parser("edit", help="edit a photo without a window"))
+    _add_select(commands.add_parser("select", help="write the mask of the chosen object"))
+    _add_replay(commands.add_parser("replay", help="render a saved session again"))
+    _add_info(commands.add_parser("info", help="what a session holds"))
+    _add_models(commands.add_parser("models", help="list, get and check learned weights"))
+    return parser
+
+
+def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
+    """The options of the editor's window: `objectmorpher [FILE]`."""
+    parser = _Parser(prog=PROGRAM, description="Open the editor.")
+    add = parser.add_argument
+    add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
+    add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
+    add("--renderer", choices=RENDERERS, default="auto")
+    add("--theme", choices=("dark", "light"))
+    add("--scale", type=float, metavar="S", help="pixels per point")
+    add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
+    add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
+    add("--seed", type=int, default=0)
+    add("--frames", type=int, metavar="N", help="close after N frames")
+    add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
+    return parser.parse_args(list(arguments))
+
+
+def window_options(options: argparse.Namespace) -> WindowOptions:
+    """What `parse_window` read, as the window takes it."""
+    from .resources import resource
+
+    file = options.file or (resource(SAMPLE) if options.is_sample else None)
+    width, height = options.size
+    return WindowOptions(
+        file, options.renderer, options.theme, options.scale, (int(width), int(height)),
+        options.fov, options.seed, options.frames, options.screenshot,
+    )  # fmt: skip
+
+
+def _add_choosing(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("choosing the object (px of the upright photo)")
+    add = group.add_argument
+    add("--click", action="append", type=_list(2, 2), metavar="X,Y", help="on the object")
+    add("--not-click", action="append", type=_list(2, 2), metavar="X,Y", help="beside it")
+    add("--box", type=_list(4, 4), metavar="X0,Y0,X1,Y1", help="around it")
+    add("--subject", action="store_true", default=None, help="the photo's main subject")
+    add("--mask", metavar="M.png", help="a mask picture; it wins over everything else")
+    add("--segment", metavar="NAME", help="backend: auto, dino, grabcut, subject")
+    add("--seed", type=int, metavar="N", help="default 0; two runs give identical bytes")
+
+
+def _add_edit(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("photo", type=Path, nargs="?", metavar="PHOTO")
+    parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
+    _add_choosing(parser)
+    add = parser.add_argument_group("backends").add_argument
+    add("--lift", metavar="NAME", help="auto or relief")
+    add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
+    add("--refine", metavar="NAME", help="auto or none")
+    add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
+    add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
+    add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
+    add = parser.add_argument_group("deforming").add_argument
+    add("--pin", action="append", type=_list(2, 2), metavar="X,Y", help="a point that stays")
+    add("--handle", action="append", type=_handle, metavar="X,Y:X2,Y2[,DZ]",
+        help="drag the surface point seen at X,Y to X2,Y2, DZ diameters away")  # fmt: skip
+    add("--deform", metavar="MODE", help="arap (default) or laplacian")
+    add("--links", metavar="KIND", help="geodesic (default) or euclidean")
+    add("--faithful", action="store_true", default=None, help="the paper as printed")
+    add = parser.add_argument_group("placing the whole object, after the handles").add_argument
+    add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
+    add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
+    add("--scale", type=float, metavar="S")
+    add("--shadow", metavar="auto|none", help="default auto")
+    add = parser.add_argument_group("scripts and further outputs").add_argument
+    add("--script", type=Path, metavar="EDIT.json", help="the same options from a file")
+    add("--session", type=Path, metavar="S.omorph")
+    add("--save-mask", type=Path, metavar="FILE")
+    add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
+    add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
+    add("--save-splats", type=Path, metavar="FILE", help="the edited object as 3DGS .ply")
+    add("--report", type=Path, metavar="R.json")
+    parser.set_defaults(run=_lazily("edit"))
+
+
+def _add_select(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("photo", type=Path, metavar="PHOTO")
+    parser.add_argument("-o", "--out", type=Path, metavar="MASK.png", required=True)
+    _add_choosing(parser)
+    parser.set_defaults(run=_lazily("select"))
+
+
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("-o", "--out", type=Path, metavar="OUT", required=True)
+    parser.add_argument("--report", type=Path, metavar="R.json")
+    parser.set_defaults(run=_lazily("replay"))
+
+
+def _add_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
+    parser.set_defaults(run=_lazily("info"))
+
+
+def _add_models(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("action", choices=("list", "get", "path", "verify"))
+    parser.add_argument("id", nargs="?", help="one weight; default all of them")
+    parser.set_defaults(run=_lazily("models"))
+
+
+def _lazily(name: str) -> Callable[[argparse.Namespace], None]:
+    """The subcommand's function, imported when it runs: `--help` stays instant."""
+
+    def run(options: argparse.Namespace) -> None:
+        from . import cli_commands
+
+        getattr(cli_commands, f"run_{name}")(options)
+
+    return run
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Progress]:
+    """A Progress that draws a bar on a terminal, and does nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description:<28}"), BarColumn(), TimeElapsedColumn())
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task(title, total=1.0)
+        yield lambda fraction, note: bars.update(task, completed=fraction, description=note)
+
+
+def _joined_negatives(arguments: Sequence[str]) -> list[str]:
+    """`--move -10,4` as `--move=-10,4`: a value may begin with a minus sign."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and re.fullmatch(r"--[a-z-]+", joined[-1]) and re.match(r"-[\d.]", word):
+            joined[-1] += "=" + word
+        else:
+            joined.append(word)
+    return joined
+
+
+def _list(least: int, most: int) -> Callable[[str], tuple[float, ...]]:
+    def parse(text: str) -> tuple[float, ...]:
+        try:
+            numbers = tuple(float(word) for word in text.split(","))
+        except ValueError:
+            numbers = ()
+        if not least <= len(numbers) <= most:
+            count = f"{least}" if least == most else f"{least} or {most}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not {count} numbers with commas")
+        return numbers
+
+    return parse
+
+
+def _handle(text: str) -> dict[str, Any]:
+    at, colon, to = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,DZ")
+    target = _list(2, 3)(to)
+    return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
+
+
+def _sentence(error: BaseException) -> str:
+    """One line for the user: what failed, in the words of whoever noticed."""
+    if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
+        reason = {FileNotFoundError: "does not exist", PermissionError: "cannot be read"}
+        if error.filename is not None:
+            return f"{error.filename} {reason.get(type(error), 'is a folder, not a file')}"
+    text = str(error) or type(error).__name__
+    return json.dumps(text)[1:-1] if "\n" in text else text

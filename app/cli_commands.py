@@ -1,0 +1,270 @@
+"""What the subcommands do. Every output is written at the end, all of them or none."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from objectmorpher_core.arrays import Mask
+from objectmorpher_core.compose.composite import plate_picture, straight_cutout
+from objectmorpher_core.document import Document
+from objectmorpher_core.files import write_all
+from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.pipeline import Edited, open_photo, refuse_missing, replay, run_script
+from objectmorpher_core.pipeline import select as select_object
+from objectmorpher_core.script import (
+    BatchItem,
+    EditScript,
+    ScriptError,
+    parse_scripts,
+    script_from,
+)
+
+from .cli import PICTURE_ENDINGS, PROGRAM, UsageError, progress_bar
+
+SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
+EXTRAS = {  # further outputs of `edit` and the endings each may have
+    "session": (".omorph",), "save_mask": (".png",), "save_plate": PICTURE_ENDINGS,
+    "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": (".ply",),
+    "report": (".json",),
+}  # fmt: skip
+
+
+def run_edit(options: argparse.Namespace) -> None:
+    """`objectmorpher edit`"""
+    items = _items(options)
+    outputs: dict[Path, bytes] = {}
+    for item in items:
+        photo, out = Path(item.photo or ""), Path(item.out or "")
+        extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
+        _check_outputs([photo], {out: PICTURE_ENDINGS})
+        _check_outputs([photo], {path: EXTRAS[name] for name, path in extras.items()})
+        everything = [*outputs, out, *extras.values()]
+        if len({path.resolve() for path in everything}) < len(everything):
+            raise UsageError("two outputs have the same name")
+        refuse_missing(item.script)
+        outputs |= _edit_one(item.script, photo, out, extras)
+    write_all(outputs)
+
+
+def _edit_one(
+    script: EditScript, photo: Path, out: Path, extras: dict[str, Path]
+) -> dict[Path, bytes]:
+    mask = Path(script.mask).read_bytes() if script.mask else None
+    with progress_bar("Opening") as progress:
+        edited = run_script(
+            photo.read_bytes(), photo.name, script, mask, progress, "save_plate" in extras
+        )
+        with edited.stopwatch.stage("save"):
+            outputs = {out: encode_picture(edited.picture, out.suffix)}
+            for name, path in extras.items():
+                if name != "report":
+                    outputs[path] = _extra(name, edited, path)
+        if "report" in extras:
+            outputs[extras["report"]] = _json(edited.report())
+    return outputs
+
+
+def _extra(name: str, edited: Edited, path: Path) -> bytes:
+    """The bytes of one of the further outputs."""
+    document = edited.document
+    if name == "session":
+        from objectmorpher_core.session_file import encode_session
+
+        return encode_session(document)
+    if name == "save_mask":
+        return encode_mask(_mask(document))
+    if name == "save_plate":
+        plate = Picture(plate_picture(document), is_grey=document.photo.picture.is_grey,
+                        icc=document.photo.picture.icc)  # fmt: skip
+        return encode_picture(plate, path.suffix)
+    if name == "save_object":
+        cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
+        picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
+        return encode_picture(picture, path.suffix)
+    from objectmorpher_core.splat_files.ply import encode_ply
+
+    item = document.objects[0]
+    return encode_ply(edited.puppet.posed_gaussians(item.pose, item.placement))
+
+
+def run_select(options: argparse.Namespace) -> None:
+    """`objectmorpher select`"""
+    _check_outputs([options.photo], {options.out: (".png",)})
+    script = _script(options)
+    mask = Path(script.mask).read_bytes() if script.mask else None
+    with progress_bar("Selecting") as progress:
+        document = open_photo(options.photo.read_bytes(), options.photo.name)
+        document = select_object(document, script, mask, progress)
+    write_all({options.out: encode_mask(_mask(document))})
+
+
+def run_replay(options: argparse.Namespace) -> None:
+    """`objectmorpher replay`"""
+    from objectmorpher_core.session_file import decode_session
+
+    wanted = {options.out: PICTURE_ENDINGS}
+    if options.report:
+        wanted[options.report] = (".json",)
+    _check_outputs([options.session], wanted)
+    with progress_bar("Opening") as progress:
+        edited = replay(decode_session(options.session.read_bytes()), progress)
+        outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
+        if options.report:
+            outputs[options.report] = _json(edited.report())
+    write_all(outputs)
+
+
+def run_info(options: argparse.Namespace) -> None:
+    """`objectmorpher info`"""
+    from objectmorpher_core.session_file import decode_session
+
+    info = describe(decode_session(options.session.read_bytes()))
+    if options.json:
+        sys.stdout.write(_json(info).decode())
+        return
+    for key, value in info.items():
+        if key != "objects":
+            sys.stdout.write(f"{key}: {_line(value)}\n")
+    for item in info["objects"]:
+        sys.stdout.write("- " + ", ".join(f"{k}: {_line(v)}" for k, v in item.items()) + "\n")
+
+
+def describe(document: Document) -> dict[str, Any]:
+    """What a document holds, in plain values."""
+    width, height = document.photo.size
+    objects = []
+    for item in document.objects:
+        lifted = item.lifted
+        objects.append({
+            "name": item.name,
+            "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
+            "gaussians": 0 if lifted is None else len(lifted.gaussians),
+            "control_points": 0 if lifted is None else len(lifted.control_points),
+            "handles": sum(not h.is_pin for h in item.handles),
+            "pins": sum(h.is_pin for h in item.handles),
+            "is_moved": item.is_moved,
+            "move": list(item.placement.move), "depth": item.placement.depth,
+            "turn": list(item.placement.turn), "scale": item.placement.scale,
+        })  # fmt: skip
+    return {
+        "photo": {
+            "name": document.photo.name, "width": width, "height": height,
+            "bits": document.photo.pixels.dtype.itemsize * 8,
+        },
+        "focal_px": round(document.photo.camera.focal, 2),
+        "seed": document.seed,
+        "backends": dict(document.backends),
+        "has_plate": document.plate is not None,
+        "objects": objects,
+    }  # fmt: skip
+
+
+def run_models(options: argparse.Namespace) -> None:
+    """`objectmorpher models list|get|path|verify`"""
+    from objectmorpher_core import models
+
+    chosen = [models.weight(options.id)] if options.id else list(models.weights())
+    if options.action == "get":
+        for weight in chosen:
+            with progress_bar(f"Getting {weight.id}") as progress:
+                at = models.fetch(weight.id, progress)
+            sys.stdout.write(f"{weight.id}: {at}\n")
+        return
+    broken = []
+    for weight in chosen:
+        at = models.path(weight.id)
+        if options.action == "path":
+            sys.stdout.write(f"{at}\n" if at else "")
+            broken += [] if at else [weight.id]
+        elif options.action == "list":
+            state = "installed" if at else "not installed"
+            megabytes = weight.size / 1e6
+            sys.stdout.write(
+                f"{weight.id:<12} {megabytes:7.1f} MB  {weight.licence:<12} {state:<14}"
+                f" {weight.purpose}\n"
+            )
+        else:
+            state = models.verify(weight.id)[0].state
+            sys.stdout.write(f"{weight.id}: {state}\n")
+            broken += [] if state == "ok" else [weight.id]
+    if broken:
+        raise UsageError(f"{', '.join(broken)}: not installed or damaged, use `models get`")
+
+
+def _items(options: argparse.Namespace) -> list[BatchItem]:
+    """The edits that the command line asks for, each with its photo and output."""
+    said = _script(options)
+    if options.script is None:
+        items = [BatchItem(said)]
+    else:
+        read = parse_scripts(options.script.read_text(encoding="utf-8"))
+        folder = options.script.parent
+        items = [_beside(item, folder) for item in read]
+        items = [BatchItem(i.script.merged(said), i.photo, i.out) for i in items]
+    if len(items) > 1:
+        single = [name for name in EXTRAS if getattr(options, name)]
+        if options.photo or options.out or single:
+            raise UsageError('a batch names "photo" and "out" in the script, and nothing else')
+        if any(item.photo is None or item.out is None for item in items):
+            raise ScriptError('every edit of a batch needs "photo" and "out"')
+        return items
+    photo, out = options.photo or items[0].photo, options.out or items[0].out
+    if photo is None:
+        raise UsageError("which photo? objectmorpher edit PHOTO -o OUT.png")
+    if out is None:
+        raise UsageError("where to? add -o OUT.png")
+    return [BatchItem(items[0].script, str(photo), str(out))]
+
+
+def _beside(item: BatchItem, folder: Path) -> BatchItem:
+    """File names of a script are relative to the script."""
+    from dataclasses import replace
+
+    def at(name: str | None) -> str | None:
+        return None if name is None else str(folder / name)
+
+    return BatchItem(replace(item.script, mask=at(item.script.mask)), at(item.photo), at(item.out))
+
+
+def _script(options: argparse.Namespace) -> EditScript:
+    said = {
+        name: getattr(options, name)
+        for name in SCRIPT_OPTIONS
+        if getattr(options, name, None) is not None
+    }
+    return script_from(said)
+
+
+def _check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> None:
+    """Refuses, before any work, what could not be written or would overwrite an input."""
+    read = {path.resolve() for path in inputs}
+    for path, endings in outputs.items():
+        if path.resolve() in read:
+            raise UsageError(f"{path} is the input; choose another name for the output")
+        if path.suffix.lower() not in endings:
+            raise UsageError(f"{path}: the ending must be {' or '.join(endings)}")
+        if not path.parent.is_dir():
+            raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
+
+
+def _mask(document: Document) -> Mask:
+    mask = document.objects[0].mask
+    assert mask is not None
+    return mask
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=2) + "\n").encode()
+
+
+def _line(value: Any) -> str:
+    if isinstance(value, dict):
+        return " ".join(f"{k} {_line(v)}" for k, v in value.items())
+    return str(value)
+
+
+__all__ = ["PROGRAM", "run_edit", "run_info", "run_models", "run_replay", "run_select"]

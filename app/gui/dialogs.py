@@ -1,0 +1,116 @@
+"""File dialogs, the system's or our own, and the question about unsaved changes."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import portable_file_dialogs as pfd
+
+from ..editor import Editor
+from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog
+from .file_chooser import FileChooser
+from .theme import theme
+from .widgets import Kind, bold_text, button, note
+
+HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialogs need on Linux
+QUESTION = "Unsaved changes"
+FILTERS = {
+    Dialog.OPEN: (*PHOTO_ENDINGS, SESSION_ENDING),
+    Dialog.SAVE: (SESSION_ENDING,),
+    Dialog.EXPORT: EXPORT_ENDINGS,
+}
+
+
+def has_native_dialogs() -> bool:
+    return not sys.platform.startswith("linux") or any(shutil.which(h) for h in HELPERS)
+
+
+class Dialogs:
+    """Shows what the editor wants to be asked."""
+
+    def __init__(self) -> None:
+        self._native: tuple[Dialog, Any] | None = None
+        self._chooser = FileChooser()
+        self._has_native = has_native_dialogs()
+
+    @property
+    def is_open(self) -> bool:
+        return self._native is not None or self._chooser.is_open
+
+    def draw(self, editor: Editor) -> None:
+        """Once a frame, after the panels."""
+        wanted = editor.filing.wanted
+        if wanted is not None and not self.is_open:
+            editor.filing.wanted = None
+            self._open(editor, wanted)
+        self._poll_native(editor)
+        self._chooser.draw(editor)
+        self._draw_question(editor)
+
+    def _open(self, editor: Editor, dialog: Dialog) -> None:
+        suggestion = editor.filing.suggestion(dialog)
+        if not self._has_native or editor.settings.dialogs == "built-in":
+            self._chooser.open(dialog, suggestion, FILTERS[dialog])
+            return
+        patterns = " ".join(f"*{ending}" for ending in FILTERS[dialog])
+        filters = [dialog.value, patterns, "All files", "*"]
+        if dialog is Dialog.OPEN:
+            native = pfd.open_file(dialog.value, str(suggestion), filters)
+        else:
+            native = pfd.save_file(dialog.value, str(suggestion), filters)
+        self._native = (dialog, native)
+
+    def _poll_native(self, editor: Editor) -> None:
+        if self._native is None:
+            return
+        dialog, native = self._native
+        if not native.ready(0):
+            return
+        self._native = None
+        result = native.result()
+        chosen = (result[0] if result else "") if isinstance(result, list) else result
+        if chosen:
+            editor.filing.choose(dialog, Path(chosen))
+        else:
+            editor.filing.cancel_dialog()
+
+    def _draw_question(self, editor: Editor) -> None:
+        if editor.filing.question is not None and not imgui.is_popup_open(QUESTION):
+            imgui.open_popup(QUESTION)
+        centre = imgui.get_main_viewport().get_center()
+        imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
+        imgui.set_next_window_size(ImVec2(theme.pt(400), 0))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(20, 20))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
+        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+        is_shown = imgui.begin_popup_modal(QUESTION, None, flags)[0]
+        imgui.pop_style_var(2)
+        if is_shown:
+            self._draw_answers(editor)
+            imgui.end_popup()
+
+    def _draw_answers(self, editor: Editor) -> None:
+        with bold_text():
+            imgui.text_unformatted("Save what you have changed?")
+        note(
+            "The session keeps the selection, the 3D object and its pose. The photo is not touched."
+        )
+        imgui.dummy(theme.size(0, 4))
+        filing = editor.filing
+        answer = None
+        if button("Save session", Kind.PRIMARY, width=132):
+            answer = filing.answer_save
+        imgui.same_line()
+        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + theme.pt(6))
+        if button("Don't save", width=104):
+            answer = filing.answer_discard
+        imgui.same_line()
+        if button("Cancel", width=104) or imgui.is_key_pressed(imgui.Key.escape):
+            answer = filing.answer_cancel
+        if answer is not None:
+            imgui.close_current_popup()
+            answer()

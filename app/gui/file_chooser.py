@@ -1,0 +1,178 @@
+"""A file dialog of our own, for desktops that have none: a path to type and a list of files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+
+from ..editor import Editor
+from ..filing import Dialog
+from .theme import Icon, theme
+from .widgets import Kind, bold_text, button, icon_button, note
+
+TITLE = "Choose a file"
+SIZE = (640.0, 480.0)  # points
+ROW = 28.0
+VERBS = {Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Export"}
+
+
+class FileChooser:
+    """One dialog at a time."""
+
+    def __init__(self) -> None:
+        self.is_open = False
+        self._dialog = Dialog.OPEN
+        self._folder = Path.home()
+        self._endings: tuple[str, ...] = ()
+        self._name = ""
+        self._is_first = False
+        self._entries: list[Path] = []
+        self._replacing: Path | None = None  # asked whether it may be overwritten
+
+    def open(self, dialog: Dialog, suggestion: Path, endings: tuple[str, ...]) -> None:
+        """`suggestion`: a folder, or a file's path."""
+        self._dialog, self._endings = dialog, endings
+        is_folder = suggestion.is_dir()
+        self._enter(suggestion if is_folder else suggestion.parent)
+        self._name = "" if is_folder else suggestion.name
+        self.is_open = self._is_first = True
+        self._replacing = None
+        imgui.open_popup(TITLE)
+
+    def draw(self, editor: Editor) -> None:
+        if not self.is_open:
+            return
+        centre = imgui.get_main_viewport().get_center()
+        imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
+        imgui.set_next_window_size(theme.size(*SIZE))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(20, 20))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
+        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+        is_shown = imgui.begin_popup_modal(TITLE, None, flags)[0]
+        imgui.pop_style_var(2)
+        if not is_shown:
+            return
+        self._draw_head()
+        is_entered = self._draw_path()
+        chosen = self._draw_list()
+        is_confirmed, is_cancelled = self._draw_foot()
+        self._is_first = False
+        if is_cancelled or imgui.is_key_pressed(imgui.Key.escape):
+            self._close()
+            editor.filing.cancel_dialog()
+        elif chosen is not None or is_entered or is_confirmed:
+            self._choose(editor, chosen or self._typed())
+        imgui.end_popup()
+
+    def _draw_head(self) -> None:
+        with bold_text():
+            imgui.text_unformatted(self._dialog.value)
+        endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
+        note(f"{endings}. Type a name or a whole path, or choose below.")
+
+    def _draw_path(self) -> bool:
+        """The field; True when Enter was pressed in it."""
+        if self._is_first:
+            imgui.set_keyboard_focus_here()
+        imgui.set_next_item_width(-1)
+        is_entered, self._name = imgui.input_text_with_hint(
+            "##path", "name or path", self._name, imgui.InputTextFlags_.enter_returns_true
+        )
+        if is_entered and not self._name:
+            return False
+        return is_entered
+
+    def _draw_list(self) -> Path | None:
+        """Folders and files; a file that was double-clicked."""
+        if icon_button(Icon.UP, "up", "One folder up"):
+            self._enter(self._folder.parent)
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.vec("secondary"), _shortened(self._folder, 80))
+        imgui.push_style_color(imgui.Col_.child_bg, theme.vec("surround"))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
+        foot = theme.pt(56)
+        imgui.begin_child("##files", ImVec2(0, -foot), imgui.ChildFlags_.always_use_window_padding)
+        chosen = None
+        for entry in self._entries:
+            chosen = self._draw_entry(entry) or chosen
+        if not self._entries:
+            note("No such files here.")
+        imgui.end_child()
+        imgui.pop_style_var(2)
+        imgui.pop_style_color()
+        return chosen
+
+    def _draw_entry(self, entry: Path) -> Path | None:
+        is_folder = entry.is_dir()
+        icon = Icon.FOLDER if is_folder else Icon.IMAGE
+        flags = imgui.SelectableFlags_.allow_double_click
+        height = ImVec2(0, theme.pt(ROW))
+        is_current = entry.name == self._name
+        imgui.push_style_var(imgui.StyleVar_.selectable_text_align, ImVec2(0, 0.5))
+        label = f"{icon}   {entry.name}"
+        is_clicked = imgui.selectable(label, is_current, flags, height)[0]
+        imgui.pop_style_var()
+        if not is_clicked:
+            return None
+        if is_folder:
+            self._enter(entry)
+        else:
+            self._name, self._replacing = entry.name, None
+            if imgui.is_mouse_double_clicked(0):
+                return entry
+        return None
+
+    def _draw_foot(self) -> tuple[bool, bool]:
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
+        if self._replacing is not None:
+            imgui.align_text_to_frame_padding()
+            text = f"{self._replacing.name} exists. Press again to replace it."
+            imgui.text_colored(theme.vec("warning"), text)
+            imgui.same_line()
+        verb = "Replace" if self._replacing is not None else VERBS[self._dialog]
+        right = imgui.get_window_width() - theme.pt(20 + 120 + 8 + 96)
+        imgui.same_line(right)
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(54))
+        is_cancelled = button("Cancel", width=96)
+        imgui.same_line()
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
+        why_not = None if self._name else "Type a name or choose a file"
+        return button(verb, Kind.PRIMARY, why_not, width=120), is_cancelled
+
+    def _typed(self) -> Path:
+        return self._folder / Path(self._name.strip()).expanduser()
+
+    def _choose(self, editor: Editor, path: Path) -> None:
+        """Enters a folder, asks before replacing, else gives the file to the editor."""
+        if path.is_dir():
+            self._enter(path)
+            self._name = "" if self._dialog is Dialog.OPEN else self._name
+            return
+        if self._dialog is not Dialog.OPEN and path.exists() and path != self._replacing:
+            self._replacing = path
+            return
+        self._close()
+        editor.filing.choose(self._dialog, path)
+
+    def _close(self) -> None:
+        self.is_open = False
+        imgui.close_current_popup()
+
+    def _enter(self, folder: Path) -> None:
+        """Lists a folder: folders first, then the files that can be chosen."""
+        try:
+            entries = [e for e in folder.iterdir() if not e.name.startswith(".")]
+            folders = sorted((e for e in entries if e.is_dir()), key=lambda e: e.name.lower())
+            files = [e for e in entries if e.suffix.lower() in self._endings and e.is_file()]
+        except OSError:
+            return
+        self._folder = folder.resolve()
+        self._entries = folders + sorted(files, key=lambda e: e.name.lower())
+
+
+def _shortened(path: Path, length: int) -> str:
+    text = str(path)
+    return text if len(text) <= length else f"…{text[-length:]}"

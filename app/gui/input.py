@@ -1,0 +1,138 @@
+"""From ImGui's mouse and keys to pointers, strokes and commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from ..commands import COMMANDS, run
+from ..editor import Editor, Hover
+from ..tools import navigate
+from ..tools.place_tool import PlaceTool
+from ..tools.pointer import Button, Pointer, Shape, Tool
+from ..tools.pose_tool import PoseTool
+from ..tools.select_tool import SelectTool
+from ..view import ToolName
+from .layout import Rect
+
+TOOLS: dict[ToolName, Tool] = {
+    ToolName.SELECT: SelectTool(),
+    ToolName.POSE: PoseTool(),
+    ToolName.PLACE: PlaceTool(),
+}
+ARROWS = {
+    imgui.Key.left_arrow: (-1, 0),
+    imgui.Key.right_arrow: (1, 0),
+    imgui.Key.up_arrow: (0, -1),
+    imgui.Key.down_arrow: (0, 1),
+}
+NAMED_KEYS = {"\\": "backslash", "=": "equal", "-": "minus", "Delete": "delete"}
+
+
+def chord(keys: str) -> int:
+    """ImGui's number of "Ctrl+Shift+S"."""
+    *modifiers, key = keys.split("+")
+    number = getattr(imgui.Key, NAMED_KEYS.get(key, f"_{key}" if key.isdigit() else key.lower()))
+    total = int(number)
+    for modifier in modifiers:
+        total |= int(getattr(imgui.Key, f"mod_{modifier.lower()}"))
+    return total
+
+
+class Input:
+    """One frame's input to the editor; remembers only what the pointer looks like."""
+
+    def __init__(self) -> None:
+        self.shape = Shape.ARROW
+        self._chords = {name: chord(c.keys) for name, c in COMMANDS.items() if c.keys}
+        self._last: tuple[float, float] | None = None
+
+    def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
+        """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
+        io = imgui.get_io()
+        if not io.want_text_input:
+            self._take_keys(editor)
+        mouse = io.mouse_pos
+        pointer = Pointer(
+            (mouse.x - rect.x) * ratio,
+            (mouse.y - rect.y) * ratio,
+            is_down=True,
+            shift=io.key_shift,
+            alt=io.key_alt,
+            ctrl=io.key_ctrl,
+            space=imgui.is_key_down(imgui.Key.space),
+            wheel=io.mouse_wheel,
+        )
+        is_over = rect.contains(mouse.x, mouse.y) and not io.want_capture_mouse
+        if editor.hand.is_busy:
+            self._go_on(editor, pointer)
+        elif editor.document is not None and is_over:
+            self._begin(editor, pointer)
+        else:
+            self.shape = Shape.ARROW
+            editor.hover = Hover()
+        if not editor.hand.is_busy and editor.rubber is not None:
+            editor.rubber = None
+
+    def hint(self, editor: Editor) -> str:
+        if editor.document is None:
+            return "Open a photo, drop one here, or try a sample"
+        return TOOLS[editor.view.tool].hint(editor)
+
+    def _take_keys(self, editor: Editor) -> None:
+        editor.view.is_before = editor.document is not None and imgui.is_key_down(imgui.Key.x)
+        if imgui.is_key_pressed(imgui.Key.escape, False):
+            editor.escape()
+        for name, number in self._chords.items():
+            if imgui.is_key_chord_pressed(number):
+                run(editor, name)
+        if imgui.is_key_chord_pressed(chord("Ctrl+Y")):
+            run(editor, "redo")
+        if imgui.is_key_pressed(imgui.Key.backspace, False):
+            editor.remove_handle()
+        far = 10 if imgui.get_io().key_shift else 1
+        for key, (dx, dy) in ARROWS.items():
+            if imgui.is_key_pressed(key):
+                editor.nudge_handle(dx * far, dy * far)
+
+    def _begin(self, editor: Editor, pointer: Pointer) -> None:
+        """The pointer hovers, zooms, or starts a stroke."""
+        if pointer.wheel:
+            navigate.zoom(editor, pointer)
+        tool = TOOLS[editor.view.tool]
+        for button in Button:
+            if imgui.is_mouse_clicked(button.value):
+                pressed = replace(pointer, button=button)
+                if navigate.wants_pan(pressed):
+                    stroke = navigate.pan(editor, pressed)
+                elif navigate.is_on_split(editor, pressed):
+                    stroke = navigate.drag_split(editor, pressed)
+                elif button is Button.MIDDLE or editor.view.is_before:
+                    continue
+                else:
+                    editor.message = None
+                    stroke = tool.press(editor, pressed)
+                editor.hand.press(stroke, button)
+                self._last = (pointer.x, pointer.y)
+                if not imgui.is_mouse_down(button.value):  # pressed and released in one frame
+                    editor.hand.move(replace(pointer, is_down=False))
+                return
+        if pointer.space:
+            self.shape = Shape.HAND
+        elif navigate.is_on_split(editor, pointer):
+            self.shape = Shape.SPLIT
+        else:
+            self.shape = tool.hover(editor, pointer)
+
+    def _go_on(self, editor: Editor, pointer: Pointer) -> None:
+        """A stroke goes on or ends."""
+        button = editor.hand.button
+        is_down = button is not None and imgui.is_mouse_down(button.value)
+        if imgui.get_io().app_focus_lost:
+            editor.hand.abort(editor)
+            return
+        has_moved = self._last != (pointer.x, pointer.y) or pointer.wheel != 0
+        if has_moved or not is_down:
+            self._last = (pointer.x, pointer.y)
+            editor.hand.move(replace(pointer, is_down=is_down))

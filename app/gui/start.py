@@ -1,0 +1,144 @@
+"""The screen before a photo is open: where to drop, what to try, what was open last."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+from imgui_bundle import ImVec2, imgui
+from PIL import Image
+
+from ..commands import run
+from ..editor import Editor
+from ..resources import resource
+from .layout import Rect
+from .panes import FLAGS
+from .theme import TITLE_SIZE, Icon, theme
+from .widgets import Kind, bold_text, button, note, tooltip
+
+SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flower", "Flower"))
+COLUMN = 720.0  # points, width of everything
+DROP_HEIGHT = 240.0
+THUMB = (168.0, 112.0)
+RECENT = 4  # files shown
+
+
+class StartScreen:
+    """Owns the samples' thumbnails."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._thumbs: dict[str, moderngl.Texture] = {}
+
+    def draw(self, editor: Editor, rect: Rect) -> None:
+        imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
+        imgui.set_next_window_size(ImVec2(rect.width, rect.height))
+        imgui.push_style_color(imgui.Col_.window_bg, theme.vec("surround"))
+        imgui.begin("##start", None, FLAGS & ~imgui.WindowFlags_.no_scrollbar)
+        imgui.pop_style_color()
+        column = min(theme.pt(COLUMN), rect.width - theme.pt(48))
+        recent = [Path(r) for r in editor.settings.recent[:RECENT]]
+        content = DROP_HEIGHT + 12 + 80 + THUMB[1] + 64 + (28 * len(recent) + 44 if recent else 0)
+        top = max((rect.height - theme.pt(content)) / 2, theme.pt(24))
+        imgui.set_cursor_pos(ImVec2((rect.width - column) / 2, top))
+        imgui.begin_group()
+        self._draw_drop_target(editor, column)
+        imgui.dummy(theme.size(0, 12))
+        self._draw_samples(editor, column)
+        if recent:
+            imgui.dummy(theme.size(0, 8))
+            self._draw_recent(editor, recent)
+        imgui.end_group()
+        imgui.end()
+
+    def _draw_drop_target(self, editor: Editor, column: float) -> None:
+        draw = imgui.get_window_draw_list()
+        low = imgui.get_cursor_screen_pos()
+        high = ImVec2(low.x + column, low.y + theme.pt(DROP_HEIGHT))
+        draw.add_rect_filled(low, high, theme.u32("panel"), theme.pt(12))
+        draw.add_rect(low, high, theme.u32("pressed"), theme.pt(12), theme.pt(1.5))
+        self._centred(Icon.IMAGE, low, column, 40, TITLE_SIZE, "secondary")
+        with bold_text():
+            self._centred("Drop a photo here", low, column, 88, TITLE_SIZE, "text")
+        text = "Click an object in it, lift it into 3D, drag its points, save the photo."
+        self._centred(text, low, column, 128, 0.0, "secondary")
+        imgui.set_cursor_screen_pos(
+            ImVec2(low.x + (column - theme.pt(160)) / 2, low.y + theme.pt(172))
+        )
+        if button("Open a photo…", Kind.PRIMARY, width=160):
+            run(editor, "open")
+        imgui.set_cursor_screen_pos(ImVec2(low.x, high.y))
+        imgui.dummy(ImVec2(column, 0))
+
+    def _centred(
+        self, text: str, low: ImVec2, column: float, y: float, size: float, role: str
+    ) -> None:
+        imgui.push_font(None, size)
+        across = imgui.calc_text_size(text).x
+        at = ImVec2(low.x + (column - across) / 2, low.y + theme.pt(y))
+        imgui.get_window_draw_list().add_text(at, theme.u32(role), text)
+        imgui.pop_font()
+
+    def _draw_samples(self, editor: Editor, column: float) -> None:
+        with bold_text():
+            imgui.text_unformatted("Or try one of these")
+        imgui.dummy(theme.size(0, 0))
+        gap = (column - len(SAMPLES) * theme.pt(THUMB[0])) / (len(SAMPLES) - 1)
+        for i, (name, title) in enumerate(SAMPLES):
+            if i:
+                imgui.same_line(0, gap)
+            self._draw_sample(editor, name, title)
+
+    def _draw_sample(self, editor: Editor, name: str, title: str) -> None:
+        size = theme.size(*THUMB)
+        low = imgui.get_cursor_screen_pos()
+        imgui.begin_group()
+        if imgui.invisible_button(f"##{name}", ImVec2(size.x, size.y)):
+            editor.filing.open_sample(Path(str(resource(f"assets/samples/{name}.jpg"))))
+        is_hovered = imgui.is_item_hovered()
+        if is_hovered:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+        draw = imgui.get_window_draw_list()
+        high = ImVec2(low.x + size.x, low.y + size.y)
+        picture = imgui.ImTextureRef(self._thumb(name).glo)
+        white = theme.u32("#FFFFFF")
+        zero, one = ImVec2(0, 0), ImVec2(1, 1)
+        draw.add_image_rounded(picture, low, high, zero, one, white, theme.pt(8))
+        if is_hovered:
+            draw.add_rect(low, high, theme.u32("accent"), theme.pt(8), theme.pt(2))
+        imgui.text_colored(theme.vec("text" if is_hovered else "secondary"), title)
+        imgui.end_group()
+
+    def _thumb(self, name: str) -> moderngl.Texture:
+        """The sample's picture, cut to the thumbnail's shape."""
+        if name not in self._thumbs:
+            with Image.open(str(resource(f"assets/samples/{name}.jpg"))) as file:
+                picture = file.convert("RGB")
+            aspect = THUMB[0] / THUMB[1]
+            width, height = picture.size
+            across, down = min(width, height * aspect), min(height, width / aspect)
+            left, top = (width - across) / 2, (height - down) / 2
+            box = (int(left), int(top), int(left + across), int(top + down))
+            size = (int(THUMB[0] * 2), int(THUMB[1] * 2))
+            picture = picture.crop(box).resize(size, Image.Resampling.LANCZOS)
+            texture = self._context.texture(size, 3, picture.tobytes(), alignment=1)
+            texture.build_mipmaps()
+            texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+            self._thumbs[name] = texture
+        return self._thumbs[name]
+
+    def _draw_recent(self, editor: Editor, recent: list[Path]) -> None:
+        with bold_text():
+            imgui.text_unformatted("Recent")
+        imgui.push_style_var(imgui.StyleVar_.button_text_align, ImVec2(0, 0.5))
+        for path in recent:
+            if button(f"{Icon.FILE}   {path.name}##{path}", Kind.QUIET, width=320):
+                if path.exists():
+                    editor.filing.open(path)
+                else:
+                    editor.complain(f"{path.name} is not there any more")
+                    editor.filing.forget_recent(str(path))
+            tooltip(str(path))
+        imgui.pop_style_var()
+        if not recent:
+            note("Nothing yet.")

@@ -1,0 +1,319 @@
+"""The window: creation, the loop, and one frame as a recipe."""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui  # before glfw: both must use one libglfw
+
+# isort: split
+import glfw
+import moderngl
+
+from ..derived import warm_up
+from ..editor import Editor
+from ..filing import Filing
+from ..options import WindowOptions
+from ..render.renderer import Renderer
+from ..resources import resource
+from ..settings import read_settings, settings_path, write_settings
+from ..tools.pointer import Shape
+from . import theme as looks
+from .dialogs import Dialogs
+from .input import Input
+from .inspector import draw_inspector
+from .layout import Rect, lay_out
+from .menu import draw_menu
+from .overlays import Overlays
+from .scenes import build_scene
+from .start import StartScreen
+from .status import draw_status
+from .theme import theme
+from .toolbar import draw_toolbar
+
+log = logging.getLogger(__name__)
+
+SETTLE = 3  # frames drawn after the last event: ImGui lays out in two
+IDLE = 0.5  # s between two looks at the clock when nothing happens
+BUSY = 0.05  # s, while a job runs or a dialog is open
+CURSORS = {
+    Shape.ARROW: glfw.ARROW_CURSOR,
+    Shape.CROSS: glfw.CROSSHAIR_CURSOR,
+    Shape.HAND: glfw.POINTING_HAND_CURSOR,
+    Shape.MOVE: glfw.RESIZE_ALL_CURSOR,
+    Shape.TURN: glfw.POINTING_HAND_CURSOR,
+    Shape.SIZE: glfw.RESIZE_NWSE_CURSOR,
+    Shape.SPLIT: glfw.RESIZE_EW_CURSOR,
+}
+
+
+class WindowError(RuntimeError):
+    """No window can be opened; one sentence."""
+
+
+def run_window(options: WindowOptions) -> int:
+    """Opens the editor's window and runs until it is closed; the exit code."""
+    started = time.monotonic()
+    window = Window(options)
+    try:
+        log.info("The window is there after %.2f s", time.monotonic() - started)
+        window.run()
+    finally:
+        window.close()
+    return 0
+
+
+class Window:
+    """The GLFW window, ImGui's context, and what is drawn in them."""
+
+    def __init__(self, options: WindowOptions) -> None:
+        self._options = options
+        self._handle = _open_window(options)
+        glfw.make_context_current(self._handle)
+        glfw.swap_interval(0 if options.frames is not None else 1)
+        self._context = moderngl.create_context(require=330)
+        settings = read_settings(settings_path())
+        self.editor = Editor(settings, wake=glfw.post_empty_event)
+        self.editor.filing = Filing(self.editor, options.fov, options.seed)
+        self._saved_settings = settings
+        self._look: tuple[str, float] = ("", 0.0)
+        self._start_imgui()
+        self._renderer = Renderer(self._context, options.renderer)
+        self._start = StartScreen(self._context)
+        self._dialogs, self._input = Dialogs(), Input()
+        self._cursors: dict[int, Any] = {}
+        self._is_cursor_ours = False
+        self._title = ""
+        glfw.set_drop_callback(self._handle, self._take_drop)
+
+    def run(self) -> None:
+        """Frames, as few as possible: after an event, and while something moves."""
+        drawn, lively = 0, SETTLE
+        while True:
+            if self._options.frames is None and lively <= 0:
+                lively = self._wait()
+            else:
+                glfw.poll_events()
+            has_news = self.editor.poll()
+            lively = SETTLE if has_news else lively - 1
+            self._frame()
+            drawn += 1
+            if self._is_over(drawn):
+                break
+            glfw.swap_buffers(self._handle)
+            if drawn == 1:
+                self._open_first()
+        if self._options.screenshot is not None:
+            self._write_screenshot(self._options.screenshot)
+
+    def _is_over(self, drawn: int) -> bool:
+        """Whether this frame is the last; asks about unsaved changes first."""
+        if self._options.frames is not None:
+            return drawn >= self._options.frames
+        if glfw.window_should_close(self._handle):
+            if self.editor.is_saved:
+                return True
+            glfw.set_window_should_close(self._handle, False)
+            self.editor.filing.guard(self._quit)
+        return False
+
+    def _open_first(self) -> None:
+        """What takes a second to import waits until the window has been drawn."""
+        if self._options.file is not None:
+            self.editor.filing.open(self._options.file)
+        elif self._options.frames is None:
+            warm_up()
+
+    def _quit(self) -> None:
+        self.editor.close_document()
+        glfw.set_window_should_close(self._handle, True)
+
+    def _wait(self) -> int:
+        """Sleeps until an event; how many frames to draw for it."""
+        is_busy = self.editor.jobs.current is not None or self._dialogs.is_open
+        patience = BUSY if is_busy else IDLE
+        before = time.monotonic()
+        glfw.wait_events_timeout(patience)
+        is_event = time.monotonic() - before < 0.95 * patience
+        return SETTLE if is_event else 1
+
+    # One frame
+
+    def _frame(self) -> None:
+        size = glfw.get_framebuffer_size(self._handle)
+        if 0 in size:  # minimised
+            return
+        self._adopt_look()
+        imgui.backends.opengl3_new_frame()
+        imgui.backends.glfw_new_frame()
+        imgui.new_frame()
+        display = imgui.get_io().display_size
+        ratio = size[0] / max(display.x, 1)
+        layout = lay_out(display.x, display.y, self.editor.document is not None)
+        self._resize_canvas(layout.canvas, ratio)
+        self._input.update(self.editor, layout.canvas, ratio)
+        layout = lay_out(display.x, display.y, self.editor.document is not None)
+        draw_menu(self.editor, layout.menu)
+        if self.editor.document is None:
+            self._start.draw(self.editor, layout.canvas)
+        else:
+            draw_toolbar(self.editor, layout.strip)
+            draw_inspector(self.editor, layout.inspector)
+            Overlays(self.editor, layout.canvas, ratio).draw()
+        draw_status(self.editor, layout.status, self._input.hint(self.editor))
+        self._dialogs.draw(self.editor)
+        self._set_cursor()
+        self._set_title()
+        imgui.render()
+        self._draw(layout.canvas, ratio, size)
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        self._save_settings()
+
+    def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
+        """The picture below ImGui's."""
+        screen = self._context.screen
+        screen.use()
+        self._context.viewport = (0, 0, *size)
+        screen.clear(*theme.rgb("surround"), 1.0)
+        scene = build_scene(self.editor)
+        if scene is not None:
+            view = self.editor.view
+            left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
+            viewport = (left, size[1] - bottom, view.width, view.height)
+            self._renderer.draw(scene, view, viewport)
+        self._context.viewport = (0, 0, *size)
+
+    def _resize_canvas(self, canvas: Rect, ratio: float) -> None:
+        size = (max(round(canvas.width * ratio), 1), max(round(canvas.height * ratio), 1))
+        self.editor.view.resize(size, theme.scale * ratio, self.editor.photo_size)
+
+    # What the window looks like
+
+    def _start_imgui(self) -> None:
+        imgui.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename("")
+        io.config_drag_click_to_input_text = True
+        io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
+        looks.load_fonts()
+        address = ctypes.cast(self._handle, ctypes.c_void_p).value
+        assert address is not None
+        imgui.backends.glfw_init_for_opengl(address, True)
+        imgui.backends.opengl3_init("#version 330")
+
+    def _adopt_look(self) -> None:
+        """Theme and scale, when the user or the monitor changed them."""
+        settings = self.editor.settings
+        name = settings.theme
+        if self._options.theme is not None and settings.theme == self._saved_settings.theme:
+            name = self._options.theme
+        scale = self._options.scale or settings.scale or self._monitor_scale()
+        if (name, scale) != self._look:
+            self._look = (name, scale)
+            looks.apply(name if name in looks.PALETTES else "dark", scale)
+
+    def _monitor_scale(self) -> float:
+        """Window units per point. Where the framebuffer is finer than the window, 1."""
+        content = glfw.get_window_content_scale(self._handle)[0]
+        window = max(glfw.get_window_size(self._handle)[0], 1)
+        ratio = glfw.get_framebuffer_size(self._handle)[0] / window
+        return max(round(content / max(ratio, 1e-3) * 4) / 4, 1.0)
+
+    def _set_cursor(self) -> None:
+        """On the canvas the tool's cursor, elsewhere what ImGui asks for."""
+        io = imgui.get_io()
+        if io.want_capture_mouse and not self.editor.hand.is_busy:
+            wanted = _IMGUI_CURSORS.get(imgui.get_mouse_cursor(), glfw.ARROW_CURSOR)
+        else:
+            wanted = CURSORS[self._input.shape]
+        if wanted not in self._cursors:
+            self._cursors[wanted] = glfw.create_standard_cursor(wanted)
+        if self._cursors[wanted] is not self._is_cursor_ours:
+            glfw.set_cursor(self._handle, self._cursors[wanted])
+            self._is_cursor_ours = self._cursors[wanted]
+
+    def _set_title(self) -> None:
+        editor = self.editor
+        title = "ObjectMorpher"
+        if editor.document is not None:
+            name = editor.path.name if editor.path else editor.document.photo.name
+            title = f"{name}{'' if editor.is_saved else ' — edited'} · ObjectMorpher"
+        if title != self._title:
+            self._title = title
+            glfw.set_window_title(self._handle, title)
+
+    # The rest
+
+    def _take_drop(self, _window: object, paths: list[str]) -> None:
+        if paths:
+            self.editor.filing.open(Path(paths[0]))
+
+    def _save_settings(self) -> None:
+        if self.editor.settings is not self._saved_settings:
+            self._saved_settings = self.editor.settings
+            write_settings(settings_path(), self._saved_settings)
+
+    def _write_screenshot(self, path: Path) -> None:
+        from PIL import Image
+
+        size = glfw.get_framebuffer_size(self._handle)
+        data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
+        picture = Image.frombytes("RGB", size, data).transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+        picture.save(path)
+
+    def close(self) -> None:
+        self.editor.shut_down()
+        imgui.backends.opengl3_shutdown()
+        imgui.backends.glfw_shutdown()
+        imgui.destroy_context()
+        glfw.terminate()
+
+
+_IMGUI_CURSORS = {
+    imgui.MouseCursor_.text_input: glfw.IBEAM_CURSOR,
+    imgui.MouseCursor_.hand: glfw.POINTING_HAND_CURSOR,
+    imgui.MouseCursor_.resize_ew: glfw.RESIZE_EW_CURSOR,
+    imgui.MouseCursor_.resize_ns: glfw.RESIZE_NS_CURSOR,
+    imgui.MouseCursor_.resize_all: glfw.RESIZE_ALL_CURSOR,
+}
+
+
+def _open_window(options: WindowOptions) -> Any:
+    """A window with an OpenGL 3.3 core context."""
+    errors: list[str] = []
+    glfw.set_error_callback(lambda _code, text: errors.append(text.decode(errors="replace")))
+    if not glfw.init():
+        raise WindowError(f"no window can be opened: {'; '.join(errors) or 'no display'}")
+    hints: tuple[tuple[int, int], ...] = (
+        (glfw.CONTEXT_VERSION_MAJOR, 3),
+        (glfw.CONTEXT_VERSION_MINOR, 3),
+        (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+        (glfw.OPENGL_FORWARD_COMPAT, glfw.TRUE),
+        (glfw.SCALE_TO_MONITOR, glfw.TRUE),
+    )
+    for hint, value in hints:
+        glfw.window_hint(hint, value)
+    scale = options.scale or 1.0
+    size = (int(options.size[0] * scale), int(options.size[1] * scale))
+    handle = glfw.create_window(*size, "ObjectMorpher", None, None)
+    if not handle:
+        glfw.terminate()
+        raise WindowError(f"OpenGL 3.3 is not available: {'; '.join(errors)}")
+    _set_icon(handle)
+    return handle
+
+
+def _set_icon(handle: Any) -> None:
+    from PIL import Image
+
+    path: Callable[[], Any] = lambda: resource("assets/icon.png")  # noqa: E731
+    try:
+        with Image.open(str(path())) as file:
+            glfw.set_window_icon(handle, 1, [file.convert("RGBA").resize((64, 64))])
+    except (OSError, glfw.GLFWError) as error:
+        log.info("The window has no icon: %s", error)

@@ -1,0 +1,59 @@
+"""Putting the edited picture together (paper 3.3): the plate behind the object, then the object.
+
+An inpainter a file; `load()` imports the chosen one. What lies outside the hole is never touched.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Protocol
+
+from ..arrays import Mask, Pixels
+from ..progress import Progress
+
+
+class InpaintError(ValueError):
+    """The hole cannot be filled; one sentence."""
+
+
+class Inpainter(Protocol):
+    """Invents what the photo shows where an object was."""
+
+    name: str
+
+    def missing(self) -> str | None:
+        """Why this backend cannot run here, as a sentence for the user; None where it can."""
+        ...
+
+    def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
+        """`rgb` (h, w, 3) u8 or u16 with its `hole` (h, w) filled, the same values elsewhere.
+
+        The same arguments give the same bytes. Raises InpaintError where the hole is everything.
+        """
+        ...
+
+
+BACKENDS = {  # best first; the last one is always there
+    "patchmatch": "objectmorpher_core.compose.inpaint_patchmatch:PatchMatchInpainter",
+    "telea": "objectmorpher_core.compose.inpaint_telea:TeleaInpainter",
+}
+
+
+def load(name: str = "auto") -> Inpainter:
+    """The inpainter called `name`; "auto" is the first that can run here.
+
+    Raises InpaintError for an unknown name, or one that cannot run here.
+    """
+    if name == "auto":
+        return next(found for found in map(_create, BACKENDS) if found.missing() is None)
+    if name not in BACKENDS:
+        raise InpaintError(f"there is no inpainter {name!r}; known are {', '.join(BACKENDS)}")
+    inpainter = _create(name)
+    if (sentence := inpainter.missing()) is not None:
+        raise InpaintError(sentence)
+    return inpainter
+
+
+def _create(name: str) -> Inpainter:
+    module, _, kind = BACKENDS[name].partition(":")
+    return getattr(import_module(module), kind)()

@@ -1,0 +1,114 @@
+"""The figures of one edit (DESIGN section 6)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from .compose.composite import Composite
+from .document import Document, Placement
+from .puppet import Puppet
+
+VERSION = 1
+STAGES = (
+    "load", "segment", "lift", "graph", "deform", "inpaint", "render", "refine", "save", "total",
+)  # fmt: skip
+
+
+class Stopwatch:
+    """Seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(STAGES, 0.0)
+        self._start = time.perf_counter()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Adds the time inside the block to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] += time.perf_counter() - start
+
+    def read(self) -> dict[str, float]:
+        """Seconds by stage so far, with the total."""
+        self.seconds["total"] = time.perf_counter() - self._start
+        return {name: round(value, 4) for name, value in self.seconds.items()}
+
+
+def build_report(
+    document: Document,
+    puppet: Puppet,
+    energies: tuple[float, ...],
+    result: Composite,
+    stopwatch: Stopwatch,
+) -> dict[str, Any]:
+    """`R.json` of the document's first object.
+
+    `reached` is where a handle's surface point is seen before the placement: handles deform
+    first, and their targets are in the picture of that moment.
+    """
+    width, height = document.photo.size
+    item = document.objects[0]
+    lifted = item.lifted
+    assert lifted is not None and item.mask is not None, "a report is about a lifted object"
+    camera = document.photo.camera
+    handles = []
+    for handle in item.handles:
+        at = puppet.picture_of(handle.point, None, Placement())
+        to = camera.project(lifted.world_points(handle.target))
+        reached = puppet.picture_of(handle.point, item.pose, Placement())
+        handles.append({
+            "from": _px(at), "to": _px(to), "reached": _px(reached),
+            "error_px": round(float(np.linalg.norm(reached - to)), 4),
+        })  # fmt: skip
+    used = dict(document.backends)
+    shares = result.shares
+    return {
+        "version": VERSION,
+        "photo": {"width": width, "height": height},
+        "object": {
+            "mask_area_px": int(item.mask.sum()),
+            "gaussians": len(lifted.gaussians),
+            "control_points": len(lifted.control_points),
+            "links": puppet.deformer.graph.link_count,
+            "components": puppet.deformer.graph.component_count,
+        },
+        "handles": handles,
+        "energy": {
+            "start": energies[0], "end": energies[-1], "iterations": max(len(energies) - 1, 0),
+        },
+        "pixels": {
+            "changed": result.changed,
+            "outside_footprint_changed": result.outside_footprint_changed,
+            "from_photo": shares.from_photo,
+            "from_lifter": shares.from_lifter,
+            "from_inpainter": shares.from_inpainter,
+            "from_refiner": shares.from_refiner,
+        },
+        "backends": {
+            stage: used.get(stage, "none") for stage in ("segment", "lift", "inpaint", "refine")
+        },
+        "seconds": stopwatch.read(),
+        "peak_memory_mb": peak_memory_mb(),
+    }  # fmt: skip
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far, MB; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0.0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+
+
+def _px(xy: np.ndarray) -> list[float]:
+    return [round(float(v), 3) for v in xy]

@@ -1,0 +1,207 @@
+"""The edit script: what is to be done to one photo, in the words of the command line.
+
+The options of `objectmorpher edit`, a JSON file of `--script` and the script that a session
+keeps are all this one dataclass.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+XY = tuple[float, float]
+
+
+class ScriptError(ValueError):
+    """The script asks for something that does not exist or makes no sense; one sentence."""
+
+
+@dataclass(frozen=True)
+class HandleMove:
+    """The surface point seen at `at` must appear at `to`, moved `dz` diameters away."""
+
+    at: XY  # px
+    to: XY  # px
+    dz: float = 0.0  # object diameters
+
+
+@dataclass(frozen=True)
+class EditScript:
+    """One edit. Every field is a long option of the command line (DESIGN section 6)."""
+
+    click: tuple[XY, ...] = ()  # px
+    not_click: tuple[XY, ...] = ()
+    box: tuple[float, float, float, float] | None = None
+    subject: bool = False
+    mask: str | None = None  # file
+    segment: str = "auto"
+    lift: str = "auto"
+    inpaint: str = "auto"
+    refine: str = "auto"
+    splats: str | None = None  # file
+    gaussians: int | None = None
+    pin: tuple[XY, ...] = ()
+    handle: tuple[HandleMove, ...] = ()
+    move: tuple[float, float, float] | None = None  # px, px, diameters
+    turn: tuple[float, float, float] | None = None  # degrees
+    scale: float | None = None
+    deform: str = "arap"
+    links: str = "geodesic"
+    faithful: bool = False
+    shadow: str = "auto"
+    fov: float | None = None
+    seed: int = 0
+
+    def merged(self, other: EditScript) -> EditScript:
+        """This script with everything that `other` says differently from the defaults."""
+        default = EditScript()
+        said = {
+            f.name: getattr(other, f.name)
+            for f in fields(other)
+            if getattr(other, f.name) != getattr(default, f.name)
+        }
+        return replace(self, **said)
+
+    def to_json(self) -> dict[str, Any]:
+        """The script as `--script` reads it; options at their default are left out."""
+        default = EditScript()
+        result: dict[str, Any] = {}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if value == getattr(default, f.name):
+                continue
+            if f.name == "handle":
+                value = [{"at": list(h.at), "to": list(h.to), "dz": h.dz} for h in value]
+            result[f.name.replace("_", "-")] = _plain(value)
+        return result
+
+
+@dataclass(frozen=True)
+class BatchItem:
+    """One edit of a batch: which photo, where to, and what."""
+
+    script: EditScript
+    photo: str | None = None
+    out: str | None = None
+
+
+def parse_scripts(text: str) -> tuple[BatchItem, ...]:
+    """The edits in the JSON of `--script`: one object, or an array of them. Raises ScriptError."""
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ScriptError(f"the script is not JSON: {error.msg} in line {error.lineno}") from error
+    items = data if isinstance(data, list) else [data]
+    if not items:
+        raise ScriptError("the script is empty")
+    return tuple(_batch_item(item) for item in items)
+
+
+def script_from(options: Mapping[str, Any]) -> EditScript:
+    """A script from long option names without dashes. Raises ScriptError."""
+    known = {f.name for f in fields(EditScript)}
+    said: dict[str, Any] = {}
+    for key, value in options.items():
+        name = key.replace("-", "_")
+        if name not in known:
+            raise ScriptError(f"the script's {key!r} is not an option")
+        said[name] = PARSERS[name](key, value)
+    return EditScript(**said)
+
+
+def _batch_item(item: Any) -> BatchItem:
+    if not isinstance(item, dict):
+        raise ScriptError("the script is not a JSON object")
+    options = {k: v for k, v in item.items() if k not in ("photo", "out")}
+    for key in ("photo", "out"):
+        if key in item and not isinstance(item[key], str):
+            raise ScriptError(f"the script's {key!r} is not a file name")
+    return BatchItem(script_from(options), item.get("photo"), item.get("out"))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(v) for v in value]
+    return value
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ScriptError(f"{key}: {value!r} is not a number")
+    return float(value)
+
+
+def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
+    def parse(key: str, value: Any) -> tuple[float, ...]:
+        if not isinstance(value, list | tuple) or not least <= len(value) <= most:
+            count = f"{least}" if least == most else f"{least} or {most}"
+            raise ScriptError(f"{key}: {value!r} is not {count} numbers")
+        numbers = tuple(_number(key, v) for v in value)
+        return numbers + (0.0,) * (most - len(numbers))
+
+    return parse
+
+
+def _points(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    if not isinstance(value, list | tuple):
+        raise ScriptError(f"{key}: {value!r} is not a list of points")
+    return tuple(_numbers(2, 2)(key, v) for v in value)
+
+
+def _handles(key: str, value: Any) -> tuple[HandleMove, ...]:
+    if not isinstance(value, list | tuple):
+        raise ScriptError(f"{key}: {value!r} is not a list of handles")
+    return tuple(_handle(key, v) for v in value)
+
+
+def _handle(key: str, value: Any) -> HandleMove:
+    if isinstance(value, HandleMove):
+        return value
+    if not isinstance(value, dict) or not {"at", "to"} <= set(value) <= {"at", "to", "dz"}:
+        raise ScriptError(f'{key}: {value!r} is not {{"at": [x, y], "to": [x, y], "dz": d}}')
+    at, to = (_numbers(2, 2)(key, value[end]) for end in ("at", "to"))
+    return HandleMove((at[0], at[1]), (to[0], to[1]), _number(key, value.get("dz", 0.0)))
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise ScriptError(f"{key}: {value!r} is not a name")
+    return value
+
+
+def _one_of(*allowed: str) -> Callable[[str, Any], str]:
+    def parse(key: str, value: Any) -> str:
+        if value not in allowed:
+            raise ScriptError(f"{key}: {value!r} is not one of {', '.join(allowed)}")
+        return value
+
+    return parse
+
+
+def _flag(key: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ScriptError(f"{key}: {value!r} is not true or false")
+    return value
+
+
+def _whole(least: int, most: int) -> Callable[[str, Any], int]:
+    def parse(key: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise ScriptError(f"{key}: {value!r} is not a whole number from {least} to {most}")
+        return value
+
+    return parse
+
+
+PARSERS: dict[str, Callable[[str, Any], Any]] = {
+    "click": _points, "not_click": _points, "box": _numbers(4, 4), "subject": _flag,
+    "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
+    "splats": _text, "gaussians": _whole(100, 2_000_000), "pin": _points, "handle": _handles,
+    "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
+    "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
+    "faithful": _flag, "shadow": _one_of("auto", "none"), "fov": _number,
+    "seed": _whole(0, 2**31 - 1),
+}  # fmt: skip

@@ -1,0 +1,155 @@
+"""What every inpainter promises, and what the default one does to real photos."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from objectmorpher_core.compose import BACKENDS, InpaintError, load
+from objectmorpher_core.progress import Cancelled, silent
+
+
+@pytest.fixture(params=BACKENDS)
+def inpainter(request):
+    return load(request.param)
+
+
+@pytest.fixture
+def view(rocket):
+    return rocket[180:400, 200:440]
+
+
+@pytest.fixture
+def hole(view):
+    """About the rocket, and away from the frame."""
+    hole = np.zeros(view.shape[:2], bool)
+    hole[10:200, 90:150] = True
+    return hole
+
+
+def sixteen_bit(pixels: np.ndarray) -> np.ndarray:
+    noise = np.random.default_rng(3).integers(-128, 128, pixels.shape)
+    return np.clip(pixels.astype(int) * 257 + noise, 0, 65535).astype(np.uint16)
+
+
+def roughness(pixels: np.ndarray, where: np.ndarray) -> float:
+    """RMS of the Laplacian, 8-bit levels: what a smear lacks."""
+    grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    return float(np.sqrt(np.mean(cv2.Laplacian(grey, cv2.CV_32F)[where] ** 2)))
+
+
+@pytest.mark.parametrize("depth", [8, 16])
+def test_contract(inpainter, view, hole, depth):
+    pixels = view if depth == 8 else sixteen_bit(view)
+    before, hole_before = pixels.copy(), hole.copy()
+    filled = inpainter.inpaint(pixels, hole, silent)
+    assert filled.dtype == pixels.dtype
+    assert filled.shape == pixels.shape
+    np.testing.assert_array_equal(filled[~hole], pixels[~hole])
+    np.testing.assert_array_equal(pixels, before)
+    np.testing.assert_array_equal(hole, hole_before)
+    assert (filled[hole] != pixels[hole]).any(1).mean() > 0.9
+    again = inpainter.inpaint(pixels, hole, silent)
+    np.testing.assert_array_equal(again, filled)
+
+
+def test_the_rocket_is_gone(inpainter, view, hole):
+    """The rocket is white on a dark sky; the fill is as dark as the sky beside it."""
+    filled = inpainter.inpaint(view, hole, silent).astype(float)
+    sky = np.zeros_like(hole)
+    sky[20:90, 40:80] = True
+    filling = np.zeros_like(hole)
+    filling[20:90, 95:145] = True
+    assert view[filling].mean() > 60
+    np.testing.assert_allclose(filled[filling].mean(0), filled[sky].mean(0), atol=12)
+
+
+def test_what_the_hole_hides_does_not_matter(inpainter, view, hole):
+    """The old object must not shine through, not even at its rim."""
+    covered = view.copy()
+    covered[hole] = (255, 0, 255)
+    np.testing.assert_array_equal(
+        inpainter.inpaint(covered, hole, silent), inpainter.inpaint(view, hole, silent)
+    )
+
+
+def test_hole_at_the_frame(inpainter, view):
+    hole = np.zeros(view.shape[:2], bool)
+    hole[:, :70] = True
+    hole[-30:] = True
+    filled = inpainter.inpaint(view, hole, silent)
+    np.testing.assert_array_equal(filled[~hole], view[~hole])
+
+
+def test_only_a_rim_is_known(inpainter, view):
+    hole = np.ones(view.shape[:2], bool)
+    hole[0, 0] = hole[-1, -3:] = False
+    filled = inpainter.inpaint(view, hole, silent)
+    np.testing.assert_array_equal(filled[~hole], view[~hole])
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (2, 1), (3, 3), (1, 40), (9, 5)])
+def test_tiny_pictures(inpainter, view, shape):
+    pixels = view[: shape[0], : shape[1]]
+    hole = np.zeros(shape, bool)
+    hole[-1, -1] = True
+    filled = inpainter.inpaint(pixels, hole, silent)
+    np.testing.assert_array_equal(filled[~hole], pixels[~hole])
+
+
+def test_no_hole_changes_nothing(inpainter, view):
+    np.testing.assert_array_equal(
+        inpainter.inpaint(view, np.zeros(view.shape[:2], bool), silent), view
+    )
+
+
+def test_nothing_but_hole(inpainter, view):
+    with pytest.raises(InpaintError, match="nothing to fill it from"):
+        inpainter.inpaint(view, np.ones(view.shape[:2], bool), silent)
+
+
+def test_cancel(inpainter, view, hole):
+    def stop(fraction: float, note: str) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        inpainter.inpaint(view, hole, stop)
+
+
+def test_seed_changes_the_result(coffee):
+    hole = np.zeros(coffee.shape[:2], bool)
+    hole[320:380, 480:560] = True
+    results = [load("patchmatch").inpaint(coffee, hole, silent, seed) for seed in (0, 1)]
+    assert not np.array_equal(*results)
+
+
+def test_detail_is_the_photos_own(china):
+    """Trees that are filled at 1/3 of the photo's resolution are as rough as the trees around."""
+    large = cv2.resize(china[250:, 380:], None, fx=4, fy=4, interpolation=cv2.INTER_LANCZOS4)
+    large = np.clip(large + np.random.default_rng(1).normal(0, 6, large.shape), 0, 255)
+    large = large.astype(np.uint8)
+    hole = np.zeros(large.shape[:2], bool)
+    hole[420:560, 200:420] = True
+    around = cv2.dilate(hole.astype(np.uint8), np.ones((81, 81))).astype(bool) & ~hole
+    filled = load("patchmatch").inpaint(large, hole, silent)
+    inner = cv2.erode(hole.astype(np.uint8), np.ones((5, 5))).astype(bool)
+    assert 0.75 < roughness(filled, inner) / roughness(large, around) < 1.25
+
+
+def test_16_bit_gradient_shows_no_bands():
+    """A sky finer than 8 bits: the fill has in-between values, and no step above the photo's."""
+    ramp = np.linspace(20000, 23000, 240)[:, None, None]
+    noise = np.random.default_rng(2).normal(0, 20, (240, 300, 3))
+    sky = np.rint(ramp + noise).astype(np.uint16)
+    hole = np.zeros(sky.shape[:2], bool)
+    hole[90:150, 120:180] = True
+    filled = load("patchmatch").inpaint(sky, hole, silent)[hole]
+    assert len(np.unique(filled)) > 500
+    means = load("patchmatch").inpaint(sky, hole, silent)[90:150, 120:180].mean((1, 2))
+    np.testing.assert_allclose(means, ramp[90:150, 0, 0], atol=257)
+
+
+def test_unknown_name():
+    with pytest.raises(InpaintError, match="there is no inpainter 'lama'"):
+        load("lama")
