@@ -291,7 +291,8 @@ class Editor:
         return self.derived.project(self.document, self.current, targets)
 
     def handle_position(self, handle: int) -> Spot:
-        assert self.document is not None and self.object is not None
+        assert self.document is not None
+        assert self.object is not None
         return self.derived.spot(self.document, self.current, self.object.handles[handle].target)
 
     def start_handle(self, canvas_xy: np.ndarray, is_pin: bool) -> int | None:

@@ -11,8 +11,15 @@ from pathlib import Path
 
 from objectmorpher_core.arrays import Mask, Pixels
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Prompt
-from objectmorpher_core.progress import Progress
+from objectmorpher_core.document import (
+    Document,
+    EditObject,
+    LiftedObject,
+    Matte,
+    Plate,
+    Prompt,
+)
+from objectmorpher_core.progress import Progress, part
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -45,7 +52,33 @@ def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matt
     """The masked object's soft cut-out and its 3D Gaussians, about `count` of them."""
     from objectmorpher_core.pipeline import lift_mask
 
-    return lift_mask(cut.pixels, cut.camera, cut.mask, choice.backend, count, progress, choice.seed)
+    stage = part(progress, 0.0, 0.95)
+    matte, lifted = lift_mask(
+        cut.pixels, cut.camera, cut.mask, choice.backend, count, stage, choice.seed
+    )
+    progress(0.95, "getting ready to pose")
+    _rehearse(cut, matte, lifted)
+    return matte, lifted
+
+
+def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
+    """Drags the new object once, here: what is compiled for it is on the disk for the window.
+
+    Compiling takes many seconds after an installation and nothing later.
+    """
+    from objectmorpher_core.document import Handle, Placement
+    from objectmorpher_core.puppet import puppet_of
+    from objectmorpher_core.raster.posed import build_levels
+
+    puppet = puppet_of(EditObject("", matte=matte, lifted=lifted), cut.camera)
+    texture = build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+    point = lifted.control_points[0].astype(float)
+    handles = (Handle(0, point, point + 0.01),)
+    pose = puppet.deformer.solve(handles, True, None).pose
+    pose = puppet.deformer.solve(handles, True, pose).pose
+    x, y = puppet.picture_of(point, pose, Placement())
+    puppet.pick((float(x), float(y)), pose, Placement(), texture)
+    puppet.pick((float(x), float(y)), None, Placement(), texture)
 
 
 def inpaint(pixels: Pixels, hole: Mask, choice: Choice, progress: Progress) -> Plate:

@@ -106,7 +106,7 @@ class Tasks:
 
     def ensure_plate(self) -> bool:
         """Sees to it that lifted objects have a background behind them; each frame."""
-        editor, document = self._editor, self._editor.document
+        document = self._editor.document
         if document is None or document.plate is not None:
             return False
         masks = tuple(o.mask for o in document.objects)

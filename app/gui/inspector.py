@@ -14,7 +14,7 @@ from .panel_place import draw_place
 from .panel_pose import draw_pose
 from .panes import edge, pane
 from .theme import PRIMARY, Icon, theme
-from .widgets import Kind, button, gap, heading, icon_button, note, rule, tooltip
+from .widgets import Kind, button, gap, heading, icon_button, note, rule
 
 ROW = 32.0  # points
 
@@ -106,15 +106,8 @@ def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
     label, command = next_step(editor)
     if command is None:
         button(label, Kind.WAITING)
-        tooltip(_hint(editor))
     elif button(label, Kind.PRIMARY, why_not=COMMANDS[command].why_not(editor)):
         run(editor, command)
-
-
-def _hint(editor: Editor) -> str:
-    if editor.jobs.current is not None:
-        return "The status line below says how far it is"
-    return "This is done in the photo, with the pointer"
 
 
 _PANELS: dict[ToolName, Callable[[Editor], None]] = {

@@ -6,6 +6,8 @@ any photo and by everybody.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
@@ -48,12 +50,12 @@ class Overlays:
 
     # Places
 
-    def _at(self, image_xy: np.ndarray) -> list[ImVec2]:
+    def _at(self, image_xy: np.ndarray) -> list[Any]:
         """Window positions of image px (N, 2)."""
         canvas = self._editor.view.canvas_from_image(image_xy)
         return self._on_canvas(canvas)
 
-    def _on_canvas(self, canvas_xy: np.ndarray) -> list[ImVec2]:
+    def _on_canvas(self, canvas_xy: np.ndarray) -> list[Any]:
         xy = np.atleast_2d(canvas_xy) / self._ratio + (self._rect.x, self._rect.y)
         return [ImVec2(x, y) for x, y in xy.tolist()]
 
@@ -133,13 +135,14 @@ class Overlays:
         editor = self._editor
         assert editor.document is not None
         for at in self._at(editor.derived.control_points(editor.document, editor.current)):
-            self._draw.add_circle_filled(at, theme.pt(1.6), theme.u32(DARK, 0.35), 8)
-            self._draw.add_circle_filled(at, theme.pt(1.1), theme.u32(WHITE, 0.65), 8)
+            self._draw.add_circle_filled(at, theme.scale * 2.6, theme.u32(DARK, 0.5), 8)
+            self._draw.add_circle_filled(at, theme.scale * 1.7, theme.u32(WHITE, 0.9), 8)
 
     def _draw_surface_point(self) -> None:
         editor = self._editor
         surface = editor.hover.surface
-        assert surface is not None and editor.document is not None
+        assert surface is not None
+        assert editor.document is not None
         xy = editor.document.photo.camera.project(surface.world)
         at = self._at(xy)[0]
         if editor.hover.is_pin:
@@ -240,7 +243,7 @@ class Overlays:
         self._draw_label("After", x + theme.pt(12), is_left=True)
 
     def _draw_label(self, text: str, x: float, is_left: bool) -> None:
-        """White on dark, at the top of the canvas; `is_left`: it begins at x, else it ends there."""
+        """White on dark, at the canvas's top; `is_left`: it begins at x, else it ends there."""
         size = imgui.calc_text_size(text)
         pad_x, pad_y = theme.pt(8), theme.pt(4)
         left = x if is_left else x - size.x - 2 * pad_x

@@ -7,7 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from ..commands import COMMANDS, run
 from ..editor import Editor
 from .theme import Icon, theme
-from .widgets import button, gap, heading, icon_button, note, tooltip
+from .widgets import button, checkbox, gap, heading, icon_button, note, tooltip
 
 ROW = 28.0  # points
 VISIBLE_ROWS = 8
@@ -23,13 +23,11 @@ def draw_pose(editor: Editor) -> None:
             _draw_handle(editor, h)
     gap(12)
     if thing is not None:
-        is_changed, is_on = imgui.checkbox("Hold the far side still", thing.has_auto_anchors)
+        is_on = checkbox("Hold the far side still", thing.has_auto_anchors)
         tooltip("With one handle, the part farthest from it is anchored by itself")
-        if is_changed:
+        if is_on != thing.has_auto_anchors:
             editor.set_auto_anchors(is_on)
-    is_changed, is_on = imgui.checkbox("Show control points", editor.view.has_points)
-    if is_changed:
-        editor.view.has_points = is_on
+    editor.view.has_points = checkbox("Show control points", editor.view.has_points)
     gap(12)
     reason = COMMANDS["reset_pose"].why_not(editor)
     if reason is None and thing is not None and not thing.handles:

@@ -195,3 +195,11 @@ def _stepper(icon: str) -> bool:
     imgui.pop_font()
     imgui.pop_style_var()
     return is_pressed
+
+
+def checkbox(label: str, is_on: bool) -> bool:
+    """A small box with a label; whether it is on now."""
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 1))
+    is_on = imgui.checkbox(label, is_on)[1]
+    imgui.pop_style_var()
+    return is_on

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import logging
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +86,10 @@ class Window:
         self._start = StartScreen(self._context)
         self._dialogs, self._input = Dialogs(), Input()
         self._cursors: dict[int, Any] = {}
-        self._is_cursor_ours = False
+        self._cursor: Any = None
         self._title = ""
-        glfw.set_drop_callback(self._handle, self._take_drop)
+        take_drop: Any = self._take_drop
+        glfw.set_drop_callback(self._handle, take_drop)
 
     def run(self) -> None:
         """Frames, as few as possible: after an event, and while something moves."""
@@ -228,14 +228,14 @@ class Window:
         """On the canvas the tool's cursor, elsewhere what ImGui asks for."""
         io = imgui.get_io()
         if io.want_capture_mouse and not self.editor.hand.is_busy:
-            wanted = _IMGUI_CURSORS.get(imgui.get_mouse_cursor(), glfw.ARROW_CURSOR)
+            wanted = _IMGUI_CURSORS.get(int(imgui.get_mouse_cursor()), glfw.ARROW_CURSOR)
         else:
             wanted = CURSORS[self._input.shape]
         if wanted not in self._cursors:
             self._cursors[wanted] = glfw.create_standard_cursor(wanted)
-        if self._cursors[wanted] is not self._is_cursor_ours:
+        if self._cursors[wanted] is not self._cursor:
             glfw.set_cursor(self._handle, self._cursors[wanted])
-            self._is_cursor_ours = self._cursors[wanted]
+            self._cursor = self._cursors[wanted]
 
     def _set_title(self) -> None:
         editor = self.editor
@@ -249,7 +249,7 @@ class Window:
 
     # The rest
 
-    def _take_drop(self, _window: object, paths: list[str]) -> None:
+    def _take_drop(self, _window: object, paths: Any) -> None:
         if paths:
             self.editor.filing.open(Path(paths[0]))
 
@@ -275,18 +275,18 @@ class Window:
 
 
 _IMGUI_CURSORS = {
-    imgui.MouseCursor_.text_input: glfw.IBEAM_CURSOR,
-    imgui.MouseCursor_.hand: glfw.POINTING_HAND_CURSOR,
-    imgui.MouseCursor_.resize_ew: glfw.RESIZE_EW_CURSOR,
-    imgui.MouseCursor_.resize_ns: glfw.RESIZE_NS_CURSOR,
-    imgui.MouseCursor_.resize_all: glfw.RESIZE_ALL_CURSOR,
+    int(imgui.MouseCursor_.text_input): glfw.IBEAM_CURSOR,
+    int(imgui.MouseCursor_.hand): glfw.POINTING_HAND_CURSOR,
+    int(imgui.MouseCursor_.resize_ew): glfw.RESIZE_EW_CURSOR,
+    int(imgui.MouseCursor_.resize_ns): glfw.RESIZE_NS_CURSOR,
+    int(imgui.MouseCursor_.resize_all): glfw.RESIZE_ALL_CURSOR,
 }
 
 
 def _open_window(options: WindowOptions) -> Any:
     """A window with an OpenGL 3.3 core context."""
     errors: list[str] = []
-    glfw.set_error_callback(lambda _code, text: errors.append(text.decode(errors="replace")))
+    glfw.set_error_callback(lambda _code, text: errors.append(str(text)))
     if not glfw.init():
         raise WindowError(f"no window can be opened: {'; '.join(errors) or 'no display'}")
     hints: tuple[tuple[int, int], ...] = (
@@ -311,9 +311,5 @@ def _open_window(options: WindowOptions) -> Any:
 def _set_icon(handle: Any) -> None:
     from PIL import Image
 
-    path: Callable[[], Any] = lambda: resource("assets/icon.png")  # noqa: E731
-    try:
-        with Image.open(str(path())) as file:
-            glfw.set_window_icon(handle, 1, [file.convert("RGBA").resize((64, 64))])
-    except (OSError, glfw.GLFWError) as error:
-        log.info("The window has no icon: %s", error)
+    icon: Any = Image.open(str(resource("assets/icon.png"))).convert("RGBA")
+    glfw.set_window_icon(handle, 1, [icon])

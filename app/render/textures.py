@@ -27,7 +27,7 @@ class PictureTexture:
         self._uploaded = pixels
         shown = np.zeros((1, 1), np.uint8) if pixels is None else self._fitting(_as_u8(pixels))
         height, width = shown.shape[:2]
-        channels = 1 if shown.ndim == 2 else shown.shape[2]
+        channels = shown.size // (height * width)
         data = np.ascontiguousarray(shown)
         self.texture = self._context.texture((width, height), channels, data, alignment=1)
         self.texture.repeat_x = self.texture.repeat_y = False

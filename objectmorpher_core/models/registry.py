@@ -31,7 +31,7 @@ class Weight:
 @cache
 def weights() -> tuple[Weight, ...]:
     """All known weights, in the registry's order."""
-    text = files(__package__).joinpath("registry.toml").read_text(encoding="utf-8")
+    text = files("objectmorpher_core.models").joinpath("registry.toml").read_text(encoding="utf-8")
     return tuple(Weight(**entry) for entry in tomllib.loads(text)["weight"])
 
 

@@ -35,8 +35,8 @@ MATTE_END = 0.50
 
 # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below STREAK_START the
 # photo's pixels begin to show as streaks, below STREAK_END they are not used.
-STREAK_START = 0.30
-STREAK_END = 0.12
+STREAK_START = 0.50
+STREAK_END = 0.25
 
 
 SAME_POINT = 1.0  # px of the photo: layers that look this close together are one surface

@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from ..arrays import frozen
+from ..arrays import F64, frozen
 from ..camera import Camera
 from . import rules
 from .posed import PosedSplats, TextureLevels
@@ -40,15 +40,8 @@ def render(
 ) -> Picture3D:
     """The object as `camera` sees it; see `reference.render`, with which it agrees."""
     height, width = camera.height, camera.width
-    view = frozen(np.array([camera.focal, camera.cx, camera.cy]))
-    photo = frozen(np.array([photo_camera.focal, photo_camera.cx, photo_camera.cy]))
-    fields = (
-        splats.means, splats.linear, splats.rest_covariances, splats.rest_pictures,
-        splats.normals, splats.u0, splats.visibility, splats.solidity, splats.colors,
-        splats.opacities, splats.rest_zoom,
-    )  # fmt: skip
-    near = float(rules.NEAR * splats.gap)
-    projected = frozen(_project(*(frozen(a) for a in fields), view, photo, near))
+    view, photo = _intrinsics(camera), _intrinsics(photo_camera)
+    projected = frozen(project(splats, camera, photo_camera))
     across, down = -(-width // TILE), -(-height // TILE)
     keep, order = _depth_order(projected, width, height)
     starts, members = _bin(projected, frozen(keep[order]), across, down)
@@ -60,6 +53,25 @@ def render(
         frozen(offsets), float(texture.left), float(texture.top), out,
     )  # fmt: skip
     return Picture3D(out[..., :3], out[..., 3], out[..., 4], out[..., 5], out[..., 6:8])
+
+
+def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
+    """Gaussians on the screen (N, SPAN), columns as named above; unseen ones are all 0.
+
+    Steps 1 and 2 of the reference, and what the GPU draws from.
+    """
+    fields = (
+        splats.means, splats.linear, splats.rest_covariances, splats.rest_pictures,
+        splats.normals, splats.u0, splats.visibility, splats.solidity, splats.colors,
+        splats.opacities, splats.rest_zoom,
+    )  # fmt: skip
+    near = float(rules.NEAR * splats.gap)
+    inputs = [frozen(a) for a in (*fields, _intrinsics(camera), _intrinsics(photo_camera))]
+    return _project(*inputs, near)
+
+
+def _intrinsics(camera: Camera) -> F64:
+    return frozen(np.array([camera.focal, camera.cx, camera.cy]))
 
 
 def _flatten(texture: TextureLevels):

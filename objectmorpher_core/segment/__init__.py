@@ -14,7 +14,7 @@ from ..document import Prompt
 from ..progress import Progress
 from .selection import SelectionError
 
-__all__ = ["BACKENDS", "SelectionError", "Segmenter", "load"]
+__all__ = ["BACKENDS", "Segmenter", "SelectionError", "load"]
 
 
 class Segmenter(Protocol):
@@ -24,9 +24,11 @@ class Segmenter(Protocol):
 
     def missing(self) -> str | None:
         """Why this backend cannot run here, as a sentence for the user; None where it can."""
+        ...
 
     def encode(self, rgb: RGB, progress: Progress) -> Any:
         """What is worth keeping of a photo (H, W, 3): plain, picklable, or None if nothing is."""
+        ...
 
     def segment(
         self, rgb: RGB, prompt: Prompt, embedding: Any, progress: Progress, seed: int = 0
@@ -35,6 +37,7 @@ class Segmenter(Protocol):
 
         The same arguments give the same mask. Raises SelectionError: one sentence.
         """
+        ...
 
 
 BACKENDS = {

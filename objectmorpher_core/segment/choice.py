@@ -2,7 +2,7 @@
 
 Each positive click proposes outlines (`Walk.regions`), and the subject it stands on. The best has
 strong contrast across its outline, agrees with the subject map and leaves the photo's border free;
-so a click on a part chooses the whole. Negative clicks take what the walk reaches from them first.
+so a click on a part chooses the whole. A negative click takes away the part that it is on.
 """
 
 from __future__ import annotations
@@ -96,10 +96,8 @@ def _subjects(ground: Ground) -> list[Choice]:
     """The photo's subject: what hangs together with the inmost cell of each of its pieces."""
     if ground.salience is None or ground.salience.max() <= 0.5:
         raise SelectionError("no subject stands out in this photo: click the object")
-    salient = ((ground.salience > 0.5) & (_enlarge(ground.inside.astype(np.float32)) > 0.5)).astype(
-        np.uint8
-    )
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(salient)
+    salient = (ground.salience > 0.5) & (_enlarge(ground.inside.astype(np.float32)) > 0.5)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(salient.astype(np.uint8))
     if count == 1:
         raise SelectionError("no subject stands out in the box: click the object")
     largest = stats[1:, cv2.CC_STAT_AREA].max()
@@ -235,7 +233,8 @@ def _sharpen(cells: Mask, subject: F32 | None) -> F32:
 def _blur(mask: Mask) -> F32:
     """(h, w) mask of cells with an outline as unsure as the cells are coarse."""
     image = mask.astype(np.float32)
-    return cv2.GaussianBlur(image, (0, 0), UNSURE, borderType=cv2.BORDER_REPLICATE)
+    soft = cv2.GaussianBlur(image, (0, 0), UNSURE, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(soft, np.float32)
 
 
 def _soften(mask: Mask) -> F32:
@@ -244,11 +243,12 @@ def _soften(mask: Mask) -> F32:
 
 
 def _enlarge(cells: F32) -> F32:
-    return cv2.resize(cells, (SIDE, SIDE), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.resize(cells, (SIDE, SIDE), interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def _to_cells(image: F32, shape: tuple[int, int]) -> F32:
-    return cv2.resize(image, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+    size = (shape[1], shape[0])
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _cell(click: Click, rgb: RGB, walk: Walk) -> tuple[int, int]:

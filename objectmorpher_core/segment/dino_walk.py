@@ -1,4 +1,4 @@
-"""Clicks -> object by a random walk over DINOv2's patch tokens (Oquab et al. 2023, arXiv 2304.07193).
+"""Clicks -> object by a random walk over DINOv2's patch tokens (Oquab et al., arXiv 2304.07193).
 
 Tokens of one object are alike, so a walk from the click stays on it; the subject map, where its
 weights are here, says how far a whole object extends.

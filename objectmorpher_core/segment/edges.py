@@ -33,7 +33,7 @@ def cut(rgb: RGB, guess: F32, prompt: Prompt, seed: int = 0) -> Mask:
     crop = np.ascontiguousarray(rgb[top:bottom, left:right])
     scale = min(1.0, (WORK_AREA / (crop.shape[0] * crop.shape[1])) ** 0.5)
     size = (max(1, round(crop.shape[1] * scale)), max(1, round(crop.shape[0] * scale)))
-    small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
+    small = np.asarray(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), np.uint8)
     trimap = _trimap(guess, (left, top, right, bottom), (height, width), size)
     inside = box_mask((height, width), prompt)[top:bottom, left:right].astype(np.uint8)
     trimap[cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST) == 0] = cv2.GC_BGD
@@ -74,9 +74,9 @@ def _trimap(
     left, top, right, bottom = crop
     xs = (left + (np.arange(size[0]) + 0.5) * (right - left) / size[0]) * guess.shape[1] / shape[1]
     ys = (top + (np.arange(size[1]) + 0.5) * (bottom - top) / size[1]) * guess.shape[0] / shape[0]
-    grid = np.meshgrid((xs - 0.5).astype(np.float32), (ys - 0.5).astype(np.float32))
+    x, y = np.meshgrid((xs - 0.5).astype(np.float32), (ys - 0.5).astype(np.float32))
     soft = cv2.remap(
-        guess.astype(np.float32), *grid, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        guess.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
     trimap = np.where(soft > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     trimap[soft > 1 - SURE] = cv2.GC_FGD
@@ -94,7 +94,7 @@ def _grabcut(rgb: RGB, trimap: np.ndarray, seed: int) -> F32:
     foreground = _color_model(rgb[is_object], seed)
     cv2.setRNGSeed(seed)
     labels = trimap.copy()
-    cv2.grabCut(rgb, labels, None, background, foreground, ROUNDS, cv2.GC_EVAL)
+    cv2.grabCut(rgb, labels, (0, 0, 0, 0), background, foreground, ROUNDS, cv2.GC_EVAL)
     return ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
 
 
@@ -126,7 +126,7 @@ def _sharpen(rgb: RGB, found: F32) -> Mask:
     """(H, W) `found` (h, w) carried to the photo's resolution along the photo's own edges."""
     height, width = rgb.shape[:2]
     scale = width / found.shape[1]
-    radius = int(round(GUIDE_RADIUS * scale))
+    radius = round(GUIDE_RADIUS * scale)
     coarse = cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR)
     coarse = cv2.GaussianBlur(coarse, (0, 0), 0.7 * scale)
     mask = coarse > 0.5

@@ -71,7 +71,8 @@ class GrabCut:
 def _box_guess(rgb: RGB, prompt: Prompt) -> F32:
     """(BOX_SIDE, BOX_SIDE) guess of a box alone: outside is ground, inside is for GrabCut."""
     inside = box_mask(rgb.shape, prompt).astype(np.float32)
-    return UNDECIDED * cv2.resize(inside, (BOX_SIDE, BOX_SIDE), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(inside, (BOX_SIDE, BOX_SIDE), interpolation=cv2.INTER_AREA)
+    return np.asarray(UNDECIDED * small, np.float32)
 
 
 def _colors(rgb: RGB) -> F32:
@@ -84,4 +85,4 @@ def _colors(rgb: RGB) -> F32:
     )
     half = cv2.resize(small, ((size[0] + 1) // 2, (size[1] + 1) // 2), interpolation=cv2.INTER_AREA)
     lab = cv2.cvtColor(half.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
-    return lab / COLOR_STEP
+    return np.asarray(lab / COLOR_STEP, np.float32)

@@ -19,6 +19,7 @@ BAND = 0.0035  # x the photo's diagonal: half-width of the band where alpha may 
 MIN_BAND = 2.0  # px
 REACH = 3.0  # x band: how far the colours of object and background are gathered
 CONTRAST = 0.15  # sRGB distance of the two colours from which they, not the mask, decide
+TRUST = 0.2  # sRGB: how far an unmixed colour may be from the object's colour beside it
 SLOPE = 1.25  # stretches alpha about 0.5: the estimate is a little too soft
 
 
@@ -63,16 +64,21 @@ def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:
     blurred = np.clip(0.5 + distance / (1.2 * band), 0, 1)
     trust = np.clip(contrast / CONTRAST - 0.35, 0, 1)
     # What the colours say may move the edge by no more than the band.
-    fence = np.clip(1.5 + distance / band, 0, 1) * 1.0
+    fence = np.clip(1.5 + distance / band, 0, 1)
     floor = np.clip(distance / band - 0.5, 0, 1)
     alpha = trust * np.clip(along, 0, 1) + (1 - trust) * blurred
-    alpha = cv2.ximgproc.guidedFilter(rgb, alpha.astype(np.float32), int(round(band)), 1e-4)
+    alpha = cv2.ximgproc.guidedFilter(rgb, alpha.astype(np.float32), round(band), 1e-4)
     alpha = np.clip(0.5 + SLOPE * (alpha - 0.5), 0, 1)
     alpha = np.clip(alpha, floor, fence)
     alpha[inner] = 1.0
     alpha[outer] = 0.0
-    mixed = (alpha < 1.0)[..., None]
-    foreground = np.where(mixed, inside, rgb)
+    # The colour that explains a mixed pixel, as far as it is near what stands beside it: the
+    # thinner the pixel's share of the object, the less it says.
+    share = alpha[..., None]
+    unmixed = (rgb - (1 - share) * outside) / np.maximum(share, 1e-3)
+    room = TRUST * share**2
+    mixed = np.clip(unmixed, inside - room, inside + room)
+    foreground = np.where(share < 1.0, mixed, rgb)
     return alpha.astype(np.float32), np.clip(foreground, 0, 1).astype(np.float32)
 
 

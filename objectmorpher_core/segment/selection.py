@@ -71,7 +71,9 @@ def keep_touched(mask: Mask, prompt: Prompt) -> Mask:
     if not clicks or prompt.is_subject or (not kept and prompt.box is not None):
         areas = stats[1:, cv2.CC_STAT_AREA]
         kept |= {int(k) + 1 for k in np.flatnonzero(areas >= SMALL_ISLAND * areas.max())}
-    return np.isin(labels, sorted(kept))
+    is_kept = np.zeros(count, bool)
+    is_kept[sorted(kept)] = True
+    return is_kept[labels]
 
 
 def fill_small_holes(mask: Mask, prompt: Prompt) -> Mask:

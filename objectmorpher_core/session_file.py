@@ -1,0 +1,247 @@
+"""Sessions: a document in a zip file (.omorph), so that reloading shows the same picture.
+
+    document.json       version, every choice, and the SHA-256 of each other member
+    photo/NAME          the opened file's own bytes
+    objects/0/mask.png  masks, and the plate's pixels
+    arrays.npz          every other array, exactly (never pickled)
+    objects/0/*.ply     the Gaussians once more, for other programs; not read back
+
+What is stored follows from the dataclasses of `document.py`: a new field there needs nothing here
+but a default, which is what older sessions get. The same document gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+import zlib
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from .camera import Camera
+from .document import Document, EditObject, Photo
+from .files import write_all
+from .image import ImageError, encode_picture, read_picture
+from .session_tree import Reader, SessionError, Writer
+from .splat_files.ply import encode_ply
+
+__all__ = ["SessionError", "decode_session", "encode_session", "save_session"]
+
+VERSION = 1
+FORMAT = "objectmorpher session"
+DOCUMENT, ARRAYS = "document.json", "arrays.npz"
+LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the zip format's first day: no clock in the bytes
+MAX_BYTES = 4 << 30  # unpacked, all members: more than any real session, less than a zip bomb
+PACKED_ENDINGS = (".png", ".npz", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".avif")
+
+
+def save_session(document: Document, path: Path) -> None:
+    """Writes the session file, whole or not at all. Raises OutputError."""
+    write_all({path: encode_session(document)})
+
+
+def encode_session(document: Document) -> bytes:
+    """The bytes of the document's session file. Raises SessionError for values beyond numbers."""
+    members: dict[str, bytes] = {}
+    photo = document.photo
+    ending = PurePosixPath(photo.name).suffix.lower()
+    source = f"photo/photo{ending if ending.isascii() and ending[1:].isalnum() else ''}"
+    members[source] = photo.source or encode_picture(photo.picture, "png")
+    writer = Writer(skipped=(Photo,))
+    tree = writer.tree(document, "")
+    tree["photo"] = {
+        "name": photo.name,
+        "source": source,
+        "camera": writer.tree(photo.camera, "camera"),
+    }
+    members |= writer.pictures
+    for k, item in enumerate(document.objects):
+        if item.lifted is not None:
+            members[f"objects/{k}/gaussians.ply"] = encode_ply(item.lifted.gaussians)
+    members[ARRAYS] = _zip({f"{path}.npy": _npy(a) for path, a in writer.arrays.items()}, 1)
+    head = {
+        "format": FORMAT,
+        "version": VERSION,
+        "document": tree,
+        "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
+    }
+    text = json.dumps(head, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return _zip({DOCUMENT: text.encode()} | members, 1)
+
+
+def decode_session(data: bytes) -> Document:
+    """The document of a session file's bytes, equal to the saved one array by array.
+
+    Raises SessionError: one sentence.
+    """
+    members = _unzip(data, "session")
+    head = _head(members)
+    hashes = head.get("sha256")
+    if not isinstance(hashes, dict):
+        raise SessionError("the session's document.json is damaged: sha256 is missing")
+    for name, expected in hashes.items():
+        if name not in members:
+            raise SessionError(f"the session is incomplete: {name} is missing")
+        if hashlib.sha256(members[name]).hexdigest() != expected:
+            raise SessionError(f"the session is damaged: {name} is not what was saved")
+    trusted = {name: members[name] for name in hashes}
+    reader = Reader(trusted, _arrays(trusted))
+    tree = head.get("document")
+    if not isinstance(tree, dict):
+        raise SessionError("the session's document.json is damaged: document is missing")
+    photo = _photo(tree.get("photo"), trusted, reader)
+    try:
+        document = reader.value(Document, tree | {"photo": photo}, "document")
+        _check(document)
+    except SessionError:
+        raise
+    except (ValueError, TypeError) as error:
+        raise SessionError(f"the session is damaged: {error}") from error
+    return document
+
+
+def _head(members: dict[str, bytes]) -> dict[str, Any]:
+    """document.json, of this version."""
+    if DOCUMENT not in members:
+        raise SessionError("the file is a zip archive but not a session: it has no document.json")
+    try:
+        head = json.loads(members[DOCUMENT], parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise SessionError("the session's document.json is damaged") from error
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
+        raise SessionError("the file is a zip archive but not a session")
+    version = head.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise SessionError(f"the session has no valid version ({version})")
+    if version > VERSION:
+        raise SessionError(f"the session was made by a newer version ({version})")
+    return head
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _photo(tree: object, members: dict[str, bytes], reader: Reader) -> Photo:
+    """The photo, its picture decoded from the original file's bytes."""
+    if not isinstance(tree, dict) or tree.get("source") not in members:
+        raise SessionError("the session is damaged: its photo is missing")
+    source = members[tree["source"]]
+    try:
+        picture = read_picture(source)
+    except ImageError as error:
+        raise SessionError(f"the session's photo cannot be read: {error}") from error
+    camera = reader.value(Camera, tree.get("camera"), "photo.camera")
+    name = reader.value(str, tree.get("name"), "photo.name")
+    return Photo(picture, camera, source, name)
+
+
+def _arrays(members: dict[str, bytes]) -> dict[str, np.ndarray]:
+    """The arrays of arrays.npz by path; never a pickle, never a value beyond numbers."""
+    arrays = {}
+    for name, data in _unzip(members.get(ARRAYS, b""), ARRAYS).items():
+        try:
+            array = np.load(io.BytesIO(data), allow_pickle=False)
+        except (ValueError, EOFError, OSError, SyntaxError) as error:
+            raise SessionError(f"the session is damaged: {name} is no array") from error
+        if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
+            raise SessionError(f"the session is damaged: {name} is no array of numbers")
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise SessionError(f"the session is damaged: {name} holds values that are not finite")
+        arrays[name.removesuffix(".npy")] = array
+    return arrays
+
+
+def _npy(array: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    np.lib.format.write_array(out, np.ascontiguousarray(array), allow_pickle=False)
+    return out.getvalue()
+
+
+def _zip(members: dict[str, bytes], level: int) -> bytes:
+    """Zip file whose bytes depend on nothing but the members; packed ones are not packed again."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, data in members.items():
+            info = zipfile.ZipInfo(name, LONG_AGO)
+            info.create_system, info.external_attr = 3, 0o644 << 16  # as on Linux, everywhere
+            is_packed = name.endswith(PACKED_ENDINGS)
+            info.compress_type = zipfile.ZIP_STORED if is_packed else zipfile.ZIP_DEFLATED
+            archive.writestr(info, data, compresslevel=level)
+    return out.getvalue()
+
+
+def _unzip(data: bytes, what: str) -> dict[str, bytes]:
+    """The members of a zip file by name, within bounds."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            infos = archive.infolist()
+            names = [info.filename for info in infos]
+            for name in names:
+                if name.startswith("/") or "\\" in name or ".." in name.split("/"):
+                    raise SessionError(f"the {what} holds a member with a forbidden name: {name!r}")
+            if len(set(names)) < len(names):
+                raise SessionError(f"the {what} holds two members of the same name")
+            if sum(info.file_size for info in infos) > MAX_BYTES:
+                raise SessionError(f"the {what} would unpack to more than {MAX_BYTES >> 30} GiB")
+            return {info.filename: archive.read(info) for info in infos}
+    except SessionError:
+        raise
+    except (zipfile.BadZipFile, EOFError, OSError, ValueError, RuntimeError) as error:
+        raise SessionError(f"the {what} is not a zip file, is damaged or ends early") from error
+    except (NotImplementedError, zlib.error) as error:
+        raise SessionError(f"the {what} is damaged") from error
+
+
+def _check(document: Document) -> None:
+    """ValueError where the document's arrays do not fit each other."""
+    width, height = document.photo.size
+    camera = document.photo.camera
+    _same("the camera", (camera.width, camera.height), (width, height))
+    for item in document.objects:
+        if item.mask is not None:
+            _same("mask", item.mask.shape, (height, width))
+        if item.matte is not None:
+            _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
+            _inside("matte", item.matte.box, (width, height))
+        _check_lifted(item)
+    if (plate := document.plate) is not None:
+        _same("plate", plate.pixels.shape, (*plate.hole.shape, 3))
+        _inside("plate", plate.box, (width, height))
+        if plate.pixels.dtype != document.photo.pixels.dtype:
+            raise ValueError("the plate has another bit depth than the photo")
+
+
+def _check_lifted(item: EditObject) -> None:
+    lifted = item.lifted
+    if lifted is None:
+        if item.handles or item.pose is not None:
+            raise ValueError("an object that is not lifted has handles")
+        return
+    count, nodes = len(lifted.gaussians), len(lifted.control_points)
+    _same("u0", lifted.texture.u0.shape, (count, 2))
+    _same("visibility", lifted.texture.visibility.shape, (count,))
+    _same("solidity", lifted.texture.solidity.shape, (count,))
+    _same("control_points", lifted.control_points.shape, (nodes, 3))
+    _same("world_from_object", lifted.world_from_object.shape, (4, 4))
+    for handle in item.handles:
+        _same("handle", (handle.point.shape, handle.target.shape), ((3,), (3,)))
+        if not 0 <= handle.control_point < nodes:
+            raise ValueError(f"a handle names control point {handle.control_point} of {nodes}")
+    if item.pose is not None:
+        _same("pose", item.pose.points.shape, (nodes, 3))
+        _same("rotations", item.pose.rotations.shape, (nodes, 3, 3))
+
+
+def _same(what: str, found: tuple, expected: tuple) -> None:
+    if found != expected:
+        raise ValueError(f"{what} is {found}, expected {expected}")
+
+
+def _inside(what: str, box: tuple[int, int, int, int], size: tuple[int, int]) -> None:
+    if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1]:
+        raise ValueError(f"the {what}'s box {box} is not inside the photo")

@@ -1,0 +1,1 @@
+"""3D Gaussians in and out of files; a format a file."""

@@ -1,0 +1,142 @@
+"""3DGS files: our Gaussians come back, and those of other programs are understood."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.splat_files.ply import READ, SH0, SplatFileError, decode_ply, encode_ply
+
+F32 = 2e-6  # relative; a value goes through a float32 logarithm or logit of size up to 14
+
+
+def gaussians(count: int = 20) -> Gaussians:
+    random = np.random.default_rng(7)
+    quats = random.normal(size=(count, 4))
+    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
+    return Gaussians(
+        means=random.normal(size=(count, 3)).astype(np.float32),
+        quats=quats.astype(np.float32),
+        scales=np.exp(random.normal(-4, 1, (count, 3))).astype(np.float32),
+        opacities=random.uniform(0.01, 0.99, count).astype(np.float32),
+        colors=random.uniform(0, 1, (count, 3)).astype(np.float32),
+    )
+
+
+def assert_close(got: Gaussians, expected: Gaussians) -> None:
+    np.testing.assert_array_equal(got.means, expected.means)
+    np.testing.assert_allclose(got.quats, expected.quats, atol=2e-7)
+    np.testing.assert_allclose(got.scales, expected.scales, rtol=F32)
+    np.testing.assert_allclose(got.opacities, expected.opacities, atol=F32)
+    np.testing.assert_allclose(got.colors, expected.colors, atol=F32)
+
+
+def stored(cloud: Gaussians) -> dict[str, np.ndarray]:
+    """The columns as a 3DGS trainer would store them."""
+    columns = {name: cloud.means[:, k] for k, name in enumerate("xyz")}
+    for k in range(3):
+        columns[f"f_dc_{k}"] = (cloud.colors[:, k] - 0.5) / SH0
+        columns[f"scale_{k}"] = np.log(cloud.scales[:, k])
+    columns["opacity"] = np.log(cloud.opacities / (1 - cloud.opacities))
+    return columns | {f"rot_{k}": cloud.quats[:, k] for k in range(4)}
+
+
+def foreign_file(columns: dict[str, np.ndarray], kind: str, types: dict[str, str]) -> bytes:
+    """A .ply of these columns, in this order, with an element before and one after."""
+    count = len(columns["x"])
+    lines = ["ply", f"format {kind} 1.0", "comment made elsewhere"]
+    lines += ["element camera 2", "property uchar lens", f"element vertex {count}"]
+    lines += [f"property {types.get(name, 'float')} {name}" for name in columns]
+    lines += ["element face 1", "property list uchar int vertex_index", "end_header"]
+    head = ("\n".join(lines) + "\n").encode()
+    if kind == "ascii":
+        rows = zip(*columns.values(), strict=True)
+        body = "7\n8\n" + "".join(" ".join(map(repr, map(float, r))) + "\n" for r in rows)
+        return head + body.encode() + b"3 0 1 2\n"
+    order = "<" if "little" in kind else ">"
+    codes = {"float": "f4", "double": "f8", "uchar": "u1"}
+    row = [(name, order + codes[types.get(name, "float")]) for name in columns]
+    table = np.empty(count, row)
+    for name, column in columns.items():
+        table[name] = column
+    return head + b"\7\10" + table.tobytes() + b"\3" + bytes(12)
+
+
+def test_round_trip():
+    assert_close(decode_ply(encode_ply(gaussians())), gaussians())
+
+
+def test_none_and_extremes():
+    none = gaussians(1).select(np.zeros(0, int))
+    assert len(decode_ply(encode_ply(none))) == 0
+    base = gaussians(2)
+    extremes = Gaussians(
+        base.means, base.quats, base.scales, np.array([0, 1], np.float32), base.colors
+    )
+    back = decode_ply(encode_ply(extremes))
+    np.testing.assert_allclose(back.opacities, [0, 1], atol=F32)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_files_of_other_programs(kind, degree):
+    """Any order of properties, any degree, doubles, extra properties, elements on both sides."""
+    cloud = gaussians()
+    columns = stored(cloud)
+    for k in range(3 * ((degree + 1) ** 2 - 1)):
+        columns[f"f_rest_{k}"] = np.full(20, 0.1)
+    columns["label"] = np.arange(20)
+    names = list(columns)
+    np.random.default_rng(degree).shuffle(names)
+    shuffled = {name: columns[name] for name in names}
+    data = foreign_file(shuffled, kind, {"label": "uchar", "x": "double"})
+    assert_close(decode_ply(data), cloud)
+
+
+def test_quaternions_are_made_unit():
+    columns = stored(gaussians(3))
+    for k in range(4):
+        columns[f"rot_{k}"] = columns[f"rot_{k}"] * 5
+        columns[f"rot_{k}"][0] = 0
+    back = decode_ply(foreign_file(columns, "binary_little_endian", {}))
+    np.testing.assert_allclose(np.linalg.norm(back.quats, axis=1), 1, atol=1e-6)
+    np.testing.assert_array_equal(back.quats[0], [1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_missing_property_is_named(name):
+    columns = stored(gaussians())
+    if name == "x":
+        columns = {"q" if key == "x" else key: value for key, value in columns.items()}
+        columns["x_"] = columns.pop("q")
+        with pytest.raises(SplatFileError, match="x is missing"):
+            decode_ply(foreign_file({"x": columns["x_"]} | columns, "ascii", {}).replace(
+                b"property float x\n", b"property float w\n"))  # fmt: skip
+        return
+    del columns[name]
+    with pytest.raises(SplatFileError, match=f"{name} is missing"):
+        decode_ply(foreign_file(columns, "ascii", {}))
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda data: b"",
+        lambda data: b"solid\n" + data,
+        lambda data: data[:-1],
+        lambda data: data[:100],
+        lambda data: data.replace(b"float x", b"quad x"),
+        lambda data: data.replace(b"vertex 20", b"vertex -1"),
+        lambda data: data.replace(b"vertex 20", b"vertex 9999999999999"),
+        lambda data: data.replace(b"vertex", b"corner"),
+        lambda data: data.replace(b"float y", b"float x"),
+        lambda data: data.replace(b"property float x", b"property list uchar int x"),
+        lambda data: data[:-4] + np.float32(np.nan).tobytes(),
+        lambda data: data[:-20] + np.float32(1e30).tobytes() + data[-16:],
+    ],
+)
+def test_bad_files_give_one_sentence(spoil):
+    with pytest.raises(SplatFileError) as caught:
+        decode_ply(spoil(encode_ply(gaussians())))
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,245 @@
+"""Scenes made in code, all of them seeded: clouds of points, masks, photos, lifted objects."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, replace
+from functools import cache
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from objectmorpher_core.arrays import F32, F64, RGB, Mask, frozen
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.compose.composite import object_texture
+from objectmorpher_core.document import (
+    DeformSettings,
+    Document,
+    EditObject,
+    Handle,
+    LiftedObject,
+    Matte,
+    Photo,
+    PhotoTexture,
+    Plate,
+)
+from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.puppet import Puppet
+from objectmorpher_core.raster.posed import TextureLevels
+from objectmorpher_core.rotations import matrices_from_quats
+
+WIDTH, HEIGHT = 160, 120  # px, of the made photos
+MASKS = ("disc", "ellipse", "thin", "frame", "parts", "ring", "star")
+
+
+# ---- clouds of points, each (N, 3) ----------------------------------------------------------
+
+
+def ball(count: int = 300, seed: int = 0) -> F64:
+    """Points on a sphere of diameter 1."""
+    points = np.random.default_rng(seed).normal(size=(count, 3))
+    return 0.5 * points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def bar(count: int = 200, length: float = 1.0, width: float = 0.12, seed: int = 0) -> F64:
+    """Points on the four sides of a square bar along x."""
+    rng = np.random.default_rng(seed)
+    across = rng.uniform(-0.5, 0.5, count) * width
+    side = rng.integers(0, 4, count)
+    fixed = np.where(side < 2, 0.5, -0.5) * width
+    is_y = side % 2 == 0
+    x = rng.uniform(-0.5, 0.5, count) * length
+    return np.column_stack([x, np.where(is_y, fixed, across), np.where(is_y, across, fixed)])
+
+
+def sheet(columns: int = 14, rows: int = 9, thickness: float = 0.0) -> F64:
+    """A flat grid of points, one unit long, in the plane z = 0 or on both faces of it."""
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, columns), np.linspace(-0.3, 0.3, rows))
+    flat = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    if thickness == 0.0:
+        return flat
+    up = np.array([0.0, 0.0, 0.5 * thickness])
+    return np.concatenate([flat + up, flat - up])
+
+
+def two_sheets(gap: float) -> F64:
+    """Two parallel sheets, `gap` apart."""
+    return sheet(thickness=gap)
+
+
+def horseshoe(count: int = 240, seed: int = 0) -> F64:
+    """A tube bent into a U whose ends come near each other: near in space, far along it."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0.15, 2 * np.pi - 0.15, count)
+    around = rng.uniform(0, 2 * np.pi, count)
+    radius = 0.4 + 0.05 * np.cos(around)
+    return np.column_stack(
+        [radius * np.cos(angle), radius * np.sin(angle), 0.05 * np.sin(around)]
+    )
+
+
+def rotation(seed: int = 0) -> F64:
+    """A random rotation matrix (3, 3)."""
+    return matrices_from_quats(np.random.default_rng(seed).normal(size=(1, 4)))[0]
+
+
+def rotations(count: int, seed: int = 0) -> F64:
+    """Random rotation matrices (count, 3, 3)."""
+    return matrices_from_quats(np.random.default_rng(seed).normal(size=(count, 4)))
+
+
+# ---- lifted objects made of a cloud ---------------------------------------------------------
+
+
+def gaussians_at(points: np.ndarray, sigma: float = 0.02, seed: int = 0) -> Gaussians:
+    """Solid Gaussians at `points` (N, 3), turned and coloured at random."""
+    rng = np.random.default_rng(seed)
+    count = len(points)
+    quats = rng.normal(size=(count, 4))
+    return Gaussians(
+        points,
+        quats / np.linalg.norm(quats, axis=1, keepdims=True),
+        sigma * np.array([1.0, 0.8, 0.2]) * rng.uniform(0.7, 1.3, (count, 1)),
+        np.ones(count),
+        rng.random((count, 3)),
+    )
+
+
+def lifted_cloud(
+    points: np.ndarray, control_points: np.ndarray, depth: float = 3.0
+) -> LiftedObject:
+    """An object of Gaussians at `points` that stands `depth` before a 160 x 120 camera."""
+    gaussians = gaussians_at(points)
+    world_from_object = np.eye(4)
+    world_from_object[2, 3] = depth
+    world = gaussians.means + world_from_object[:3, 3]
+    texture = PhotoTexture(
+        camera().project(world), np.ones(len(points)), np.ones(len(points))
+    )
+    return LiftedObject(gaussians, texture, control_points, world_from_object, 0.03, "made")
+
+
+def handle(lifted: LiftedObject, control_point: int, move: np.ndarray, **more) -> Handle:
+    """A handle that takes a control point from where it is by `move` (3,)."""
+    point = lifted.control_points[control_point].astype(np.float64)
+    return Handle(control_point, point, point + move, **more)
+
+
+# ---- masks and photos -----------------------------------------------------------------------
+
+
+def mask(name: str, width: int = WIDTH, height: int = HEIGHT) -> Mask:
+    """One of MASKS, (height, width)."""
+    y, x = np.mgrid[:height, :width] + 0.5
+    x, y = x / width * 160, y / height * 120
+    if name == "disc":
+        return np.hypot(x - 80, y - 60) < 40
+    if name == "ellipse":
+        return ((x - 78) / 45) ** 2 + ((y - 62) / 30) ** 2 < 1
+    if name == "thin":  # a limb six px wide and a whisker of two
+        limb = np.abs((y - 60) - 0.2 * (x - 80)) < 3
+        whisker = (np.abs(x - 80) < 1) & (np.abs(y - 60) < 40)
+        return (limb & (np.abs(x - 80) < 55)) | whisker
+    if name == "frame":  # leaves the photo below and to the right
+        return ((x - 130) / 60) ** 2 + ((y - 100) / 55) ** 2 < 1
+    if name == "parts":
+        return (np.hypot(x - 45, y - 55) < 24) | (np.hypot(x - 115, y - 65) < 20)
+    if name == "ring":
+        return (np.hypot(x - 80, y - 60) < 45) & (np.hypot(x - 80, y - 60) > 20)
+    if name == "star":
+        angle, radius = np.arctan2(y - 60, x - 80), np.hypot(x - 80, y - 60)
+        return radius < 30 + 16 * np.cos(5 * angle)
+    raise KeyError(name)
+
+
+def picture(inside: Mask, seed: int = 0) -> RGB:
+    """A photo (H, W, 3) u8 with soft texture everywhere and an object of another colour."""
+    rng = np.random.default_rng(seed)
+    noise = cv2.GaussianBlur(rng.normal(size=(*inside.shape, 3)), (0, 0), 1.2)
+    noise = noise / noise.std() * 22
+    ground = np.array([70, 105, 135]) + noise
+    body = np.array([190, 120, 60]) + noise[::-1]
+    soft = cv2.GaussianBlur(inside.astype(np.float64), (0, 0), 0.7)[..., None]
+    return np.clip(soft * body + (1 - soft) * ground, 0, 255).astype(np.uint8)
+
+
+def camera(width: int = WIDTH, height: int = HEIGHT) -> Camera:
+    """The camera that a photo without EXIF gets."""
+    return Camera.from_fov(width, height)
+
+
+def png(pixels: np.ndarray, **more) -> bytes:
+    """The bytes of a PNG of `pixels` (H, W, 3)."""
+    return encode_picture(Picture(pixels, **more), ".png")
+
+
+def mask_png(inside: Mask) -> bytes:
+    """The bytes of a mask file."""
+    return encode_mask(inside)
+
+
+def jpeg(pixels: np.ndarray) -> bytes:
+    """The bytes of a JPEG of `pixels` (H, W, 3) u8."""
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "JPEG", quality=90)
+    return stream.getvalue()
+
+
+# ---- whole scenes ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A photo with a lifted object, and what is derived from it."""
+
+    pixels: RGB  # (H, W, 3)
+    mask: Mask  # (H, W)
+    camera: Camera
+    matte: Matte
+    lifted: LiftedObject
+    texture: TextureLevels
+    puppet: Puppet
+
+    def cutout(self) -> tuple[F32, F32]:
+        """Premultiplied colour (H, W, 3) and alpha (H, W) of the object in the photo."""
+        height, width = self.mask.shape
+        alpha = np.zeros((height, width), np.float32)
+        colour = np.zeros((height, width, 3), np.float32)
+        x0, y0, x1, y1 = self.matte.box
+        straight = self.texture.levels[0][..., :3]
+        alpha[y0:y1, x0:x1] = self.matte.alpha
+        colour[y0:y1, x0:x1] = straight * self.matte.alpha[..., None]
+        return colour, alpha
+
+    def document(self) -> Document:
+        """The document in which the object is lifted, at rest, before a plain grey plate."""
+        photo = Photo(Picture(self.pixels), self.camera, png(self.pixels), "made.png")
+        item = EditObject("Object 1", mask=frozen(self.mask))
+        document = Document(photo, (item.with_lifted(self.matte, self.lifted),))
+        return replace(document, plate=grey_plate(self.mask))
+
+
+def grey_plate(inside: Mask, margin: int = 9) -> Plate:
+    """A plate that shows plain grey where the object was."""
+    hole = cv2.dilate(inside.astype(np.uint8), np.ones((2 * margin + 1,) * 2)).astype(bool)
+    return Plate(0, 0, np.full((*inside.shape, 3), 128, np.uint8), hole, "made")
+
+
+def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
+    """`inside` of the photo `pixels` lifted by the relief, to about `count` Gaussians."""
+    height, width = inside.shape
+    view = camera(width, height)
+    matte, lifted = lift_mask(pixels, view, inside, "relief", count, seed=seed)
+    texture = object_texture(pixels, matte)
+    puppet = Puppet(lifted, DeformSettings(), view)
+    return Scene(pixels, inside, view, matte, lifted, texture, puppet)
+
+
+@cache
+def scene(name: str = "ellipse", count: int = 800, seed: int = 0) -> Scene:
+    """The lifted object of one of MASKS in a made photo."""
+    inside = mask(name)
+    return lifted_scene(picture(inside, seed), inside, count, seed)
