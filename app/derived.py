@@ -17,7 +17,7 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import F32, F64, Mask
 from objectmorpher_core.document import Document, EditObject, Photo, Pose
 
-from .view import View
+from .layers import Layers
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import Puppet, SurfacePoint
@@ -52,15 +52,6 @@ class ObjectFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
-    """A rendered object on the canvas."""
-
-    left: int  # canvas px
-    top: int
-    rgba: F32  # (h, w, 4) premultiplied sRGB
-
-
-@dataclass(frozen=True, eq=False)
 class Shape:
     """All that depends on the lifted object only."""
 
@@ -89,9 +80,9 @@ class Derived:
     """Solver, posed Gaussians and rendered layers of the document's objects."""
 
     def __init__(self) -> None:
-        self._shapes, self._posed, self._layers = Memo(), Memo(), Memo()
+        self._shapes, self._posed = Memo(), Memo()
+        self.layers = Layers(self)
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
-        self._view_key: tuple[float, ...] = ()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -110,6 +101,10 @@ class Derived:
         """Solver, poser and texture; a fraction of a second the first time."""
         return self._shapes(lambda: _build_shape(photo, thing), thing.lifted, thing.deform)
 
+    def prepare(self, document: Document, k: int) -> None:
+        """Makes ready what the first drag of object `k` needs."""
+        self.shape(document.photo, document.objects[k]).puppet.deformer  # noqa: B018
+
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""
         thing = document.objects[k]
@@ -118,13 +113,18 @@ class Derived:
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
 
-    def solved(self, document: Document, k: int, start: Pose | None) -> Document:
-        """The document with object `k` in the pose that its handles ask for."""
+    def solved(
+        self, document: Document, k: int, start: Pose | None, iterations: int | None = None
+    ) -> Document:
+        """The document with object `k` in the pose that its handles ask for.
+
+        `start` and few `iterations` give a drag's frame; without, the solve is complete.
+        """
         thing = document.objects[k]
         if not thing.handles:
             return edits.set_pose(document, k, None)
         deformer = self.shape(document.photo, thing).puppet.deformer
-        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start)
+        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, iterations)
         return edits.set_pose(document, k, solution.pose)
 
     def anchors(self, document: Document, k: int) -> F64:
@@ -209,50 +209,13 @@ class Derived:
         at = (float(xy[0]), float(xy[1]))
         return shape.puppet.pick(at, thing.pose, thing.placement, shape.texture)
 
-    def layers(self, document: Document, view: View) -> tuple[Layer, ...]:
-        """The moved objects as the canvas shows them, back to front."""
-        key = (view.left, view.top, view.zoom, view.width, view.height)
-        if key != self._view_key:
-            self._layers, self._view_key = Memo(), key
-        moved = [
-            k for k, o in enumerate(document.objects) if o.lifted and o.is_moved and o.is_visible
-        ]
-        depths = {k: float(np.median(self.posed(document, k).means[:, 2])) for k in moved}
-        layers = [self._layer(document, k, view) for k in sorted(moved, key=lambda k: -depths[k])]
-        return tuple(layer for layer in layers if layer is not None)
-
-    def _layer(self, document: Document, k: int, view: View) -> Layer | None:
-        thing, camera = document.objects[k], document.photo.camera
-        splats = self.posed(document, k)
-
-        def build() -> Layer | None:
-            from objectmorpher_core.raster import tiles
-
-            xy = view.canvas_from_image(camera.project(splats.means[splats.means[:, 2] > 0]))
-            margin = 8 + 4 * splats.gap * camera.focal / np.median(splats.means[:, 2]) * view.zoom
-            low = np.floor(xy.min(0) - margin).astype(int).clip(0, (view.width, view.height))
-            high = np.ceil(xy.max(0) + margin).astype(int).clip(0, (view.width, view.height))
-            if (high <= low).any():
-                return None
-            box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-            texture = self.shape(document.photo, thing).texture
-            seen = tiles.render(splats, texture, view.camera(camera, box), camera)
-            return Layer(box[0], box[1], np.dstack([seen.color, seen.alpha]))
-
-        return self._layers(build, splats)
-
 
 def _build_shape(photo: Photo, thing: EditObject) -> Shape:
+    from objectmorpher_core.compose.composite import object_texture
     from objectmorpher_core.puppet import puppet_of
-    from objectmorpher_core.raster.posed import build_levels
 
     assert thing.matte is not None
-    matte = thing.matte
-    x0, y0, x1, y1 = matte.box
-    texture = build_levels(
-        matte.foreground, matte.alpha, matte.left, matte.top, photo.pixels[y0:y1, x0:x1]
-    )
-    return Shape(puppet_of(thing, photo.camera), texture)
+    return Shape(puppet_of(thing, photo.camera), object_texture(thing.matte))
 
 
 def _outlines(mask: Mask) -> tuple[F32, ...]:

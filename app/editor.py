@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 SELECT = "segment"  # kinds of jobs
 NUDGE_LABEL = "Nudge point"
+DRAG_ITERATIONS = 6  # of the solver in a frame of a drag; the rest when it ends
 
 
 @dataclass(frozen=True)
@@ -325,13 +326,19 @@ class Editor:
             return
         k, start = self.current, self.object.pose
         changed = edits.move_handle(self.document, k, handle, target)
-        self.preview = self.derived.solved(changed, k, start)
+        self.preview = self.derived.solved(changed, k, start, DRAG_ITERATIONS)
+
+    def settle(self) -> None:
+        """Lets the preview's pose come to rest: at the end of a drag."""
+        if self.preview is not None and self.object is not None:
+            self.preview = self.derived.solved(self.preview, self.current, self.object.pose)
 
     def nudge_handle(self, dx: float, dy: float) -> None:
         """Moves the selected handle by image px; one step each."""
         if self.handle is not None and not self.hand.is_busy:
             spot = self.handle_position(self.handle)
             self.drag_handle(self.handle, spot.moved(np.array([dx, dy]), 0.0))
+            self.settle()
             self.commit(NUDGE_LABEL)
 
     def select_handle(self, handle: int | None) -> None:

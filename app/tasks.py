@@ -94,6 +94,7 @@ class Tasks:
             changed = edits.set_lifted(current, k, matte, lifted)
             editor.handle = None
             editor.apply("Lift object", changed)
+            editor.derived.prepare(changed, k)
             editor.view.tool = ToolName.POSE
             editor.say(f"Lifted: {len(lifted.gaussians):,} Gaussians. Now drag a point on it")
 

@@ -64,6 +64,8 @@ class Prompt:
 class Matte:
     """Soft cut-out of an object inside a crop of the photo; alpha is 0 outside the crop.
 
+    The crop may reach past the photo's frame where the object does.
+
     `foreground` is the object's own colour, freed of the background, and continued beyond the
     object so that sampling near the edge never meets the background.
     """

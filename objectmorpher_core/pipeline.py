@@ -265,7 +265,7 @@ def _with_handles(document: Document, puppet: Puppet, script: EditScript) -> Doc
     lifted, camera = puppet.lifted, document.photo.camera
     matte = document.objects[0].matte
     assert matte is not None
-    texture = object_texture(document.photo.pixels, matte)
+    texture = object_texture(matte)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
         width, height = document.photo.size

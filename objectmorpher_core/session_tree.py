@@ -12,6 +12,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from .arrays import frozen
 from .image import ImageError, Picture, encode_mask, encode_picture, read_picture
 
 
@@ -122,9 +123,9 @@ class Reader:
     def _array(self, tree: Any, where: str) -> np.ndarray:
         match tree:
             case {"array": str(path)} if path in self.arrays:
-                return self.arrays[path]
+                return frozen(self.arrays[path])
             case {"png": str(member)} if member in self.members:
-                return self._picture(member)
+                return frozen(self._picture(member))
         raise _damaged(where)
 
     def _picture(self, member: str) -> np.ndarray:

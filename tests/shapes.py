@@ -206,13 +206,15 @@ class Scene:
     def cutout(self) -> tuple[F32, F32]:
         """Premultiplied colour (H, W, 3) and alpha (H, W) of the object in the photo."""
         height, width = self.mask.shape
-        alpha = np.zeros((height, width), np.float32)
-        colour = np.zeros((height, width, 3), np.float32)
+        pad = 2 * max(height, width)  # the matte's crop may reach beyond the photo
+        whole = np.zeros((height + 2 * pad, width + 2 * pad, 4), np.float32)
         x0, y0, x1, y1 = self.matte.box
-        straight = self.texture.levels[0][..., :3]
-        alpha[y0:y1, x0:x1] = self.matte.alpha
-        colour[y0:y1, x0:x1] = straight * self.matte.alpha[..., None]
-        return colour, alpha
+        alpha = self.matte.alpha[..., None]
+        whole[y0 + pad : y1 + pad, x0 + pad : x1 + pad] = np.concatenate(
+            [self.matte.foreground * alpha, alpha], axis=2
+        )
+        whole = whole[pad : pad + height, pad : pad + width]
+        return whole[..., :3], whole[..., 3]
 
     def document(self) -> Document:
         """The document in which the object is lifted, at rest, before a plain grey plate."""
@@ -233,7 +235,7 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     height, width = inside.shape
     view = camera(width, height)
     matte, lifted = lift_mask(pixels, view, inside, "relief", count, seed=seed)
-    texture = object_texture(pixels, matte)
+    texture = object_texture(matte)
     puppet = Puppet(lifted, DeformSettings(), view)
     return Scene(pixels, inside, view, matte, lifted, texture, puppet)
 

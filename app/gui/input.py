@@ -47,6 +47,7 @@ class Input:
         self.shape = Shape.ARROW
         self._chords = {name: chord(c.keys) for name, c in COMMANDS.items() if c.keys}
         self._last: tuple[float, float] | None = None
+        self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
 
     def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
         """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
@@ -71,7 +72,7 @@ class Input:
             self._begin(editor, pointer)
         else:
             self.shape = Shape.ARROW
-            editor.hover = Hover()
+            editor.hover, self._hovered = Hover(), None
         if not editor.hand.is_busy and editor.rubber is not None:
             editor.rubber = None
 
@@ -123,7 +124,17 @@ class Input:
         elif navigate.is_on_split(editor, pointer):
             self.shape = Shape.SPLIT
         else:
+            self._hover(tool, editor, pointer)
+
+    def _hover(self, tool: Tool, editor: Editor, pointer: Pointer) -> None:
+        """Looks under the pointer anew only where it, the view or the document changed."""
+        view = editor.view
+        key = (tool, pointer, editor.document, view.left, view.top, view.zoom, view.tool)
+        if self._hovered is None or any(
+            a is not b and a != b for a, b in zip(key, self._hovered, strict=True)
+        ):
             self.shape = tool.hover(editor, pointer)
+            self._hovered = key
 
     def _go_on(self, editor: Editor, pointer: Pointer) -> None:
         """A stroke goes on or ends."""

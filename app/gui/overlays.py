@@ -12,6 +12,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ..editor import Editor
+from ..tools.place_tool import gizmo
 from ..view import ToolName
 from .layout import Rect
 from .theme import theme
@@ -196,13 +197,13 @@ class Overlays:
 
     def _draw_frame(self) -> None:
         editor = self._editor
-        frame = editor.object_frame()
-        if frame is None:
+        shown = gizmo(editor)
+        if shown is None:
             return
         part = editor.hover.part
-        corners = self._at(frame.corners)
-        centre = self._at(frame.centre)[0]
-        radius = frame.radius * editor.view.zoom / self._ratio
+        corners = self._on_canvas(shown.corners)
+        centre = self._on_canvas(shown.centre)[0]
+        radius = shown.radius / self._ratio
         ring_role = WHITE if part != "roll" else "#5AA9FF"
         self._draw.add_circle(centre, radius, theme.u32(DARK, 0.5), 96, theme.pt(3.5))
         self._draw.add_circle(centre, radius, theme.u32(ring_role, 0.9), 96, theme.pt(1.5))

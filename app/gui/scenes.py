@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from objectmorpher_core.document import Document
+
 from ..editor import Editor
-from ..render.scene import Scene
+from ..render.scene import Scene, SplatObject
 from ..view import ToolName
 from .theme import theme
 
@@ -11,8 +13,8 @@ VEIL = 0.45  # share of black outside the selection, while selecting
 HATCH = 1.0
 
 
-def build_scene(editor: Editor) -> Scene | None:
-    """The canvas's picture, or None while no photo is open."""
+def build_scene(editor: Editor, renderer: str) -> Scene | None:
+    """The canvas's picture, or None while no photo is open. `renderer`: "gl" or "tiles"."""
     document, view = editor.document, editor.view
     if document is None:
         return None
@@ -28,8 +30,17 @@ def build_scene(editor: Editor) -> Scene | None:
         photo,
         surround,
         plate=document.plate,
-        layers=editor.derived.layers(document, view),
+        layers=editor.derived.layers.draw(document, view) if renderer == "tiles" else (),
+        objects=_objects(editor, document) if renderer == "gl" else (),
         mask=hole,
         hatch=HATCH if hole is not None else 0.0,
         split=view.split or 0.0,
+    )
+
+
+def _objects(editor: Editor, document: Document) -> tuple[SplatObject, ...]:
+    camera, photo = document.photo.camera, document.photo
+    return tuple(
+        SplatObject(splats, editor.derived.shape(photo, document.objects[k]).texture, camera)
+        for k, splats in editor.derived.layers.order(document).items()
     )

@@ -187,11 +187,10 @@ def number_field(number: Number, value: float) -> Change:
 
 
 def _stepper(icon: str) -> bool:
+    size = ImVec2(theme.pt(STEPPER), imgui.get_frame_height())
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
     imgui.push_font(None, SMALL_SIZE - 3)
-    is_pressed = imgui.button(
-        icon, ImVec2(theme.pt(STEPPER), imgui.get_frame_height_with_spacing())
-    )
+    is_pressed = imgui.button(icon, size)
     imgui.pop_font()
     imgui.pop_style_var()
     return is_pressed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,9 @@ class Window:
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
         self._title = ""
+        self._is_finished = True  # whether the last frame showed all there is to show
+        if options.frames is not None:
+            self.editor.derived.layers.frame_time = math.inf
         take_drop: Any = self._take_drop
         glfw.set_drop_callback(self._handle, take_drop)
 
@@ -100,7 +104,7 @@ class Window:
             else:
                 glfw.poll_events()
             has_news = self.editor.poll()
-            lively = SETTLE if has_news else lively - 1
+            lively = SETTLE if has_news or not self._is_finished else lively - 1
             self._frame()
             drawn += 1
             if self._is_over(drawn):
@@ -180,12 +184,13 @@ class Window:
         screen.use()
         self._context.viewport = (0, 0, *size)
         screen.clear(*theme.rgb("surround"), 1.0)
-        scene = build_scene(self.editor)
+        scene = build_scene(self.editor, self._renderer.kind)
         if scene is not None:
             view = self.editor.view
             left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
             viewport = (left, size[1] - bottom, view.width, view.height)
             self._renderer.draw(scene, view, viewport)
+        self._is_finished = self.editor.derived.layers.is_finished
         self._context.viewport = (0, 0, *size)
 
     def _resize_canvas(self, canvas: Rect, ratio: float) -> None:

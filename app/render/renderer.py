@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from typing import TYPE_CHECKING
 
 import moderngl
 
@@ -10,6 +11,9 @@ from ..view import View
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from .splat_pass import SplatPass
 
 log = logging.getLogger(__name__)
 
@@ -27,11 +31,31 @@ class Renderer:
         self._context = context
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
+        self._splat_pass: SplatPass | None = None
         log.info("OpenGL by %s; objects drawn by %s", self.gl_name, self.kind)
 
     def draw(self, scene: Scene, view: View, viewport: tuple[int, int, int, int]) -> None:
         """`viewport`: left, bottom, width, height of the canvas, framebuffer px."""
-        self._context.viewport = viewport
-        self._context.disable(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._begin(viewport)
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
+        for item in scene.objects:
+            splat_pass = self._splats()
+            camera = view.camera(item.camera)
+            front, behind = splat_pass.draw(item.splats, item.texture, camera, item.camera)
+            self._begin(viewport)
+            for texture in (behind, front):
+                self._layer_pass.draw_texture(texture, scene, view)
+
+    def _begin(self, viewport: tuple[int, int, int, int]) -> None:
+        self._context.screen.use()
+        self._context.viewport = viewport
+        self._context.enable_only(moderngl.NOTHING)
+
+    def _splats(self) -> SplatPass:
+        """Made for the first object: its module needs the compiler."""
+        if self._splat_pass is None:
+            from .splat_pass import SplatPass
+
+            self._splat_pass = SplatPass(self._context)
+        return self._splat_pass

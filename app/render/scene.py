@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Plate
 
-from ..derived import Layer
+from ..layers import Layer
+
+if TYPE_CHECKING:
+    from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
 
 Colour = tuple[float, float, float]  # sRGB in [0, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class SplatObject:
+    """A moved object for the GPU to draw."""
+
+    splats: PosedSplats
+    texture: TextureLevels
+    camera: Camera  # the photo's
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +33,8 @@ class Scene:
     photo: Pixels
     surround: Colour
     plate: Plate | None = None  # shown where there is one
-    layers: tuple[Layer, ...] = ()  # moved objects, back to front
+    layers: tuple[Layer, ...] = ()  # moved objects that are rendered already, back to front
+    objects: tuple[SplatObject, ...] = ()  # moved objects to render, back to front
     mask: Mask | None = None  # what `veil` and `hatch` refer to
     veil: float = 0.0  # share of black outside the mask
     hatch: float = 0.0  # share of the hatching inside the mask

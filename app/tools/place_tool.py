@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.arrays import F64
 from objectmorpher_core.document import Placement
 
 from .pointer import Button, Pointer, Shape, Stroke, has_moved
@@ -14,6 +15,9 @@ from .pointer import Button, Pointer, Shape, Stroke, has_moved
 if TYPE_CHECKING:
     from ..editor import Editor
 
+INSET = 16.0  # points between a corner and the canvas's edge, at least
+SMALLEST_RING = 48.0  # points
+LARGEST_RING = 0.42  # x the canvas's smaller side
 REACH = 10.0  # points around a corner or beside the ring where a press takes it
 TURN_SPEED = 0.4  # degrees per point that the pointer moves
 DEPTH_STEP = 0.05  # object diameters per notch of the wheel
@@ -26,6 +30,29 @@ HINTS = {
     "turn": "Drag turns the object in 3D · Shift keeps one axis",
 }
 SHAPES = {"move": Shape.MOVE, "scale": Shape.SIZE, "roll": Shape.TURN, "turn": Shape.TURN}
+
+
+@dataclass(frozen=True, eq=False)
+class Gizmo:
+    """What the object is taken by, canvas px. It stays within reach, however large the object."""
+
+    corners: F64  # (4, 2) left top, right top, right bottom, left bottom
+    centre: F64  # (2,)
+    radius: float  # of the ring
+
+
+def gizmo(editor: Editor) -> Gizmo | None:
+    """The current object's, or None where nothing is lifted."""
+    frame, view = editor.object_frame(), editor.view
+    if frame is None:
+        return None
+    size = np.array([view.width, view.height])
+    inset = INSET * view.scale
+    corners = view.canvas_from_image(frame.corners).clip(inset, np.maximum(size - inset, inset))
+    centre = view.canvas_from_image(frame.centre)
+    largest = LARGEST_RING * float(size.min())
+    radius = float(np.clip(frame.radius * view.zoom, SMALLEST_RING * view.scale, largest))
+    return Gizmo(corners, centre, radius)
 
 
 class PlaceTool:
@@ -50,16 +77,14 @@ class PlaceTool:
 
     def part_at(self, editor: Editor, pointer: Pointer) -> str | None:
         """What a press would do: "move", "scale", "roll" or "turn"."""
-        frame = editor.object_frame()
-        if frame is None:
+        shown = gizmo(editor)
+        if shown is None:
             return None
         reach = REACH * editor.view.scale
-        corners = editor.view.canvas_from_image(frame.corners)
-        if np.linalg.norm(corners - pointer.xy, axis=1).min() <= reach:
+        if np.linalg.norm(shown.corners - pointer.xy, axis=1).min() <= reach:
             return "scale"
-        centre = editor.view.canvas_from_image(frame.centre)
-        gap = float(np.linalg.norm(pointer.xy - centre))
-        if abs(gap - frame.radius * editor.view.zoom) <= reach:
+        gap = float(np.linalg.norm(pointer.xy - shown.centre))
+        if abs(gap - shown.radius) <= reach:
             return "roll"
         return "move" if editor.surface_at(pointer.xy) is not None else "turn"
 
@@ -92,17 +117,17 @@ def _move(editor: Editor, start: Placement, first: Pointer, now: Pointer) -> Pla
 
 def _scale(editor: Editor, start: Placement, first: Pointer, now: Pointer) -> Placement:
     """By how much farther from the centre the corner was pulled."""
-    frame = editor.object_frame()
-    assert frame is not None
-    centre = editor.view.canvas_from_image(frame.centre)
+    shown = gizmo(editor)
+    assert shown is not None
+    centre = shown.centre
     ratio = np.linalg.norm(now.xy - centre) / max(float(np.linalg.norm(first.xy - centre)), 1.0)
     return replace(start, scale=float(np.clip(start.scale * ratio, MIN_SCALE, MAX_SCALE)))
 
 
 def _roll(editor: Editor, start: Placement, first: Pointer, now: Pointer) -> Placement:
-    frame = editor.object_frame()
-    assert frame is not None
-    centre = editor.view.canvas_from_image(frame.centre)
+    shown = gizmo(editor)
+    assert shown is not None
+    centre = shown.centre
     (x0, y0), (x1, y1) = first.xy - centre, now.xy - centre
     angle = float(np.degrees(np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)))
     yaw, pitch, roll = start.turn

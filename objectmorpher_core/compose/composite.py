@@ -60,18 +60,17 @@ def plate_hole(document: Document) -> Mask:
     covered = np.zeros((height, width), np.uint8)
     for item in document.objects:
         if item.matte is not None:
-            x0, y0, x1, y1 = item.matte.box
-            covered[y0:y1, x0:x1] |= (item.matte.alpha > 0).astype(np.uint8)
+            whole = (0, 0, width, height)
+            covered |= (_crop(item.matte.alpha, item.matte.box, whole) > 0).astype(np.uint8)
         elif item.mask is not None:
             covered |= item.mask.astype(np.uint8)
     distance = cv2.distanceTransform(1 - covered, cv2.DIST_L2, 5)
     return (distance < hole_margin(width, height)) if covered.any() else covered.astype(bool)
 
 
-def object_texture(photo: Pixels, matte: Matte) -> TextureLevels:
+def object_texture(matte: Matte) -> TextureLevels:
     """What the object's Gaussians carry: straight colour and alpha on the matte's crop."""
-    x0, y0, x1, y1 = matte.box
-    return build_levels(matte.foreground, matte.alpha, x0, y0, photo[y0:y1, x0:x1])
+    return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
 
 
 def composite(
@@ -155,7 +154,7 @@ class _Blend:
         if not item.is_visible:
             self.disturbed |= rest > 0
             return
-        texture = object_texture(self.document.photo.pixels, item.matte)
+        texture = object_texture(item.matte)
         window = camera.windowed(x0, y0, x1 - x0, y1 - y0)
         picture = _drawn(splats, texture, window, camera)
         self.disturbed |= is_disturbed(picture, rest)

@@ -179,7 +179,7 @@ def _square_distances(points: F64) -> F64:
     return np.maximum(squares[:, None] + squares[None, :] - 2.0 * points @ points.T, 0.0)
 
 
-@numba.njit(cache=True, fastmath=False)
+@numba.njit(cache=True, nogil=True)
 def _fit_rotations(covariances: F64, warm: F64) -> F64:
     """Rotation nearest to each 3x3 matrix, from a warm start (Mueller et al. 2016).
 
@@ -187,13 +187,15 @@ def _fit_rotations(covariances: F64, warm: F64) -> F64:
     nothing; a product of rotations never becomes a mirror image. From more than a right angle
     away the first turns are large but still in the right sense.
     """
-    fitted = np.empty_like(warm)
+    fitted = np.empty(warm.shape)
     for i in range(len(covariances)):
-        a = covariances[i]
-        r = warm[i].copy()
-        size = np.abs(a).max()
+        a, r = covariances[i], fitted[i]
+        size = 0.0
+        for j in range(3):
+            for k in range(3):
+                r[j, k] = warm[i, j, k]
+                size = max(size, abs(a[j, k]))
         if size <= 1e-300:
-            fitted[i] = r
             continue
         for _ in range(ROTATION_STEPS):
             # omega = sum_k r_k x a_k / |sum_k r_k . a_k|, r_k and a_k the columns
@@ -213,7 +215,6 @@ def _fit_rotations(covariances: F64, warm: F64) -> F64:
             if square < ROTATION_TOLERANCE:
                 break
         _orthonormalise(r)
-        fitted[i] = r
     return fitted
 
 

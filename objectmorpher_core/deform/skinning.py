@@ -45,56 +45,50 @@ def bind(points: np.ndarray, control_points: np.ndarray, graph: Graph) -> Bindin
     x = np.atleast_2d(points).astype(np.float64)
     near = cKDTree(p).query(x)[1]
     order = np.argsort(graph.geodesics, axis=1, kind="stable")[:, :CANDIDATES]
-    reachable = np.isfinite(np.take_along_axis(graph.geodesics, order, 1))
+    reach = np.take_along_axis(graph.geodesics, order, 1)[near]
+    order = order[near]  # (N, C)
+    distances = np.linalg.norm(x[:, None] - p[order], axis=2)
+    distances[~np.isfinite(reach)] = np.inf
     count = min(NEIGHBOURS, len(p) - 1)
-    inputs = [frozen(a) for a in (x, p, near, order, reachable)]
-    return Binding(*_bind(*inputs, count))
+    rank = np.argsort(distances, axis=1, kind="stable")[:, : count + 1]
+    chosen = np.take_along_axis(order, rank, 1)  # (N, K + 1), the last one is not used
+    distances = np.take_along_axis(distances, rank, 1)
+    weights, gradients = _falloff(x, p[chosen], distances)
+    return Binding(chosen[:, :count].astype(np.int32), weights, gradients)
 
 
-@numba.njit(cache=True)
-def _bind(x, p, near, order, reachable, count):
-    n, width = len(x), order.shape[1]
-    chosen = np.zeros((n, count), np.int32)
-    weights = np.zeros((n, count))
-    gradients = np.zeros((n, count, 3))
-    distance = np.empty(width)
-    for i in range(n):
-        usable = 0
-        for c in range(width):
-            distance[c] = np.inf
-            if reachable[near[i], c]:
-                distance[c] = np.sqrt(((x[i] - p[order[near[i], c]]) ** 2).sum())
-                usable += 1
-        rank = np.argsort(distance, kind="mergesort")
-        used = min(count, max(usable - 1, 1))
-        last = order[near[i], rank[min(used, usable - 1)]]
-        limit = distance[rank[min(used, usable - 1)]] if usable > 1 else np.inf
-        total = 0.0
-        total_gradient = np.zeros(3)
-        for c in range(used):
-            j = order[near[i], rank[c]]
-            chosen[i, c] = j
-            d = distance[rank[c]]
-            if not np.isfinite(limit) or limit <= 0.0:
-                weights[i, c] = 1.0
-            else:
-                # (1 - d / limit)^2; both distances change with x
-                slack = 1.0 - d / limit
-                along = (x[i] - p[j]) / max(d, 1e-12)
-                limit_along = (x[i] - p[last]) / limit
-                weights[i, c] = slack * slack
-                gradients[i, c] = 2 * slack * (-along / limit + d / limit**2 * limit_along)
-            total += weights[i, c]
-            total_gradient += gradients[i, c]
-        if total <= 1e-30:  # equally far from all of them
-            for c in range(used):
-                weights[i, c] = 1.0 / used
-                gradients[i, c] = 0.0
-            continue
-        for c in range(used):
-            weights[i, c] /= total
-            gradients[i, c] = (gradients[i, c] - weights[i, c] * total_gradient) / total
-    return chosen, weights, gradients
+def _falloff(x: F64, nodes: F64, distances: F64) -> tuple[F64, F64]:
+    """Normalised (1 - d_k / d_K+1)^2 of (N, K) control points, and its gradients (N, K, 3).
+
+    `nodes` (N, K + 1, 3) and `distances` (N, K + 1) are in the order of distance; inf marks one
+    on another part.
+    """
+    # In a part with few control points the farthest of it takes the place of the next one.
+    usable = np.isfinite(distances).sum(1)
+    last = np.maximum(usable - 1, 0)
+    rows = np.arange(len(x))
+    limit = distances[rows, last][:, None]
+    d = distances[:, :-1]
+    is_used = np.arange(d.shape[1])[None] < np.maximum(last, 1)[:, None]
+    d = np.where(is_used, d, 0.0)
+    safe = np.maximum(limit, 1e-300)
+    slack = np.where(is_used, 1 - d / safe, 0.0)
+    along = (x[:, None] - nodes[:, :-1]) / np.maximum(d, 1e-12)[..., None]
+    limit_along = (x - nodes[rows, last]) / safe
+    change = -along / safe[..., None] + (d / safe**2)[..., None] * limit_along[:, None]
+    weights = slack**2
+    gradients = 2 * slack[..., None] * change
+    total = weights.sum(1, keepdims=True)
+    # Equally far from all of them, or alone: equal shares that do not change.
+    even = total[:, 0] <= 1e-30
+    weights[even] = is_used[even]
+    gradients[even] = 0.0
+    total = weights.sum(1, keepdims=True)
+    weights /= total
+    gradients = (gradients - weights[..., None] * gradients.sum(1, keepdims=True)) / total[
+        ..., None
+    ]
+    return weights, gradients
 
 
 def skin(
@@ -122,12 +116,12 @@ def skin(
     )
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True, nogil=True)
 def _skin(x, nodes, weights, gradients, p, p_new, r):
     n, count = nodes.shape
     moved = np.zeros((n, 3))
     linear = np.zeros((n, 3, 3))
-    for i in numba.prange(n):
+    for i in range(n):
         for c in range(count):
             w = weights[i, c]
             j = nodes[i, c]

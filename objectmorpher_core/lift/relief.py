@@ -21,12 +21,13 @@ from ..document import LiftedObject, Matte, PhotoTexture
 from ..gaussians import Gaussians
 from ..progress import Progress
 from ..rotations import quats_from_matrices
-from ..segment.matte import band_width
+from ..segment.matte import band_width, extended_mask, frame_extension
 from . import LiftError
 from .membrane import solve_membrane
 from .poisson_disk import thin_to_spacing
 
 GRID = 256  # cells on the longer side of the crop in which the shape is found
+DEEPEST = 0.3  # x extent: half-thickness that even the widest body does not exceed
 OVERSAMPLING = 10  # candidates per Gaussian before thinning
 PACKING = 0.68  # Gaussians per (spacing^2 of area) that thinning at that spacing leaves
 TANGENT_SIGMA = 0.6  # x mean spacing: neighbours overlap without gaps
@@ -89,7 +90,9 @@ class Inflation:
 
     @staticmethod
     def of(mask: Mask) -> Inflation:
-        """Inflates `mask` (H, W). Where the object leaves the photo it is not closed off."""
+        """Inflates `mask` (H, W). Where the object leaves the photo it goes on and stays open."""
+        extension = frame_extension(mask)
+        mask = extended_mask(mask, extension)
         height, width = mask.shape
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         top, left = int(rows[0]), int(columns[0])
@@ -112,7 +115,17 @@ class Inflation:
         near = cv2.blur(inside.astype(np.float64), (3, 3))
         mirrored = -cv2.blur(u, (3, 3)) / np.maximum(near, 1e-9)
         u = np.where(inside, u, np.where(near > 1e-6, mirrored, 0.0))
-        return Inflation(u, inside, cell, left - cell, top - cell, extent)
+        corner = (left - extension[2] - cell, top - extension[0] - cell)
+        return Inflation(u, inside, cell, *corner, extent)
+
+    @property
+    def deepest(self) -> float:
+        """px: the half-thickness that no body exceeds."""
+        return DEEPEST * self.extent
+
+    def heights(self, u: F64) -> F64:
+        """Half-thickness (N,) px of the membrane's values: sqrt(2 u), flattened where deep."""
+        return self.deepest * np.tanh(np.sqrt(2 * np.maximum(u, 0)) / self.deepest)
 
     def grid_xy(self, xy: F64) -> F64:
         """Grid coordinates (N, 2), cell centres at integers, of photo px."""
@@ -162,6 +175,7 @@ def _sample(
     u, cell = shape.membrane, shape.cell
     dy, dx = np.gradient(u, cell)
     height = np.sqrt(2 * np.maximum(u, 0.02 * cell * cell))
+    height /= 1 - (shape.heights(u) / shape.deepest) ** 2  # the flattening makes it less steep
     # |grad height| = |grad u| / height; the area of a cell of the surface
     area = np.where(shape.inside, cell**2 * np.sqrt(1 + (dx**2 + dy**2) / height**2), 0.0)
     spacing = float(np.sqrt(2 * area.sum() / count))
@@ -208,14 +222,19 @@ def _draw_brim(shape: Inflation, spacing: float, band: float, rng: np.random.Gen
 def _join(shape: Inflation, front: F64, back: F64, brim: F64) -> Surface:
     """The three sheets as one set of points with outward normals.
 
-    The surface is height^2 / 2 = u(x, y); its gradient (-du/dx, -du/dy, height) never vanishes
-    and turns from facing the camera to facing away without a jump at the rim.
+    Before it is flattened the surface is height^2 / 2 = u(x, y); its gradient
+    (-du/dx, -du/dy, height) never vanishes and turns from facing the camera to facing away
+    without a jump at the rim.
     """
     xy = np.concatenate([front, back, brim])
     u, gradient = shape.sample(xy)
     side = np.repeat([1.0, -1.0, 0.0], [len(front), len(back), len(brim)])
-    height = side * np.sqrt(2 * np.maximum(u, 0))
-    normals = np.column_stack([-gradient, height])
+    flattened = shape.heights(u)
+    flatness = 1 - (flattened / shape.deepest) ** 2  # d height / d sqrt(2 u)
+    normals = np.column_stack(
+        [-gradient * flatness[:, None], side * np.sqrt(2 * np.maximum(u, 0))]
+    )
+    height = side * flattened
     is_brim = side == 0
     normals[is_brim] = np.column_stack([shape.outward(xy[is_brim]), np.zeros(is_brim.sum())])
     # A corner cell whose u is still 0 has no gradient: let it face where its sheet does.

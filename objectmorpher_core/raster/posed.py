@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..deform.skinning import Skinned
 from ..document import LiftedObject
-from ..pixels import unit_pixels
 
 SURFACE_GAP = 2.5  # x spacing: samples farther apart in depth are different surfaces
 TEXTURE_GAP = 3.0  # x spacing in the photo: likewise for what they show of it
@@ -108,19 +108,12 @@ class TextureLevels:
     top: float
 
 
-def build_levels(
-    foreground: F32, alpha: F32, left: float, top: float, photo: np.ndarray | None = None
-) -> TextureLevels:
+def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> TextureLevels:
     """Texture from straight `foreground` (h, w, 3) in [0, 1] and `alpha` (h, w).
 
-    Where `photo` (h, w, 3 integers) is given and alpha is 1, its very values are used.
+    `left`, `top`: px in the photo of the crop's corner, which may lie outside it.
     """
-    import cv2
-
-    colour = foreground
-    if photo is not None:
-        colour = np.where((alpha >= 1.0)[..., None], unit_pixels(photo), foreground)
-    level = np.dstack([colour, alpha]).astype(np.float32)
+    level = np.dstack([foreground, alpha]).astype(np.float32)
     levels = [level]
     while min(level.shape[:2]) >= 4 and len(levels) < 8:
         height, width = level.shape[:2]

@@ -231,7 +231,9 @@ class _Composite:
         mixed = (shown[:, None] * sample[:, :3] + layer.color[at]) / np.maximum(
             shown + body, 1e-30
         )[:, None]
-        seen = layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
+        size = np.array([self.photo_camera.width, self.photo_camera.height])
+        within = ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
+        seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
         with np.errstate(invalid="ignore"):
             same = np.linalg.norm(shift - self.last_shift[at], axis=1) < rules.SAME_POINT
         clear = 1 - self.alpha[at]

@@ -42,21 +42,21 @@ STREAK_END = 0.25
 SAME_POINT = 1.0  # px of the photo: layers that look this close together are one surface
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True, nogil=True)
 def ramp(value: float, zero: float, one: float) -> float:
     """0 at `zero`, 1 at `one`, smooth between and constant beyond (either may be larger)."""
     t = min(max((value - zero) / (one - zero), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True, nogil=True)
 def facing_weight(cosine: float, is_seen: float, solidity: float) -> float:
     """Weight of a Gaussian whose normal makes this cosine with the direction to the camera."""
     front = min(max((cosine - FACING_RAMP * (1.0 - is_seen)) / FACING_RAMP + 1.0, 0.0), 1.0)
     return solidity * front + (1.0 - solidity) * ramp(abs(cosine), BRIM_END, BRIM_START)
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True, nogil=True)
 def coverage(total: float, slope: float) -> float:
     """Share of a pixel that is inside the surface whose kernel sum is `total`.
 

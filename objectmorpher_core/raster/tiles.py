@@ -16,8 +16,10 @@ from ..camera import Camera
 from . import rules
 from .posed import PosedSplats, TextureLevels
 from .reference import Picture3D
+from .threads import in_threads
 
 TILE = 16  # px
+PARTS = 8  # pieces of the picture for each thread: they are not equally full
 SPAN = 25  # floats that describe a projected Gaussian, see _project
 OPAQUE = 0.999  # alpha from which what lies behind is not looked at
 
@@ -47,11 +49,12 @@ def render(
     starts, members = _bin(projected, frozen(keep[order]), across, down)
     out = np.zeros((height, width, 8), np.float32)
     flat, shapes, offsets = _flatten(texture)
-    _draw(
-        projected, frozen(starts), frozen(members), across, down, width, height, view, photo,
+    inputs = (
+        projected, frozen(starts), frozen(members), across, width, height, view, photo,
         float(splats.gap), float(splats.texture_gap), frozen(flat), frozen(shapes),
         frozen(offsets), float(texture.left), float(texture.top), out,
     )  # fmt: skip
+    in_threads(lambda first, last: _draw(first, last, *inputs), across * down, PARTS)
     return Picture3D(out[..., :3], out[..., 3], out[..., 4], out[..., 5], out[..., 6:8])
 
 
@@ -67,11 +70,15 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
     )  # fmt: skip
     near = float(rules.NEAR * splats.gap)
     inputs = [frozen(a) for a in (*fields, _intrinsics(camera), _intrinsics(photo_camera))]
-    return _project(*inputs, near)
+    out = np.zeros((len(splats), SPAN))
+    in_threads(lambda first, last: _project(first, last, *inputs, near, out), len(splats))
+    return out
 
 
 def _intrinsics(camera: Camera) -> F64:
-    return frozen(np.array([camera.focal, camera.cx, camera.cy]))
+    return frozen(
+        np.array([camera.focal, camera.cx, camera.cy, camera.width, camera.height], np.float64)
+    )
 
 
 def _flatten(texture: TextureLevels):
@@ -91,117 +98,96 @@ def _depth_order(projected, width, height):
     return keep, np.argsort(projected[keep, Z], kind="stable")
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project(
-    means, linear, rest, pictures, normals, u0, visibility, solidity, colors, opacities,
-    rest_zoom, view, photo, near,
+    first, last, means, linear, rest, pictures, normals, u0, visibility, solidity, colors,
+    opacities, rest_zoom, view, photo, near, out,
 ):  # fmt: skip
-    n = len(means)
-    out = np.zeros((n, SPAN))
+    """Fills the rows first..last of `out`; see the columns above."""
     f = view[0]
     ratio = photo[0] / f
-    for i in numba.prange(n):
-        x, y, z = means[i]
+    for i in range(first, last):
+        x, y, z = means[i, 0], means[i, 1], means[i, 2]
         if not (z > near and math.isfinite(x + y + z)):
             continue
-        m = linear[i]
-        jx, jy = f / z, f / z
-        jxz, jyz = -f * x / (z * z), -f * y / (z * z)
-        # P = Sigma F^T (3, 3), W = F P, then their columns on the screen
-        p = np.zeros((3, 3))
-        for a in range(3):
-            for b in range(3):
-                p[a, b] = (
-                    rest[i, a, 0] * m[b, 0] + rest[i, a, 1] * m[b, 1] + rest[i, a, 2] * m[b, 2]
-                )
-        ws = np.zeros((3, 2))  # world covariance against the screen
-        for a in range(3):
-            w0 = m[a, 0] * p[0, 0] + m[a, 1] * p[1, 0] + m[a, 2] * p[2, 0]
-            w1 = m[a, 0] * p[0, 1] + m[a, 1] * p[1, 1] + m[a, 2] * p[2, 1]
-            w2 = m[a, 0] * p[0, 2] + m[a, 1] * p[1, 2] + m[a, 2] * p[2, 2]
-            ws[a, 0] = w0 * jx + w2 * jxz
-            ws[a, 1] = w1 * jy + w2 * jyz
-        sxx = jx * ws[0, 0] + jxz * ws[2, 0]
-        sxy = jx * ws[0, 1] + jxz * ws[2, 1]
-        syy = jy * ws[1, 1] + jyz * ws[2, 1]
+        # J1 = [[j, 0, jx], [0, j, jy]]
+        j = f / z
+        jx, jy = -j * x / z, -j * y / z
+        m00, m01, m02 = linear[i, 0, 0], linear[i, 0, 1], linear[i, 0, 2]
+        m10, m11, m12 = linear[i, 1, 0], linear[i, 1, 1], linear[i, 1, 2]
+        m20, m21, m22 = linear[i, 2, 0], linear[i, 2, 1], linear[i, 2, 2]
+        # the rows of J1 F: a screen px in terms of the rest world
+        a0, a1, a2 = j * m00 + jx * m20, j * m01 + jx * m21, j * m02 + jx * m22
+        b0, b1, b2 = j * m10 + jy * m20, j * m11 + jy * m21, j * m12 + jy * m22
+        # Sigma (J1 F)^T, column by column
+        r00, r01, r02 = rest[i, 0, 0], rest[i, 0, 1], rest[i, 0, 2]
+        r11, r12, r22 = rest[i, 1, 1], rest[i, 1, 2], rest[i, 2, 2]
+        p0, p1, p2 = (
+            r00 * a0 + r01 * a1 + r02 * a2,
+            r01 * a0 + r11 * a1 + r12 * a2,
+            r02 * a0 + r12 * a1 + r22 * a2,
+        )
+        q0, q1, q2 = (
+            r00 * b0 + r01 * b1 + r02 * b2,
+            r01 * b0 + r11 * b1 + r12 * b2,
+            r02 * b0 + r12 * b1 + r22 * b2,
+        )
+        sxx = a0 * p0 + a1 * p1 + a2 * p2
+        sxy = a0 * q0 + a1 * q1 + a2 * q2
+        syy = b0 * q0 + b1 * q1 + b2 * q2
+        szx = m20 * p0 + m21 * p1 + m22 * p2  # depth against the screen
+        szy = m20 * q0 + m21 * q1 + m22 * q2
         ridge = rules.RIDGE * (sxx + syy) + 1e-12
         det = (sxx + ridge) * (syy + ridge) - sxy * sxy
         ixx, ixy, iyy = (syy + ridge) / det, -sxy / det, (sxx + ridge) / det
-        # C = J0 Sigma F^T J1^T
-        c = np.zeros((2, 2))
-        for a in range(2):
-            t0 = (
-                pictures[i, a, 0] * m[0, 0]
-                + pictures[i, a, 1] * m[0, 1]
-                + pictures[i, a, 2] * m[0, 2]
-            )
-            t1 = (
-                pictures[i, a, 0] * m[1, 0]
-                + pictures[i, a, 1] * m[1, 1]
-                + pictures[i, a, 2] * m[1, 2]
-            )
-            t2 = (
-                pictures[i, a, 0] * m[2, 0]
-                + pictures[i, a, 1] * m[2, 1]
-                + pictures[i, a, 2] * m[2, 2]
-            )
-            c[a, 0] = t0 * jx + t2 * jxz
-            c[a, 1] = t1 * jy + t2 * jyz
-        axx, axy = c[0, 0] * ixx + c[0, 1] * ixy, c[0, 0] * ixy + c[0, 1] * iyy
-        ayx, ayy = c[1, 0] * ixx + c[1, 1] * ixy, c[1, 0] * ixy + c[1, 1] * iyy
-        # singular values of A
+        # A = J0 Sigma (J1 F)^T (...)^-1
+        c00 = pictures[i, 0, 0] * a0 + pictures[i, 0, 1] * a1 + pictures[i, 0, 2] * a2
+        c01 = pictures[i, 0, 0] * b0 + pictures[i, 0, 1] * b1 + pictures[i, 0, 2] * b2
+        c10 = pictures[i, 1, 0] * a0 + pictures[i, 1, 1] * a1 + pictures[i, 1, 2] * a2
+        c11 = pictures[i, 1, 0] * b0 + pictures[i, 1, 1] * b1 + pictures[i, 1, 2] * b2
+        axx, axy = c00 * ixx + c01 * ixy, c00 * ixy + c01 * iyy
+        ayx, ayy = c10 * ixx + c11 * ixy, c10 * ixy + c11 * iyy
+        # its singular values
         total = axx * axx + axy * axy + ayx * ayx + ayy * ayy
         area = abs(axx * ayy - axy * ayx)
         spread = math.sqrt(max(total * total - 4 * area * area, 0.0))
         largest = math.sqrt(max(0.5 * (total + spread), 1e-30))
         smallest = area / largest
-        cof = np.empty((3, 3))
-        for a in range(3):
-            b, d = (a + 1) % 3, (a + 2) % 3
-            for e in range(3):
-                g, h = (e + 1) % 3, (e + 2) % 3
-                cof[a, e] = m[b, g] * m[d, h] - m[b, h] * m[d, g]
-        determinant = m[0, 0] * cof[0, 0] + m[0, 1] * cof[0, 1] + m[0, 2] * cof[0, 2]
-        volume = abs(determinant) ** (1.0 / 3.0)
-        stretch = smallest * volume * f / z / rest_zoom[i]
+        # normals turn with the cofactors of F
+        k00, k01, k02 = m11 * m22 - m12 * m21, m12 * m20 - m10 * m22, m10 * m21 - m11 * m20
+        k10, k11, k12 = m02 * m21 - m01 * m22, m00 * m22 - m02 * m20, m01 * m20 - m00 * m21
+        k20, k21, k22 = m01 * m12 - m02 * m11, m02 * m10 - m00 * m12, m00 * m11 - m01 * m10
+        determinant = m00 * k00 + m01 * k01 + m02 * k02
         sign = 1.0 if determinant >= 0 else -1.0
-        nx = sign * (
-            cof[0, 0] * normals[i, 0] + cof[0, 1] * normals[i, 1] + cof[0, 2] * normals[i, 2]
-        )
-        ny = sign * (
-            cof[1, 0] * normals[i, 0] + cof[1, 1] * normals[i, 1] + cof[1, 2] * normals[i, 2]
-        )
-        nz = sign * (
-            cof[2, 0] * normals[i, 0] + cof[2, 1] * normals[i, 1] + cof[2, 2] * normals[i, 2]
-        )
+        n0, n1, n2 = normals[i, 0], normals[i, 1], normals[i, 2]
+        nx = sign * (k00 * n0 + k01 * n1 + k02 * n2)
+        ny = sign * (k10 * n0 + k11 * n1 + k12 * n2)
+        nz = sign * (k20 * n0 + k21 * n1 + k22 * n2)
         lengths = math.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + z * z))
         cosine = -(nx * x + ny * y + nz * z) / max(lengths, 1e-30)
+        stretch = smallest * abs(determinant) ** (1.0 / 3.0) * j / rest_zoom[i]
         fxx, fyy = sxx + rules.FILTER, syy + rules.FILTER
         fdet = fxx * fyy - sxy * sxy
         weight = opacities[i] * rules.facing_weight(cosine, visibility[i], solidity[i])
         weight *= math.sqrt(max(sxx * syy - sxy * sxy, 0.0) / fdet)
         carried = rules.ramp(stretch, rules.STREAK_END, rules.STREAK_START)
-        row = out[i]
-        row[CX], row[CY] = x / z * f + view[1], y / z * f + view[2]
-        row[QXX], row[QXY], row[QYY] = fyy / fdet, -sxy / fdet, fxx / fdet
-        row[EX], row[EY] = math.sqrt(rules.CUTOFF * fxx), math.sqrt(rules.CUTOFF * fyy)
-        row[Z] = z
-        row[ZX] = ws[2, 0] * ixx + ws[2, 1] * ixy
-        row[ZY] = ws[2, 0] * ixy + ws[2, 1] * iyy
-        row[SX] = u0[i, 0] - ((row[CX] - view[1]) * ratio + photo[1])
-        row[SY] = u0[i, 1] - ((row[CY] - view[2]) * ratio + photo[2])
-        row[AXX], row[AXY], row[AYX], row[AYY] = axx - ratio, axy, ayx, ayy - ratio
-        row[LOD] = math.log2(max(largest, 1.0))
-        row[PHOTO] = weight * carried
-        row[BODY] = weight * (1.0 - carried) * solidity[i]
-        row[MATTED] = rules.ramp(stretch, rules.MATTE_END, rules.MATTE_START)
-        row[SOLID] = solidity[i]
-        row[SEEN] = visibility[i]
-        row[RED], row[GREEN], row[BLUE] = colors[i]
-    return out
+        px, py = j * x + view[1], j * y + view[2]
+        out[i, CX], out[i, CY], out[i, Z] = px, py, z
+        out[i, QXX], out[i, QXY], out[i, QYY] = fyy / fdet, -sxy / fdet, fxx / fdet
+        out[i, EX], out[i, EY] = math.sqrt(rules.CUTOFF * fxx), math.sqrt(rules.CUTOFF * fyy)
+        out[i, ZX], out[i, ZY] = szx * ixx + szy * ixy, szx * ixy + szy * iyy
+        out[i, SX] = u0[i, 0] - (j * x * ratio + photo[1])
+        out[i, SY] = u0[i, 1] - (j * y * ratio + photo[2])
+        out[i, AXX], out[i, AXY], out[i, AYX], out[i, AYY] = axx - ratio, axy, ayx, ayy - ratio
+        out[i, LOD] = math.log2(max(largest, 1.0))
+        out[i, PHOTO] = weight * carried
+        out[i, BODY] = weight * (1.0 - carried) * solidity[i]
+        out[i, MATTED] = rules.ramp(stretch, rules.MATTE_END, rules.MATTE_START)
+        out[i, SOLID], out[i, SEEN] = solidity[i], visibility[i]
+        out[i, RED], out[i, GREEN], out[i, BLUE] = colors[i, 0], colors[i, 1], colors[i, 2]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _bin(projected, order, across, down):
     """Members of each tile, front to back: (tiles + 1,) starts into (members,)."""
     counts = np.zeros(across * down + 1, np.int64)
@@ -215,31 +201,40 @@ def _bin(projected, order, across, down):
         for ty in range(boxes[k, 2], boxes[k, 3] + 1):
             for tx in range(boxes[k, 0], boxes[k, 1] + 1):
                 counts[ty * across + tx + 1] += 1
-    starts = np.cumsum(counts)
-    fill = starts[:-1].copy()
-    members = np.empty(starts[-1], np.int64)
+    for tile in range(across * down):
+        counts[tile + 1] += counts[tile]
+    fill = np.empty(across * down, np.int64)
+    for tile in range(across * down):
+        fill[tile] = counts[tile]
+    members = np.empty(counts[across * down], np.int64)
     for k in range(len(order)):
         for ty in range(boxes[k, 2], boxes[k, 3] + 1):
             for tx in range(boxes[k, 0], boxes[k, 1] + 1):
                 tile = ty * across + tx
                 members[fill[tile]] = order[k]
                 fill[tile] += 1
-    return starts, members
+    return counts, members
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _draw(
-    projected, starts, members, across, down, width, height, view, photo,
+    first, last, projected, starts, members, across, width, height, view, photo,
     gap, texture_gap, texels, shapes, offsets, left, top, out,
 ):  # fmt: skip
+    """Draws the tiles first..last into `out` (height, width, 8)."""
     ratio = photo[0] / view[0]
-    for tile in numba.prange(across * down):
+    sums = np.zeros((TILE, TILE, SUMS))
+    result = np.zeros((TILE, TILE, RESULTS))
+    sample, value = np.zeros(4), np.zeros(4)
+    wx, wy = np.zeros(4), np.zeros(4)
+    for tile in range(first, last):
         x0, y0 = (tile % across) * TILE, (tile // across) * TILE
         x1, y1 = min(x0 + TILE, width), min(y0 + TILE, height)
-        sums = np.zeros((TILE, TILE, SUMS))
-        result = np.zeros((TILE, TILE, RESULTS))
-        result[:, :, D_OUT] = np.inf
-        result[:, :, LAST_X] = np.inf
+        for y in range(TILE):
+            for x in range(TILE):
+                for c in range(RESULTS):
+                    result[y, x, c] = 0.0
+                result[y, x, D_OUT] = result[y, x, LAST_X] = np.inf
         for slot in range(starts[tile], starts[tile + 1]):
             s = projected[members[slot]]
             both = s[PHOTO] + s[BODY]
@@ -272,19 +267,9 @@ def _draw(
                             apart = ex * ex + ey * ey > texture_gap * texture_gap
                         if apart:
                             _close(
-                                layer,
-                                r,
-                                x,
-                                y,
-                                view,
-                                photo,
-                                ratio,
-                                texels,
-                                shapes,
-                                offsets,
-                                left,
-                                top,
-                            )
+                                layer, r, x, y, view, photo, ratio, texels, shapes, offsets,
+                                left, top, sample, value, wx, wy,
+                            )  # fmt: skip
                     layer[TOTAL] += kernel * both
                     layer[BODIED] += kernel * s[BODY]
                     layer[GX] -= bell * gx * both
@@ -308,24 +293,32 @@ def _draw(
             for x in range(x0, x1):
                 layer, r = sums[y - y0, x - x0], result[y - y0, x - x0]
                 if layer[TOTAL] > 0.0 and r[3] <= OPAQUE:
-                    _close(layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top)
+                    _close(
+                        layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top,
+                        sample, value, wx, wy,
+                    )  # fmt: skip
                 for c in range(8):
                     out[y, x, c] = r[c]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _close(layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top):
+def _close(
+    layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top,
+    sample, value, wx, wy,
+):  # fmt: skip
     """Composites a pixel's layer into `r` and empties it: steps 4 and 5 of the reference."""
     total, body = layer[TOTAL], layer[BODIED]
     seen = max(total - body, 0.0)
     matte = 0.0
-    sample = np.zeros(4)
+    is_within = False  # the photo; elsewhere the texture is made up
     sx = sy = 0.0
     if seen > 1e-9 * total:
         sx, sy = layer[SHX] / seen, layer[SHY] / seen
         u = (x + 0.5 - view[1]) * ratio + photo[1] + sx
         v = (y + 0.5 - view[2]) * ratio + photo[2] + sy
-        _sample(texels, shapes, offsets, u - left, v - top, layer[LEVEL] / seen, sample)
+        is_within = 0.0 < u < photo[3] and 0.0 < v < photo[4]
+        _sample(texels, shapes, offsets, u - left, v - top, layer[LEVEL] / seen, sample,
+                value, wx, wy)  # fmt: skip
         matte = (sample[3] * layer[MATTES] + layer[SOLIDS]) / seen
     whole = rules.coverage(total, math.sqrt(layer[GX] ** 2 + layer[GY] ** 2))
     solid = rules.coverage(body, math.sqrt(layer[BGX] ** 2 + layer[BGY] ** 2))
@@ -347,39 +340,43 @@ def _close(layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, to
             r[X_OUT], r[Y_OUT] = sx, sy
         for c in range(3):
             r[c] += scale * (shown * sample[c] + layer[R + c])
-        if seen > 0.0:
+        if is_within:
             r[PHOTO_OUT] += scale * shown * layer[SEES] / seen
         r[3] += through
-    layer[:] = 0.0
+    for c in range(SUMS):
+        layer[c] = 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _sample(texels, shapes, offsets, u, v, lod, sample):
+def _sample(texels, shapes, offsets, u, v, lod, sample, value, wx, wy):
     """Straight colour and alpha at crop px (u, v), mixed from the two nearest levels."""
     last = len(shapes) - 1
     lod = min(max(lod, 0.0), float(last))
     lower = int(lod)
     mix = lod - lower
-    sample[:] = 0.0
-    _add_level(texels, shapes, offsets, lower, u, v, 1.0 - mix, sample)
-    if mix > 0.0:
-        _add_level(texels, shapes, offsets, lower + 1, u, v, mix, sample)
+    for c in range(4):
+        sample[c] = 0.0
+    level = lower
+    while level <= (lower + 1 if mix > 0.0 else lower):
+        share = mix if level > lower else 1.0 - mix
+        _add_level(texels, shapes, offsets, level, u, v, share, sample, value, wx, wy)
+        level += 1
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _add_level(texels, shapes, offsets, level, u, v, share, sample):
+def _add_level(texels, shapes, offsets, level, u, v, share, sample, value, wx, wy):
     """Adds `share` of one level: bicubic (Catmull-Rom) at full size, bilinear when halved."""
-    height, width = shapes[level]
+    height, width = shapes[level, 0], shapes[level, 1]
     scale = 1.0 / (1 << level)
     u, v = u * scale - 0.5, v * scale - 0.5
     j, i = int(math.floor(u)), int(math.floor(v))
-    wx, wy = np.zeros(4), np.zeros(4)
+    for c in range(4):
+        wx[c] = wy[c] = value[c] = 0.0
     if level == 0:
         _cubic_weights(u - j, wx)
         _cubic_weights(v - i, wy)
     else:
         wx[1], wx[2], wy[1], wy[2] = 1.0 - (u - j), u - j, 1.0 - (v - i), v - i
-    value = np.zeros(4)
     for a in range(4):
         row = i + a - 1
         if wy[a] == 0.0:

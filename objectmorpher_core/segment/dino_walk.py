@@ -27,6 +27,7 @@ IMAGES = "input_image"
 TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
+SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
 TEMPERATURE = 0.15  # of 1 - cosine; crosses from part to part of an object
 STRICT_TEMPERATURE = 0.03  # stops at the borders of parts too
 
@@ -92,7 +93,7 @@ class DinoWalk:
     def _tokens(self, rgb: RGB) -> F32:
         """(h, w, 384) for a photo (H, W, 3)."""
         height, width = rgb.shape[:2]
-        scale = (PATCHES / (height * width)) ** 0.5
+        scale = min((PATCHES / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
         h, w = max(1, round(height * scale)), max(1, round(width * scale))
         shrinks = h * PATCH < height
         small = cv2.resize(

@@ -19,6 +19,7 @@ BAND = 0.0035  # x the photo's diagonal: half-width of the band where alpha may 
 MIN_BAND = 2.0  # px
 REACH = 3.0  # x band: how far the colours of object and background are gathered
 CONTRAST = 0.15  # sRGB distance of the two colours from which they, not the mask, decide
+EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
 TRUST = 0.2  # sRGB: how far an unmixed colour may be from the object's colour beside it
 SLOPE = 1.25  # stretches alpha about 0.5: the estimate is a little too soft
 
@@ -28,22 +29,67 @@ def band_width(width: int, height: int) -> float:
     return max(MIN_BAND, BAND * float(np.hypot(width, height)))
 
 
+def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
+    """How far, in px, an object that leaves the photo is continued: top, bottom, left, right.
+
+    Turned or moved, such an object would show its cut edge. Mirrored at the frame it goes on for
+    a tenth of its size; those pixels are invented, and counted so.
+    """
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    reach = round(EXTENSION * max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1)
+    touches = (rows[0] == 0, rows[-1] == height - 1, columns[0] == 0, columns[-1] == width - 1)
+    limits = (height - 1, height - 1, width - 1, width - 1)
+    top, bottom, left, right = (
+        int(min(reach, limit)) if touch else 0
+        for touch, limit in zip(touches, limits, strict=True)
+    )
+    return top, bottom, left, right
+
+
+def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndarray:
+    """`image` (H, W, ...) continued past its frame by mirroring."""
+    top, bottom, left, right = extension
+    pads = [(top, bottom), (left, right)] + [(0, 0)] * (image.ndim - 2)
+    return np.pad(image, pads, mode="reflect")
+
+
+def extended_mask(mask: Mask, extension: tuple[int, int, int, int]) -> Mask:
+    """`mask` (H, W) continued like `extended`, but only where it touches the frame.
+
+    What merely stands near the frame must not come back as its own mirror image.
+    """
+    top, bottom, left, right = extension
+    whole = extended(mask, extension)
+    height, width = whole.shape
+    for axis, near, far in ((0, top, height - bottom), (1, left, width - right)):
+        turned = np.moveaxis(whole, axis, 0)  # a view: both sides are changed in place
+        turned[:near] = np.logical_and.accumulate(turned[near::-1])[:0:-1]
+        turned[far:] = np.logical_and.accumulate(turned[far - 1 :])[1:]
+    return whole
+
+
 def build_matte(pixels: Pixels, mask: Mask, margin: int) -> Matte:
     """Soft cut-out of `mask` (H, W) in the photo (H, W, 3), on a crop with `margin` px around it.
 
+    Where the object leaves the photo the crop does so too, see `frame_extension`.
     Raises ValueError for an empty mask or one that is not the photo's size.
     """
     if mask.shape != pixels.shape[:2]:
         raise ValueError(f"mask is {mask.shape}, photo is {pixels.shape[:2]}")
     if not mask.any():
         raise ValueError("the mask is empty")
+    band = band_width(mask.shape[1], mask.shape[0])
+    extension = frame_extension(mask)
+    mask = extended_mask(mask, extension)
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     left, top = max(columns[0] - margin, 0), max(rows[0] - margin, 0)
     right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
-    rgb = unit_pixels(pixels[top:bottom, left:right])
-    alpha, foreground = _soft_edge(rgb, mask[top:bottom, left:right], band_width(width, height))
-    return Matte(int(left), int(top), alpha, foreground)
+    window = (slice(top, bottom), slice(left, right))
+    rgb = unit_pixels(extended(pixels, extension)[window])
+    alpha, foreground = _soft_edge(rgb, mask[window], band)
+    return Matte(int(left) - extension[2], int(top) - extension[0], alpha, foreground)
 
 
 def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:

@@ -73,7 +73,7 @@ def keep_touched(mask: Mask, prompt: Prompt) -> Mask:
         kept |= {int(k) + 1 for k in np.flatnonzero(areas >= SMALL_ISLAND * areas.max())}
     is_kept = np.zeros(count, bool)
     is_kept[sorted(kept)] = True
-    return is_kept[labels]
+    return is_kept[np.asarray(labels, np.int32)]
 
 
 def fill_small_holes(mask: Mask, prompt: Prompt) -> Mask:

@@ -1,0 +1,83 @@
+"""The wheel works away from the checkout: its command, its shaders, its photos."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+READ_RESOURCES = """
+import sys
+from pathlib import Path
+from app.resources import resource
+for name in sys.argv[1:]:
+    assert resource(name).stat().st_size > 0, name
+    assert Path(sys.prefix) in resource(name).parents, resource(name)
+print(len(sys.argv) - 1)
+"""
+
+
+def run(*command: object, cwd: Path) -> str:
+    clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    done = subprocess.run(
+        [str(part) for part in command], cwd=cwd, env=clean, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> Path:
+    """Folder of a fresh environment with the wheel in it; `bin` or `Scripts` holds its programs.
+
+    What the wheel depends on is seen through this environment's packages, so that the test takes
+    seconds; `.ci/run` installs everything anew.
+    """
+    folder = tmp_path_factory.mktemp("wheel")
+    run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
+    (wheel,) = folder.glob("*.whl")
+    run(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
+    programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
+    run(programs / "python", "-m", "pip", "install", "-q", "--no-deps", wheel, cwd=folder)
+    packages = run(
+        programs / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))",
+        cwd=folder,
+    ).strip()  # fmt: skip
+    # Behind the wheel on sys.path; an editable install there would need its own .pth file read.
+    import numpy
+
+    (Path(packages) / "dependencies.pth").write_text(str(Path(numpy.__file__).parents[1]))
+    return programs
+
+
+@pytest.mark.slow
+def test_version(installed, tmp_path):
+    assert run(installed / "objectmorpher", "--version", cwd=tmp_path).startswith("objectmorpher ")
+
+
+@pytest.mark.slow
+def test_every_resource_is_inside(installed, tmp_path):
+    names = [
+        path.relative_to(ROOT).as_posix()
+        for folder in ("shaders", "assets")
+        for path in sorted((ROOT / folder).rglob("*"))
+        if path.is_file()
+    ]
+    assert any(name.startswith("shaders/") for name in names)
+    out = run(installed / "python", "-c", READ_RESOURCES, *names, cwd=tmp_path)
+    assert out.strip() == str(len(names))
+
+
+@pytest.mark.slow
+def test_an_edit(installed, tmp_path):
+    photo = ROOT / "assets" / "samples" / "coffee.jpg"
+    run(
+        installed / "objectmorpher", "edit", photo, "--click", "300,215", "--turn", "15,0,0",
+        "-o", "out.png", cwd=tmp_path,
+    )  # fmt: skip
+    assert (tmp_path / "out.png").stat().st_size > 10_000
