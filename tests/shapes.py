@@ -13,6 +13,7 @@ from PIL import Image
 from objectmorpher_core.arrays import F32, F64, RGB, Mask, frozen
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
+from objectmorpher_core.deform.control_points import sample_control_points
 from objectmorpher_core.document import (
     DeformSettings,
     Document,
@@ -79,6 +80,11 @@ def horseshoe(count: int = 240, seed: int = 0) -> F64:
     return np.column_stack(
         [radius * np.cos(angle), radius * np.sin(angle), 0.05 * np.sin(around)]
     )
+
+
+def even(points: np.ndarray, count: int) -> F64:
+    """`count` of `points`, evenly spread, as control points are."""
+    return sample_control_points(points, np.ones(len(points)), count).astype(np.float64)
 
 
 def rotation(seed: int = 0) -> F64:

@@ -196,7 +196,7 @@ def _set_colours(style: imgui.Style) -> None:
         "border": "line", "frame_bg": "raised", "frame_bg_hovered": "hovered",
         "frame_bg_active": "pressed", "menu_bar_bg": "panel", "scrollbar_grab": "hovered",
         "scrollbar_grab_hovered": "pressed", "scrollbar_grab_active": "pressed",
-        "check_mark": "accent", "button": "raised", "button_hovered": "hovered",
+        "check_mark": "on_accent", "checkbox_selected_bg": "accent", "button": "raised", "button_hovered": "hovered",
         "button_active": "pressed", "header": "raised", "header_hovered": "hovered",
         "header_active": "pressed", "separator": "line", "nav_cursor": "accent",
         "title_bg": "panel", "title_bg_active": "panel", "slider_grab": "accent",

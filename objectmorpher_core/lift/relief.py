@@ -1,10 +1,13 @@
 """A closed shape from the silhouette alone: no model, no download, half a second.
 
-The silhouette is inflated: u solves -laplace u = 1 inside the mask with u = 0 on its edge, and
-the half-thickness is sqrt(2 u). A strip becomes a round limb, a disc a body 0.7 times as deep as
-wide, and the surface leaves the edge at a right angle, so it is smooth all round. The front
-lies on the photo's own rays, so the photo is reproduced at rest whatever the thickness. A flat
-brim around the silhouette carries the matte's soft edge.
+The silhouette is inflated: u solves -laplace u = 1 inside the mask with u = 0 on its edge.
+sqrt(2 u) would be the half-thickness of a round limb (a strip) or a body 0.7 times as deep as
+wide (a disc), but it leaves the edge at a right angle: there the photo sees the surface edge-on
+and has no pixels to show when it turns. So the slope at the edge is held to 67 degrees, and the
+two halves meet in a soft crease. Until the object is turned by some twenty degrees all that is
+seen of it was seen in the photo. The front lies on the photo's own rays, so the photo is
+reproduced at rest whatever the thickness. A brim around the silhouette carries the matte's soft
+edge.
 """
 
 from __future__ import annotations
@@ -27,6 +30,9 @@ from .membrane import solve_membrane
 from .poisson_disk import thin_to_spacing
 
 GRID = 256  # cells on the longer side of the crop in which the shape is found
+RIM_SLOPE = 2.0  # tangent of the angle, before FULLNESS, at which the front leaves the rim
+FULLNESS = 1.2  # makes up for the thickness that the crease takes away
+CREASE_BLUR = 4.0  # cells
 DEEPEST = 0.3  # x extent: half-thickness that even the widest body does not exceed
 OVERSAMPLING = 10  # candidates per Gaussian before thinning
 PACKING = 0.68  # Gaussians per (spacing^2 of area) that thinning at that spacing leaves
@@ -82,6 +88,7 @@ class Inflation:
     """The membrane u over the silhouette, on a grid that covers its crop."""
 
     membrane: F64  # (h, w) u in px^2; below 0 in the ring outside, so that 0 is on the edge
+    crease: F64  # (h, w) px, see `half_thickness`
     inside: Mask  # (h, w)
     cell: float  # px per grid cell
     left: float  # px, photo coordinates of the grid's corner
@@ -116,28 +123,31 @@ class Inflation:
         mirrored = -cv2.blur(u, (3, 3)) / np.maximum(near, 1e-9)
         u = np.where(inside, u, np.where(near > 1e-6, mirrored, 0.0))
         corner = (left - extension[2] - cell, top - extension[0] - cell)
-        return Inflation(u, inside, cell, *corner, extent)
+        return Inflation(u, _crease(u, inside, cell), inside, cell, *corner, extent)
 
-    @property
-    def deepest(self) -> float:
-        """px: the half-thickness that no body exceeds."""
-        return DEEPEST * self.extent
+    def half_thickness(self, u: F64, crease: F64) -> tuple[F64, F64]:
+        """Height (N,) px of the front, and d height / d u, for membrane and crease (N,).
 
-    def heights(self, u: F64) -> F64:
-        """Half-thickness (N,) px of the membrane's values: sqrt(2 u), flattened where deep."""
-        return self.deepest * np.tanh(np.sqrt(2 * np.maximum(u, 0)) / self.deepest)
+        sqrt(2 u + c^2) - c rises from the edge with the slope |grad u| / c, and c is the slope
+        of u at the nearest edge over RIM_SLOPE; where deep it is flattened.
+        """
+        root = np.sqrt(2 * np.maximum(u, 0) + crease**2)
+        deepest = DEEPEST * self.extent
+        flattened = np.tanh(FULLNESS * (root - crease) / deepest)
+        return deepest * flattened, FULLNESS * (1 - flattened**2) / np.maximum(root, 1e-9)
 
     def grid_xy(self, xy: F64) -> F64:
         """Grid coordinates (N, 2), cell centres at integers, of photo px."""
         return (xy - [self.left, self.top]) / self.cell - 0.5
 
     def sample(self, xy: F64) -> tuple[F64, F64]:
-        """u (N,) px^2 and its gradient (N, 2) px at photo px (N, 2), bilinear."""
+        """Height (N,) px of the front and its gradient (N, 2) at photo px (N, 2)."""
         padded = np.pad(self.membrane, 1)
         dy, dx = np.gradient(padded, self.cell)
         g = self.grid_xy(xy) + 1
-        at = [bilinear(field, g) for field in (padded, dx, dy)]
-        return at[0], np.stack(at[1:], axis=1)
+        u, ux, uy = (bilinear(field, g) for field in (padded, dx, dy))
+        height, slope = self.half_thickness(u, bilinear(self.crease, g - 1))
+        return height, np.stack([ux * slope, uy * slope], axis=1)
 
     def outward(self, xy: F64) -> F64:
         """Unit directions (N, 2) away from the silhouette at photo px (N, 2) outside it."""
@@ -172,12 +182,11 @@ def _sample(
 
     Candidates are drawn in proportion to the true area, then thinned to one spacing in 3D.
     """
-    u, cell = shape.membrane, shape.cell
-    dy, dx = np.gradient(u, cell)
-    height = np.sqrt(2 * np.maximum(u, 0.02 * cell * cell))
-    height /= 1 - (shape.heights(u) / shape.deepest) ** 2  # the flattening makes it less steep
-    # |grad height| = |grad u| / height; the area of a cell of the surface
-    area = np.where(shape.inside, cell**2 * np.sqrt(1 + (dx**2 + dy**2) / height**2), 0.0)
+    cell = shape.cell
+    dy, dx = np.gradient(shape.membrane, cell)
+    _, slope = shape.half_thickness(shape.membrane, shape.crease)
+    steepness = np.sqrt(1 + (dx**2 + dy**2) * slope**2)  # of the surface over its picture
+    area = np.where(shape.inside, cell**2 * steepness, 0.0)
     spacing = float(np.sqrt(2 * area.sum() / count))
     spacing = max(spacing, MIN_SPACING)
     per_cell = area * (OVERSAMPLING / spacing**2)
@@ -220,28 +229,32 @@ def _draw_brim(shape: Inflation, spacing: float, band: float, rng: np.random.Gen
 
 
 def _join(shape: Inflation, front: F64, back: F64, brim: F64) -> Surface:
-    """The three sheets as one set of points with outward normals.
-
-    Before it is flattened the surface is height^2 / 2 = u(x, y); its gradient
-    (-du/dx, -du/dy, height) never vanishes and turns from facing the camera to facing away
-    without a jump at the rim.
-    """
+    """The three sheets as one set of points with outward normals."""
     xy = np.concatenate([front, back, brim])
-    u, gradient = shape.sample(xy)
+    height, gradient = shape.sample(xy)
     side = np.repeat([1.0, -1.0, 0.0], [len(front), len(back), len(brim)])
-    flattened = shape.heights(u)
-    flatness = 1 - (flattened / shape.deepest) ** 2  # d height / d sqrt(2 u)
-    normals = np.column_stack(
-        [-gradient * flatness[:, None], side * np.sqrt(2 * np.maximum(u, 0))]
-    )
-    height = side * flattened
+    normals = np.column_stack([-gradient, side])
     is_brim = side == 0
     normals[is_brim] = np.column_stack([shape.outward(xy[is_brim]), np.zeros(is_brim.sum())])
-    # A corner cell whose u is still 0 has no gradient: let it face where its sheet does.
-    flat = np.linalg.norm(normals, axis=1) < 1e-9
-    normals[flat] = np.column_stack([np.zeros((flat.sum(), 2)), side[flat]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Surface(xy, height, normals, is_brim)
+    return Surface(xy, side * height, normals, is_brim)
+
+
+def _crease(membrane: F64, inside: Mask, cell: float) -> F64:
+    """(h, w) px: |grad u| at the nearest edge over RIM_SLOPE, made smooth."""
+    dy, dx = np.gradient(membrane, cell)
+    slope = np.hypot(dx, dy)
+    solid = inside.astype(np.uint8)
+    rim = (solid > 0) & (cv2.erode(solid, np.ones((3, 3), np.uint8)) == 0)
+    if not rim.any():
+        return np.full(membrane.shape, float(slope.max()) / RIM_SLOPE + 1e-6)
+    _, labels = cv2.distanceTransformWithLabels(
+        (~rim).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    at_rim = np.zeros(labels.max() + 1)
+    at_rim[labels[rim]] = slope[rim]
+    nearest = cv2.GaussianBlur(at_rim[labels], (0, 0), CREASE_BLUR)
+    return np.maximum(nearest, 0.25 * cell) / RIM_SLOPE
 
 
 def _assemble(

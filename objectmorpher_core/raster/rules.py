@@ -25,18 +25,18 @@ EDGE_WIDTH = 1.0  # px, width of the antialiased edge there
 # the silhouette of the photo and carries its soft edge, faces along the rim; it counts while the
 # rim is still the silhouette.
 FACING_RAMP = 0.25
-BRIM_START = 0.08
-BRIM_END = 0.20
+BRIM_START = 0.22
+BRIM_END = 0.42
 
 # Where the motion magnifies the photo, the matte's edge would become a translucent band: from
 # MATTE_START on the surface's own edge takes over from the matte's, wholly at MATTE_END.
-MATTE_START = 0.80
-MATTE_END = 0.50
+MATTE_START = 0.55
+MATTE_END = 0.35
 
 # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below STREAK_START the
 # photo's pixels begin to show as streaks, below STREAK_END they are not used.
-STREAK_START = 0.50
-STREAK_END = 0.25
+STREAK_START = 0.40
+STREAK_END = 0.18
 
 
 SAME_POINT = 1.0  # px of the photo: layers that look this close together are one surface

@@ -1,0 +1,112 @@
+"""A made photo, an editor with its worker, and an X display for the window."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.editor import Editor
+from app.settings import Settings
+
+WIDTH, HEIGHT = 180, 140  # px of the made photo
+CENTRE = (90.0, 72.0)  # px, of the ball in it
+RADII = (34.0, 44.0)
+PATIENCE = 90.0  # s; the first run compiles
+
+
+def made_photo() -> np.ndarray:
+    """A shaded red ball before a blue-green wall (H, W, 3) u8."""
+    random = np.random.default_rng(7)
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
+    wall = np.stack([40 + 0.1 * x, 90 + 0.3 * y, 110 + 0.2 * x], -1)
+    wall += random.normal(0, 4, (HEIGHT, WIDTH, 1))
+    dx, dy = (x - CENTRE[0]) / RADII[0], (y - CENTRE[1]) / RADII[1]
+    inside = 1 - dx**2 - dy**2
+    shade = 0.45 + 0.55 * np.sqrt(inside.clip(0)) - 0.15 * dx
+    ball = np.array([225, 60, 40]) * shade[..., None] + random.normal(0, 3, (HEIGHT, WIDTH, 1))
+    share = (inside / 0.05).clip(0, 1)[..., None]
+    return (wall * (1 - share) + ball * share).clip(0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="session")
+def photo_bytes() -> bytes:
+    out = io.BytesIO()
+    Image.fromarray(made_photo()).save(out, "PNG")
+    return out.getvalue()
+
+
+@pytest.fixture
+def photo_path(tmp_path: Path, photo_bytes: bytes) -> Path:
+    path = tmp_path / "ball.png"
+    path.write_bytes(photo_bytes)
+    return path
+
+
+@pytest.fixture(scope="session")
+def shared_editor() -> Iterator[Editor]:
+    editor = Editor(Settings(gaussians=3000))
+    editor.view.resize((720, 560), 1.0, None)
+    yield editor
+    editor.shut_down()
+
+
+@pytest.fixture
+def editor(shared_editor: Editor, photo_path: Path) -> Editor:
+    """An editor with the made photo open; the worker is shared, it takes seconds to start."""
+    shared_editor.close_document()
+    wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
+    shared_editor.filing.open(photo_path)
+    assert shared_editor.message is None, shared_editor.message
+    return shared_editor
+
+
+def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
+    """Polls as the window's loop does."""
+    end = time.monotonic() + PATIENCE
+    while not is_reached():
+        assert time.monotonic() < end, f"nothing came in time; the message is {editor.message}"
+        editor.poll()
+        time.sleep(0.005)
+
+
+def wait_for_jobs(editor: Editor) -> None:
+    wait_until(editor, lambda: not editor.poll() and editor.jobs.is_idle)
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """An X display of our own, 1440 x 900."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not installed")
+    for number in range(90, 140):
+        if Path(f"/tmp/.X11-unix/X{number}").exists() or Path(f"/tmp/.X{number}-lock").exists():
+            continue
+        command = ["Xvfb", f":{number}", "-screen", "0", "1440x900x24", "-nolisten", "tcp"]
+        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        for _ in range(100):
+            time.sleep(0.05)
+            if Path(f"/tmp/.X11-unix/X{number}").exists() or server.poll() is not None:
+                break
+        if server.poll() is None:
+            yield f":{number}"
+            server.terminate()
+            server.wait()
+            return
+    pytest.skip("no free X display was found")
+
+
+@pytest.fixture
+def window_environment(display: str, tmp_path: Path) -> dict[str, str]:
+    """For a process with a window: its display, and settings of its own."""
+    settings = tmp_path / "settings.toml"
+    settings.write_text('dialogs = "built-in"\ngaussians = 3000\n', encoding="utf-8")
+    return {**os.environ, "DISPLAY": display, "OBJECTMORPHER_SETTINGS": str(settings)}

@@ -1,0 +1,242 @@
+"""The whole job without a window: open, select, lift, pose, place, export, save, reload, undo."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from conftest import CENTRE, wait_for_jobs
+from PIL import Image
+
+from app.commands import COMMANDS, next_step, run
+from app.editor import Editor
+from app.filing import Dialog
+from app.tools.pointer import Button, Pointer
+from app.tools.pose_tool import PoseTool
+from app.view import ToolName
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.session_file import decode_session
+
+PIXEL = 1.0  # px, DESIGN promise 3: a handle ends within one of its target
+
+
+def lift_ball(editor: Editor) -> Document:
+    """The ball, selected, lifted and with a background behind it."""
+    editor.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert editor.mask is not None, editor.message
+    run(editor, "lift")
+    wait_for_jobs(editor)
+    assert editor.is_lifted, editor.message
+    assert editor.document is not None
+    assert editor.document.plate is not None
+    return editor.document
+
+
+def canvas_xy(editor: Editor, x: float, y: float) -> np.ndarray:
+    return editor.view.canvas_from_image(np.array([x, y]))
+
+
+def drag(editor: Editor, start: np.ndarray, end: np.ndarray) -> None:
+    """A stroke of the Pose tool in five moves."""
+    pointer = Pointer(*start, button=Button.LEFT, is_down=True)
+    editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
+    for share in (0.2, 0.5, 0.8, 1.0, 1.0):
+        editor.hand.move(Pointer(*(start + share * (end - start)), is_down=True))
+    editor.hand.move(Pointer(*end, is_down=False))
+
+
+def test_the_whole_job(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> None:
+    assert editor.history is not None
+    opened = editor.document
+    assert next_step(editor) == ("Click an object in the photo", None)
+    lifted = lift_ball(editor)
+    assert next_step(editor)[1] is None  # "Drag a point on the object"
+
+    start, end = canvas_xy(editor, 90, 50), canvas_xy(editor, 110, 40)
+    drag(editor, start, end)
+    assert editor.history.undo_label == "Drag point"
+    assert editor.object is not None
+    assert len(editor.object.handles) == 1
+    seen = editor.surface_at(end)
+    assert seen is not None
+    point = editor.object.handles[0].point
+    diameter_px = 2 * 44.0
+    scale = diameter_px / editor.object.lifted.diameter  # type: ignore[union-attr]
+    assert np.linalg.norm(seen.rest - point) * scale < PIXEL
+    assert next_step(editor) == ("Export photo…", "export")
+
+    editor.place(Placement(move=(12.0, -4.0), turn=(10.0, 0.0, 0.0)))
+    editor.commit("Move object")
+    posed = editor.document
+
+    picture = tmp_path / "out.png"
+    editor.filing.choose(Dialog.EXPORT, picture)
+    session = tmp_path / "ball.omorph"
+    editor.filing.choose(Dialog.SAVE, session)
+    wait_for_jobs(editor)
+    assert editor.is_saved, editor.message
+    before, after = editor.document.photo.pixels, np.asarray(Image.open(picture))  # type: ignore[union-attr]
+    assert after.shape == before.shape
+    assert (after != before).any(axis=2).mean() > 0.05
+    np.testing.assert_array_equal(after[:, :20], before[:, :20])
+
+    for _ in range(10):
+        editor.undo()
+    assert editor.history.document is opened
+    for _ in range(10):
+        editor.redo()
+    assert editor.history.document is posed
+    editor.undo()
+    editor.undo()
+    assert editor.history.document is lifted
+
+    editor.filing.open(session)
+    editor.filing.answer_discard()
+    assert editor.path == session
+    assert editor.is_saved
+    assert editor.object is not None
+    np.testing.assert_array_equal(editor.object.handles[0].point, point)
+    assert editor.object.placement == Placement(move=(12.0, -4.0), turn=(10.0, 0.0, 0.0))
+    assert decode_session(session.read_bytes()).photo.source == photo_bytes
+
+
+def test_a_second_click_refines_and_undo_takes_it_back(editor: Editor) -> None:
+    editor.add_click(*CENTRE, True)
+    assert editor.pending is not None  # shown at once
+    wait_for_jobs(editor)
+    first = editor.mask
+    editor.add_click(10, 10, False)
+    wait_for_jobs(editor)
+    assert len(editor.prompt.clicks) == 2
+    run(editor, "undo")
+    assert editor.mask is first
+    run(editor, "undo")
+    assert editor.mask is None
+    assert len(editor.prompt.clicks) == 0
+
+
+def test_undo_while_selecting_takes_the_click_back(editor: Editor) -> None:
+    editor.add_click(*CENTRE, True)
+    run(editor, "undo")
+    wait_for_jobs(editor)
+    assert editor.pending is None
+    assert editor.mask is None
+
+
+def test_an_answer_to_an_old_question_is_dropped(editor: Editor) -> None:
+    editor.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    editor.tasks.lift()
+    editor.clear_selection()
+    wait_for_jobs(editor)
+    assert editor.mask is None
+    assert not editor.is_lifted
+
+
+def test_an_aborted_stroke_changes_nothing(editor: Editor) -> None:
+    before = lift_ball(editor)
+    start = canvas_xy(editor, 90, 60)
+    pointer = Pointer(*start, button=Button.LEFT, is_down=True)
+    editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
+    editor.hand.move(Pointer(*(start + 60), is_down=True))
+    assert editor.document is not before
+    editor.escape()
+    assert editor.document is before
+    assert not editor.hand.is_busy
+
+
+def test_pins_hold_and_handles_can_be_removed(editor: Editor) -> None:
+    lift_ball(editor)
+    pin, start = canvas_xy(editor, 90, 100), canvas_xy(editor, 90, 50)
+    for at, alt in ((pin, True), (start, False)):
+        pointer = Pointer(*at, button=Button.LEFT, is_down=True, alt=alt)
+        editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
+        editor.hand.move(Pointer(*at, is_down=False))
+    assert editor.object is not None
+    assert [h.is_pin for h in editor.object.handles] == [True, False]
+    held = editor.handle_positions()[0]
+    editor.select_handle(1)
+    editor.nudge_handle(10, 0)
+    np.testing.assert_allclose(editor.handle_positions()[0], held, atol=1e-6)
+    assert editor.history is not None
+    assert editor.history.undo_label == "Nudge point"
+    editor.remove_handle(1)
+    editor.remove_handle(0)
+    assert editor.object.handles == ()
+    assert editor.object.pose is None
+
+
+def test_errors_are_one_sentence_and_change_nothing(editor: Editor, tmp_path: Path) -> None:
+    document = editor.document
+    broken = tmp_path / "broken.jpg"
+    broken.write_bytes(b"\xff\xd8\xff not a photo")
+    for path in (broken, tmp_path / "missing.png", tmp_path):
+        editor.filing.open(path)
+        assert editor.message is not None
+        assert editor.message.is_error
+        assert "\n" not in editor.message.text
+        assert editor.document is document
+    editor.filing.export(tmp_path / "out.gif")
+    assert editor.message.is_error
+    assert "gif" in editor.message.text
+
+
+def test_the_opened_photo_is_never_overwritten(editor: Editor, photo_bytes: bytes) -> None:
+    assert editor.source is not None
+    editor.filing.export(editor.source)
+    wait_for_jobs(editor)
+    assert editor.message is not None
+    assert editor.message.is_error
+    assert editor.source.read_bytes() == photo_bytes
+
+
+def test_an_export_that_cannot_be_written_says_so(editor: Editor, tmp_path: Path) -> None:
+    editor.filing.export(tmp_path / "no folder" / "out.png")
+    wait_for_jobs(editor)
+    assert editor.message is not None
+    assert editor.message.is_error
+    assert not (tmp_path / "no folder").exists()
+
+
+def test_unsaved_changes_are_asked_about(editor: Editor, photo_path: Path) -> None:
+    editor.select_subject()
+    wait_for_jobs(editor)
+    document = editor.document
+    editor.filing.open(photo_path)
+    assert editor.filing.question is not None
+    editor.filing.answer_cancel()
+    assert editor.document is document
+    editor.filing.open(photo_path)
+    editor.filing.answer_save()
+    assert editor.filing.wanted is Dialog.SAVE
+    session = photo_path.with_suffix(".omorph")
+    editor.filing.choose(Dialog.SAVE, session)
+    wait_for_jobs(editor)
+    assert session.exists()
+    assert editor.document is not document  # saved, and then the photo was opened
+    assert editor.is_saved
+
+
+def test_what_cannot_be_done_says_why(editor: Editor) -> None:
+    assert COMMANDS["lift"].why_not(editor) == "Click an object in the photo first"
+    assert COMMANDS["pose"].why_not(editor) == "Lift an object first"
+    run(editor, "pose")
+    assert editor.view.tool is ToolName.SELECT
+    assert editor.message is not None
+    assert editor.message.text == "Lift an object first"
+
+
+def test_the_editor_needs_no_window_and_no_heavy_modules() -> None:
+    code = (
+        "import sys, app.editor, app.commands, app.tools.place_tool, app.tools.pose_tool; "
+        "heavy = {'moderngl', 'imgui_bundle', 'glfw', 'torch', 'numba', 'scipy'}; "
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    root = Path(__file__).parents[2]
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root
+    )
+    assert result.stdout.strip() == "[]"

@@ -1,0 +1,80 @@
+"""Farthest point sampling: even, deterministic, no point twice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from objectmorpher_core.deform.control_points import COUNT, MIN_COUNT, sample_control_points
+from tests import shapes
+
+F32 = 1e-6  # points come back as float32 of numbers below 1
+
+
+def _sample(points: np.ndarray, count: int, opacity: float = 1.0) -> np.ndarray:
+    return sample_control_points(points, np.full(len(points), opacity), count)
+
+
+def test_the_same_cloud_gives_the_same_points():
+    cloud = shapes.ball(500)
+    assert np.array_equal(_sample(cloud, 64), _sample(cloud, 64))
+
+
+def test_control_points_are_distinct_gaussians():
+    cloud = shapes.ball(500).astype(np.float32)
+    chosen = _sample(cloud, 64)
+    distance, index = cKDTree(cloud).query(chosen)
+    assert distance.max() <= F32
+    assert len(np.unique(index)) == 64
+
+
+def test_no_gaussian_is_farther_from_a_control_point_than_two_of_them_are_apart():
+    """The property that farthest point sampling has: covering radius <= packing distance."""
+    cloud = shapes.horseshoe(600)
+    chosen = _sample(cloud, 50)
+    covering = cKDTree(chosen).query(cloud)[0].max()
+    packing = cKDTree(chosen).query(chosen, k=2)[0][:, 1].min()
+    assert covering <= packing + F32
+
+
+def test_covering_is_near_the_best_possible():
+    """At most twice the optimum (Gonzalez 1985); the optimum of a sphere is known from area."""
+    chosen = _sample(shapes.ball(4000), 100)
+    covering = cKDTree(chosen).query(shapes.ball(4000, seed=1))[0].max()
+    hexagonal = np.sqrt(2 * np.pi * 0.25 * 4 / 100 / (3 * np.sqrt(3)))  # m hexagons tile its area
+    assert covering <= 2 * hexagonal
+
+
+def test_fewer_gaussians_than_asked_all_become_control_points():
+    cloud = shapes.ball(30)
+    chosen = _sample(cloud, COUNT)
+    assert len(chosen) == 30
+    assert cKDTree(chosen).query(cloud)[0].max() <= F32
+
+
+def test_coincident_gaussians_count_once():
+    cloud = np.repeat(shapes.ball(10), 5, axis=0)
+    assert len(_sample(cloud, 40)) == 10
+
+
+def test_transparent_gaussians_are_not_chosen():
+    solid, ghost = shapes.ball(200), shapes.ball(200) + [5.0, 0, 0]
+    opacities = np.repeat([1.0, 0.2], 200)
+    chosen = sample_control_points(np.concatenate([solid, ghost]), opacities, 50)
+    assert chosen[:, 0].max() < 1
+
+
+def test_the_threshold_falls_where_too_few_are_solid():
+    assert len(_sample(shapes.ball(100), 50, opacity=0.3)) == 50
+
+
+@pytest.mark.parametrize("cloud", [shapes.ball(MIN_COUNT - 1), np.zeros((50, 3))])
+def test_too_few_distinct_gaussians_are_refused(cloud):
+    with pytest.raises(ValueError, match="distinct Gaussians, too few to deform"):
+        _sample(cloud, 50)
+
+
+def test_too_few_control_points_are_refused():
+    with pytest.raises(ValueError, match="at least 4 are needed"):
+        _sample(shapes.ball(100), 3)
