@@ -15,8 +15,9 @@ import moderngl
 import numpy as np
 
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.raster import rules, tiles
+from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+from objectmorpher_core.raster.rules import RULES
 
 from .shaders import build_program, set_uniforms
 
@@ -71,12 +72,12 @@ class SplatPass:
         self._uploaded: TextureLevels | None = None
         self._targets: _Targets | None = None
         for program in (self._depth, self._sum):
-            set_uniforms(program, cutoff=rules.CUTOFF, tail=rules.TAIL, front=0, before=1)
+            set_uniforms(program, cutoff=RULES.cutoff, tail=RULES.tail, front=0, before=1)
         set_uniforms(self._depth, least=LEAST_FRONT)
         set_uniforms(
             self._resolve, sum_shift=0, sum_color=1, sum_slope=2, sum_edge=3, photo=4,
-            look_before=5, result_before=6, same_point=rules.SAME_POINT,
-            level=rules.SURFACE_LEVEL, edge_width=rules.EDGE_WIDTH,
+            look_before=5, result_before=6, same_point=RULES.same_point,
+            level=RULES.surface_level, edge_width=RULES.edge_width,
         )  # fmt: skip
 
     def draw(

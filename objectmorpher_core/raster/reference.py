@@ -25,8 +25,8 @@ import numpy as np
 
 from ..arrays import F32, F64
 from ..camera import Camera
-from . import rules
 from .posed import PosedSplats, TextureLevels, projection_jacobians
+from .rules import RULES
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,18 +62,18 @@ class Projected:
 
 def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projected:
     """Step 1 and 2. `camera` is the view's, `photo_camera` the photo's."""
-    near = rules.NEAR * splats.gap
+    near = RULES.near * splats.gap
     index = np.flatnonzero((splats.means[:, 2] > near) & np.isfinite(splats.means).all(1))
     means, motion = splats.means[index], splats.linear[index]
     jacobian = projection_jacobians(means, camera.focal)
     rest = splats.rest_covariances[index]
     world = motion @ rest @ motion.transpose(0, 2, 1)
     screen = jacobian @ world @ jacobian.transpose(0, 2, 1)
-    ridge = rules.RIDGE * np.trace(screen, axis1=1, axis2=2) + 1e-12
+    ridge = RULES.ridge * np.trace(screen, axis1=1, axis2=2) + 1e-12
     inverse = np.linalg.inv(screen + ridge[:, None, None] * np.eye(2))
     pictures = splats.rest_pictures[index]
     a = pictures @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
-    filtered = screen + rules.FILTER * np.eye(2)
+    filtered = screen + RULES.filter * np.eye(2)
     conic = np.linalg.inv(filtered)
     # The filter spreads a small Gaussian over more pixels: it must not gain weight by that.
     compensation = np.sqrt(np.linalg.det(screen).clip(0) / np.linalg.det(filtered))
@@ -81,7 +81,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     volume = np.cbrt(np.abs(np.linalg.det(motion)))
     zoom = camera.focal / means[:, 2] / splats.rest_zoom[index]
     stretch = singular[:, 1] * zoom * volume
-    carried = _ramp(stretch, rules.STREAK_END, rules.STREAK_START)
+    carried = _ramp(stretch, RULES.streak_end, RULES.streak_start)
     seen = splats.visibility[index].astype(np.float64)
     cofactor = np.linalg.inv(motion).transpose(0, 2, 1)
     normals = (cofactor @ splats.normals[index][:, :, None])[:, :, 0]
@@ -90,15 +90,15 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         np.linalg.norm(normals, axis=1) * np.linalg.norm(towards, axis=1), 1e-30
     )
     solidity = splats.solidity[index].astype(np.float64)
-    ramp = rules.FACING_RAMP
+    ramp = RULES.facing_ramp
     front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
-    brim = _ramp(np.abs(cosine), rules.BRIM_END, rules.BRIM_START)
+    brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
     facing = solidity * front + (1 - solidity) * brim
     weight = splats.opacities[index] * facing * compensation
     centre = camera.project(means)
     ratio = photo_camera.focal / camera.focal  # photo px per view px
     unmoved = (centre - [camera.cx, camera.cy]) * ratio + [photo_camera.cx, photo_camera.cy]
-    extent = np.sqrt(rules.CUTOFF * np.stack([filtered[:, 0, 0], filtered[:, 1, 1]], axis=1))
+    extent = np.sqrt(RULES.cutoff * np.stack([filtered[:, 0, 0], filtered[:, 1, 1]], axis=1))
     covariance_z = (world @ jacobian.transpose(0, 2, 1))[:, 2]  # (N, 2) depth against screen
     projected = Projected(
         centre=centre,
@@ -111,7 +111,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         lod=np.log2(np.maximum(singular[:, 0], 1.0)),
         photo=weight * carried,
         body=weight * (1 - carried) * solidity,
-        matted=_ramp(stretch, rules.MATTE_END, rules.MATTE_START),
+        matted=_ramp(stretch, RULES.matte_end, RULES.matte_start),
         solidity=solidity,
         seen=seen,
         color=splats.colors[index].astype(np.float64),
@@ -158,7 +158,7 @@ def render(
         xx, xy, yy = p.conic[i]
         q = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy
         bell = np.exp(-0.5 * q)
-        kernel = np.where(q < rules.CUTOFF, bell - rules.TAIL, 0.0)
+        kernel = np.where(q < RULES.cutoff, bell - RULES.tail, 0.0)
         hit = kernel > 0
         gradient = -bell[..., None] * np.stack([xx * dx + xy * dy, xy * dx + yy * dy], -1)
         depth = p.depth[i] + p.slope[i, 0] * dx + p.slope[i, 1] * dy
@@ -235,7 +235,7 @@ class _Composite:
         within = ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
         seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
         with np.errstate(invalid="ignore"):
-            same = np.linalg.norm(shift - self.last_shift[at], axis=1) < rules.SAME_POINT
+            same = np.linalg.norm(shift - self.last_shift[at], axis=1) < RULES.same_point
         clear = 1 - self.alpha[at]
         before = np.where(same, self.last_through[at], clear)
         through = before * np.where(same, 1 - self.last_whole[at], 1) * alpha
@@ -262,7 +262,7 @@ def _ramp(value: np.ndarray, zero: float, one: float) -> np.ndarray:
 
 
 def _coverage(total: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    edge = (total - rules.SURFACE_LEVEL) / (rules.EDGE_WIDTH * slope + 1e-6)
+    edge = (total - RULES.surface_level) / (RULES.edge_width * slope + 1e-6)
     return np.clip(0.5 + edge, 0, 1)
 
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..arrays import F64, frozen
 from ..camera import Camera
-from . import rules
 from .posed import PosedSplats, TextureLevels
 from .reference import Picture3D
+from .rules import RULES, coverage, facing_weight, ramp
 from .threads import in_threads
 
 TILE = 16  # px
@@ -52,7 +52,7 @@ def render(
     inputs = (
         projected, frozen(starts), frozen(members), across, width, height, view, photo,
         float(splats.gap), float(splats.texture_gap), frozen(flat), frozen(shapes),
-        frozen(offsets), float(texture.left), float(texture.top), out,
+        frozen(offsets), float(texture.left), float(texture.top), RULES, out,
     )  # fmt: skip
     in_threads(lambda first, last: _draw(first, last, *inputs), across * down, PARTS)
     return Picture3D(out[..., :3], out[..., 3], out[..., 4], out[..., 5], out[..., 6:8])
@@ -68,10 +68,10 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
         splats.normals, splats.u0, splats.visibility, splats.solidity, splats.colors,
         splats.opacities, splats.rest_zoom,
     )  # fmt: skip
-    near = float(rules.NEAR * splats.gap)
+    near = RULES.near * splats.gap
     inputs = [frozen(a) for a in (*fields, _intrinsics(camera), _intrinsics(photo_camera))]
     out = np.zeros((len(splats), SPAN))
-    in_threads(lambda first, last: _project(first, last, *inputs, near, out), len(splats))
+    in_threads(lambda first, last: _project(first, last, *inputs, near, RULES, out), len(splats))
     return out
 
 
@@ -101,7 +101,7 @@ def _depth_order(projected, width, height):
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project(
     first, last, means, linear, rest, pictures, normals, u0, visibility, solidity, colors,
-    opacities, rest_zoom, view, photo, near, out,
+    opacities, rest_zoom, view, photo, near, rules, out,
 ):  # fmt: skip
     """Fills the rows first..last of `out`; see the columns above."""
     f = view[0]
@@ -137,7 +137,7 @@ def _project(
         syy = b0 * q0 + b1 * q1 + b2 * q2
         szx = m20 * p0 + m21 * p1 + m22 * p2  # depth against the screen
         szy = m20 * q0 + m21 * q1 + m22 * q2
-        ridge = rules.RIDGE * (sxx + syy) + 1e-12
+        ridge = rules.ridge * (sxx + syy) + 1e-12
         det = (sxx + ridge) * (syy + ridge) - sxy * sxy
         ixx, ixy, iyy = (syy + ridge) / det, -sxy / det, (sxx + ridge) / det
         # A = J0 Sigma (J1 F)^T (...)^-1
@@ -166,15 +166,15 @@ def _project(
         lengths = math.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + z * z))
         cosine = -(nx * x + ny * y + nz * z) / max(lengths, 1e-30)
         stretch = smallest * abs(determinant) ** (1.0 / 3.0) * j / rest_zoom[i]
-        fxx, fyy = sxx + rules.FILTER, syy + rules.FILTER
+        fxx, fyy = sxx + rules.filter, syy + rules.filter
         fdet = fxx * fyy - sxy * sxy
-        weight = opacities[i] * rules.facing_weight(cosine, visibility[i], solidity[i])
+        weight = opacities[i] * facing_weight(cosine, visibility[i], solidity[i], rules)
         weight *= math.sqrt(max(sxx * syy - sxy * sxy, 0.0) / fdet)
-        carried = rules.ramp(stretch, rules.STREAK_END, rules.STREAK_START)
+        carried = ramp(stretch, rules.streak_end, rules.streak_start)
         px, py = j * x + view[1], j * y + view[2]
         out[i, CX], out[i, CY], out[i, Z] = px, py, z
         out[i, QXX], out[i, QXY], out[i, QYY] = fyy / fdet, -sxy / fdet, fxx / fdet
-        out[i, EX], out[i, EY] = math.sqrt(rules.CUTOFF * fxx), math.sqrt(rules.CUTOFF * fyy)
+        out[i, EX], out[i, EY] = math.sqrt(rules.cutoff * fxx), math.sqrt(rules.cutoff * fyy)
         out[i, ZX], out[i, ZY] = szx * ixx + szy * ixy, szx * ixy + szy * iyy
         out[i, SX] = u0[i, 0] - (j * x * ratio + photo[1])
         out[i, SY] = u0[i, 1] - (j * y * ratio + photo[2])
@@ -182,7 +182,7 @@ def _project(
         out[i, LOD] = math.log2(max(largest, 1.0))
         out[i, PHOTO] = weight * carried
         out[i, BODY] = weight * (1.0 - carried) * solidity[i]
-        out[i, MATTED] = rules.ramp(stretch, rules.MATTE_END, rules.MATTE_START)
+        out[i, MATTED] = ramp(stretch, rules.matte_end, rules.matte_start)
         out[i, SOLID], out[i, SEEN] = solidity[i], visibility[i]
         out[i, RED], out[i, GREEN], out[i, BLUE] = colors[i, 0], colors[i, 1], colors[i, 2]
 
@@ -219,7 +219,7 @@ def _bin(projected, order, across, down):
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _draw(
     first, last, projected, starts, members, across, width, height, view, photo,
-    gap, texture_gap, texels, shapes, offsets, left, top, out,
+    gap, texture_gap, texels, shapes, offsets, left, top, rules, out,
 ):  # fmt: skip
     """Draws the tiles first..last into `out` (height, width, 8)."""
     ratio = photo[0] / view[0]
@@ -248,14 +248,14 @@ def _draw(
                     dx = x + 0.5 - s[CX]
                     gx, gy = s[QXX] * dx + s[QXY] * dy, s[QXY] * dx + s[QYY] * dy
                     q = gx * dx + gy * dy
-                    if q >= rules.CUTOFF:
+                    if q >= rules.cutoff:
                         continue
                     r = result[y - y0, x - x0]
                     if r[3] > OPAQUE:
                         continue
                     layer = sums[y - y0, x - x0]
                     bell = math.exp(-0.5 * q)
-                    kernel = bell - rules.TAIL
+                    kernel = bell - rules.tail
                     depth = s[Z] + s[ZX] * dx + s[ZY] * dy
                     sx = s[SX] + s[AXX] * dx + s[AXY] * dy
                     sy = s[SY] + s[AYX] * dx + s[AYY] * dy
@@ -268,7 +268,7 @@ def _draw(
                         if apart:
                             _close(
                                 layer, r, x, y, view, photo, ratio, texels, shapes, offsets,
-                                left, top, sample, value, wx, wy,
+                                left, top, rules, sample, value, wx, wy,
                             )  # fmt: skip
                     layer[TOTAL] += kernel * both
                     layer[BODIED] += kernel * s[BODY]
@@ -295,7 +295,7 @@ def _draw(
                 if layer[TOTAL] > 0.0 and r[3] <= OPAQUE:
                     _close(
                         layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top,
-                        sample, value, wx, wy,
+                        rules, sample, value, wx, wy,
                     )  # fmt: skip
                 for c in range(8):
                     out[y, x, c] = r[c]
@@ -304,7 +304,7 @@ def _draw(
 @numba.njit(cache=True, error_model="numpy")
 def _close(
     layer, r, x, y, view, photo, ratio, texels, shapes, offsets, left, top,
-    sample, value, wx, wy,
+    rules, sample, value, wx, wy,
 ):  # fmt: skip
     """Composites a pixel's layer into `r` and empties it: steps 4 and 5 of the reference."""
     total, body = layer[TOTAL], layer[BODIED]
@@ -320,11 +320,11 @@ def _close(
         _sample(texels, shapes, offsets, u - left, v - top, layer[LEVEL] / seen, sample,
                 value, wx, wy)  # fmt: skip
         matte = (sample[3] * layer[MATTES] + layer[SOLIDS]) / seen
-    whole = rules.coverage(total, math.sqrt(layer[GX] ** 2 + layer[GY] ** 2))
-    solid = rules.coverage(body, math.sqrt(layer[BGX] ** 2 + layer[BGY] ** 2))
+    whole = coverage(total, math.sqrt(layer[GX] ** 2 + layer[GY] ** 2), rules)
+    solid = coverage(body, math.sqrt(layer[BGX] ** 2 + layer[BGY] ** 2), rules)
     alpha = matte * whole + (1.0 - matte) * solid
     ex, ey = sx - r[LAST_X], sy - r[LAST_Y]
-    if ex * ex + ey * ey < rules.SAME_POINT * rules.SAME_POINT:
+    if ex * ex + ey * ey < rules.same_point * rules.same_point:
         through = r[LAST_THROUGH] * (1.0 - r[LAST_WHOLE]) * alpha
         r[LAST_WHOLE] = 1.0 - (1.0 - r[LAST_WHOLE]) * (1.0 - whole)
     else:

@@ -1,0 +1,200 @@
+"""The real window under Xvfb: a few frames of it, and the whole job by mouse and keyboard."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CENTRE, HEIGHT, PATIENCE, WIDTH
+from PIL import Image, ImageGrab
+
+pytestmark = pytest.mark.window
+
+ROOT = Path(__file__).parents[2]
+ACCENT = (0x5A, 0xA9, 0xFF)
+CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
+PRIMARY = (1160, 839)  # in the primary button, left of its label
+POSE_TOOL = (10, 88)  # in the Pose tool's button, beside its icon
+
+
+def run_app(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "app", *arguments]
+    return subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
+    )
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_the_start_screen_is_drawn(
+    window_environment: dict[str, str], tmp_path: Path, theme: str
+) -> None:
+    shot = tmp_path / "shot.png"
+    arguments = ("--frames", "5", "--screenshot", str(shot), "--theme", theme)
+    result = run_app(window_environment, *arguments)
+    assert result.returncode == 0, result.stderr
+    assert "Traceback" not in result.stderr
+    pixels = np.asarray(Image.open(shot))
+    assert pixels.shape == (900, 1440, 3)
+    surround = (30, 31, 34) if theme == "dark" else (217, 218, 220)
+    assert tuple(pixels[850, 700]) == surround
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000  # the thumbnails
+
+
+@pytest.mark.parametrize("renderer", ["tiles", "gl"])
+def test_the_photo_is_shown_as_it_is(
+    window_environment: dict[str, str], photo_path: Path, tmp_path: Path, renderer: str
+) -> None:
+    shot = tmp_path / "shot.png"
+    arguments = ("--frames", "5", "--screenshot", str(shot), "--renderer", renderer)
+    result = run_app(window_environment, str(photo_path), *arguments)
+    assert result.returncode == 0, result.stderr
+    pixels, photo = np.asarray(Image.open(shot)), np.asarray(Image.open(photo_path))
+    for x, y in ((20, 20), (90, 70), (150, 120)):
+        left, top = screen_xy(x + 0.5, y + 0.5)  # at 4x and more single pixels are shown
+        np.testing.assert_array_equal(pixels[round(top), round(left)], photo[y, x])
+
+
+def test_a_broken_photo_leaves_the_start_screen(
+    window_environment: dict[str, str], tmp_path: Path
+) -> None:
+    broken, shot = tmp_path / "broken.jpg", tmp_path / "shot.png"
+    broken.write_bytes(b"not a photo")
+    result = run_app(
+        window_environment, str(broken), "--frames", "4", "--screenshot", str(shot)
+    )
+    assert result.returncode == 0, result.stderr
+    status = np.asarray(Image.open(shot))[875:, 10:400].astype(int)
+    is_red = (status[..., 0] - status[..., 2] > 80).sum()
+    assert is_red > 50  # the sentence, in the colour of errors
+
+
+def screen_xy(x: float, y: float) -> tuple[float, float]:
+    """Where image px are on the screen while the photo is fitted."""
+    left, top, width, height = CANVAS
+    zoom = min((width - 48) / WIDTH, (height - 48) / HEIGHT, 4.0)
+    return (
+        left + width / 2 + (x - WIDTH / 2) * zoom,
+        top + height / 2 + (y - HEIGHT / 2) * zoom,
+    )
+
+
+class Hands:
+    """Mouse, keyboard and eyes on the display."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._environment = environment
+        self._display = environment["DISPLAY"]
+
+    def xdotool(self, *arguments: object) -> str:
+        command = ["xdotool", *(str(a) for a in arguments)]
+        result = subprocess.run(command, env=self._environment, capture_output=True, text=True)
+        time.sleep(0.08)
+        return result.stdout
+
+    def click(self, x: float, y: float, button: int = 1) -> None:
+        self.xdotool("mousemove", round(x), round(y))
+        self.xdotool("click", button)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        self.xdotool("mousemove", round(start[0]), round(start[1]))
+        self.xdotool("mousedown", 1)
+        for share in (0.25, 0.5, 0.75, 1.0, 1.0):
+            x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+            self.xdotool("mousemove", round(x), round(y))
+        self.xdotool("mouseup", 1)
+
+    def press(self, keys: str) -> None:
+        self.xdotool("key", keys)
+
+    def fill_in(self, path: Path) -> None:
+        """Types a path into the open dialog, in place of what it suggests."""
+        time.sleep(0.5)
+        self.press("ctrl+a")
+        self.xdotool("type", "--delay", 5, path)
+        self.press("Return")
+
+    def picture(self) -> np.ndarray:
+        return np.asarray(ImageGrab.grab(xdisplay=self._display))
+
+    def is_accent(self, at: tuple[int, int]) -> bool:
+        return tuple(int(v) for v in self.picture()[at[1], at[0], :3]) == ACCENT
+
+    def title(self) -> str:
+        names = self.xdotool("search", "--name", "ObjectMorpher", "getwindowname", "%@")
+        return names.strip()
+
+    def wait(self, is_reached: Callable[[], bool], what: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not is_reached():
+            if time.monotonic() > end:
+                Image.fromarray(self.picture()).save(f"window-test-{what.replace(' ', '-')}.png")
+                pytest.fail(f"{what} did not happen; a picture of the screen was saved")
+            time.sleep(0.1)
+
+
+@pytest.fixture
+def hands(window_environment: dict[str, str], photo_path: Path) -> Iterator[Hands]:
+    """On a window that shows the made photo."""
+    if shutil.which("xdotool") is None:
+        pytest.skip("xdotool is not installed")
+    command = [sys.executable, "-m", "app", str(photo_path)]
+    with subprocess.Popen(command, env=window_environment, cwd=ROOT) as window:
+        hands = Hands(window_environment)
+        hands.wait(lambda: photo_path.name in hands.title(), "opening the photo")
+        yield hands
+        window.kill()
+
+
+def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -> None:
+    x, y = CENTRE
+    hands.click(*screen_xy(x, y))
+    hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
+    hands.click(*PRIMARY)
+    hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
+    assert not hands.is_accent(PRIMARY)  # it asks for a drag
+    before = hands.picture()
+    hands.drag(screen_xy(x, y - 25), screen_xy(x + 25, y - 35))
+    hands.wait(lambda: hands.is_accent(PRIMARY), "dragging")
+    top, left = CANVAS[1], CANVAS[0]
+    moved = (hands.picture()[top:872, left:1140] != before[top:872, left:1140]).any(axis=2)
+    assert moved.mean() > 0.02
+
+    exported, session = tmp_path / "edited.png", tmp_path / "ball.omorph"
+    hands.press("ctrl+e")
+    hands.fill_in(exported)
+    hands.wait(exported.exists, "exporting")
+    difference = np.asarray(Image.open(exported)) != np.asarray(Image.open(photo_path))
+    assert difference.any()
+    hands.press("ctrl+s")
+    hands.fill_in(session)
+    hands.wait(lambda: "ball.omorph · " in hands.title(), "saving")
+
+    hands.press("ctrl+z")
+    hands.wait(lambda: "edited" in hands.title(), "undoing")
+    assert not hands.is_accent(PRIMARY)
+    hands.press("ctrl+shift+z")
+    hands.wait(lambda: "edited" not in hands.title(), "redoing")
+    hands.press("ctrl+w")
+    hands.wait(lambda: hands.title() == "ObjectMorpher", "closing the photo")
+    hands.press("ctrl+o")
+    hands.fill_in(session)
+    hands.wait(lambda: "ball.omorph · " in hands.title(), "reopening")
+    hands.wait(lambda: hands.is_accent(PRIMARY), "showing the session")
+
+
+def test_closing_asks_about_unsaved_changes(hands: Hands) -> None:
+    hands.click(*screen_xy(*CENTRE))
+    hands.wait(lambda: "edited" in hands.title(), "selecting")
+    hands.press("ctrl+w")
+    time.sleep(0.4)
+    assert "edited" in hands.title()  # the question is there instead
+    hands.press("Escape")
+    time.sleep(0.3)
+    hands.press("ctrl+z")
+    hands.wait(lambda: "edited" not in hands.title(), "undoing")
