@@ -143,7 +143,8 @@ class Input:
         if imgui.get_io().app_focus_lost:
             editor.hand.abort(editor)
             return
-        has_moved = self._last != (pointer.x, pointer.y) or pointer.wheel != 0
-        if has_moved or not is_down:
+        if self._last != (pointer.x, pointer.y) or pointer.wheel != 0:
             self._last = (pointer.x, pointer.y)
-            editor.hand.move(replace(pointer, is_down=is_down))
+            editor.hand.move(pointer)  # before the release: both may come in one slow frame
+        if not is_down:
+            editor.hand.move(replace(pointer, is_down=False))

@@ -25,8 +25,8 @@ class Rules(NamedTuple):
     ridge: float = 1e-6  # x trace, added to the covariance before inversion
     near: float = 1e-3  # x the object's gap: nothing nearer to the camera is drawn
 
-    # The kernels' sum is about 2 where the surface is whole (spacing 1, sigma 0.6).
-    surface_level: float = 0.5  # kernel sum at which the surface ends
+    # The kernels' sum is about 2 where the surface is whole (spacing 1, sigma 0.66).
+    surface_level: float = 0.35  # kernel sum at which the surface ends
     edge_width: float = 1.0  # px, width of the antialiased edge there
 
     # Cosine between normal and view ray. Fronts fade until 0.25 beyond grazing, backs begin at

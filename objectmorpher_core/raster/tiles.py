@@ -232,6 +232,8 @@ def _draw(
         x1, y1 = min(x0 + TILE, width), min(y0 + TILE, height)
         for y in range(TILE):
             for x in range(TILE):
+                for c in range(SUMS):  # opaque pixels of the last tile left theirs
+                    sums[y, x, c] = 0.0
                 for c in range(RESULTS):
                     result[y, x, c] = 0.0
                 result[y, x, D_OUT] = result[y, x, LAST_X] = np.inf

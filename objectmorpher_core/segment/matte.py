@@ -1,9 +1,9 @@
 """From a hard mask to a soft cut-out: alpha and the object's own colours at its edge.
 
 In a narrow band about the mask's edge each pixel is a mixture of a colour of the object and one
-of the background. Both are estimated from their neighbourhoods, so alpha is the pixel's place on
-the line between them (Chuang et al. 2001 call this the projection step); where the two colours
-hardly differ the mask's own blurred edge decides.
+of the background. Alpha comes from closed-form matting (Levin et al. 2008), solved on the band
+alone; the object's colour is what remains when the background's share is taken out, as far as it
+is near what stands beside it.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ import numpy as np
 from ..arrays import F32, Mask, Pixels
 from ..document import Matte
 from ..pixels import unit_pixels
+from .closed_form import solve_alpha
 
-BAND = 0.0035  # x the photo's diagonal: half-width of the band where alpha may be soft
+BAND = 0.0040  # x the photo's diagonal: half-width of the band where alpha may be soft
 MIN_BAND = 2.0  # px
-REACH = 3.0  # x band: how far the colours of object and background are gathered
-CONTRAST = 0.15  # sRGB distance of the two colours from which they, not the mask, decide
+REACH = 2.5  # x band: how far the colours of object and background are gathered
 EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
 TRUST = 0.2  # sRGB: how far an unmixed colour may be from the object's colour beside it
-SLOPE = 1.25  # stretches alpha about 0.5: the estimate is a little too soft
 
 
 def band_width(width: int, height: int) -> float:
@@ -95,29 +94,13 @@ def build_matte(pixels: Pixels, mask: Mask, margin: int) -> Matte:
 def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:
     """Alpha (h, w) and foreground (h, w, 3) for a crop."""
     distance = signed_distance(mask)  # px, > 0 inside
-    inner = distance > band
-    if not inner.any():  # thinner than the band: its ridge is all that is certain
-        inner = distance > 0.6 * distance.max()
-    # Near thin parts nothing is farther inside than the band: their ridge counts as certain too.
+    # A limb thinner than the band has its ridge for what is certain.
     ridge = mask & (distance >= cv2.dilate(distance, np.ones((3, 3))) - 0.25)
-    inner |= ridge & (distance > 0.75)
+    inner = (distance > band) | (ridge & (distance > 0.75))
     outer = distance < -band
-    inside = _gather(rgb, inner.astype(np.float32), REACH * band)
-    outside = _gather(rgb, outer.astype(np.float32), REACH * band)
-    across = inside - outside
-    contrast = np.linalg.norm(across, axis=2)
-    along = ((rgb - outside) * across).sum(2) / np.maximum((across * across).sum(2), 1e-6)
-    blurred = np.clip(0.5 + distance / (1.2 * band), 0, 1)
-    trust = np.clip(contrast / CONTRAST - 0.35, 0, 1)
-    # What the colours say may move the edge by no more than the band.
-    fence = np.clip(1.5 + distance / band, 0, 1)
-    floor = np.clip(distance / band - 0.5, 0, 1)
-    alpha = trust * np.clip(along, 0, 1) + (1 - trust) * blurred
-    alpha = cv2.ximgproc.guidedFilter(rgb, alpha.astype(np.float32), round(band), 1e-4)
-    alpha = np.clip(0.5 + SLOPE * (alpha - 0.5), 0, 1)
-    alpha = np.clip(alpha, floor, fence)
-    alpha[inner] = 1.0
-    alpha[outer] = 0.0
+    alpha = solve_alpha(rgb, inner, outer, np.clip(0.5 + distance / band, 0, 1))
+    inside = _gather(rgb, (inner & (alpha > 0.98)).astype(np.float32), REACH * band)
+    outside = _gather(rgb, (outer & (alpha < 0.02)).astype(np.float32), REACH * band)
     # The colour that explains a mixed pixel, as far as it is near what stands beside it: the
     # thinner the pixel's share of the object, the less it says.
     share = alpha[..., None]
@@ -125,7 +108,7 @@ def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:
     room = TRUST * share**2
     mixed = np.clip(unmixed, inside - room, inside + room)
     foreground = np.where(share < 1.0, mixed, rgb)
-    return alpha.astype(np.float32), np.clip(foreground, 0, 1).astype(np.float32)
+    return alpha, np.clip(foreground, 0, 1).astype(np.float32)
 
 
 def signed_distance(mask: Mask) -> F32:

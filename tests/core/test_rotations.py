@@ -1,0 +1,65 @@
+"""Quaternions, matrices, and the signs of `--turn`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objectmorpher_core.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
+from tests import shapes
+
+F64 = 1e-12  # a handful of products of numbers below 1
+QUATS = np.random.default_rng(0).normal(size=(500, 4))
+HALF_TURNS = np.array(
+    [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 1, 1, 0], [1e-9, 0.6, 0, 0.8]], float
+)
+
+
+def test_matrices_are_rotations():
+    matrices = matrices_from_quats(QUATS)
+    assert np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max() < F64
+    assert np.abs(np.linalg.det(matrices) - 1).max() < F64
+
+
+@pytest.mark.parametrize("quats", [QUATS, HALF_TURNS], ids=["random", "half turns"])
+def test_a_rotation_survives_the_way_through_its_quaternion(quats):
+    matrices = matrices_from_quats(quats)
+    assert np.abs(matrices_from_quats(quats_from_matrices(matrices)) - matrices).max() < F64
+
+
+def test_quaternions_come_out_unit_with_a_positive_real_part():
+    quats = quats_from_matrices(matrices_from_quats(QUATS))
+    assert np.abs(np.linalg.norm(quats, axis=1) - 1).max() < F64
+    assert quats[:, 0].min() >= 0
+
+
+def test_a_quaternion_and_its_opposite_are_one_rotation():
+    assert np.array_equal(matrices_from_quats(QUATS), matrices_from_quats(-QUATS))
+
+
+def test_products_of_matrices_are_products_of_rotations():
+    a, b = shapes.rotation(1), shapes.rotation(2)
+    quats = quats_from_matrices(np.stack([a, b, a @ b]))
+    wa, va, wb, vb = quats[0, 0], quats[0, 1:], quats[1, 0], quats[1, 1:]
+    product = np.concatenate([[wa * wb - va @ vb], wa * vb + wb * va + np.cross(va, vb)])
+    assert min(np.abs(product - quats[2]).max(), np.abs(product + quats[2]).max()) < F64
+
+
+# x right, y down, z away; what faces the camera points along -z
+@pytest.mark.parametrize(("turn", "before", "after"), [
+    ((90, 0, 0), (0, 0, -1), (-1, 0, 0)),  # yaw: what faces the camera goes to the left
+    ((0, 90, 0), (0, 0, -1), (0, 1, 0)),  # pitch: it goes down
+    ((0, 0, 90), (1, 0, 0), (0, 1, 0)),  # roll: clockwise in the picture
+])  # fmt: skip
+def test_turns_are_right_handed_about_the_camera_axes(turn, before, after):
+    assert np.abs(turn_matrix(*turn) @ before - np.array(after)).max() < F64
+
+
+def test_yaw_comes_first_then_pitch_then_roll():
+    whole = turn_matrix(30, 40, 50)
+    steps = turn_matrix(0, 0, 50) @ turn_matrix(0, 40, 0) @ turn_matrix(30, 0, 0)
+    assert np.abs(whole - steps).max() < F64
+
+
+def test_no_turn_is_exactly_nothing():
+    assert np.array_equal(turn_matrix(0, 0, 0), np.eye(3))

@@ -1,0 +1,94 @@
+"""The edit script: JSON and back, and one sentence for everything that is wrong."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from objectmorpher_core.script import (
+    EditScript,
+    HandleMove,
+    ScriptError,
+    parse_scripts,
+    script_from,
+)
+
+FULL = {
+    "click": [[1, 2], [3.5, 4]], "not-click": [[5, 6]], "box": [1, 2, 30, 40], "subject": True,
+    "mask": "m.png", "segment": "grabcut", "lift": "relief", "inpaint": "telea", "refine": "none",
+    "splats": "s.ply", "gaussians": 500, "pin": [[7, 8]],
+    "handle": [{"at": [1, 2], "to": [3, 4], "dz": -0.5}, {"at": [5, 6], "to": [7, 8]}],
+    "move": [1, -2, 0.5], "turn": [10, 20, 30], "scale": 1.5, "deform": "laplacian",
+    "links": "euclidean", "faithful": True, "shadow": "none", "fov": 60, "seed": 7,
+}  # fmt: skip
+
+
+def test_every_option_has_a_place():
+    keys = {name.replace("_", "-") for name in EditScript.__dataclass_fields__}
+    assert keys == set(FULL)
+    script = script_from(FULL)
+    assert all(
+        getattr(script, name) != getattr(EditScript(), name)
+        for name in EditScript.__dataclass_fields__
+    )
+
+
+def test_a_script_survives_the_way_through_json():
+    script = script_from(FULL)
+    assert parse_scripts(json.dumps(script.to_json()))[0].script == script
+
+
+def test_options_at_their_default_are_not_written():
+    assert EditScript().to_json() == {}
+    assert EditScript(turn=(1.0, 0.0, 0.0)).to_json() == {"turn": [1.0, 0.0, 0.0]}
+
+
+def test_a_move_without_depth_stays_at_its_depth():
+    assert script_from({"move": [3, 4]}).move == (3.0, 4.0, 0.0)
+
+
+def test_a_handle_without_depth_keeps_its_depth():
+    script = script_from({"handle": [{"at": [1, 2], "to": [3, 4]}]})
+    assert script.handle == (HandleMove((1.0, 2.0), (3.0, 4.0), 0.0),)
+
+
+def test_what_is_said_later_wins():
+    file, line = script_from({"move": [1, 2], "scale": 2, "seed": 3}), EditScript(scale=0.5)
+    merged = file.merged(line)
+    assert (merged.move, merged.scale, merged.seed) == ((1.0, 2.0, 0.0), 0.5, 3)
+
+
+def test_a_batch_names_photos_and_outputs():
+    items = parse_scripts('[{"photo": "a.png", "out": "b.png", "scale": 2}, {"photo": "c.png"}]')
+    assert [(i.photo, i.out) for i in items] == [("a.png", "b.png"), ("c.png", None)]
+    assert items[0].script.scale == 2
+
+
+@pytest.mark.parametrize(("text", "sentence"), [
+    ("{", "not JSON"),
+    ("", "not JSON"),
+    ("[]", "empty"),
+    ("3", "not a JSON object"),
+    ("[[]]", "not a JSON object"),
+    ('{"photo": 3}', "'photo' is not a file name"),
+    ('{"clik": [[1, 2]]}', "'clik' is not an option"),
+])  # fmt: skip
+def test_what_is_no_script_is_refused(text, sentence):
+    with pytest.raises(ScriptError, match=sentence):
+        parse_scripts(text)
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    ("click", [1, 2]), ("click", [[1]]), ("click", "1,2"), ("box", [1, 2, 3]), ("subject", 1),
+    ("mask", ""), ("mask", 3), ("segment", None), ("gaussians", 99), ("gaussians", 1e5),
+    ("gaussians", True), ("handle", [[1, 2]]), ("handle", [{"at": [1, 2]}]),
+    ("handle", [{"at": [1, 2], "to": [1, 2], "dx": 1}]), ("move", [1]), ("move", [1, 2, 3, 4]),
+    ("turn", [1, 2]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
+    ("scale", float("nan")), ("deform", "jelly"), ("links", None), ("faithful", "yes"),
+    ("shadow", "dark"), ("fov", True), ("seed", -1), ("seed", 1.5), ("seed", 2**40),
+])  # fmt: skip
+def test_wrong_values_are_refused_with_the_option_and_the_value(key, value):
+    with pytest.raises(ScriptError, match=f"^{key}: ") as caught:
+        script_from({key: value})
+    assert "\n" not in str(caught.value)
