@@ -89,3 +89,8 @@ test: .make/test
 	    "$$found" -m venv .venv
 	fi
 	touch $@
+
+# Makes the pictures of docs/gallery anew.
+.PHONY: gallery
+gallery: .make/run
+	@$(PYTHON) docs/gallery/make_gallery.py

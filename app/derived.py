@@ -17,7 +17,9 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import F32, F64, Mask
 from objectmorpher_core.document import Document, EditObject, Photo, Pose
 
+from .blend import build_blend
 from .layers import Layers
+from .view import View
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import Puppet, SurfacePoint
@@ -82,6 +84,7 @@ class Derived:
     def __init__(self) -> None:
         self._shapes, self._posed = Memo(), Memo()
         self.layers = Layers(self)
+        self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
 
     def share(self, mask: Mask) -> float:
@@ -112,6 +115,13 @@ class Derived:
         return self._posed(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
+
+    def blend(self, document: Document, view: View) -> F32:
+        """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
+        key = (view.left, view.top, view.zoom, view.width, view.height)
+        if self._blend is None or self._blend[0] is not document or self._blend[1] != key:
+            self._blend = (document, key, build_blend(self, document, view))
+        return self._blend[2]
 
     def solved(
         self, document: Document, k: int, start: Pose | None, iterations: int | None = None

@@ -8,7 +8,7 @@ tests call the same methods. No GL, no ImGui, no window in here.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from objectmorpher_core.arrays import F64, Mask
 from objectmorpher_core.document import Click, Document, EditObject, Placement, Prompt
 
 from .derived import Derived, ObjectFrame, Spot
+from .feedback import Hover, Message
 from .filing import Filing
 from .history import History
 from .job_functions import WARM
@@ -36,25 +37,6 @@ NUDGE_LABEL = "Nudge point"
 DRAG_ITERATIONS = 6  # of the solver in a frame of a drag; the rest when it ends
 
 
-@dataclass(frozen=True)
-class Message:
-    """One sentence for the status line."""
-
-    text: str
-    is_error: bool = False
-    details: str = ""
-
-
-@dataclass(frozen=True)
-class Hover:
-    """What is under the pointer."""
-
-    handle: int | None = None
-    surface: SurfacePoint | None = None
-    is_pin: bool = False  # a click would set a pin
-    part: str | None = None  # of the Place tool's frame
-
-
 class Editor:
     """Everything that the window shows and changes."""
 
@@ -67,6 +49,7 @@ class Editor:
         self.derived = Derived()
         self.tasks = Tasks(self)
         self.filing = Filing(self)
+        self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
         self.path: Path | None = None  # the session's file

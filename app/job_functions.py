@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from objectmorpher_core.arrays import Mask, Pixels
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
@@ -20,6 +22,8 @@ from objectmorpher_core.document import (
     Prompt,
 )
 from objectmorpher_core.progress import Progress, part
+
+from .layers import Request, render
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -66,12 +70,12 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
 
     Compiling takes many seconds after an installation and nothing later.
     """
+    from objectmorpher_core.compose.composite import object_texture
     from objectmorpher_core.document import Handle, Placement
     from objectmorpher_core.puppet import puppet_of
-    from objectmorpher_core.raster.posed import build_levels
 
     puppet = puppet_of(EditObject("", matte=matte, lifted=lifted), cut.camera)
-    texture = build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+    texture = object_texture(matte)
     point = lifted.control_points[0].astype(float)
     handles = (Handle(0, point, point + 0.01),)
     pose = puppet.deformer.solve(handles, True, None).pose
@@ -79,6 +83,13 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
     x, y = puppet.picture_of(point, pose, Placement())
     puppet.pick((float(x), float(y)), pose, Placement(), texture)
     puppet.pick((float(x), float(y)), None, Placement(), texture)
+
+
+def render_exact(request: Request, progress: Progress) -> np.ndarray:
+    """A layer of the view: (h, w, 4) u8, premultiplied."""
+    picture = render(request)
+    rgba = np.dstack([picture.color, picture.alpha])
+    return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)
 
 
 def inpaint(pixels: Pixels, hole: Mask, choice: Choice, progress: Progress) -> Plate:
@@ -104,9 +115,8 @@ def write_picture(document: Document, path: Path, quality: int, progress: Progre
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:
     """Saves the document as an .omorph file."""
-    from objectmorpher_core.session_file import encode_session
-
     from objectmorpher_core.files import write_all
+    from objectmorpher_core.session_file import encode_session
 
     progress(0.1, "packing")
     data = encode_session(document)

@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from typing import Any
@@ -55,7 +55,8 @@ class Job:
     note: str = ""
     started: float = 0.0  # s, monotonic
     stop_asked: float | None = None  # s, monotonic
-    number: int = field(default=0)
+    number: int = 0
+    is_quiet: bool = False
 
 
 class Worker:
@@ -132,14 +133,17 @@ class Jobs:
         failed: Callable[[JobError], None],
         cancelled: Callable[[], None] = lambda: None,
         kind: str = "",
+        is_quiet: bool = False,
     ) -> None:
         """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
 
         A request of the same `kind` that waits or runs is replaced; its answer never comes.
+        A quiet one is not the user's: the status line does not show it.
         """
         self._count += 1
         kind = kind or function.__name__
-        job = Job(title, function, arguments, done, failed, cancelled, kind, number=self._count)
+        job = Job(title, function, arguments, done, failed, cancelled, kind)
+        job.number, job.is_quiet = self._count, is_quiet
         self._waiting.pop(kind, None)
         self._waiting[kind] = job
         if self.current is not None and self.current.kind == kind:
@@ -215,7 +219,8 @@ class Jobs:
             log.error("%s failed: %s\n%s", job.title, value.sentence, value.trace)
             self._finish(job, lambda: job.failed(value))
         else:
-            log.info("%s took %.2f s", job.title, time.monotonic() - job.started)
+            level = logging.DEBUG if job.is_quiet else logging.INFO
+            log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
             self._finish(job, lambda: job.done(value))
 
     def _finish(self, job: Job, tell: Callable[[], None]) -> None:

@@ -2,8 +2,8 @@
 
 Where the rasteriser needs longer, a frame shows a *draft*: the object at a fraction of the
 canvas's resolution, together with where each of its pixels looks in the photo. That map is smooth,
-so the renderer samples the photo through it at full resolution and the draft stays sharp. While
-nothing changes, the exact picture is made strip by strip, a few in each frame, and replaces it.
+so the renderer samples the photo through it at full resolution and the draft stays sharp. When
+nothing has changed for a moment, the worker is asked for the exact picture, which replaces it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from .derived import Derived
 
 FRAME = 0.028  # s, what rendering may take of a frame
-STRIP_TIME = 0.016  # s, of one strip of the exact picture
-STRIP_ROWS = 16  # px, the rasteriser's tile
+STILL = 0.12  # s without a change, after which the exact picture is asked for
 COARSEST = 6  # canvas px per px of a draft
 FIRST_RATE = 2.5e-7  # s per px, before anything has been measured
 MARGIN = 8.0  # px around the Gaussians' centres, besides their own size
@@ -52,24 +51,34 @@ class Layer:
     """A rendered object on the canvas."""
 
     box: tuple[float, float, float, float]  # x0, y0, x1, y1 canvas px
-    rgba: F32  # (h, w, 4) premultiplied sRGB
+    rgba: np.ndarray  # (h, w, 4) premultiplied sRGB, f32 in [0, 1] or u8
     draft: Draft | None = None  # None: `rgba` is exact, px for px
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """An exact picture to be rendered."""
+
+    splats: PosedSplats
+    texture: TextureLevels
+    window: Camera
+    camera: Camera  # the photo's
 
 
 @dataclass(eq=False)
 class _Work:
-    """An object's picture in the making."""
+    """An object's picture."""
 
     splats: PosedSplats
     view: tuple[float, ...]
+    request: Request  # for the exact one
     box: tuple[int, int, int, int]  # canvas px
     shown: Layer
-    exact: F32 | None = None  # (h, w, 4) filled down to `rows`
-    rows: int = 0
+    since: float  # s, monotonic, when the splats or the view changed last
+    is_asked: bool = False
 
-    @property
-    def is_done(self) -> bool:
-        return self.shown.draft is None
+
+Ask = Callable[[Request, Callable[[np.ndarray], None]], None]
 
 
 class Layers:
@@ -80,14 +89,18 @@ class Layers:
         self._works: dict[int, _Work] = {}  # object index -> its last picture
         self._rate = FIRST_RATE  # s per px, measured
         self.frame_time = FRAME  # s; infinite where only the last frame counts
-        self.is_finished = True  # whether all that is shown is exact
+        self.ask: Ask | None = None  # renders elsewhere and calls back
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether an exact picture is still to be asked for."""
+        return any(w.shown.draft is not None and not w.is_asked for w in self._works.values())
 
     def draw(self, document: Document, view: View) -> tuple[Layer, ...]:
         """The moved objects' pictures, back to front."""
         order = self.order(document)
         self._works = {k: w for k, w in self._works.items() if k in order}
         layers = [self._layer(document, k, splats, view) for k, splats in order.items()]
-        self.is_finished = all(w.is_done for w in self._works.values())
         return tuple(layer for layer in layers if layer is not None)
 
     def order(self, document: Document) -> dict[int, PosedSplats]:
@@ -102,59 +115,49 @@ class Layers:
     def _layer(self, document: Document, k: int, splats: PosedSplats, view: View) -> Layer | None:
         key = (view.left, view.top, view.zoom, view.width, view.height)
         thing, camera = document.objects[k], document.photo.camera
-        texture = self._derived.shape(document.photo, thing).texture
-
-        def render(box: tuple[int, int, int, int], coarse: int = 1) -> Picture3D:
-            return _render(splats, texture, _window(view, camera, box, coarse), camera)
-
         work = self._works.get(k)
         if work is not None and work.splats is splats and work.view == key:
-            if not work.is_done:
-                self._refine(work, render)
+            self._want_exact(work)
             return work.shown
         box = _bounds(splats, camera, view)
         if box is None:
             self._works.pop(k, None)
             return None
-        shown = self._first(box, render, texture)
-        self._works[k] = _Work(splats, key, box, shown)
+        texture = self._derived.shape(document.photo, thing).texture
+        request = Request(splats, texture, _window(view, camera, box), camera)
+        shown = self._first(request, box)
+        self._works[k] = _Work(splats, key, request, box, shown, time.monotonic())
         return shown
 
-    def _first(
-        self, box: tuple[int, int, int, int], render: Callable[..., Picture3D],
-        texture: TextureLevels,
-    ) -> Layer:  # fmt: skip
+    def _first(self, request: Request, box: tuple[int, int, int, int]) -> Layer:
         """Exact where the time allows, else a draft."""
         pixels = (box[2] - box[0]) * (box[3] - box[1])
         excess = pixels * self._rate / self.frame_time
         coarse = 1 if excess <= 1 else min(max(math.ceil(math.sqrt(excess)), 2), COARSEST)
         start = time.perf_counter()
-        picture = render(box, coarse)
+        picture = render(replace(request, window=_coarser(request.window, coarse)))
         self._learn(time.perf_counter() - start, pixels / coarse**2)
         rgba = np.dstack([picture.color, picture.alpha])
         height, width = picture.alpha.shape
         covered = (box[0], box[1], box[0] + width * coarse, box[1] + height * coarse)
         if coarse == 1:
             return Layer(covered, rgba)
-        crop = texture.levels[0]
-        draft = Draft(_looks(picture), crop, texture.left, texture.top)
+        texture = request.texture
+        draft = Draft(_looks(picture), texture.levels[0], texture.left, texture.top)
         return Layer(covered, rgba, draft)
 
-    def _refine(self, work: _Work, render: Callable[..., Picture3D]) -> None:
-        """Another strip or more of the exact picture; it is shown when it is complete."""
-        x0, y0, x1, y1 = work.box
-        if work.exact is None:
-            work.exact = np.zeros((y1 - y0, x1 - x0, 4), np.float32)
-        width, height = x1 - x0, y1 - y0
-        rows = int(STRIP_TIME / (self._rate * width)) // STRIP_ROWS * STRIP_ROWS
-        end = min(work.rows + max(rows, STRIP_ROWS), height)
-        start = time.perf_counter()
-        picture = render((x0, y0 + work.rows, x1, y0 + end))
-        self._learn(time.perf_counter() - start, (end - work.rows) * width)
-        work.exact[work.rows : end] = np.dstack([picture.color, picture.alpha])
-        work.rows = end
-        if end == height:
-            work.shown = Layer((x0, y0, x1, y1), work.exact)
+    def _want_exact(self, work: _Work) -> None:
+        """Asks for the exact picture of what has not changed for a moment."""
+        if self.ask is None or work.shown.draft is None or work.is_asked:
+            return
+        if time.monotonic() - work.since < STILL:
+            return
+        work.is_asked = True
+
+        def accept(rgba: np.ndarray) -> None:
+            work.shown = Layer(work.box, rgba)
+
+        self.ask(work.request, accept)
 
     def _learn(self, seconds: float, pixels: float) -> None:
         """A moving average, so that one disturbed frame decides little."""
@@ -162,20 +165,24 @@ class Layers:
         self._rate = float(np.clip(0.7 * self._rate + 0.3 * rate, 1e-9, 1e-5))
 
 
-def _render(
-    splats: PosedSplats, texture: TextureLevels, window: Camera, camera: Camera
-) -> Picture3D:
+def render(request: Request) -> Picture3D:
+    """The exact picture."""
     from objectmorpher_core.raster import tiles
 
-    return tiles.render(splats, texture, window, camera)
+    return tiles.render(request.splats, request.texture, request.window, request.camera)
 
 
-def _window(view: View, camera: Camera, box: tuple[int, int, int, int], coarse: int) -> Camera:
-    """The photo's camera through a part of the canvas, at a fraction of its resolution."""
+def _window(view: View, camera: Camera, box: tuple[int, int, int, int]) -> Camera:
+    """The photo's camera through a part of the canvas."""
     x0, y0, x1, y1 = box
     left, top = view.left + x0 / view.zoom, view.top + y0 / view.zoom
-    width, height = -(-(x1 - x0) // coarse), -(-(y1 - y0) // coarse)
-    return camera.windowed(left, top, width, height, view.zoom / coarse)
+    return camera.windowed(left, top, x1 - x0, y1 - y0, view.zoom)
+
+
+def _coarser(window: Camera, coarse: int) -> Camera:
+    """The same window with `coarse` times fewer px across and down."""
+    width, height = -(-window.width // coarse), -(-window.height // coarse)
+    return window.windowed(0.0, 0.0, width, height, 1.0 / coarse)
 
 
 def _bounds(

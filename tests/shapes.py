@@ -23,6 +23,7 @@ from objectmorpher_core.document import (
     Matte,
     Photo,
     PhotoTexture,
+    Placement,
     Plate,
 )
 from objectmorpher_core.gaussians import Gaussians
@@ -244,6 +245,12 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     texture = object_texture(matte)
     puppet = Puppet(lifted, DeformSettings(), view)
     return Scene(pixels, inside, view, matte, lifted, texture, puppet)
+
+
+def around_the_camera(item: Scene) -> Placement:
+    """Puts the object so near that a part of it is behind the camera."""
+    lifted = item.lifted
+    return Placement(depth=0.05 - float(lifted.centre[2]) / (lifted.diameter * lifted.scale))
 
 
 @cache

@@ -7,7 +7,8 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from ..commands import COMMANDS, run
-from ..editor import Editor, Hover
+from ..editor import Editor
+from ..feedback import Hover
 from ..tools import navigate
 from ..tools.place_tool import PlaceTool
 from ..tools.pointer import Button, Pointer, Shape, Tool
@@ -21,23 +22,8 @@ TOOLS: dict[ToolName, Tool] = {
     ToolName.POSE: PoseTool(),
     ToolName.PLACE: PlaceTool(),
 }
-ARROWS = {
-    imgui.Key.left_arrow: (-1, 0),
-    imgui.Key.right_arrow: (1, 0),
-    imgui.Key.up_arrow: (0, -1),
-    imgui.Key.down_arrow: (0, 1),
-}
-NAMED_KEYS = {"\\": "backslash", "=": "equal", "-": "minus", "Delete": "delete"}
-
-
-def chord(keys: str) -> int:
-    """ImGui's number of "Ctrl+Shift+S"."""
-    *modifiers, key = keys.split("+")
-    number = getattr(imgui.Key, NAMED_KEYS.get(key, f"_{key}" if key.isdigit() else key.lower()))
-    total = int(number)
-    for modifier in modifiers:
-        total |= int(getattr(imgui.Key, f"mod_{modifier.lower()}"))
-    return total
+ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
+FAR = 10  # px that an arrow with Shift moves
 
 
 class Input:
@@ -45,15 +31,16 @@ class Input:
 
     def __init__(self) -> None:
         self.shape = Shape.ARROW
-        self._chords = {name: chord(c.keys) for name, c in COMMANDS.items() if c.keys}
+        self._commands = {c.keys: name for name, c in COMMANDS.items() if c.keys}
+        self._commands |= {"Ctrl+Y": "redo", "Backspace": "remove_handle"}
+        self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
 
     def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
         """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
         io = imgui.get_io()
-        if not io.want_text_input:
-            self._take_keys(editor)
+        self._run_keys(editor)
         mouse = io.mouse_pos
         pointer = Pointer(
             (mouse.x - rect.x) * ratio,
@@ -81,21 +68,30 @@ class Input:
             return "Open a photo, drop one here, or try a sample"
         return TOOLS[editor.view.tool].hint(editor)
 
-    def _take_keys(self, editor: Editor) -> None:
+    def take_key(self, keys: str) -> None:
+        """A key went down, or repeats: "Ctrl+Shift+S"."""
+        self._pressed.append(keys)
+
+    def _run_keys(self, editor: Editor) -> None:
+        """What was pressed since the last frame; nothing while a field or a dialog has the keys."""
+        pressed, self._pressed = self._pressed, []
+        any_popup = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
+        if imgui.get_io().want_text_input or imgui.is_popup_open("", any_popup):
+            editor.view.is_before = False
+            return
         editor.view.is_before = editor.document is not None and imgui.is_key_down(imgui.Key.x)
-        if imgui.is_key_pressed(imgui.Key.escape, False):
+        for keys in pressed:
+            self._run_key(editor, keys)
+
+    def _run_key(self, editor: Editor, keys: str) -> None:
+        far, direction = keys.startswith("Shift+"), ARROWS.get(keys.removeprefix("Shift+"))
+        if keys == "Escape":
             editor.escape()
-        for name, number in self._chords.items():
-            if imgui.is_key_chord_pressed(number):
-                run(editor, name)
-        if imgui.is_key_chord_pressed(chord("Ctrl+Y")):
-            run(editor, "redo")
-        if imgui.is_key_pressed(imgui.Key.backspace, False):
-            editor.remove_handle()
-        far = 10 if imgui.get_io().key_shift else 1
-        for key, (dx, dy) in ARROWS.items():
-            if imgui.is_key_pressed(key):
-                editor.nudge_handle(dx * far, dy * far)
+        elif direction is not None:
+            step = FAR if far else 1
+            editor.nudge_handle(direction[0] * step, direction[1] * step)
+        elif keys in self._commands:
+            run(editor, self._commands[keys])
 
     def _begin(self, editor: Editor, pointer: Pointer) -> None:
         """The pointer hovers, zooms, or starts a stroke."""

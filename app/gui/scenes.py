@@ -34,6 +34,7 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
         objects=_objects(editor, document) if renderer == "gl" else (),
         mask=hole,
         hatch=HATCH if hole is not None else 0.0,
+        blend=editor.derived.blend(document, view),
         split=view.split or 0.0,
     )
 

@@ -52,7 +52,7 @@ def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
 def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     """Name, bar, share and Cancel; the left end of what it drew."""
     job = editor.jobs.current
-    if job is None or time.monotonic() - job.started < JOB_DELAY:
+    if job is None or job.is_quiet or time.monotonic() - job.started < JOB_DELAY:
         return right
     side = rect.height - theme.pt(4)
     text = job.title if not job.note else f"{job.title}: {job.note}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,17 @@ log = logging.getLogger(__name__)
 SETTLE = 3  # frames drawn after the last event: ImGui lays out in two
 IDLE = 0.5  # s between two looks at the clock when nothing happens
 BUSY = 0.05  # s, while a job runs or a dialog is open
+CONTROL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
+MODIFIERS = (("Ctrl", CONTROL), ("Shift", glfw.MOD_SHIFT), ("Alt", glfw.MOD_ALT))
+KEY_NAMES = {
+    glfw.KEY_ESCAPE: "Escape",
+    glfw.KEY_DELETE: "Delete",
+    glfw.KEY_BACKSPACE: "Backspace",
+    glfw.KEY_LEFT: "Left",
+    glfw.KEY_RIGHT: "Right",
+    glfw.KEY_UP: "Up",
+    glfw.KEY_DOWN: "Down",
+}
 CURSORS = {
     Shape.ARROW: glfw.ARROW_CURSOR,
     Shape.CROSS: glfw.CROSSHAIR_CURSOR,
@@ -82,14 +94,14 @@ class Window:
         self.editor.filing = Filing(self.editor, options.fov, options.seed)
         self._saved_settings = settings
         self._look: tuple[str, float] = ("", 0.0)
+        self._input = Input()
         self._start_imgui()
         self._renderer = Renderer(self._context, options.renderer)
         self._start = StartScreen(self._context)
-        self._dialogs, self._input = Dialogs(), Input()
+        self._dialogs = Dialogs()
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
         self._title = ""
-        self._is_finished = True  # whether the last frame showed all there is to show
         if options.frames is not None:
             self.editor.derived.layers.frame_time = math.inf
         take_drop: Any = self._take_drop
@@ -104,7 +116,7 @@ class Window:
             else:
                 glfw.poll_events()
             has_news = self.editor.poll()
-            lively = SETTLE if has_news or not self._is_finished else lively - 1
+            lively = SETTLE if has_news else lively - 1
             self._frame()
             drawn += 1
             if self._is_over(drawn):
@@ -139,7 +151,9 @@ class Window:
 
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""
-        is_busy = self.editor.jobs.current is not None or self._dialogs.is_open
+        editor = self.editor
+        is_busy = editor.jobs.current is not None or self._dialogs.is_open
+        is_busy = is_busy or editor.derived.layers.is_waiting
         patience = BUSY if is_busy else IDLE
         before = time.monotonic()
         glfw.wait_events_timeout(patience)
@@ -190,7 +204,6 @@ class Window:
             left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
             viewport = (left, size[1] - bottom, view.width, view.height)
             self._renderer.draw(scene, view, viewport)
-        self._is_finished = self.editor.derived.layers.is_finished
         self._context.viewport = (0, 0, *size)
 
     def _resize_canvas(self, canvas: Rect, ratio: float) -> None:
@@ -206,6 +219,8 @@ class Window:
         io.config_drag_click_to_input_text = True
         io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
         looks.load_fonts()
+        take_key: Any = self._take_key
+        glfw.set_key_callback(self._handle, take_key)  # before ImGui's, which calls it too
         address = ctypes.cast(self._handle, ctypes.c_void_p).value
         assert address is not None
         imgui.backends.glfw_init_for_opengl(address, True)
@@ -253,6 +268,15 @@ class Window:
             glfw.set_window_title(self._handle, title)
 
     # The rest
+
+    def _take_key(self, _window: object, key: int, scancode: int, action: int, mods: int) -> None:
+        """Names the chord while the modifiers are what they were when the key went down."""
+        if action not in (glfw.PRESS, glfw.REPEAT):
+            return
+        name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
+        if name:
+            held = [word for word, bit in MODIFIERS if mods & bit]
+            self._input.take_key("+".join([*held, name[:1].upper() + name[1:]]))
 
     def _take_drop(self, _window: object, paths: Any) -> None:
         if paths:

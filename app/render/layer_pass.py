@@ -109,4 +109,6 @@ def _photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
 
 
 def _as_u8(rgba: np.ndarray) -> np.ndarray:
+    if rgba.dtype == np.uint8:
+        return rgba
     return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)

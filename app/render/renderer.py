@@ -46,6 +46,7 @@ class Renderer:
             self._begin(viewport)
             for texture in (behind, front):
                 self._layer_pass.draw_texture(texture, scene, view)
+        self._photo_pass.draw_kept(scene, view)
 
     def _begin(self, viewport: tuple[int, int, int, int]) -> None:
         self._context.screen.use()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.arrays import F32, Mask, Pixels
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Plate
 
@@ -38,4 +38,5 @@ class Scene:
     mask: Mask | None = None  # what `veil` and `hatch` refer to
     veil: float = 0.0  # share of black outside the mask
     hatch: float = 0.0  # share of the hatching inside the mask
+    blend: F32 | None = None  # (h, w) over the canvas: 0 shows the photo over the edit
     split: float = 0.0  # share of the canvas, from the left, that shows the photo as it was

@@ -6,21 +6,22 @@ import cv2
 import moderngl
 import numpy as np
 
-LINEAR = (moderngl.LINEAR, moderngl.LINEAR)
 SHARP_FROM = 4.0  # magnification from which single pixels are shown
 
 
 class PictureTexture:
-    """A picture of 1, 3 or 4 channels, 8 bits each on the GPU, with mipmaps."""
+    """A picture of 1, 3 or 4 channels, 8 bits each on the GPU."""
 
-    def __init__(self, context: moderngl.Context) -> None:
+    def __init__(self, context: moderngl.Context, has_mipmaps: bool = True) -> None:
+        """Mipmaps are for what is shown smaller than it is; they cost time at each upload."""
+        self._has_mipmaps = has_mipmaps
         self._context = context
         self._limit = int(context.info["GL_MAX_TEXTURE_SIZE"])
         self._uploaded: np.ndarray | None = None
         self.texture = context.texture((1, 1), 1, b"\0")
 
     def upload(self, pixels: np.ndarray | None) -> None:
-        """`pixels` (h, w) or (h, w, channels): bool, u8 or u16; None is one black pixel."""
+        """`pixels` (h, w) or (h, w, channels): bool, u8, u16 or f32; None is one black px."""
         if pixels is self._uploaded:
             return
         self.texture.release()
@@ -31,12 +32,14 @@ class PictureTexture:
         data = np.ascontiguousarray(shown)
         self.texture = self._context.texture((width, height), channels, data, alignment=1)
         self.texture.repeat_x = self.texture.repeat_y = False
-        self.texture.build_mipmaps()
+        if self._has_mipmaps:
+            self.texture.build_mipmaps()
 
     def use(self, unit: int, zoom: float) -> None:
         """Binds it: single pixels at high magnification, smooth below."""
         above = moderngl.NEAREST if zoom >= SHARP_FROM else moderngl.LINEAR
-        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, above)
+        below = moderngl.LINEAR_MIPMAP_LINEAR if self._has_mipmaps else moderngl.LINEAR
+        self.texture.filter = (below, above)
         self.texture.use(unit)
 
     def _fitting(self, pixels: np.ndarray) -> np.ndarray:
@@ -52,4 +55,6 @@ def _as_u8(pixels: np.ndarray) -> np.ndarray:
         return (pixels >> 8).astype(np.uint8)
     if pixels.dtype == np.bool_:
         return pixels.view(np.uint8) * np.uint8(255)
+    if pixels.dtype == np.float32:
+        return (pixels * 255 + 0.5).astype(np.uint8)
     return pixels

@@ -24,6 +24,7 @@ HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the
 MIN_HOLE_MARGIN = 4.0  # px
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha
+NEAR = 7  # px, window in which a left pixel looks for the object's new edge
 FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
 
 
@@ -141,7 +142,7 @@ class _Blend:
             self.invented = _crop(document.plate.hole, document.plate.box, box).astype(np.float32)
         self.from_photo = 1 - self.invented
         self.from_lifter = np.zeros_like(self.invented)
-        self.disturbed = np.zeros(self.invented.shape, bool)
+        self.moved = np.zeros(self.invented.shape, np.float32)  # px, see `displacement`
         self.covered = np.zeros(self.invented.shape, bool)
         self.layers: list[tuple[int, int, Picture3D]] = []
 
@@ -152,12 +153,12 @@ class _Blend:
         rest = _crop(item.matte.alpha, item.matte.box, self.box)
         self.covered |= rest > 0
         if not item.is_visible:
-            self.disturbed |= rest > 0
+            self.moved[rest > 0] = np.inf
             return
         texture = object_texture(item.matte)
         window = camera.windowed(x0, y0, x1 - x0, y1 - y0)
         picture = _drawn(splats, texture, window, camera)
-        self.disturbed |= is_disturbed(picture, rest)
+        self.moved = np.maximum(self.moved, displacement(picture, rest))
         self.covered |= picture.alpha > 0
         through = 1 - picture.alpha
         self.colour = picture.color + through[..., None] * self.colour
@@ -172,11 +173,7 @@ class _Blend:
         height, width = photo.shape[:2]
         x0, y0, x1, y1 = self.box
         margin = hole_margin(width, height)
-        blend = np.zeros(self.disturbed.shape, np.float32)
-        if self.disturbed.any():
-            still = (~self.disturbed).astype(np.uint8)
-            distance = cv2.distanceTransform(still, cv2.DIST_L2, 5)
-            blend = np.clip((margin - distance) / ((1 - FEATHER_START) * margin), 0, 1)
+        blend = _blend_weights(self.moved, margin)
         mixed = self.photo + blend[..., None] * (self.colour - self.photo)
         crop = photo[y0:y1, x0:x1]
         # Where the blend is nothing, or changes nothing, the photo's own integers stay.
@@ -205,11 +202,39 @@ class _Blend:
         return Shares(photo / total, lifter / total, inpainter / total, 0.0)
 
 
-def is_disturbed(picture: Picture3D, rest_alpha: F32) -> Mask:
-    """(h, w) where a rendered object is not what stood there in the photo."""
-    moved = (picture.shift**2).sum(-1) > STILL**2
-    moved |= picture.from_photo < picture.alpha - STILL_ALPHA
-    return (np.abs(picture.alpha - rest_alpha) > STILL_ALPHA) | ((picture.alpha > 0) & moved)
+def displacement(picture: Picture3D, rest_alpha: F32) -> F32:
+    """(h, w) px by which what stands at a pixel is not where it was; 0 where nothing changed.
+
+    A pixel that the object has left counts as far as its neighbours moved, or as infinitely far
+    where none of the object is left near it.
+    """
+    stands = picture.alpha > 0
+    shift = np.where(stands, np.sqrt((picture.shift**2).sum(-1)), 0).astype(np.float32)
+    near = cv2.dilate(shift, np.ones((NEAR, NEAR), np.uint8))
+    shift = np.where(stands, shift, np.where(near > 0, near, np.inf))
+    is_invented = picture.from_photo < picture.alpha - STILL_ALPHA
+    is_other = np.abs(picture.alpha - rest_alpha) > STILL_ALPHA
+    shift[is_invented] = np.inf
+    shift[is_other] = np.maximum(shift[is_other], STILL)
+    is_still = (shift < STILL) | (~stands & ~is_other)
+    return np.where(is_still, 0, shift).astype(np.float32)
+
+
+def _blend_weights(moved: F32, margin: float) -> F32:
+    """(h, w) in [0, 1]: how much of the edit to show.
+
+    1 where something moved, and falling to 0 around it over a distance that grows with the
+    move: the plate's invented ring is not shown around what has hardly moved.
+    """
+    blend = np.zeros(moved.shape, np.float32)
+    for least, reach in ((STILL, 1.5), (0.5, 3.0), (2.0, 6.0), (6.0, margin)):
+        there = moved >= least
+        if there.any():
+            distance = cv2.distanceTransform((~there).astype(np.uint8), cv2.DIST_L2, 5)
+            reach = min(reach, margin)
+            ramp = (reach - distance) / ((1 - FEATHER_START) * reach)
+            blend = np.maximum(blend, np.clip(ramp, 0, 1))
+    return blend
 
 
 def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -> np.ndarray:

@@ -287,7 +287,7 @@ def _assemble(
     body = ~surface.is_brim
     texture = PhotoTexture(
         u0=camera.project(gaussians.means @ world_from_object[:3, :3].T + centre),
-        visibility=(surface.height >= 0).astype(np.float32),
+        visibility=(surface.normals[:, 2] >= 0).astype(np.float32),  # the back has height 0, too
         solidity=body.astype(np.float32),
     )
     points = sample_control_points(gaussians.means[body], gaussians.opacities[body], COUNT)

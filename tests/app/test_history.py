@@ -12,9 +12,10 @@ from objectmorpher_core.document import Document, Photo
 from objectmorpher_core.image import Picture
 
 
-
 def document() -> Document:
-    return Document(Photo(Picture(np.zeros((6, 8, 3), np.uint8)), Camera.from_fov(8, 6), b"", "a.png"))
+    return Document(
+        Photo(Picture(np.zeros((6, 8, 3), np.uint8)), Camera.from_fov(8, 6), b"", "a.png")
+    )
 
 
 def test_undo_gives_the_same_documents_back() -> None:

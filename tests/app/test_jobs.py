@@ -1,15 +1,15 @@
-"""The worker process: answers, progress, cancelling, failures and crashes, all with a real spawn."""
+"""The worker process: answers, progress, cancelling, failures and crashes, with a real spawn."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 
+import job_functions
 import numpy as np
 import pytest
 
 from app.jobs import JobError, Jobs
-import job_functions
 
 
 class Log:

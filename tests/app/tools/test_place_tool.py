@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.derived import ObjectFrame
-from app.editor import Hover
+from app.feedback import Hover
 from app.tools.place_tool import PlaceTool, gizmo, wrapped
 from app.tools.pointer import Button, Hand, Pointer
 from app.view import View

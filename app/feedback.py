@@ -1,0 +1,28 @@
+"""What the editor tells: a sentence for the status line, and what is under the pointer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from objectmorpher_core.puppet import SurfacePoint
+
+
+@dataclass(frozen=True)
+class Message:
+    """One sentence for the status line."""
+
+    text: str
+    is_error: bool = False
+    details: str = ""
+
+
+@dataclass(frozen=True)
+class Hover:
+    """What is under the pointer."""
+
+    handle: int | None = None
+    surface: SurfacePoint | None = None
+    is_pin: bool = False  # a click would set a pin
+    part: str | None = None  # of the Place tool's frame
