@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SELECT = "segment"  # kinds of jobs
 NUDGE_LABEL = "Nudge point"
-DRAG_ITERATIONS = 6  # of the solver in a frame of a drag; the rest when it ends
+DRAG_ITERATIONS = 4  # of the solver in a frame of a drag; the rest when it ends
 
 
 class Editor:

@@ -5,6 +5,8 @@
 uniform sampler2D layer;  // premultiplied sRGB, coarse
 uniform sampler2D looks;  // x, y photo px relative to the pixel; share that shows the photo
 uniform sampler2D crop;   // straight sRGB and alpha of the object in the photo
+uniform sampler2D blend;  // 1 shows the edit, 0 the photo
+uniform vec2 cells;       // canvas px that the blend covers
 uniform vec4 box;         // x0, y0, x1, y1 canvas px
 uniform vec4 crop_box;    // x0, y0, x1, y1 image px
 uniform vec2 corner;      // image px at the canvas's left top
@@ -24,5 +26,5 @@ void main() {
     vec4 texel = texture(crop, (point - crop_box.xy) / (crop_box.zw - crop_box.xy));
     float covered = clamp(2.0 * coarse.a, 0.0, 1.0);
     vec4 sharp = vec4(texel.rgb * texel.a, texel.a) * covered;
-    color = mix(coarse, sharp, look.z);
+    color = mix(coarse, sharp, look.z) * texture(blend, xy / cells).r;
 }

@@ -4,6 +4,8 @@
 uniform sampler2D photo;
 uniform sampler2D plate;
 uniform sampler2D mask;
+uniform sampler2D blend;  // 1 shows the edit, 0 the photo
+uniform vec2 cells;       // canvas px that the blend covers
 uniform vec2 corner;      // image px at the canvas's left top
 uniform float zoom;       // canvas px per image px
 uniform vec2 photo_size;  // px
@@ -33,14 +35,15 @@ void main() {
     vec2 point = corner + xy / zoom;  // image px
     vec3 picture = texture(photo, point / photo_size).rgb;
     if (xy.x >= split) {
+        float edited = texture(blend, xy / cells).r;
         vec2 in_plate = (point - plate_box.xy) / (plate_box.zw - plate_box.xy);
         if (all(greaterThan(in_plate, vec2(0))) && all(lessThan(in_plate, vec2(1)))) {
-            picture = texture(plate, in_plate).rgb;
+            picture = mix(picture, texture(plate, in_plate).rgb, edited);
         }
         float meant = texture(mask, point / photo_size).r;
         picture = mix(picture, vec3(0), veil * (1.0 - meant));
         vec3 striped = mix(picture * 0.25, vec3(0.5), 0.35 * stripes());
-        picture = mix(picture, striped, hatch * meant);
+        picture = mix(picture, striped, hatch * meant * edited);
     }
     color = vec4(mix(surround, picture, inside(point, vec4(0, 0, photo_size))), 1);
 }

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..layers import Draft, Layer
 from ..view import View
+from .blend_texture import BLEND, blend_cells
 from .scene import Scene
 from .shaders import build_program, set_uniforms
 from .textures import PictureTexture
@@ -26,8 +27,8 @@ class LayerPass:
         self._draft_quad = context.vertex_array(self._draft, [])
         self._uploaded: dict[int, tuple[Layer, list[moderngl.Texture]]] = {}
         self._crops: dict[int, tuple[np.ndarray, PictureTexture]] = {}
-        set_uniforms(self._exact, layer=LAYER)
-        set_uniforms(self._draft, layer=LAYER, looks=LOOKS, crop=CROP)
+        set_uniforms(self._exact, layer=LAYER, blend=BLEND)
+        set_uniforms(self._draft, layer=LAYER, looks=LOOKS, crop=CROP, blend=BLEND)
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -43,6 +44,7 @@ class LayerPass:
                 canvas=(view.width, view.height),
                 box=layer.box,
                 photo_box=_photo_box(scene, view),
+                cells=blend_cells(scene),
                 split=scene.split * view.width,
             )
             if layer.draft is not None:
@@ -61,6 +63,7 @@ class LayerPass:
             canvas=(view.width, view.height),
             box=(0, 0, view.width, view.height),
             photo_box=_photo_box(scene, view),
+            cells=blend_cells(scene),
             split=scene.split * view.width,
         )
         self._exact_quad.render(moderngl.TRIANGLE_STRIP, 4)

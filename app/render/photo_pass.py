@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import moderngl
 
-from ..blend import CELL
 from ..view import View
+from .blend_texture import BLEND, blend_cells
 from .scene import Scene
 from .shaders import build_program, set_uniforms
 from .textures import PictureTexture
 
-PHOTO, PLATE, MASK = range(3)  # texture units
+PHOTO, PLATE, MASK = range(3)  # texture units; BLEND is bound by the renderer
 
 
 class PhotoPass:
@@ -19,15 +19,10 @@ class PhotoPass:
     def __init__(self, context: moderngl.Context) -> None:
         self._program = build_program(context, "quad.vert", "photo.frag")
         self._quad = context.vertex_array(self._program, [])
-        self._keep = build_program(context, "quad.vert", "keep.frag")
-        self._keep_quad = context.vertex_array(self._keep, [])
-        self._context = context
         self._photo = PictureTexture(context)
         self._plate = PictureTexture(context)
         self._mask = PictureTexture(context)
-        self._blend = PictureTexture(context, has_mipmaps=False)
-        set_uniforms(self._program, photo=PHOTO, plate=PLATE, mask=MASK)
-        set_uniforms(self._keep, photo=PHOTO, blend=MASK)
+        set_uniforms(self._program, photo=PHOTO, plate=PLATE, mask=MASK, blend=BLEND)
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -52,27 +47,6 @@ class PhotoPass:
             veil=scene.veil,
             hatch=scene.hatch,
             unit=view.scale,
+            cells=blend_cells(scene),
         )
         self._quad.render(moderngl.TRIANGLE_STRIP, 4)
-
-    def draw_kept(self, scene: Scene, view: View) -> None:
-        """The photo again, over the edit, where nothing moved."""
-        if scene.blend is None:
-            return
-        self._blend.upload(scene.blend)
-        self._photo.use(PHOTO, view.zoom)
-        self._blend.use(MASK, 1.0)
-        height, width = scene.photo.shape[:2]
-        set_uniforms(
-            self._keep,
-            canvas=(view.width, view.height),
-            box=(0, 0, view.width, view.height),
-            corner=(view.left, view.top),
-            zoom=view.zoom,
-            photo_size=(width, height),
-            cells=(scene.blend.shape[1] * CELL, scene.blend.shape[0] * CELL),
-        )
-        self._context.enable(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        self._keep_quad.render(moderngl.TRIANGLE_STRIP, 4)
-        self._context.disable(moderngl.BLEND)

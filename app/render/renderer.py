@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from ..view import View
+from .blend_texture import BlendTexture
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Scene
@@ -29,6 +30,7 @@ class Renderer:
         is_software = any(word in self.gl_name.lower() for word in SOFTWARE)
         self.kind = ("tiles" if is_software else "gl") if wanted == "auto" else wanted
         self._context = context
+        self._blend = BlendTexture(context)
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
         self._splat_pass: SplatPass | None = None
@@ -37,6 +39,7 @@ class Renderer:
     def draw(self, scene: Scene, view: View, viewport: tuple[int, int, int, int]) -> None:
         """`viewport`: left, bottom, width, height of the canvas, framebuffer px."""
         self._begin(viewport)
+        self._blend.use(scene)
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
@@ -44,9 +47,9 @@ class Renderer:
             camera = view.camera(item.camera)
             front, behind = splat_pass.draw(item.splats, item.texture, camera, item.camera)
             self._begin(viewport)
+            self._blend.use(scene)
             for texture in (behind, front):
                 self._layer_pass.draw_texture(texture, scene, view)
-        self._photo_pass.draw_kept(scene, view)
 
     def _begin(self, viewport: tuple[int, int, int, int]) -> None:
         self._context.screen.use()

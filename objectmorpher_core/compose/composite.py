@@ -24,6 +24,7 @@ HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the
 MIN_HOLE_MARGIN = 4.0  # px
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha
+SEAM = 0.45  # x hole margin: width of the plate's seam around an object
 NEAR = 7  # px, window in which a left pixel looks for the object's new edge
 FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
 
@@ -67,6 +68,26 @@ def plate_hole(document: Document) -> Mask:
             covered |= item.mask.astype(np.uint8)
     distance = cv2.distanceTransform(1 - covered, cv2.DIST_L2, 5)
     return (distance < hole_margin(width, height)) if covered.any() else covered.astype(bool)
+
+
+def plate_weights(document: Document, box: tuple[int, int, int, int]) -> F32:
+    """(h, w) in [0, 1] for the crop `box`: how much of the plate to show behind the objects.
+
+    The hole reaches far past the matte so that the inpainter never copies an object's rim; shown
+    is only what lies under the matte and a narrow seam around it: beyond, the photo is true.
+    """
+    assert document.plate is not None
+    x0, y0, x1, y1 = box
+    hole = _crop(document.plate.hole, document.plate.box, box)
+    covered = np.zeros((y1 - y0, x1 - x0), bool)
+    for item in document.objects:
+        if item.matte is not None:
+            covered |= _crop(item.matte.alpha, item.matte.box, box) > 0
+    if not covered.any():
+        return hole.astype(np.float32)
+    seam = SEAM * hole_margin(*document.photo.size)
+    distance = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.where(hole, np.clip((seam - distance) / (0.6 * seam), 0, 1), 0).astype(np.float32)
 
 
 def object_texture(matte: Matte) -> TextureLevels:
@@ -138,8 +159,9 @@ class _Blend:
         self.invented = np.zeros((y1 - y0, x1 - x0), np.float32)
         self.colour = self.photo.copy()
         if document.plate is not None:
-            self.colour = unit_pixels(_plate_crop(photo, document.plate, box))
-            self.invented = _crop(document.plate.hole, document.plate.box, box).astype(np.float32)
+            self.invented = plate_weights(document, box)
+            plate = unit_pixels(_plate_crop(photo, document.plate, box))
+            self.colour += self.invented[..., None] * (plate - self.photo)
         self.from_photo = 1 - self.invented
         self.from_lifter = np.zeros_like(self.invented)
         self.moved = np.zeros(self.invented.shape, np.float32)  # px, see `displacement`
