@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.commands import run
 from app.editor import Editor
 from app.settings import Settings
+from objectmorpher_core.document import Document
 
 WIDTH, HEIGHT = 180, 140  # px of the made photo
 CENTRE = (90.0, 72.0)  # px, of the ball in it
@@ -80,6 +82,19 @@ def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
 
 def wait_for_jobs(editor: Editor) -> None:
     wait_until(editor, lambda: not editor.poll() and editor.jobs.is_idle)
+
+
+def lift_ball(editor: Editor) -> Document:
+    """The ball, selected, lifted and with a background behind it."""
+    editor.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert editor.mask is not None, editor.message
+    run(editor, "lift")
+    wait_for_jobs(editor)
+    assert editor.is_lifted, editor.message
+    assert editor.document is not None
+    assert editor.document.plate is not None
+    return editor.document
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from conftest import CENTRE, wait_for_jobs
+from conftest import CENTRE, lift_ball, wait_for_jobs
 from PIL import Image
 
 from app.commands import COMMANDS, next_step, run
@@ -16,23 +16,10 @@ from app.filing import Dialog
 from app.tools.pointer import Button, Pointer
 from app.tools.pose_tool import PoseTool
 from app.view import ToolName
-from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.document import Placement
 from objectmorpher_core.session_file import decode_session
 
 PIXEL = 1.0  # px, DESIGN promise 3: a handle ends within one of its target
-
-
-def lift_ball(editor: Editor) -> Document:
-    """The ball, selected, lifted and with a background behind it."""
-    editor.add_click(*CENTRE, True)
-    wait_for_jobs(editor)
-    assert editor.mask is not None, editor.message
-    run(editor, "lift")
-    wait_for_jobs(editor)
-    assert editor.is_lifted, editor.message
-    assert editor.document is not None
-    assert editor.document.plate is not None
-    return editor.document
 
 
 def canvas_xy(editor: Editor, x: float, y: float) -> np.ndarray:

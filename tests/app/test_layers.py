@@ -1,0 +1,79 @@
+"""The view's pictures: drafts that keep the frame's time, exact ones that replace them."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from conftest import lift_ball, wait_for_jobs
+
+from app.blend import CELL
+from app.editor import Editor
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+
+
+@pytest.fixture
+def moved(editor: Editor) -> Document:
+    """The ball, lifted and turned a little."""
+    return edits.set_placement(lift_ball(editor), 0, Placement(turn=(12.0, 0.0, 0.0)))
+
+
+def test_an_object_at_rest_is_left_to_the_photo(editor: Editor) -> None:
+    assert editor.derived.layers.draw(lift_ball(editor), editor.view) == ()
+
+
+def test_a_draft_is_replaced_by_the_exact_picture(editor: Editor, moved: Document) -> None:
+    layers = editor.derived.layers
+    layers.frame_time = 1e-4
+    (draft,) = layers.draw(moved, editor.view)
+    assert draft.draft is not None
+    assert layers.is_waiting
+    end = time.monotonic() + 30
+    while (shown := layers.draw(moved, editor.view)[0]).draft is not None:
+        assert time.monotonic() < end
+        editor.poll()
+        time.sleep(0.01)
+    layers.frame_time = np.inf
+    layers.ask = None
+    editor.view.pan(1, 0, (180, 140))
+    editor.view.pan(-1, 0, (180, 140))
+    layers.draw(lift_free(moved), editor.view)
+    (exact,) = layers.draw(moved, editor.view)
+    assert exact.box == shown.box
+    np.testing.assert_allclose(shown.rgba, exact.rgba * 255, atol=0.51)
+    layers.frame_time, layers.ask = 0.028, editor.tasks.render_exact
+
+
+def lift_free(document: Document) -> Document:
+    """The same with the object at rest, so that its picture is forgotten."""
+    return edits.set_placement(document, 0, Placement())
+
+
+def test_a_draft_covers_what_the_exact_picture_covers(editor: Editor, moved: Document) -> None:
+    layers = editor.derived.layers
+    pictures = []
+    for frame_time in (np.inf, 1e-4):
+        layers.frame_time = frame_time
+        layers.draw(lift_free(moved), editor.view)
+        pictures.append(layers.draw(moved, editor.view)[0])
+    layers.frame_time = 0.028
+    exact, draft = pictures
+    coarse = round((draft.box[2] - draft.box[0]) / draft.rgba.shape[1])
+    assert coarse > 1
+    sampled = exact.rgba[coarse // 2 :: coarse, coarse // 2 :: coarse, 3]
+    height, width = (min(a, b) for a, b in zip(sampled.shape, draft.rgba.shape, strict=False))
+    difference = np.abs(sampled[:height, :width] - draft.rgba[:height, :width, 3])
+    assert difference.mean() < 0.02  # they differ along the edge only
+    wait_for_jobs(editor)
+
+
+def test_the_photo_stays_where_nothing_moved(editor: Editor, moved: Document) -> None:
+    blend = editor.derived.blend(moved, editor.view)
+    centre = editor.view.canvas_from_image(np.array([90.0, 40.0])) / CELL
+    corner = editor.view.canvas_from_image(np.array([5.0, 5.0])) / CELL
+    assert blend[int(centre[1]), int(centre[0])] == 1
+    assert blend[int(corner[1]), int(corner[0])] == 0
+    hidden = edits.set_visible(lift_free(moved), 0, False)
+    assert editor.derived.blend(hidden, editor.view)[int(centre[1]), int(centre[0])] == 1

@@ -1,0 +1,237 @@
+"""The edited photo: nothing outside the footprint, and every pixel accounted for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objectmorpher_core import edits
+from objectmorpher_core.compose.composite import (
+    composite,
+    hole_margin,
+    plate_hole,
+    plate_picture,
+    straight_cutout,
+)
+from objectmorpher_core.document import Document, Placement
+from tests import shapes
+
+MOVES = {
+    "moved": Placement(move=(18.0, -7.0)),
+    "turned": Placement(turn=(25.0, 10.0, -15.0)),
+    "scaled": Placement(scale=0.6),
+    "away": Placement(depth=1.5),
+    "out of the photo": Placement(move=(900.0, 0.0)),
+    "half out of the photo": Placement(move=(70.0, 40.0)),
+    "large": Placement(scale=6.0),
+    "a hair": Placement(move=(0.4, 0.0)),
+}
+masks = pytest.mark.parametrize("name", ["ellipse", "thin", "frame", "parts", "ring"])
+moves = pytest.mark.parametrize("move", MOVES)
+
+
+def _placed(document: Document, placement: Placement) -> Document:
+    return edits.set_placement(document, 0, placement)
+
+
+def _solved(scene: shapes.Scene, move: tuple[float, float, float]) -> Document:
+    """The document after one handle was dragged by `move`, object units."""
+    document = scene.document()
+    point = scene.lifted.control_points[7].astype(np.float64)
+    document = edits.add_handle(document, 0, point, point + move)
+    solution = scene.puppet.deformer.solve(document.objects[0].handles)
+    return edits.set_pose(document, 0, solution.pose)
+
+
+@masks
+def test_with_nothing_moved_the_photo_comes_back(name):
+    scene = shapes.scene(name)
+    result = composite(scene.document())
+    assert np.array_equal(result.pixels, scene.pixels)
+    assert result.changed == 0
+    assert not result.footprint.any()
+    assert sum(vars(result.shares).values()) == 0
+
+
+@moves
+@masks
+def test_outside_the_footprint_nothing_changes(name, move):
+    scene = shapes.scene(name)
+    result = composite(_placed(scene.document(), MOVES[move]), {0: scene.puppet})
+    different = (result.pixels != scene.pixels).any(-1)
+    assert not (different & ~result.footprint).any()
+    assert result.outside_footprint_changed == 0
+    assert result.changed == different.sum()
+
+
+@moves
+def test_the_shares_sum_to_one(move):
+    scene = shapes.scene("ellipse")
+    result = composite(_placed(scene.document(), MOVES[move]), {0: scene.puppet})
+    shares = vars(result.shares)
+    assert sum(shares.values()) == pytest.approx(1, abs=1e-6)
+    assert min(shares.values()) >= 0
+    assert shares["from_refiner"] == 0
+
+
+def test_an_object_that_only_moved_is_made_of_the_photo():
+    scene = shapes.scene("ellipse")
+    document = _placed(scene.document(), MOVES["moved"])
+    result = composite(document, {0: scene.puppet})
+    assert result.shares.from_lifter < 0.01
+    assert result.shares.from_inpainter > 0.05, "what it uncovered"
+
+
+def test_a_turned_object_shows_what_the_lifter_made_up():
+    scene = shapes.scene("ellipse")
+    back = composite(
+        _placed(scene.document(), Placement(turn=(180.0, 0.0, 0.0))), {0: scene.puppet}
+    )
+    assert back.shares.from_lifter > 0.5
+
+
+def test_moved_and_moved_back_is_the_photo():
+    scene = shapes.scene("ellipse")
+    document = _placed(_placed(scene.document(), MOVES["turned"]), Placement())
+    assert np.array_equal(composite(document, {0: scene.puppet}).pixels, scene.pixels)
+
+
+@masks
+def test_a_pose_that_is_the_rest_changes_next_to_nothing(name):
+    """A handle dragged to where it was: rendered, and still the photo's own pixels."""
+    scene = shapes.scene(name)
+    document = edits.set_pose(scene.document(), 0, scene.puppet.deformer.rest())
+    result = composite(document, {0: scene.puppet})
+    # A stray pixel of the edge (test_tiles) disturbs its surroundings by the hole's margin.
+    assert result.changed <= 0.02 * scene.mask.size
+    inside = scene.mask & ~(result.pixels != scene.pixels).any(-1)
+    assert inside.sum() >= 0.98 * scene.mask.sum()
+
+
+def test_what_a_deformation_leaves_in_place_keeps_its_very_pixels():
+    scene = shapes.scene("star")
+    document = _solved(scene, (0.05, -0.2, 0.0))
+    result = composite(document, {0: scene.puppet})
+    item = document.objects[0]
+    skinned = scene.puppet.deformer.skin_gaussians(item.pose).points
+    gap = np.linalg.norm(skinned - scene.lifted.gaussians.means, axis=1)
+    u0 = np.floor(scene.lifted.texture.u0).astype(int)
+    still = np.zeros(scene.mask.shape, bool)
+    far = np.zeros(scene.mask.shape, bool)
+    inside = ((u0 >= 0) & (u0 < [160, 120])).all(1)
+    still[u0[inside & (gap < 1e-5), 1], u0[inside & (gap < 1e-5), 0]] = True
+    far[u0[inside & (gap > 1e-3), 1], u0[inside & (gap > 1e-3), 0]] = True
+    import cv2
+
+    away = cv2.distanceTransform((~far).astype(np.uint8), cv2.DIST_L2, 5)
+    still &= away > 2 * hole_margin(160, 120)
+    assert still.sum() > 20
+    assert np.array_equal(result.pixels[still], scene.pixels[still])
+    assert result.outside_footprint_changed == 0
+
+
+@masks
+def test_a_hidden_object_shows_the_plate(name):
+    scene = shapes.scene(name)
+    document = edits.set_visible(scene.document(), 0, False)
+    result = composite(document)
+    assert (result.pixels[scene.mask] == 128).all()
+    assert result.shares.from_lifter == 0
+    assert result.shares.from_inpainter > 0.5
+    assert result.outside_footprint_changed == 0
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_the_depth_of_the_photo_is_kept(dtype):
+    scene = shapes.scene("ellipse")
+    document = scene.document()
+    if dtype == np.uint16:
+        deep = scene.pixels.astype(np.uint16) * 257 + 3
+        photo = replace(document.photo, picture=replace(document.photo.picture, pixels=deep))
+        plate = replace(document.plate, pixels=document.plate.pixels.astype(np.uint16) * 257)
+        document = replace(document, photo=photo, plate=plate)
+    result = composite(_placed(document, MOVES["moved"]), {0: scene.puppet})
+    assert result.pixels.dtype == dtype
+    far = ~result.footprint
+    assert np.array_equal(result.pixels[far], document.photo.pixels[far])
+
+
+def test_the_object_lies_where_it_was_moved_to():
+    """A whole-pixel move of a flat-lying object: its inside is the photo's, shifted."""
+    scene = shapes.scene("disc")
+    dx, dy = 11, -6
+    result = composite(
+        _placed(scene.document(), Placement(move=(float(dx), float(dy)))), {0: scene.puppet}
+    )
+    import cv2
+
+    deep = cv2.erode(scene.mask.astype(np.uint8), np.ones((21, 21))) > 0
+    rows, columns = np.nonzero(deep)
+    moved = result.pixels[rows + dy, columns + dx].astype(int)
+    # perspective: an object that moves aside is also seen a little from the side, up to a
+    # pixel of its texture (measured: mean 6 levels)
+    assert np.abs(moved - scene.pixels[rows, columns]).mean() < 12
+
+
+def test_the_nearer_of_two_objects_covers_the_farther():
+    near, far = shapes.scene("disc"), shapes.scene("ellipse")
+    document = near.document()
+    item = replace(far.document().objects[0], name="far", placement=Placement(depth=0.8))
+    document = replace(document, objects=(document.objects[0], item))
+    document = edits.set_placement(document, 0, Placement(move=(0.0, 1.0)))
+    pixels = [
+        composite(replace(document, objects=order)).pixels
+        for order in (document.objects, document.objects[::-1])
+    ]
+    assert np.array_equal(pixels[0], pixels[1]), "the order of the list does not matter"
+
+
+def test_the_hole_is_the_object_and_a_margin():
+    scene = shapes.scene("ellipse")
+    hole = plate_hole(scene.document())
+    assert hole[scene.mask].all()
+    assert hole.sum() > scene.mask.sum()
+    assert not hole[:10].any()
+
+
+def test_a_document_without_objects_has_no_hole():
+    document = replace(shapes.scene("ellipse").document(), objects=())
+    assert not plate_hole(document).any()
+
+
+def test_the_plates_picture_is_the_photo_outside_its_hole():
+    scene = shapes.scene("ellipse")
+    document = scene.document()
+    picture = plate_picture(document)
+    hole = document.plate.hole
+    assert np.array_equal(picture[~hole], scene.pixels[~hole])
+    assert (picture[hole] == 128).all()
+
+
+def test_the_cut_out_is_the_object_on_nothing():
+    scene = shapes.scene("ellipse")
+    document = _placed(scene.document(), MOVES["moved"])
+    result = composite(document, {0: scene.puppet})
+    cutout = straight_cutout(result, np.dtype(np.uint8), (160, 120))
+    assert cutout.shape == (120, 160, 4)
+    shifted = np.zeros_like(scene.mask)
+    rows, columns = np.nonzero(scene.mask)
+    shifted[rows - 7, columns + 18] = True
+    agree = (cutout[..., 3] > 127) == shifted
+    assert agree.mean() > 0.98  # perspective changes the outline by a pixel or so
+    assert not cutout[cutout[..., 3] == 0].any()
+
+
+def test_puppets_of_the_caller_give_the_same_picture():
+    scene = shapes.scene("star")
+    document = _solved(scene, (0.1, 0.1, 0.0))
+    assert np.array_equal(composite(document).pixels, composite(document, {0: scene.puppet}).pixels)
+
+
+def test_an_object_behind_the_frame_or_nowhere_changes_only_its_hole():
+    scene = shapes.scene("ellipse")
+    result = composite(_placed(scene.document(), MOVES["out of the photo"]), {0: scene.puppet})
+    assert result.shares.from_inpainter > 0.5
+    assert (result.pixels[scene.mask] == 128).mean() > 0.99
