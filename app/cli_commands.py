@@ -36,12 +36,14 @@ EXTRAS = {  # further outputs of `edit` and the endings each may have
 def run_edit(options: argparse.Namespace) -> None:
     """`objectmorpher edit`"""
     items = _items(options)
+    read = [i.photo for i in items] + [i.script.mask for i in items] + [options.script]
+    inputs = [Path(name) for name in read if name]
     outputs: dict[Path, bytes] = {}
     for item in items:
         photo, out = Path(item.photo or ""), Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
-        _check_outputs([photo], {out: PICTURE_ENDINGS})
-        _check_outputs([photo], {path: EXTRAS[name] for name, path in extras.items()})
+        _check_outputs(inputs, {out: PICTURE_ENDINGS})
+        _check_outputs(inputs, {path: EXTRAS[name] for name, path in extras.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
@@ -93,8 +95,10 @@ def _extra(name: str, edited: Edited, path: Path) -> bytes:
 
 def run_select(options: argparse.Namespace) -> None:
     """`objectmorpher select`"""
-    _check_outputs([options.photo], {options.out: (".png",)})
     script = _script(options)
+    inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
+    _check_outputs(inputs, {options.out: (".png",)})
+    refuse_missing(script)
     mask = Path(script.mask).read_bytes() if script.mask else None
     with progress_bar("Selecting") as progress:
         document = open_photo(options.photo.read_bytes(), options.photo.name)
@@ -106,7 +110,7 @@ def run_replay(options: argparse.Namespace) -> None:
     """`objectmorpher replay`"""
     from objectmorpher_core.session_file import decode_session
 
-    wanted = {options.out: PICTURE_ENDINGS}
+    wanted: dict[Path, tuple[str, ...]] = {options.out: PICTURE_ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
     _check_outputs([options.session], wanted)
@@ -244,7 +248,7 @@ def _check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> 
     read = {path.resolve() for path in inputs}
     for path, endings in outputs.items():
         if path.resolve() in read:
-            raise UsageError(f"{path} is the input; choose another name for the output")
+            raise UsageError(f"{path} is an input; choose another name for the output")
         if path.suffix.lower() not in endings:
             raise UsageError(f"{path}: the ending must be {' or '.join(endings)}")
         if not path.parent.is_dir():

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 KEPT = 6  # results remembered of each kind
+OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,17 +231,28 @@ def _build_shape(photo: Photo, thing: EditObject) -> Shape:
 
 def _outlines(mask: Mask) -> tuple[F32, ...]:
     """Along the pixels' edges, corners cut: half a pixel of rounding makes the line quiet."""
-    # At twice the size, so that the outline runs around pixels and not through their centres.
-    doubled = np.repeat(np.repeat(mask.view(np.uint8), 2, axis=0), 2, axis=1)
-    found, _ = cv2.findContours(doubled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    if len(rows) == 0:
+        return ()
+    top, left = rows[0], columns[0]
+    crop = mask[top : rows[-1] + 1, left : columns[-1] + 1].view(np.uint8)
+    # Twice the size, so that the outline runs around pixels and not through their centres; of a
+    # large photo less, which nobody sees unless far zoomed in.
+    scale = min(2.0, float(np.sqrt(OUTLINE_PIXELS / crop.size)))
+    size = (max(round(crop.shape[1] * scale), 1), max(round(crop.shape[0] * scale), 1))
+    sized = cv2.resize(crop * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 127
+    sized = np.pad(sized.view(np.uint8), 1)  # so that the photo's border closes the outline
+    found, _ = cv2.findContours(sized, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     outlines = []
     for contour in found:
         if len(contour) < 8:
             continue
-        points = (contour[:, 0].astype(np.float32) + 0.5) / 2
-        smooth = (np.roll(points, 1, 0) + points + np.roll(points, -1, 0)) / 3
-        simple = cv2.approxPolyDP(smooth.astype(np.float32)[:, None], 0.25, True)[:, 0]
-        outlines.append(simple)
+        points = contour[:, 0].astype(np.float32)
+        for _ in range(2):
+            points = (np.roll(points, 1, 0) + 2 * points + np.roll(points, -1, 0)) / 4
+        simple = cv2.approxPolyDP(points[:, None], 0.4, True)[:, 0]
+        per_px = np.array([crop.shape[1] / size[0], crop.shape[0] / size[1]])
+        outlines.append(((simple - 0.5) * per_px + (left, top)).astype(np.float32))
     return tuple(outlines)
 
 

@@ -194,9 +194,11 @@ def run_script(
     with stopwatch.stage("load"):
         document = open_photo(data, name, script.fov, script.seed)
     document = select(document, script, mask, part(progress, 0.0, 0.3), stopwatch)
+    chosen = document.objects[0].mask
+    assert chosen is not None, "select() has chosen it"
     with stopwatch.stage("lift"):
         lifted = lift_mask(
-            document.photo.pixels, document.photo.camera, document.objects[0].mask,
+            document.photo.pixels, document.photo.camera, chosen,
             script.lift, script.gaussians or GAUSSIANS, part(progress, 0.3, 0.5), script.seed,
         )  # fmt: skip
         document = edits.set_lifted(document, 0, *lifted)
@@ -229,6 +231,14 @@ def replay(document: Document, progress: Progress = silent) -> Edited:
 
 def refuse_missing(script: EditScript) -> None:
     """Raises ScriptError where the script needs a backend that is not there."""
+    chosen = (
+        ("segmenter", script.segment, segment.BACKENDS),
+        ("lifter", script.lift, lift.BACKENDS),
+        ("inpainter", script.inpaint, compose.BACKENDS),
+    )
+    for kind, name, known in chosen:  # also where the stage will not run
+        if name != "auto" and name not in known:
+            raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
     if script.splats is not None:
         raise ScriptError("--splats: the registration of imported objects is not installed")
     if script.refine not in ("auto", "none"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from .arrays import F64
 from .camera import Camera
@@ -110,7 +110,7 @@ class Puppet:
         """Rest point (3,) that the pose moves to `target` (3,), both in the object frame."""
         means = self.lifted.gaussians.means.astype(np.float64)
         facing = np.flatnonzero(splats.means[:, 2] > 0)
-        _, near = cKDTree(splats.means[facing]).query(world, k=min(PICK_NEIGHBOURS, len(facing)))
+        _, near = KDTree(splats.means[facing]).query(world, k=min(PICK_NEIGHBOURS, len(facing)))
         best, best_gap = None, np.inf
         for start in facing[np.atleast_1d(near)]:
             point = means[start]

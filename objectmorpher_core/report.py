@@ -24,7 +24,7 @@ class Stopwatch:
     """Seconds by stage."""
 
     def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
+        self.seconds: dict[str, float] = dict.fromkeys(STAGES, 0.0)
         self._start = time.perf_counter()
 
     @contextmanager

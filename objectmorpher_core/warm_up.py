@@ -20,6 +20,7 @@ def warm_up() -> None:
 
     rng = np.random.default_rng(0)
     pixels = cv2.GaussianBlur(rng.integers(0, 255, (SIZE, SIZE, 3), np.uint8), (0, 0), 2)
+    pixels = pixels.astype(np.uint8)
     mask = np.zeros((SIZE, SIZE), np.uint8)
     cv2.circle(mask, (SIZE // 2, SIZE // 2), SIZE // 4, 1, -1)
     middle = (SIZE / 2, SIZE / 2)

@@ -13,7 +13,7 @@ from imgui_bundle import portable_file_dialogs as pfd
 from ..editor import Editor
 from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog
 from .file_chooser import FileChooser
-from .theme import theme
+from .theme import FIELD, PRIMARY, theme
 from .widgets import Kind, bold_text, button, note
 
 HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialogs need on Linux
@@ -102,13 +102,16 @@ class Dialogs:
         imgui.dummy(theme.size(0, 4))
         filing = editor.filing
         answer = None
+        top = imgui.get_cursor_pos_y()
         if button("Save session", Kind.PRIMARY, width=132):
             answer = filing.answer_save
+        lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()
-        imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + theme.pt(6))
+        imgui.set_cursor_pos_y(lower)
         if button("Don't save", width=104):
             answer = filing.answer_discard
         imgui.same_line()
+        imgui.set_cursor_pos_y(lower)
         if button("Cancel", width=104) or imgui.is_key_pressed(imgui.Key.escape):
             answer = filing.answer_cancel
         if answer is not None:

@@ -28,11 +28,12 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
     imgui.begin_main_menu_bar()
     imgui.pop_style_var(2)
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(20, 10))
     for title, names in MENUS.items():
         if imgui.begin_menu(title):
             _draw_items(editor, names)
             imgui.end_menu()
-    imgui.pop_style_var()
+    imgui.pop_style_var(2)
     _draw_right(editor, rect)
     line = theme.u32("line")
     bottom = rect.y + rect.height - 0.5
@@ -41,7 +42,6 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
 
 
 def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(16, 10))
     for name in names:
         if name == "-":
             imgui.separator()
@@ -53,7 +53,6 @@ def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
                 editor.set_theme("dark" if is_light else "light")
         else:
             _draw_command(editor, name)
-    imgui.pop_style_var()
 
 
 def _draw_command(editor: Editor, name: str) -> None:

@@ -29,6 +29,7 @@ HINTS = {
     "roll": "Drag along the ring to roll the object · Shift turns in steps of 15°",
     "turn": "Drag turns the object in 3D · Shift keeps one axis",
 }
+IDLE_HINT = "Drag the object to move it, a corner to scale, the ring to roll, beside it to turn"
 SHAPES = {"move": Shape.MOVE, "scale": Shape.SIZE, "roll": Shape.TURN, "turn": Shape.TURN}
 
 
@@ -94,7 +95,7 @@ class PlaceTool:
         return SHAPES.get(part or "", Shape.ARROW)
 
     def hint(self, editor: Editor) -> str:
-        return HINTS.get(editor.hover.part or "", "Lift an object first")
+        return HINTS.get(editor.hover.part or "", IDLE_HINT)
 
 
 def _ignore() -> Stroke:

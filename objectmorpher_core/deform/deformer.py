@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64, I32
+from ..arrays import F64, I32, Mask
 from ..document import DeformSettings, Handle, LiftedObject, Pose
 from .arap import ArapSolver, Constraints, Minimum, minimise
 from .graph import Graph, build_graph
@@ -108,7 +108,7 @@ class Deformer:
         linear = faithful_linear(self.binding, self.points, pose.points, pose.rotations, self.graph)
         return Skinned(skinned.points, linear)
 
-    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, F64]:
+    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, Mask]:
         """Rows of the handles and anchors; factored again only when the set changed."""
         count = len(self.points)
         points = np.array([h.point for h in handles])
@@ -141,7 +141,7 @@ class Deformer:
     def _approach(
         self,
         constraints: Constraints,
-        is_free: F64,
+        is_free: Mask,
         handles: tuple[Handle, ...],
         rotations: F64,
     ) -> F64:
@@ -162,13 +162,13 @@ class Deformer:
         self._solver.constraints = constraints
         return rotations
 
-    def _laplacian(self, constraints: Constraints, is_free: F64) -> Minimum:
+    def _laplacian(self, constraints: Constraints, is_free: Mask) -> Minimum:
         """The ablation: Eq. 2 with R_i = identity."""
         rotations = self.rest().rotations
         positions = self._solver.positions(rotations)
         return Minimum(positions, rotations, (self._solver.energy(positions, rotations),))
 
-    def _follow(self, positions: F64, rotations: F64, is_free: F64) -> tuple[F64, F64]:
+    def _follow(self, positions: F64, rotations: F64, is_free: Mask) -> tuple[F64, F64]:
         """Parts without a handle move rigidly with the nearest part that has one."""
         if is_free.all():
             return positions, rotations

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ..arrays import F64, I32, frozen
 from .graph import Graph
@@ -43,10 +43,11 @@ def bind(points: np.ndarray, control_points: np.ndarray, graph: Graph) -> Bindin
     """
     p = control_points.astype(np.float64)
     x = np.atleast_2d(points).astype(np.float64)
-    near = cKDTree(p).query(x)[1]
-    order = np.argsort(graph.geodesics, axis=1, kind="stable")[:, :CANDIDATES]
-    reach = np.take_along_axis(graph.geodesics, order, 1)[near]
-    order = order[near]  # (N, C)
+    nearest, row = np.unique(KDTree(p).query(x)[1], return_inverse=True)
+    geodesics = graph.geodesics[nearest]  # of those in use: picking binds a single point
+    order = np.argsort(geodesics, axis=1, kind="stable")[:, :CANDIDATES]
+    reach = np.take_along_axis(geodesics, order, 1)[row]
+    order = order[row]  # (N, C)
     distances = np.linalg.norm(x[:, None] - p[order], axis=2)
     distances[~np.isfinite(reach)] = np.inf
     count = min(NEIGHBOURS, len(p) - 1)

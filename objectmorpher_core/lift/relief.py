@@ -109,7 +109,7 @@ class Inflation:
         grid = tuple(int(np.ceil(n / cell)) for n in crop.shape)
         whole = np.zeros((round(grid[0] * cell) + 1, round(grid[1] * cell) + 1), np.float32)
         whole[: crop.shape[0], : crop.shape[1]] = crop
-        warp = np.float32([[1 / cell, 0, 0.5 / cell - 0.5], [0, 1 / cell, 0.5 / cell - 0.5]])
+        warp = np.array([[1, 0, 0.5], [0, 1, 0.5]]) / cell - [0, 0, 0.5]
         if cell > 1.0:
             whole = cv2.GaussianBlur(whole, (0, 0), 0.4 * cell)
         inside = cv2.warpAffine(whole, warp, (grid[1], grid[0]), flags=cv2.INTER_LINEAR) > 0.5
@@ -145,7 +145,7 @@ class Inflation:
         padded = np.pad(self.membrane, 1)
         dy, dx = np.gradient(padded, self.cell)
         g = self.grid_xy(xy) + 1
-        u, ux, uy = (bilinear(field, g) for field in (padded, dx, dy))
+        u, ux, uy = (bilinear(np.asarray(field), g) for field in (padded, dx, dy))
         height, slope = self.half_thickness(u, bilinear(self.crease, g - 1))
         return height, np.stack([ux * slope, uy * slope], axis=1)
 

@@ -119,6 +119,6 @@ def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> Textur
         height, width = level.shape[:2]
         padded = cv2.copyMakeBorder(level, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
         size = (padded.shape[1] // 2, padded.shape[0] // 2)
-        level = cv2.resize(padded, size, interpolation=cv2.INTER_AREA)
+        level = cv2.resize(padded, size, interpolation=cv2.INTER_AREA).astype(np.float32)
         levels.append(level)
     return TextureLevels(tuple(frozen(v) for v in levels), left, top)

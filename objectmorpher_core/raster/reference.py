@@ -74,7 +74,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     pictures = splats.rest_pictures[index]
     a = pictures @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
     filtered = screen + RULES.filter * np.eye(2)
-    conic = np.linalg.inv(filtered)
+    conic = np.linalg.inv(filtered).astype(np.float64)
     # The filter spreads a small Gaussian over more pixels: it must not gain weight by that.
     compensation = np.sqrt(np.linalg.det(screen).clip(0) / np.linalg.det(filtered))
     singular = np.linalg.svd(a, compute_uv=False)

@@ -69,9 +69,12 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
         splats.opacities, splats.rest_zoom,
     )  # fmt: skip
     near = RULES.near * splats.gap
-    inputs = [frozen(a) for a in (*fields, _intrinsics(camera), _intrinsics(photo_camera))]
     out = np.zeros((len(splats), SPAN))
-    in_threads(lambda first, last: _project(first, last, *inputs, near, RULES, out), len(splats))
+    inputs = (
+        *(frozen(a) for a in fields), _intrinsics(camera), _intrinsics(photo_camera),
+        near, RULES, out,
+    )  # fmt: skip
+    in_threads(lambda first, last: _project(first, last, *inputs), len(splats))
     return out
 
 

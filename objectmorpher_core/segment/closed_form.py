@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, eye
+from scipy.sparse import coo_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from ..arrays import F32, Mask
@@ -35,14 +35,15 @@ def solve_alpha(rgb: F32, inner: Mask, outer: Mask, prior: np.ndarray) -> F32:
     index = np.flatnonzero(unknown)
     own = laplacian[index]
     known = inner.ravel().astype(np.float64)  # 0 in the unknown pixels too
-    matrix = own[:, index] + PRIOR * eye(count)
+    matrix = own[:, index] + PRIOR * eye_array(count)
     right = PRIOR * prior.ravel()[index] - own @ known
     alpha = known.astype(np.float32)
-    alpha[index] = np.clip(spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A"), 0, 1)
+    solved = np.asarray(spsolve(csc_array(matrix), right, permc_spec="MMD_AT_PLUS_A"))
+    alpha[index] = np.clip(solved, 0, 1)
     return alpha.reshape(inner.shape)
 
 
-def _laplacian(rgb: F32, unknown: Mask) -> csr_matrix:
+def _laplacian(rgb: F32, unknown: Mask) -> csr_array:
     """The matting Laplacian (h w, h w) of the windows that hold an unknown pixel."""
     height, width = unknown.shape
     touched = cv2.dilate(unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -61,7 +62,7 @@ def _laplacian(rgb: F32, unknown: Mask) -> csr_matrix:
     rows = np.broadcast_to(members[:, :, None], values.shape)
     columns = np.broadcast_to(members[:, None, :], values.shape)
     entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-    return coo_matrix(entries, shape=(height * width, height * width)).tocsr()
+    return coo_array(entries, shape=(height * width, height * width)).tocsr()
 
 
 def _solved_small(rgb: F32, inner: Mask, outer: Mask, prior: np.ndarray) -> F32:

@@ -71,6 +71,18 @@ def editor(shared_editor: Editor, photo_path: Path) -> Editor:
     return shared_editor
 
 
+@pytest.fixture(scope="session")
+def ball(
+    shared_editor: Editor, photo_bytes: bytes, tmp_path_factory: pytest.TempPathFactory
+) -> Document:
+    """The made photo's document, its ball lifted and with a background behind it."""
+    path = tmp_path_factory.mktemp("ball") / "ball.png"
+    path.write_bytes(photo_bytes)
+    shared_editor.close_document()
+    shared_editor.filing.open(path)
+    return lift_ball(shared_editor)
+
+
 def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
     """Polls as the window's loop does."""
     end = time.monotonic() + PATIENCE

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import lift_ball, wait_for_jobs
+from conftest import wait_for_jobs
 
 from app.blend import CELL
 from app.editor import Editor
@@ -15,13 +15,13 @@ from objectmorpher_core.document import Document, Placement
 
 
 @pytest.fixture
-def moved(editor: Editor) -> Document:
-    """The ball, lifted and turned a little."""
-    return edits.set_placement(lift_ball(editor), 0, Placement(turn=(12.0, 0.0, 0.0)))
+def moved(ball: Document) -> Document:
+    """The ball, turned a little."""
+    return edits.set_placement(ball, 0, Placement(turn=(12.0, 0.0, 0.0)))
 
 
-def test_an_object_at_rest_is_left_to_the_photo(editor: Editor) -> None:
-    assert editor.derived.layers.draw(lift_ball(editor), editor.view) == ()
+def test_an_object_at_rest_is_left_to_the_photo(editor: Editor, ball: Document) -> None:
+    assert editor.derived.layers.draw(ball, editor.view) == ()
 
 
 def test_a_draft_is_replaced_by_the_exact_picture(editor: Editor, moved: Document) -> None:

@@ -46,7 +46,7 @@ def test_the_picked_point_is_seen_where_it_was_picked(scene, pose, placement, is
     place, used = PLACEMENTS[placement], pose if is_posed else None
     picture = scene.puppet.draw(used, place, scene.texture, scene.camera)
     rows, columns = np.nonzero(picture.alpha > 0.99)
-    chosen = np.random.default_rng(0).choice(len(rows), 25, replace=False)
+    chosen = np.random.default_rng(0).choice(len(rows), 15, replace=False)
     for row, column in zip(rows[chosen], columns[chosen], strict=True):
         xy = (column + 0.3, row + 0.6)
         picked = _pick(scene, xy, used, place)

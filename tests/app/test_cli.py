@@ -1,0 +1,471 @@
+"""The command line: the contract of DESIGN section 6, and one sentence for every failure."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app import cli
+from objectmorpher_core.compose import BACKENDS
+from objectmorpher_core.image import read_picture
+from objectmorpher_core.script import EditScript
+from tests import shapes
+
+ROOT = Path(__file__).parents[2]
+MASK = shapes.mask("ellipse")
+PIXELS = shapes.picture(MASK)
+QUICK = ["--gaussians", "300", "--inpaint", "telea"]
+TURN = ["--turn", "20,0,0"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A working directory with a photo, its mask, and some files that are no use."""
+    monkeypatch.chdir(tmp_path)
+    Path("photo.png").write_bytes(shapes.png(PIXELS))
+    Path("mask.png").write_bytes(shapes.mask_png(MASK))
+    Path("empty.png").write_bytes(shapes.mask_png(np.zeros_like(MASK)))
+    Path("full.png").write_bytes(shapes.mask_png(np.ones_like(MASK)))
+    Path("large.png").write_bytes(shapes.mask_png(shapes.mask("disc", 200, 150)))
+    Path("text.jpg").write_text("not a photo")
+    Path("cut.jpg").write_bytes(shapes.jpeg(PIXELS)[:900])
+    Path("nothing.jpg").write_bytes(b"")
+    return tmp_path
+
+
+def _edit(
+    *more: str, photo: str = "photo.png", out: str = "out.png", mask: str = "mask.png"
+) -> int:
+    return cli.main(["edit", photo, "-o", out, "--mask", mask, *QUICK, *more])
+
+
+def _pixels(name: str) -> np.ndarray:
+    return read_picture(Path(name).read_bytes()).pixels
+
+
+def _files() -> dict[str, bytes]:
+    return {str(p): p.read_bytes() for p in Path().rglob("*") if p.is_file()}
+
+
+# ---- what works -----------------------------------------------------------------------------
+
+
+def test_the_quick_inpainter_of_these_tests_exists():
+    assert "telea" in BACKENDS
+
+
+def test_an_edit_writes_the_photo_and_nothing_else(folder, capsys):
+    before = set(_files())
+    assert _edit(*TURN) == 0
+    assert set(_files()) == before | {"out.png"}
+    assert _pixels("out.png").shape == PIXELS.shape
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_to_do_gives_the_photo_back(folder):
+    assert _edit() == 0
+    assert np.array_equal(_pixels("out.png"), PIXELS)
+
+
+def test_two_runs_with_the_same_seed_give_the_same_bytes(folder):
+    wishes = ["--handle", "110,62:120,40", *TURN, "--seed", "4"]
+    _edit(*wishes, "--report", "a.json", out="a.png")
+    _edit(*wishes, out="b.png")
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+
+
+def test_every_further_output_is_written(folder):
+    pytest.importorskip("objectmorpher_core.splat_files.ply")
+    assert _edit(
+        "--move", "10,5", "--save-mask", "m.png", "--save-plate", "p.png", "--save-object",
+        "o.png", "--save-splats", "s.ply", "--report", "r.json",
+    ) == 0  # fmt: skip
+    mask = cv2.imread("m.png", cv2.IMREAD_UNCHANGED)
+    assert mask.dtype == np.uint8
+    assert np.array_equal(mask, MASK * np.uint8(255))
+    plate = _pixels("p.png")
+    assert plate.shape == PIXELS.shape
+    assert plate.dtype == PIXELS.dtype
+    assert np.array_equal(plate[:10], PIXELS[:10])
+    assert cv2.imread("o.png", cv2.IMREAD_UNCHANGED).shape == (120, 160, 4)
+    assert Path("s.ply").read_bytes().startswith(b"ply")
+    assert json.loads(Path("r.json").read_text())["version"] == 1
+
+
+def test_the_plate_can_be_had_without_an_edit(folder):
+    assert _edit("--save-plate", "p.png") == 0
+    assert not np.array_equal(_pixels("p.png")[MASK], PIXELS[MASK])
+    assert np.array_equal(_pixels("out.png"), PIXELS)
+
+
+def test_sixteen_bits_stay_sixteen_bits(folder):
+    Path("deep.png").write_bytes(shapes.png(PIXELS.astype(np.uint16) * 257))
+    assert _edit(*TURN, "--save-plate", "p.png", photo="deep.png") == 0
+    assert _pixels("out.png").dtype == np.uint16
+    assert _pixels("p.png").dtype == np.uint16
+
+
+def test_handles_reach_their_targets(folder):
+    assert _edit(
+        "--handle", "110,62:130,40,0.2", "--handle", "45,62:-20,-30", "--pin", "78,62",
+        "--report", "r.json",
+    ) == 0  # fmt: skip
+    handles = json.loads(Path("r.json").read_text())["handles"]
+    assert len(handles) == 3
+    assert all(handle["error_px"] <= 1 for handle in handles)
+
+
+@pytest.mark.parametrize("wishes", [
+    ["--move", "-10,4"], ["--move=-10,4"], ["--turn", "-20,0,-5"],
+    ["--handle", "110,62:-5,40,-.2"], ["--move", "-1e1,4,-0.1"],
+])  # fmt: skip
+def test_values_may_begin_with_a_minus_sign(folder, wishes):
+    assert _edit(*wishes) == 0
+    assert not np.array_equal(_pixels("out.png"), PIXELS)
+
+
+def test_a_value_with_a_space_is_the_value_with_an_equals_sign(folder):
+    _edit("--move", "-10,4", out="a.png")
+    _edit("--move=-10,4", out="b.png")
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+
+
+def test_selecting_writes_the_mask(folder):
+    assert cli.main(["select", "photo.png", "-o", "s.png", "--click", "78,62",
+                     "--segment", "grabcut"]) == 0  # fmt: skip
+    found = cv2.imread("s.png", cv2.IMREAD_UNCHANGED)
+    assert set(np.unique(found)) == {0, 255}
+    overlap = ((found > 0) & MASK).sum() / ((found > 0) | MASK).sum()
+    assert overlap > 0.8
+
+
+def test_selecting_with_a_mask_gives_the_mask(folder):
+    assert cli.main(["select", "photo.png", "-o", "s.png", "--mask", "mask.png"]) == 0
+    assert Path("s.png").read_bytes() == Path("mask.png").read_bytes()
+
+
+def test_an_existing_output_is_replaced(folder):
+    Path("out.png").write_bytes(b"old")
+    assert _edit(*TURN) == 0
+    assert _pixels("out.png").shape == PIXELS.shape
+
+
+def test_a_photo_can_be_written_as_jpeg(folder):
+    assert _edit(*TURN, out="out.jpg") == 0
+    assert Path("out.jpg").read_bytes()[:2] == b"\xff\xd8"
+
+
+# ---- scripts --------------------------------------------------------------------------------
+
+
+def test_a_script_says_the_same_as_the_options(folder):
+    options = ["--handle", "110,62:120,40,0.1", "--pin", "50,62", "--turn", "10,-5,0",
+               "--move", "3,4", "--scale", "0.9", "--seed", "3"]  # fmt: skip
+    script = {
+        "handle": [{"at": [110, 62], "to": [120, 40], "dz": 0.1}], "pin": [[50, 62]],
+        "turn": [10, -5, 0], "move": [3, 4], "scale": 0.9, "seed": 3, "mask": "mask.png",
+        "gaussians": 300, "inpaint": "telea",
+    }  # fmt: skip
+    Path("edit.json").write_text(json.dumps(script))
+    assert _edit(*options, out="a.png") == 0
+    assert cli.main(["edit", "photo.png", "-o", "b.png", "--script", "edit.json"]) == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+
+
+def test_the_command_line_wins_over_the_script(folder):
+    Path("edit.json").write_text('{"turn": [45, 0, 0]}')
+    _edit("--script", "edit.json", *TURN, out="a.png")
+    _edit(*TURN, out="b.png")
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+
+
+def test_files_of_a_script_lie_beside_it(folder):
+    inner = folder / "inner"
+    inner.mkdir()
+    (inner / "edit.json").write_text(
+        '{"photo": "../photo.png", "out": "out.png", "mask": "../mask.png", "gaussians": 300}'
+    )
+    assert cli.main(["edit", "--script", "inner/edit.json"]) == 0
+    assert (inner / "out.png").exists()
+
+
+def test_a_batch_edits_every_photo(folder):
+    Path("other.png").write_bytes(shapes.png(PIXELS[::-1].copy()))
+    common = {"mask": "mask.png", "gaussians": 300, "inpaint": "telea", "turn": [20, 0, 0]}
+    Path("batch.json").write_text(json.dumps([
+        {"photo": "photo.png", "out": "a.png"} | common,
+        {"photo": "other.png", "out": "b.png"} | common,
+    ]))  # fmt: skip
+    assert cli.main(["edit", "--script", "batch.json"]) == 0
+    assert _edit(*TURN, out="c.png") == 0
+    assert Path("a.png").read_bytes() == Path("c.png").read_bytes()
+    assert Path("b.png").exists()
+
+
+def test_a_batch_of_which_one_fails_writes_none(folder, capsys):
+    common = {"mask": "mask.png", "gaussians": 300}
+    Path("batch.json").write_text(json.dumps([
+        {"photo": "photo.png", "out": "a.png"} | common,
+        {"photo": "text.jpg", "out": "b.png"} | common,
+    ]))  # fmt: skip
+    assert cli.main(["edit", "--script", "batch.json"]) != 0
+    assert not Path("a.png").exists()
+
+
+# ---- sessions -------------------------------------------------------------------------------
+
+
+def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
+    pytest.importorskip("objectmorpher_core.session_file")
+    wishes = ["--handle", "110,62:120,40", *TURN, "--seed", "4"]
+    assert _edit(*wishes, "--session", "s.omorph", "--report", "a.json") == 0
+    assert cli.main(["replay", "s.omorph", "-o", "again.png", "--report", "b.json"]) == 0
+    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
+    a, b = (json.loads(Path(name).read_text()) for name in ("a.json", "b.json"))
+    assert a["handles"] == b["handles"]
+    assert a["pixels"] == b["pixels"]
+    capsys.readouterr()
+    assert cli.main(["info", "s.omorph", "--json"]) == 0
+    info = json.loads(capsys.readouterr().out)
+    assert info["photo"] == {"name": "photo.png", "width": 160, "height": 120, "bits": 8}
+    assert info["seed"] == 4
+    assert info["objects"][0]["handles"] == 1
+    assert info["objects"][0]["turn"] == [20, 0, 0]
+    assert cli.main(["info", "s.omorph"]) == 0
+    assert "photo.png" in capsys.readouterr().out
+
+
+def test_a_session_that_is_none_is_refused(folder, capsys):
+    pytest.importorskip("objectmorpher_core.session_file")
+    _expect_failure(["replay", "photo.png", "-o", "out.png"], capsys, "")
+    _expect_failure(["info", "text.jpg"], capsys, "")
+
+
+# ---- what fails, fails in one sentence and changes nothing ----------------------------------
+
+
+def _expect_failure(arguments: list[str], capsys, words: str) -> None:
+    """Non-zero, one line on stderr that holds `words`, and no file created or changed."""
+    before = _files()
+    capsys.readouterr()
+    try:
+        code = cli.main(arguments)
+    except SystemExit as caught:
+        code = caught.code
+    told = capsys.readouterr()
+    assert code not in (0, None)
+    assert told.out == ""
+    lines = told.err.strip().splitlines()
+    assert len(lines) == 1, told.err
+    assert lines[0].startswith("objectmorpher: ")
+    assert re.search(words, lines[0]), lines[0]
+    assert "Traceback" not in told.err
+    assert _files() == before
+
+
+EDIT = ["edit", "photo.png", "-o", "out.png", "--mask", "mask.png", *QUICK]
+FAILURES = {
+    "not an image": (["edit", "text.jpg", *EDIT[2:]], "not an image"),
+    "truncated JPEG": (["edit", "cut.jpg", *EDIT[2:]], "cannot be read"),
+    "empty file": (["edit", "nothing.jpg", *EDIT[2:]], "empty"),
+    "missing photo": (["edit", "none.png", *EDIT[2:]], "none.png does not exist"),
+    "photo is a folder": (["edit", ".", *EDIT[2:]], "folder"),
+    "no photo": (["edit", "-o", "out.png"], "which photo"),
+    "no output": (["edit", "photo.png", "--mask", "mask.png"], "where to"),
+    "no object": (["edit", "photo.png", "-o", "out.png"], "no object is chosen"),
+    "click outside": ([*EDIT[:4], "--click", "900,20", "--segment", "grabcut"], "outside|900"),
+    "box outside": ([*EDIT[:4], "--box", "500,500,600,600", "--segment", "grabcut"], ""),
+    "empty mask": ([*EDIT[:5], "empty.png"], "nothing is selected|empty"),
+    "full mask": ([*EDIT[:5], "full.png"], "covers the whole photo"),
+    "mask of other size": ([*EDIT[:5], "large.png"], "200.*150|150.*200"),
+    "missing mask": ([*EDIT[:5], "none.png"], "none.png does not exist"),
+    "mask that is no image": ([*EDIT[:5], "text.jpg"], "image"),
+    "handle beside the object": ([*EDIT, "--handle", "5,5:9,9"], "5,5 misses the object"),
+    "handle outside the photo": ([*EDIT, "--handle", "500,5:9,9"], "500,5 is outside the photo"),
+    "pin beside the object": ([*EDIT, "--pin", "5,5"], "5,5 misses the object"),
+    "two places for one point": (
+        [*EDIT, "--handle", "78,62:90,62", "--handle", "78,62:60,62"], "different places"),
+    "behind the camera": ([*EDIT, "--move", "0,0,-90"], "behind the camera"),
+    "scale of nothing": ([*EDIT, "--scale", "0"], "scale of 0"),
+    "missing folder": ([*EDIT[:2], "-o", "none/out.png", *EDIT[4:]], "none.*does not exist"),
+    "unknown ending": ([*EDIT[:2], "-o", "out.xyz", *EDIT[4:]], "ending"),
+    "no ending": ([*EDIT[:2], "-o", "out", *EDIT[4:]], "ending"),
+    "output is the input": ([*EDIT[:2], "-o", "photo.png", *EDIT[4:]], "is an input"),
+    "output is the mask": ([*EDIT[:2], "-o", "mask.png", *EDIT[4:]], "is an input"),
+    "output is the input, written otherwise": (
+        [*EDIT[:2], "-o", "../{folder}/photo.png", *EDIT[4:]], "is an input"),
+    "two outputs of one name": ([*EDIT, "--save-plate", "out.png"], "same name"),
+    "report of unknown ending": ([*EDIT, "--report", "r.txt"], "r.txt.*ending.*json"),
+    "report in a missing folder": ([*EDIT, "--report", "none/r.json"], "none"),
+    "unknown segmenter": (
+        [*EDIT[:4], "--click", "78,62", "--segment", "magic"], "'magic'"),
+    "unknown segmenter, not needed": ([*EDIT, "--segment", "magic"], "'magic'"),
+    "unknown lifter": ([*EDIT, "--lift", "magic"], "'magic'"),
+    "unknown inpainter": ([*EDIT, "--inpaint", "magic", *TURN], "'magic'"),
+    "unknown inpainter, not needed": ([*EDIT, "--inpaint", "magic"], "'magic'"),
+    "unknown refiner": ([*EDIT, "--refine", "magic"], "'magic'"),
+    "no import of splats": ([*EDIT, "--splats", "x.ply"], "--splats"),
+    "unknown deformation": ([*EDIT, "--deform", "jelly"], "jelly"),
+    "unknown links": ([*EDIT, "--links", "magic"], "magic"),
+    "unknown shadow": ([*EDIT, "--shadow", "dark"], "dark"),
+    "too few gaussians": ([*EDIT, "--gaussians", "5"], "gaussians: 5"),
+    "field of view": ([*EDIT, "--fov", "200"], "field of view of 200"),
+    "unknown option": ([*EDIT, "--magic"], "--magic"),
+    "not a point": ([*EDIT, "--click", "abc"], "'abc'"),
+    "not a handle": ([*EDIT, "--handle", "1,2"], "'1,2'"),
+    "three numbers for a point": ([*EDIT, "--pin", "1,2,3"], "'1,2,3'"),
+    "not finite": ([*EDIT, "--move", "nan,3"], "nan"),
+    "no command": ([], "command"),
+    "unknown command": (["paint"], "paint"),
+    "select without a choice": (["select", "photo.png", "-o", "s.png"], "no object is chosen"),
+    "select to its mask": (
+        ["select", "photo.png", "-o", "mask.png", "--mask", "mask.png"], "is an input"),
+    "select to a photo": (
+        ["select", "photo.png", "-o", "s.jpg", "--mask", "mask.png"], "ending"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FAILURES)
+def test_a_failure_is_one_sentence_and_leaves_no_file(folder, capsys, case):
+    arguments, words = FAILURES[case]
+    arguments = [word.replace("{folder}", folder.name) for word in arguments]
+    _expect_failure(arguments, capsys, words)
+
+
+SCRIPTS = {
+    "not JSON": ("{", "not JSON"),
+    "not an object": ("3", "not a JSON object"),
+    "unknown key": ('{"magic": 1}', "'magic' is not an option"),
+    "wrong value": ('{"turn": [1, 2]}', "turn"),
+    "empty batch": ("[]", "empty"),
+    "batch without photos": ('[{"turn": [1, 2, 3]}, {"turn": [1, 2, 3]}]', "batch"),
+    "batch of one name": (
+        '[{"photo": "photo.png", "out": "x.png", "mask": "mask.png", "gaussians": 300},'
+        ' {"photo": "photo.png", "out": "x.png", "mask": "mask.png", "gaussians": 300}]',
+        "same name"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SCRIPTS)
+def test_a_bad_script_is_refused_in_one_sentence(folder, capsys, case):
+    text, words = SCRIPTS[case]
+    Path("edit.json").write_text(text)
+    arguments = ["edit", "--script", "edit.json"]
+    _expect_failure(arguments if "batch" in case else [*EDIT, *arguments[1:]], capsys, words)
+
+
+def test_a_missing_script_is_refused(folder, capsys):
+    _expect_failure([*EDIT, "--script", "none.json"], capsys, "none.json does not exist")
+
+
+def test_a_script_that_is_no_text_is_refused(folder, capsys):
+    Path("edit.json").write_bytes(shapes.png(PIXELS))
+    _expect_failure([*EDIT, "--script", "edit.json"], capsys, "")
+
+
+def test_a_failure_leaves_an_existing_output_as_it_was(folder, capsys):
+    Path("out.png").write_bytes(b"precious")
+    for case in ("not an image", "handle beside the object", "empty mask", "unknown refiner"):
+        _expect_failure(FAILURES[case][0], capsys, FAILURES[case][1])
+    assert Path("out.png").read_bytes() == b"precious"
+
+
+def test_an_output_that_is_a_folder_is_refused(folder, capsys):
+    Path("out.png").mkdir()
+    _expect_failure(EDIT, capsys, "folder")
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere"
+)
+def test_an_unwritable_folder_is_refused(folder, capsys):
+    Path("locked").mkdir()
+    Path("locked").chmod(0o500)
+    try:
+        _expect_failure([*EDIT[:2], "-o", "locked/out.png", *EDIT[4:]], capsys, "cannot be written")
+    finally:
+        Path("locked").chmod(0o700)
+
+
+def test_where_one_output_cannot_be_written_none_is(folder, capsys):
+    Path("r.json").mkdir()
+    _expect_failure([*EDIT, "--report", "r.json"], capsys, "r.json is a folder")
+
+
+# ---- help -----------------------------------------------------------------------------------
+
+DESIGN_OPTIONS = {
+    "--click", "--not-click", "--box", "--subject", "--mask", "--segment", "--lift", "--inpaint",
+    "--refine", "--splats", "--pin", "--handle", "--move", "--turn", "--scale", "--deform",
+    "--links", "--faithful", "--script", "--session", "--save-mask", "--save-plate",
+    "--save-object", "--save-splats", "--report", "--seed", "--fov", "--shadow",
+}  # fmt: skip
+
+
+def _help(*command: str, capsys) -> str:
+    with pytest.raises(SystemExit) as caught:
+        cli.main([*command, "--help"])
+    assert caught.value.code == 0
+    return capsys.readouterr().out
+
+
+def test_the_help_of_edit_lists_every_option_of_the_design(capsys):
+    told = _help("edit", capsys=capsys)
+    assert set(re.findall(r"--[a-z][a-z-]*", told)) >= DESIGN_OPTIONS
+
+
+def test_every_option_of_a_script_is_one_of_the_command_line(capsys):
+    told = set(re.findall(r"--[a-z][a-z-]*", _help("edit", capsys=capsys)))
+    names = {"--" + name.replace("_", "-") for name in EditScript.__dataclass_fields__}
+    assert names <= told
+
+
+def test_the_help_lists_the_subcommands(capsys):
+    told = _help(capsys=capsys)
+    assert all(command in told for command in cli.COMMANDS)
+
+
+def test_the_version_is_told(capsys):
+    from app import __version__
+
+    with pytest.raises(SystemExit):
+        cli.main(["--version"])
+    assert __version__ in capsys.readouterr().out
+
+
+def test_the_parser_is_built_without_heavy_imports():
+    """`--help` answers at once: no numpy, numba, OpenCV or scipy is imported for it."""
+    code = (
+        "import sys; from app.cli import build_parser; build_parser();"
+        "print([m for m in ('numpy', 'numba', 'cv2', 'scipy', 'PIL') if m in sys.modules])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert told.stdout.strip() == "[]"
+
+
+def test_the_program_runs_as_a_module(folder):
+    told = subprocess.run(
+        [sys.executable, "-m", "app", *EDIT, *TURN], cwd=folder, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert (told.returncode, told.stderr) == (0, "")
+    assert Path("out.png").exists()
+
+
+def test_a_failing_program_exits_with_a_code_and_a_sentence(folder):
+    told = subprocess.run(
+        [sys.executable, "-m", "app", "edit", "none.png", *EDIT[2:]], cwd=folder,
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert told.returncode == cli.FAILED
+    assert told.stderr == "objectmorpher: none.png does not exist\n"
