@@ -208,7 +208,8 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
         read = parse_scripts(options.script.read_text(encoding="utf-8"))
         folder = options.script.parent
         items = [_beside(item, folder) for item in read]
-        items = [BatchItem(i.script.merged(said), i.photo, i.out) for i in items]
+        names = _said(options)
+        items = [BatchItem(i.script.merged(said, names), i.photo, i.out) for i in items]
     if len(items) > 1:
         single = [name for name in EXTRAS if getattr(options, name)]
         if options.photo or options.out or single:
@@ -235,12 +236,16 @@ def _beside(item: BatchItem, folder: Path) -> BatchItem:
 
 
 def _script(options: argparse.Namespace) -> EditScript:
-    said = {
+    return script_from(_said(options))
+
+
+def _said(options: argparse.Namespace) -> dict[str, Any]:
+    """The script's options that stand on the command line."""
+    return {
         name: getattr(options, name)
         for name in SCRIPT_OPTIONS
         if getattr(options, name, None) is not None
     }
-    return script_from(said)
 
 
 def _check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> None:

@@ -221,7 +221,7 @@ class Jobs:
         else:
             level = logging.DEBUG if job.is_quiet else logging.INFO
             log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
-            self._finish(job, lambda: job.done(value))
+            self._finish(job, lambda: _accept(job, value))
 
     def _finish(self, job: Job, tell: Callable[[], None]) -> None:
         self.current = None
@@ -229,6 +229,15 @@ class Jobs:
         if not is_replaced:  # a replaced request is not the user's question any more
             tell()
         self._send_next()
+
+
+def _accept(job: Job, value: Any) -> None:
+    """Hands the answer over; one that cannot be used is a failure, not the window's end."""
+    try:
+        job.done(value)
+    except Exception as error:
+        log.exception("The answer of %s cannot be used", job.title)
+        job.failed(JobError(type(error).__name__, str(error), traceback.format_exc()))
 
 
 def _work(connection: Connection, stop: Event, warm: tuple[str, ...]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -55,15 +55,9 @@ class EditScript:
     fov: float | None = None
     seed: int = 0
 
-    def merged(self, other: EditScript) -> EditScript:
-        """This script with everything that `other` says differently from the defaults."""
-        default = EditScript()
-        said = {
-            f.name: getattr(other, f.name)
-            for f in fields(other)
-            if getattr(other, f.name) != getattr(default, f.name)
-        }
-        return replace(self, **said)
+    def merged(self, other: EditScript, said: Iterable[str]) -> EditScript:
+        """This script with the fields `said` taken from `other`, be they defaults or not."""
+        return replace(self, **{name: getattr(other, name) for name in said})
 
     def to_json(self) -> dict[str, Any]:
         """The script as `--script` reads it; options at their default are left out."""

@@ -78,9 +78,7 @@ def horseshoe(count: int = 240, seed: int = 0) -> F64:
     angle = rng.uniform(0.15, 2 * np.pi - 0.15, count)
     around = rng.uniform(0, 2 * np.pi, count)
     radius = 0.4 + 0.05 * np.cos(around)
-    return np.column_stack(
-        [radius * np.cos(angle), radius * np.sin(angle), 0.05 * np.sin(around)]
-    )
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.05 * np.sin(around)])
 
 
 def even(points: np.ndarray, count: int) -> F64:
@@ -123,9 +121,7 @@ def lifted_cloud(
     world_from_object = np.eye(4)
     world_from_object[2, 3] = depth
     world = gaussians.means + world_from_object[:3, 3]
-    texture = PhotoTexture(
-        camera().project(world), np.ones(len(points)), np.ones(len(points))
-    )
+    texture = PhotoTexture(camera().project(world), np.ones(len(points)), np.ones(len(points)))
     return LiftedObject(gaussians, texture, control_points, world_from_object, 0.03, "made")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import traceback
 from dataclasses import replace
 
 from imgui_bundle import imgui
@@ -22,6 +24,8 @@ TOOLS: dict[ToolName, Tool] = {
     ToolName.POSE: PoseTool(),
     ToolName.PLACE: PlaceTool(),
 }
+log = logging.getLogger(__name__)
+
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
 FAR = 10  # px that an arrow with Shift moves
 
@@ -52,6 +56,16 @@ class Input:
             space=imgui.is_key_down(imgui.Key.space),
             wheel=io.mouse_wheel,
         )
+        try:
+            self._point(editor, rect, pointer)
+        except Exception as error:  # a stroke that fails is taken back, and the user is told
+            log.exception("The stroke failed")
+            editor.hand.abort(editor)
+            editor.complain(str(error) or type(error).__name__, traceback.format_exc())
+
+    def _point(self, editor: Editor, rect: Rect, pointer: Pointer) -> None:
+        """Hovering, beginning, going on: whichever it is."""
+        io, mouse = imgui.get_io(), imgui.get_io().mouse_pos
         is_over = rect.contains(mouse.x, mouse.y) and not io.want_capture_mouse
         if editor.hand.is_busy:
             self._go_on(editor, pointer)

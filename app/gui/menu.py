@@ -28,7 +28,7 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
     imgui.begin_main_menu_bar()
     imgui.pop_style_var(2)
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(20, 10))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(12, 10))
     for title, names in MENUS.items():
         if imgui.begin_menu(title):
             _draw_items(editor, names)

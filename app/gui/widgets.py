@@ -9,7 +9,7 @@ from enum import Enum
 
 from imgui_bundle import ImVec2, imgui
 
-from .theme import FIELD, PRIMARY, SMALL_SIZE, Icon, theme
+from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
 STEPPER = 24.0  # points, width of a field's - and + buttons
@@ -43,12 +43,13 @@ def tooltip(text: str) -> None:
     flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
     if imgui.is_item_hovered(flags):
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
         imgui.push_text_wrap_pos(theme.pt(260))
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
-        imgui.pop_style_var()
+        imgui.pop_style_var(2)
 
 
 def button(

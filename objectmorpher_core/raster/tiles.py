@@ -7,6 +7,7 @@ touch it, front to back, and walks through them once with its pixels' layer sums
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -70,7 +71,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
     )  # fmt: skip
     near = RULES.near * splats.gap
     out = np.zeros((len(splats), SPAN))
-    inputs = (
+    inputs: tuple[Any, ...] = (
         *(frozen(a) for a in fields), _intrinsics(camera), _intrinsics(photo_camera),
         near, RULES, out,
     )  # fmt: skip

@@ -180,9 +180,9 @@ def test_a_script_says_the_same_as_the_options(folder):
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
 
 
-def test_the_command_line_wins_over_the_script(folder):
-    Path("edit.json").write_text('{"turn": [45, 0, 0]}')
-    _edit("--script", "edit.json", *TURN, out="a.png")
+def test_the_command_line_wins_over_the_script_even_with_a_default(folder):
+    Path("edit.json").write_text('{"turn": [45, 0, 0], "seed": 9}')
+    _edit("--script", "edit.json", *TURN, "--seed", "0", out="a.png")
     _edit(*TURN, out="b.png")
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
 

@@ -102,6 +102,17 @@ def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     assert "job_functions" in log.errors[0].trace
 
 
+def test_an_answer_that_cannot_be_used_is_a_failure(worker: Jobs) -> None:
+    log = Log()
+
+    def refuse(_: object) -> None:
+        raise ValueError("nothing is selected")
+
+    worker.start("Test", job_functions.double, np.ones(1), done=refuse, failed=log.errors.append)
+    run_until(worker, lambda: worker.is_idle)
+    assert [e.sentence for e in log.errors] == ["nothing is selected"]
+
+
 def test_a_crash_is_a_failure_and_the_next_job_runs() -> None:
     jobs = Jobs()
     log = Log()

@@ -76,7 +76,9 @@ def test_the_plate_stays_as_long_as_the_masks_do(document):
 
 
 def test_each_stage_has_one_backend(document):
-    twice = document.with_backend("lift", "a").with_backend("inpaint", "b").with_backend("lift", "c")
+    twice = (
+        document.with_backend("lift", "a").with_backend("inpaint", "b").with_backend("lift", "c")
+    )
     assert dict(twice.backends) == {"inpaint": "b", "lift": "c"}
 
 

@@ -53,10 +53,10 @@ def test_a_handle_without_depth_keeps_its_depth():
     assert script.handle == (HandleMove((1.0, 2.0), (3.0, 4.0), 0.0),)
 
 
-def test_what_is_said_later_wins():
-    file, line = script_from({"move": [1, 2], "scale": 2, "seed": 3}), EditScript(scale=0.5)
-    merged = file.merged(line)
-    assert (merged.move, merged.scale, merged.seed) == ((1.0, 2.0, 0.0), 0.5, 3)
+def test_what_is_said_later_wins_even_where_it_is_the_default():
+    file = script_from({"move": [1, 2], "scale": 2, "seed": 3})
+    merged = file.merged(EditScript(scale=0.5), ("scale", "seed"))
+    assert (merged.move, merged.scale, merged.seed) == ((1.0, 2.0, 0.0), 0.5, 0)
 
 
 def test_a_batch_names_photos_and_outputs():

@@ -116,9 +116,11 @@ def _two_node_binding() -> tuple[Binding, Graph, np.ndarray]:
     control = np.array([[0.0, 0, 0], [1.0, 0, 0]])
     weights = 1 - np.eye(2)
     graph = Graph(weights, weights, np.zeros(2, np.int32), 1.0)
-    return Binding(np.array([[0, 1]], np.int32), np.full((1, 2), 0.5), np.zeros((1, 2, 3))), (
-        graph
-    ), control
+    return (
+        Binding(np.array([[0, 1]], np.int32), np.full((1, 2), 0.5), np.zeros((1, 2, 3))),
+        (graph),
+        control,
+    )
 
 
 def test_quaternions_of_opposite_sign_blend_as_the_same_rotation():

@@ -38,9 +38,7 @@ def test_a_long_strip_is_a_parabola():
 def test_it_solves_its_equation_away_from_the_edge():
     inside = _disc(15.0)
     u = solve_membrane(inside, CLOSED)
-    laplacian = (
-        u[2:, 1:-1] + u[:-2, 1:-1] + u[1:-1, 2:] + u[1:-1, :-2] - 4 * u[1:-1, 1:-1]
-    )
+    laplacian = u[2:, 1:-1] + u[:-2, 1:-1] + u[1:-1, 2:] + u[1:-1, :-2] - 4 * u[1:-1, 1:-1]
     deep = _disc(12.0)
     deep = np.pad(deep, (len(u) - len(deep)) // 2)[1:-1, 1:-1]
     assert np.abs(laplacian[deep] + 1).max() < 1e-9

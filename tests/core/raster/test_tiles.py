@@ -168,12 +168,8 @@ def test_the_same_picture_twice_is_bit_equal():
 def test_a_window_is_a_crop_of_the_whole_picture():
     scene = shapes.scene("star", 800)
     splats = scene.puppet.posed(None, Placement(turn=(30.0, 10.0, 0.0)))
-    whole = scene.puppet.draw(
-        None, Placement(turn=(30.0, 10.0, 0.0)), scene.texture, scene.camera
-    )
-    crop = tiles.render(
-        splats, scene.texture, scene.camera.windowed(37, 21, 90, 70), scene.camera
-    )
+    whole = scene.puppet.draw(None, Placement(turn=(30.0, 10.0, 0.0)), scene.texture, scene.camera)
+    crop = tiles.render(splats, scene.texture, scene.camera.windowed(37, 21, 90, 70), scene.camera)
     rounding = 1e-4  # sums are the same, but for the order of their roundings
     assert np.abs(whole.color[21:91, 37:127] - crop.color).max() < rounding
     assert np.abs(whole.alpha[21:91, 37:127] - crop.alpha).max() < rounding
