@@ -27,7 +27,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not has_display():
         return _edit_headless(options.file)
     from .gui.window import run_window
+    from .logs import start_log
+    from .settings import settings_path
 
+    start_log(settings_path().parent)
     return run_window(cli.window_options(options))
 
 

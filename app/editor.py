@@ -132,6 +132,8 @@ class Editor:
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split = None
         self.view.fit(document.photo.size)
+        if not self.is_lifted:
+            self.tasks.read_photo()
 
     def close_document(self) -> None:
         self.hand.abort(self)

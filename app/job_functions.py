@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,10 @@ from objectmorpher_core.document import (
 from objectmorpher_core.progress import Progress, part
 
 from .layers import Request, render
+
+if TYPE_CHECKING:
+    from objectmorpher_core.pipeline import Reading
+    from objectmorpher_core.segment import Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -45,11 +50,44 @@ class Cut:
     mask: Mask
 
 
+class Reader:
+    """The worker's memory: its segmenter, and what it has made of the last photo."""
+
+    def __init__(self) -> None:
+        self._backend = ""
+        self._segmenter: Segmenter | None = None
+        self._reading: Reading | None = None
+
+    def read(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
+        """The photo as the segmenter sees it; at once where it is the last one."""
+        from objectmorpher_core import segment
+        from objectmorpher_core.pipeline import read_photo
+
+        if self._segmenter is None or backend != self._backend:
+            self._backend, self._segmenter = backend, segment.load(backend)
+            self._reading = None
+        if self._reading is None or not _is_same(self._reading.pixels, pixels):
+            self._reading = None  # not two photos at a time
+            self._reading = read_photo(pixels, self._segmenter, progress)
+        return self._reading
+
+
+_reader = Reader()
+
+
+def _is_same(a: Pixels, b: Pixels) -> bool:
+    return a is b or (a.dtype == b.dtype and np.array_equal(a, b))
+
+
+def read_photo(pixels: Pixels, choice: Choice, progress: Progress) -> None:
+    """Prepares for clicks on a photo that was just opened."""
+    _reader.read(pixels, choice.backend, progress)
+
+
 def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
     """The mask of what the prompt means, and the backend that made it."""
-    from objectmorpher_core.pipeline import segment_photo
-
-    return segment_photo(pixels, prompt, choice.backend, progress=progress, seed=choice.seed)
+    reading = _reader.read(pixels, choice.backend, part(progress, 0.0, 0.6))
+    return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
 
 def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matte, LiftedObject]:

@@ -34,7 +34,7 @@ class Settings:
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
     is_motion_reduced: bool = False
     quality: int = 95  # of JPEG and WebP exports
-    gaussians: int = 12000  # of a lifted object
+    gaussians: int = 16000  # of a lifted object
     recent: tuple[str, ...] = ()  # paths, newest first
     backends: Backends = field(default_factory=Backends)
 

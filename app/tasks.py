@@ -25,7 +25,7 @@ from .view import ToolName
 if TYPE_CHECKING:
     from .editor import Editor
 
-LIFT, PLATE, WRITE = "lift", "plate", "write"
+READ, LIFT, PLATE, WRITE = "read", "lift", "plate", "write"
 
 
 class Tasks:
@@ -40,6 +40,17 @@ class Tasks:
     def forget(self) -> None:
         """Another document is opened."""
         self.prompt = self._plate = self._no_plate = None
+
+    def read_photo(self) -> None:
+        """Lets the worker look at a photo that was opened, before the first click."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        editor.jobs.start(
+            "Reading the photo", job_functions.read_photo, document.photo.pixels,
+            Choice(editor.settings.backends.segment, document.seed),
+            done=lambda _: None, failed=lambda error: None, kind=READ,
+        )  # fmt: skip
 
     def segment(self, prompt: Prompt, label: str) -> None:
         """Asks for the mask of `prompt`; what was said before it is in it."""

@@ -1,6 +1,6 @@
 """The main job without a window: a photo and what to do with it -> pictures and a report.
 
-`open_photo`, `segment_photo`, `lift_mask`, `make_plate` are the costly stages, with plain
+`open_photo`, `read_photo`, `lift_mask`, `make_plate` are the costly stages, with plain
 arguments and answers so that a worker process can run them; `run_script` strings them together
 as the command line does.
 """
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import compose, edits, lift, segment
-from .arrays import Mask, Pixels
+from .arrays import RGB, Mask, Pixels
 from .camera import Camera
 from .compose.composite import Composite, composite, object_texture, plate_hole
 from .document import (
@@ -33,6 +33,7 @@ from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
 from .script import EditScript, ScriptError
+from .segment import Segmenter
 from .segment.matte import band_width, build_matte
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
@@ -60,19 +61,27 @@ def open_photo(data: bytes, name: str, fov: float | None = None, seed: int = 0) 
     return Document(Photo(picture, camera, data, name), seed=seed)
 
 
-def segment_photo(
-    pixels: Pixels,
-    prompt: Prompt,
-    backend: str = "auto",
-    progress: Progress = silent,
-    seed: int = 0,
-) -> tuple[Mask, str]:
-    """The mask (H, W) that `prompt` means, and the backend that found it."""  # fmt: skip
-    segmenter = segment.load(backend)
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a segmenter has made of a photo: costly once, then every click is cheap."""
+
+    pixels: Pixels  # the photo's
+    segmenter: Segmenter
+    rgb: RGB
+    embedding: Any  # the segmenter's own
+
+    def segment(
+        self, prompt: Prompt, progress: Progress = silent, seed: int = 0
+    ) -> tuple[Mask, str]:
+        """The mask (H, W) that `prompt` means, and the backend that found it."""
+        mask = self.segmenter.segment(self.rgb, prompt, self.embedding, progress, seed)
+        return mask, self.segmenter.name
+
+
+def read_photo(pixels: Pixels, segmenter: Segmenter, progress: Progress = silent) -> Reading:
+    """The photo as a segmenter sees it. Raises SelectionError where it cannot run."""
     rgb = to_u8(pixels)
-    embedding = segmenter.encode(rgb, part(progress, 0.0, 0.6))
-    mask = segmenter.segment(rgb, prompt, embedding, part(progress, 0.6, 1.0), seed)
-    return mask, segmenter.name
+    return Reading(pixels, segmenter, rgb, segmenter.encode(rgb, progress))
 
 
 def lift_mask(
@@ -171,7 +180,9 @@ def select(
             found, backend = read_mask(mask, document.photo.size), "mask"
         else:
             pixels = document.photo.pixels
-            found, backend = segment_photo(pixels, prompt, script.segment, progress, script.seed)
+            segmenter = segment.load(script.segment)
+            reading = read_photo(pixels, segmenter, part(progress, 0.0, 0.6))
+            found, backend = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
     document = edits.set_mask(edits.add_object(document), 0, found, prompt)
     return document.with_backend("segment", backend)
 

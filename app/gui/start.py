@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import moderngl
+import numpy as np
 from imgui_bundle import ImVec2, imgui
 from PIL import Image
 
 from ..commands import run
 from ..editor import Editor
+from ..render.renderer import Renderer
+from ..render.textures import PictureTexture
 from ..resources import resource
 from .layout import Rect
 from .panes import FLAGS
@@ -26,9 +28,9 @@ RECENT = 4  # files shown
 class StartScreen:
     """Owns the samples' thumbnails."""
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
-        self._thumbs: dict[str, moderngl.Texture] = {}
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer = renderer
+        self._thumbs: dict[str, PictureTexture] = {}
 
     def draw(self, editor: Editor, rect: Rect) -> None:
         imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
@@ -109,7 +111,7 @@ class StartScreen:
         imgui.text_colored(theme.vec("text" if is_hovered else "secondary"), title)
         imgui.end_group()
 
-    def _thumb(self, name: str) -> moderngl.Texture:
+    def _thumb(self, name: str) -> PictureTexture:
         """The sample's picture, cut to the thumbnail's shape."""
         if name not in self._thumbs:
             with Image.open(str(resource(f"assets/samples/{name}.jpg"))) as file:
@@ -121,10 +123,7 @@ class StartScreen:
             box = (int(left), int(top), int(left + across), int(top + down))
             size = (int(THUMB[0] * 2), int(THUMB[1] * 2))
             picture = picture.crop(box).resize(size, Image.Resampling.LANCZOS)
-            texture = self._context.texture(size, 3, picture.tobytes(), alignment=1)
-            texture.build_mipmaps()
-            texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
-            self._thumbs[name] = texture
+            self._thumbs[name] = self._renderer.picture(np.asarray(picture))
         return self._thumbs[name]
 
     def _draw_recent(self, editor: Editor, recent: list[Path]) -> None:

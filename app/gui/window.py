@@ -14,7 +14,6 @@ from imgui_bundle import imgui  # before glfw: both must use one libglfw
 
 # isort: split
 import glfw
-import moderngl
 
 from ..derived import warm_up
 from ..editor import Editor
@@ -88,7 +87,7 @@ class Window:
         self._handle = _open_window(options)
         glfw.make_context_current(self._handle)
         glfw.swap_interval(0 if options.frames is not None else 1)
-        self._context = moderngl.create_context(require=330)
+        self._renderer = Renderer(options.renderer)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
         self.editor.filing = Filing(self.editor, options.fov, options.seed)
@@ -96,8 +95,7 @@ class Window:
         self._look: tuple[str, float] = ("", 0.0)
         self._input = Input()
         self._start_imgui()
-        self._renderer = Renderer(self._context, options.renderer)
-        self._start = StartScreen(self._context)
+        self._start = StartScreen(self._renderer)
         self._dialogs = Dialogs()
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
@@ -194,17 +192,13 @@ class Window:
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
-        screen = self._context.screen
-        screen.use()
-        self._context.viewport = (0, 0, *size)
-        screen.clear(*theme.rgb("surround"), 1.0)
+        self._renderer.clear(theme.rgb("surround"), size)
         scene = build_scene(self.editor, self._renderer.kind)
         if scene is not None:
             view = self.editor.view
             left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
             viewport = (left, size[1] - bottom, view.width, view.height)
             self._renderer.draw(scene, view, viewport)
-        self._context.viewport = (0, 0, *size)
 
     def _resize_canvas(self, canvas: Rect, ratio: float) -> None:
         size = (max(round(canvas.width * ratio), 1), max(round(canvas.height * ratio), 1))
@@ -291,9 +285,7 @@ class Window:
         from PIL import Image
 
         size = glfw.get_framebuffer_size(self._handle)
-        data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
-        picture = Image.frombytes("RGB", size, data).transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-        picture.save(path)
+        Image.fromarray(self._renderer.read(size)).save(path)
 
     def close(self) -> None:
         self.editor.shut_down()

@@ -6,12 +6,14 @@ import logging
 from typing import TYPE_CHECKING
 
 import moderngl
+import numpy as np
 
 from ..view import View
 from .blend_texture import BlendTexture
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Scene
+from .textures import PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPass
@@ -22,10 +24,11 @@ SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")
 
 
 class Renderer:
-    """Draws scenes into the canvas's part of the window."""
+    """Draws scenes into the canvas's part of the window whose GL context is current."""
 
-    def __init__(self, context: moderngl.Context, wanted: str) -> None:
+    def __init__(self, wanted: str) -> None:
         """`wanted`: "gl", "tiles" or "auto" (tiles where OpenGL is emulated)."""
+        context = moderngl.create_context(require=330)
         self.gl_name = str(context.info["GL_RENDERER"])
         is_software = any(word in self.gl_name.lower() for word in SOFTWARE)
         self.kind = ("tiles" if is_software else "gl") if wanted == "auto" else wanted
@@ -35,6 +38,11 @@ class Renderer:
         self._layer_pass = LayerPass(context)
         self._splat_pass: SplatPass | None = None
         log.info("OpenGL by %s; objects drawn by %s", self.gl_name, self.kind)
+
+    def clear(self, color: tuple[float, float, float], size: tuple[int, int]) -> None:
+        """Begins a frame of `size` px: the whole window in one colour."""
+        self._begin((0, 0, *size))
+        self._context.screen.clear(*color, 1.0)
 
     def draw(self, scene: Scene, view: View, viewport: tuple[int, int, int, int]) -> None:
         """`viewport`: left, bottom, width, height of the canvas, framebuffer px."""
@@ -50,6 +58,17 @@ class Renderer:
             self._blend.use(scene)
             for texture in (behind, front):
                 self._layer_pass.draw_texture(texture, scene, view)
+
+    def picture(self, pixels: np.ndarray) -> PictureTexture:
+        """A picture for the interface, on the GPU; see `PictureTexture.upload`."""
+        picture = PictureTexture(self._context)
+        picture.upload(pixels)
+        return picture
+
+    def read(self, size: tuple[int, int]) -> np.ndarray:
+        """The window's pixels, (h, w, 3) u8, upright."""
+        data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
 
     def _begin(self, viewport: tuple[int, int, int, int]) -> None:
         self._context.screen.use()

@@ -35,6 +35,12 @@ class PictureTexture:
         if self._has_mipmaps:
             self.texture.build_mipmaps()
 
+    @property
+    def glo(self) -> int:
+        """OpenGL's number of the texture, drawn smooth below and above its size."""
+        self.texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+        return self.texture.glo
+
     def use(self, unit: int, zoom: float) -> None:
         """Binds it: single pixels at high magnification, smooth below."""
         above = moderngl.NEAREST if zoom >= SHARP_FROM else moderngl.LINEAR

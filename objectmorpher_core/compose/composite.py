@@ -208,9 +208,7 @@ class _Blend:
         footprint[y0:y1, x0:x1] = reach <= margin + 1
         outside = int(((pixels != photo).any(-1) & ~footprint).sum())
         shares = self._shares(changed, blend)
-        return Composite(
-            pixels, footprint, int(changed.sum()), outside, shares, tuple(self.layers)
-        )
+        return Composite(pixels, footprint, int(changed.sum()), outside, shares, tuple(self.layers))
 
     def _shares(self, changed: Mask, blend: F32) -> Shares:
         count = int(changed.sum())

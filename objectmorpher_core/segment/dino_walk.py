@@ -60,7 +60,7 @@ class DinoWalk:
         reason = self.missing()
         if reason is not None:
             raise SelectionError(reason)
-        progress(0.0, "reading the photo")
+        progress(0.0, "recognising its parts")
         tokens = self._tokens(rgb)
         progress(0.75, "looking for the subject")
         salience = self._subject.salience(rgb) if self._subject.missing() is None else None

@@ -40,8 +40,7 @@ def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
     touches = (rows[0] == 0, rows[-1] == height - 1, columns[0] == 0, columns[-1] == width - 1)
     limits = (height - 1, height - 1, width - 1, width - 1)
     top, bottom, left, right = (
-        int(min(reach, limit)) if touch else 0
-        for touch, limit in zip(touches, limits, strict=True)
+        int(min(reach, limit)) if touch else 0 for touch, limit in zip(touches, limits, strict=True)
     )
     return top, bottom, left, right
 

@@ -38,7 +38,8 @@ def test_arrays_of_the_document_cannot_be_written(document):
         document.photo.pixels, item.mask, item.matte.alpha, item.matte.foreground,
         item.lifted.control_points, item.lifted.world_from_object, item.lifted.texture.u0,
         document.plate.pixels, document.plate.hole,
-        Pose(np.zeros((3, 3)), np.zeros((3, 3, 3))).points, Handle(0, np.zeros(3), np.ones(3)).point,
+        Pose(np.zeros((3, 3)), np.zeros((3, 3, 3))).points,
+        Handle(0, np.zeros(3), np.ones(3)).point,
     ]  # fmt: skip
     assert not any(array.flags.writeable for array in arrays)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import pipeline
+from objectmorpher_core import pipeline, segment
 from objectmorpher_core.document import Placement
 from objectmorpher_core.edits import EditError
 from objectmorpher_core.image import ImageError, Picture, encode_picture, read_picture
@@ -14,9 +14,9 @@ from objectmorpher_core.pipeline import (
     export,
     make_plate,
     open_photo,
+    read_photo,
     replay,
     run_script,
-    segment_photo,
     select,
 )
 from objectmorpher_core.progress import Cancelled
@@ -203,13 +203,13 @@ def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
 
 @pytest.mark.parametrize("scale", [0.5, 1.5])
 def test_scale_scales_the_objects_picture(scale):
-    x0, y0, picture = _run(scale=scale).composite.layers[0]
+    _, _, picture = _run(scale=scale).composite.layers[0]
     width = np.flatnonzero((picture.alpha > 0.5).any(0))
     assert width[-1] - width[0] + 1 == pytest.approx(90 * scale, rel=0.06)  # perspective
 
 
 def test_a_deeper_object_is_smaller():
-    x0, y0, picture = _run(move=[0, 0, 1.0]).composite.layers[0]
+    _, _, picture = _run(move=[0, 0, 1.0]).composite.layers[0]
     assert 0.2 * MASK.sum() < (picture.alpha > 0.5).sum() < 0.7 * MASK.sum()
 
 
@@ -276,8 +276,8 @@ def test_a_target_outside_the_photo_is_allowed():
 
 
 def test_a_small_photo_is_segmented_by_a_click():
-    mask, backend = segment_photo(PIXELS, pipeline.prompt_of(EditScript(click=((78, 62),))),
-                                  "grabcut")  # fmt: skip
+    reading = read_photo(PIXELS, segment.load("grabcut"))
+    mask, backend = reading.segment(pipeline.prompt_of(EditScript(click=((78, 62),))))
     assert backend == "grabcut"
     overlap = (mask & MASK).sum() / (mask | MASK).sum()
     assert overlap > 0.8
