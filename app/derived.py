@@ -125,17 +125,17 @@ class Derived:
         return self._blend[2]
 
     def solved(
-        self, document: Document, k: int, start: Pose | None, iterations: int | None = None
+        self, document: Document, k: int, start: Pose | None, seconds: float = np.inf
     ) -> Document:
         """The document with object `k` in the pose that its handles ask for.
 
-        `start` and few `iterations` give a drag's frame; without, the solve is complete.
+        `start` and few `seconds` give a drag's frame; without, the solve is complete.
         """
         thing = document.objects[k]
         if not thing.handles:
             return edits.set_pose(document, k, None)
         deformer = self.shape(document.photo, thing).puppet.deformer
-        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, iterations)
+        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, seconds)
         return edits.set_pose(document, k, solution.pose)
 
     def anchors(self, document: Document, k: int) -> F64:

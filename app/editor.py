@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 SELECT = "segment"  # kinds of jobs
 NUDGE_LABEL = "Nudge point"
-DRAG_ITERATIONS = 4  # of the solver in a frame of a drag; the rest when it ends
+AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
+DRAG_SECONDS = 0.012  # of a drag's frame, for the solver; the rest when the drag ends
 
 
 class Editor:
@@ -52,6 +53,7 @@ class Editor:
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
+        self._restless: Document | None = None  # the preview, as long as its pose is not at rest
         self.path: Path | None = None  # the session's file
         self.source: Path | None = None  # the photo's file
         self.current = 0  # index of the object that the tools change
@@ -296,7 +298,7 @@ class Editor:
                 return h
         target = self.derived.unplaced(self.document, k, seen.world)
         changed = edits.add_handle(self.document, k, seen.rest, target, is_pin)
-        self.preview = self.derived.solved(changed, k, start=item.pose)
+        self.preview = self.derived.solved(changed, k, item.pose, DRAG_SECONDS)
         self.handle = len(item.handles)
         return self.handle
 
@@ -311,7 +313,21 @@ class Editor:
             return
         k, start = self.current, self.object.pose
         changed = edits.move_handle(self.document, k, handle, target)
-        self.preview = self.derived.solved(changed, k, start, DRAG_ITERATIONS)
+        self.preview = self._restless = self.derived.solved(changed, k, start, DRAG_SECONDS)
+
+    def _relax(self) -> bool:
+        """Goes on with a drag's solve while the pointer holds still. Whether anything moved."""
+        document, self._restless = self._restless, None
+        if document is None or document is not self.preview:
+            return False
+        before = document.objects[self.current].pose
+        after = self.derived.solved(document, self.current, before, DRAG_SECONDS)
+        pose, lifted = after.objects[self.current].pose, after.objects[self.current].lifted
+        assert before is not None and pose is not None and lifted is not None
+        self.preview = after
+        if np.abs(pose.points - before.points).max() > AT_REST * lifted.diameter:
+            self._restless = after
+        return True
 
     def settle(self) -> None:
         """Lets the preview's pose come to rest: at the end of a drag."""
@@ -389,6 +405,7 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
+        is_changed = self._relax() or is_changed
         return self.tasks.ensure_plate() or is_changed
 
     def set_theme(self, theme: str) -> None:

@@ -207,7 +207,7 @@ def _check(document: Document) -> None:
             _same("mask", item.mask.shape, (height, width))
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
-            _inside("matte", item.matte.box, (width, height))
+            _near("matte", item.matte.box, (width, height))
         _check_lifted(item)
     if (plate := document.plate) is not None:
         _same("plate", plate.pixels.shape, (*plate.hole.shape, 3))
@@ -245,3 +245,10 @@ def _same(what: str, found: tuple, expected: tuple) -> None:
 def _inside(what: str, box: tuple[int, int, int, int], size: tuple[int, int]) -> None:
     if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1]:
         raise ValueError(f"the {what}'s box {box} is not inside the photo")
+
+
+def _near(what: str, box: tuple[int, int, int, int], size: tuple[int, int]) -> None:
+    """An object that the frame cuts goes on beyond it, by as much again at most."""
+    width, height = size
+    if box[0] < -width or box[1] < -height or box[2] > 2 * width or box[3] > 2 * height:
+        raise ValueError(f"the {what}'s box {box} is not near the photo")

@@ -6,13 +6,15 @@ has some eighty neighbours, and M = 512.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, pinvh
 
-from ..arrays import F64, frozen
+from ..arrays import F64, I32, frozen
 
 ANDERSON_WINDOW = 5  # previous steps that the acceleration combines
 ROTATION_STEPS = 40  # at most, per rotation fit; two or three from a warm start
@@ -34,8 +36,37 @@ class Constraints:
 
     def targets(self, rotations: F64) -> F64:
         """(H, 3) right-hand sides for rotations (M, 3, 3)."""
-        turned = np.einsum("hm,mab,hmb->ha", self.rows, rotations, self.offsets, optimize=True)
-        return self.fixed - turned
+        if self._turning.size == 0:
+            return self.fixed
+        targets = self.fixed.copy()
+        turned = rotations[self._nodes] @ self._arms[..., None]  # (T, N, 3, 1)
+        targets[self._turning] -= turned[..., 0].sum(1)
+        return targets
+
+    @cached_property
+    def _turning(self) -> I32:
+        """(T,) the rows whose targets depend on rotations."""
+        return np.flatnonzero((self.offsets != 0).any((1, 2))).astype(np.int32)
+
+    @cached_property
+    def _nodes(self) -> I32:
+        """(T, N) the control points that they depend on, the most heavily first."""
+        weights = np.abs(self.rows[self._turning])
+        count = int((weights > 0).sum(1).max())
+        return np.argsort(-weights, axis=1, kind="stable")[:, :count].astype(np.int32)
+
+    @cached_property
+    def _arms(self) -> F64:
+        """(T, N, 3) w_j (x0 - p_j) of those."""
+        weights = np.take_along_axis(self.rows[self._turning], self._nodes, 1)
+        arms = np.take_along_axis(self.offsets[self._turning], self._nodes[..., None], 1)
+        return weights[..., None] * arms
+
+    def moved(self, fixed: F64) -> Constraints:
+        """The same conditions with other targets (H, 3)."""
+        other = Constraints(self.rows, fixed, self.offsets)
+        other.__dict__.update({k: v for k, v in self.__dict__.items() if k[0] == "_"})
+        return other
 
 
 class ArapSolver:
@@ -52,9 +83,10 @@ class ArapSolver:
         self.weights = weights
         self.degree = weights.sum(1)
         self._laplacian = np.diag(self.degree) - weights
-        self._weighted_points = weights @ self.points  # W P
-        square_sums = (weights * _square_distances(self.points)).sum(1)
-        self._rest_energy = float(square_sums.sum())  # sum of w |e|^2, both directions
+        self._centre = self.points.mean(0)
+        self._centred = self.points - self._centre  # sums of squares lose no digits
+        self._weighted_points = weights @ self._centred  # W P
+        self._rest_energy = self._square_sum(self._centred, self._weighted_points)
         self.scale = float(np.abs(self.points - self.points.mean(0)).max()) or 1.0
 
     def constrain(self, constraints: Constraints, is_free: np.ndarray) -> None:
@@ -78,45 +110,60 @@ class ArapSolver:
             jitter = 1e-10 * self._stiffness * np.eye(len(matrix))
             self._factor = cho_factor(matrix + jitter, lower=True, check_finite=False)
         self._response = cho_solve(self._factor, c.T, check_finite=False)  # K^-1 C^T
-        self._schur = c @ self._response
+        self._inverse_schur = pinvh(c @ self._response, rtol=1e-10, check_finite=False)
 
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
-        p, w = self.points, self.weights
-        m = len(p)
-        blended = (w @ rotations.reshape(m, 9)).reshape(m, 3, 3)  # sum_j w_ij R_j
+        p, m = self._centred, len(self.points)
+        r = rotations.reshape(m, 9)
         turned = (rotations @ p[:, :, None])[:, :, 0]  # R_j p_j
-        own = (rotations @ (self.degree[:, None] * p - self._weighted_points)[:, :, None])[:, :, 0]
-        right = 0.5 * (own + (blended @ p[:, :, None])[:, :, 0] - w @ turned)  # Eq. 3
+        sums = self.weights @ np.concatenate([r, turned], axis=1)  # sum_j w_ij (R_j, R_j p_j)
+        arms = self.degree[:, None] * p - self._weighted_points
+        own = (rotations @ arms[:, :, None])[:, :, 0]
+        blended = (sums[:, :9].reshape(m, 3, 3) @ p[:, :, None])[:, :, 0]
+        right = 0.5 * (own + blended - sums[:, 9:])  # Eq. 3
         c = self.constraints.rows
         targets = self.constraints.targets(rotations)
-        right = right + self._stiffness * c.T @ targets
-        right[~self.is_free] = p[~self.is_free]
+        right += self._stiffness * (c.T @ targets)
+        right[~self.is_free] = self.points[~self.is_free]
         loose = cho_solve(self._factor, right, check_finite=False)
-        multipliers = np.linalg.lstsq(self._schur, targets - c @ loose, rcond=1e-10)[0]
+        multipliers = self._inverse_schur @ (targets - c @ loose)
         return loose + self._response @ multipliers
 
     def rotations(self, positions: F64, warm: F64) -> F64:
         """Local step: rotations (M, 3, 3), det = +1, that minimise Eq. 2 for fixed positions."""
-        return _fit_rotations(frozen(self._covariances(positions)), frozen(warm))
+        return _fit_rotations(frozen(self._covariances(positions)[0]), frozen(warm))
 
     def energy(self, positions: F64, rotations: F64) -> float:
         """Eq. 2, in object units squared."""
-        s = self._covariances(positions)
-        posed = float((self.weights * _square_distances(positions)).sum())
-        return max(posed + self._rest_energy - 2.0 * float((rotations * s).sum()), 0.0)
+        return self._energy(rotations, *self._covariances(positions))
 
-    def _covariances(self, positions: F64) -> F64:
-        """sum_j w_ij e'_ij e_ij^T (M, 3, 3): the transpose of the paper's S_i."""
-        p, w = self.points, self.weights
-        outer = positions[:, :, None] * p[:, None, :]
-        m = len(p)
-        return (
-            (w @ outer.reshape(m, 9)).reshape(m, 3, 3)
-            - positions[:, :, None] * self._weighted_points[:, None, :]
-            - (w @ positions)[:, :, None] * p[:, None, :]
-            + self.degree[:, None, None] * outer
+    def fit(self, positions: F64, warm: F64) -> tuple[F64, float]:
+        """`rotations`, and the `energy` with them."""
+        covariances, posed = self._covariances(positions)
+        rotations = _fit_rotations(frozen(covariances), frozen(warm))
+        return rotations, self._energy(rotations, covariances, posed)
+
+    def _energy(self, rotations: F64, covariances: F64, posed: float) -> float:
+        aligned = float(np.vdot(rotations, covariances))
+        return max(posed + self._rest_energy - 2.0 * aligned, 0.0)
+
+    def _covariances(self, positions: F64) -> tuple[F64, float]:
+        """sum_j w_ij e'_ij e_ij^T (M, 3, 3), the transpose of the paper's S_i; sum of w |e'|^2."""
+        p, m = self._centred, len(self.points)
+        q = positions - positions.mean(0)
+        outer = (q[:, :, None] * p[:, None, :]).reshape(m, 9)
+        sums = self.weights @ np.concatenate([outer, q], axis=1)  # sum_j w_ij (p'_j p_j^T, p'_j)
+        covariances = (
+            (sums[:, :9] + self.degree[:, None] * outer).reshape(m, 3, 3)
+            - q[:, :, None] * self._weighted_points[:, None, :]
+            - sums[:, 9:, None] * p[:, None, :]
         )
+        return covariances, self._square_sum(q, sums[:, 9:])
+
+    def _square_sum(self, points: F64, weighted: F64) -> float:
+        """sum_ij w_ij |p_i - p_j|^2 of points (M, 3), `weighted` = W P."""
+        return 2.0 * float(np.vdot(points, self.degree[:, None] * points - weighted))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,34 +176,38 @@ class Minimum:
 
 
 def minimise(
-    solver: ArapSolver, rotations: F64, iterations: int, tolerance: float = 1e-4
+    solver: ArapSolver,
+    rotations: F64,
+    iterations: int,
+    tolerance: float = 1e-4,
+    seconds: float = np.inf,
 ) -> Minimum:
     """Local-global iteration with Anderson acceleration from warm `rotations`.
 
     The fixed-point map is rotations -> positions -> rotations; the acceleration extrapolates
     the positions from the last five steps (Peng et al. 2018) and falls back to the plain step
     whenever the energy would rise, so the energy never rises. Ends after `iterations` or when
-    the positions moved by less than `tolerance` x the object's size times 0.01.
+    the positions moved by less than `tolerance` x the object's size times 0.01, and begins no
+    iteration after `seconds`.
     """
+    end = time.perf_counter() + seconds
     limit = tolerance * 0.01 * solver.scale
     positions = solver.positions(rotations)
-    rotations = solver.rotations(positions, rotations)
-    energies = [solver.energy(positions, rotations)]
+    rotations, energy = solver.fit(positions, rotations)
+    energies = [energy]
     history: list[tuple[F64, F64]] = []  # (map's value, residual)
     for _ in range(iterations - 1):
         plain = solver.positions(rotations)
         residual = (plain - positions).ravel()
-        if np.abs(residual).max() < limit:
+        if np.abs(residual).max() < limit or time.perf_counter() > end:
             break
         history = [*history[-ANDERSON_WINDOW:], (plain.ravel(), residual)]
         trial = _extrapolate(history).reshape(plain.shape)
-        trial_rotations = solver.rotations(trial, rotations)
-        energy = solver.energy(trial, trial_rotations)
+        trial_rotations, energy = solver.fit(trial, rotations)
         if len(history) > 1 and energy > energies[-1] * (1 + 1e-12):
             history = history[-1:]
             trial = plain
-            trial_rotations = solver.rotations(trial, rotations)
-            energy = solver.energy(trial, trial_rotations)
+            trial_rotations, energy = solver.fit(trial, rotations)
         positions, rotations = trial, trial_rotations
         energies.append(energy)
     # One plain step last: the constraints depend on the rotations and are then met exactly.
@@ -172,11 +223,6 @@ def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
     gaps = np.stack([residual - r for _, r in history[:-1]], axis=1)
     weights = np.linalg.lstsq(gaps, residual, rcond=1e-8)[0]
     return value - sum(w * (value - v) for w, (v, _) in zip(weights, history[:-1], strict=True))
-
-
-def _square_distances(points: F64) -> F64:
-    squares = (points * points).sum(1)
-    return np.maximum(squares[:, None] + squares[None, :] - 2.0 * points @ points.T, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)

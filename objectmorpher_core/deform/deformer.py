@@ -16,6 +16,9 @@ FAITHFUL_ITERATIONS = 3  # paper 3.2.2
 ITERATIONS = 200  # at most; the solve ends earlier when nothing moves
 STEP_ITERATIONS = 4  # in the sub-steps of a large move
 LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
+GRIP = 20.0  # x a link's weight, in the hand of a handle
+GRIP_RADIUS = 0.06  # x diameter, of the patch that a handle takes hold of
+GRIP_APART = 0.4  # x distance to the next handle, no patch is larger
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
 
 
@@ -37,7 +40,7 @@ class Deformer:
         self.settings = settings
         self.points = lifted.control_points.astype(np.float64)
         self.diameter = lifted.diameter
-        self.graph: Graph = build_graph(self.points, settings.links)
+        self.graph: Graph = build_graph(self.points, settings.links, settings.is_faithful)
         self.binding = bind(lifted.gaussians.means, self.points, self.graph)
         self._solver = ArapSolver(self.points, self.graph.weights)
         self._constrained: tuple[object, ...] = ()
@@ -71,12 +74,13 @@ class Deformer:
         handles: tuple[Handle, ...],
         has_auto_anchors: bool = True,
         start: Pose | None = None,
-        iterations: int | None = None,
+        seconds: float = np.inf,
     ) -> Solution:
         """The pose in which every handle is at its target.
 
-        With `start` the solve continues from there (a drag); without, large moves are made in
-        sub-steps from rest, so the result is a function of the handles alone.
+        With `start` the solve continues from there (a drag), for about so many `seconds`; without,
+        large moves are made in sub-steps from rest, so the result is a function of the handles
+        alone.
         """
         if not handles:
             return Solution(self.rest(), (0.0,))
@@ -90,7 +94,7 @@ class Deformer:
         else:
             if start is None:
                 rotations = self._approach(constraints, is_free, handles, rotations)
-            minimum = minimise(self._solver, rotations, iterations or ITERATIONS)
+            minimum = minimise(self._solver, rotations, ITERATIONS, seconds=seconds)
         positions, rotations = self._follow(minimum.positions, minimum.rotations, is_free)
         return Solution(Pose(positions, rotations), minimum.energies)
 
@@ -134,9 +138,30 @@ class Deformer:
         if key == self._constrained:
             self._solver.constraints = constraints
         else:
+            if not self.settings.is_faithful:
+                self._solver = ArapSolver(self.points, self._stiffened(handles))
             self._solver.constrain(constraints, is_free)
             self._constrained = key
         return constraints, is_free
+
+    def _stiffened(self, handles: tuple[Handle, ...]) -> F64:
+        """(M, M) the graph's weights, larger around each handle.
+
+        A load on one point of an elastic sheet makes a spike, however fine the sheet is. A hand
+        takes hold of a patch: links inside it weigh up to `GRIP` times more, so the patch moves
+        nearly as one body and the strain is spread over what is around it. No patch reaches
+        another handle.
+        """
+        held = np.array([h.point for h in handles])
+        apart = np.linalg.norm(held[:, None] - held[None], axis=2)
+        apart[apart <= 1e-6 * self.diameter] = np.inf
+        radii = np.minimum(GRIP_RADIUS * self.diameter, GRIP_APART * apart.min(1))
+        distances = np.linalg.norm(self.points[:, None] - held[None], axis=2)
+        grip = np.exp(-((distances / radii) ** 2))  # (M, H)
+        factor = np.ones_like(self.graph.weights)
+        for column in grip.T:
+            np.maximum(factor, 1 + (GRIP - 1) * np.outer(column, column), out=factor)
+        return self.graph.weights * factor
 
     def _approach(
         self,
@@ -157,7 +182,7 @@ class Deformer:
         shift[: len(moves)] = moves
         for step in range(1, steps):
             part = constraints.fixed - shift * (1 - step / steps)
-            self._solver.constraints = Constraints(constraints.rows, part, constraints.offsets)
+            self._solver.constraints = constraints.moved(part)
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
         self._solver.constraints = constraints
         return rotations

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from ..arrays import F64, I32
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
+FALLOFF = 2.0  # x mean nearest-neighbour distance: the reach of a link's weight
 LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
 
 
@@ -33,13 +34,16 @@ class Graph:
         return int(self.components.max()) + 1
 
 
-def build_graph(points: np.ndarray, links: str = "geodesic") -> Graph:
+def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool = False) -> Graph:
     """The paper's graph on control points (M, 3).
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
     the geodesics; points within 0.3 diameters along the surface are linked. `links="euclidean"`
-    is the ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2) with s the
-    mean length of a link, and symmetric, so that the Laplacian is too (DESIGN section 4).
+    is the ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
+    so that the Laplacian is too (DESIGN section 4). s is twice the mean spacing: the object
+    behaves like a continuous body, and a dragged point takes its surroundings along. With
+    `is_faithful` it is the mean length of a link, some five spacings: then every point is tied to
+    so many far ones that a dragged one leaves its neighbours behind, and makes a spike.
     """
     if links not in ("geodesic", "euclidean"):
         raise ValueError(f"links must be geodesic or euclidean, not {links!r}")
@@ -57,7 +61,9 @@ def build_graph(points: np.ndarray, links: str = "geodesic") -> Graph:
     np.fill_diagonal(linked, False)
     if not linked.any():
         linked = (auxiliary > 0) & ~np.eye(len(p), dtype=bool)
-    falloff = float(lengths[linked].mean()) if linked.any() else 1.0
+    falloff = FALLOFF * mean_spacing
+    if is_faithful and linked.any():
+        falloff = float(lengths[linked].mean())
     weights = np.where(linked, np.exp(-(np.where(linked, lengths, 0) ** 2) / (2 * falloff**2)), 0)
     weights = np.maximum(weights, weights.T)
     count, components = connected_components(csr_matrix(weights), directed=False)

@@ -83,7 +83,6 @@ def test_two_runs_with_the_same_seed_give_the_same_bytes(folder):
 
 
 def test_every_further_output_is_written(folder):
-    pytest.importorskip("objectmorpher_core.splat_files.ply")
     assert _edit(
         "--move", "10,5", "--save-mask", "m.png", "--save-plate", "p.png", "--save-object",
         "o.png", "--save-splats", "s.ply", "--report", "r.json",
@@ -224,7 +223,6 @@ def test_a_batch_of_which_one_fails_writes_none(folder, capsys):
 
 
 def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
-    pytest.importorskip("objectmorpher_core.session_file")
     wishes = ["--handle", "110,62:120,40", *TURN, "--seed", "4"]
     assert _edit(*wishes, "--session", "s.omorph", "--report", "a.json") == 0
     assert cli.main(["replay", "s.omorph", "-o", "again.png", "--report", "b.json"]) == 0
@@ -243,8 +241,16 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert "photo.png" in capsys.readouterr().out
 
 
+def test_a_session_of_an_object_cut_by_the_frame_gives_the_same_bytes(folder):
+    inside = shapes.mask("frame")
+    Path("photo.png").write_bytes(shapes.png(shapes.picture(inside)))
+    Path("mask.png").write_bytes(shapes.mask_png(inside))
+    assert _edit("--handle", "120,80:100,60", "--session", "s.omorph") == 0
+    assert cli.main(["replay", "s.omorph", "-o", "again.png"]) == 0
+    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
+
+
 def test_a_session_that_is_none_is_refused(folder, capsys):
-    pytest.importorskip("objectmorpher_core.session_file")
     _expect_failure(["replay", "photo.png", "-o", "out.png"], capsys, "")
     _expect_failure(["info", "text.jpg"], capsys, "")
 

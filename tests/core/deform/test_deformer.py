@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -175,7 +177,7 @@ def test_the_solve_ends_within_one_percent_of_the_minimum(bar):
     found = bar.solve(handles)
     pose = found.pose
     for _ in range(10):  # and on from there
-        longer = bar.solve(handles, start=pose, iterations=200)
+        longer = bar.solve(handles, start=pose)
         pose = longer.pose
     assert found.energies[-1] <= 1.01 * longer.energies[-1]
 
@@ -201,3 +203,27 @@ def test_gaussians_move_with_the_skin(bar):
 def test_unknown_settings_are_refused(settings):
     with pytest.raises(ValueError, match="must be"):
         _deformer(shapes.ball(500), 40, settings)
+
+
+@pytest.mark.parametrize("move", [(0.1, 0.0, 0.0), (0.0, -0.1, 0.05)])
+def test_a_dragged_point_takes_its_surroundings_along(move):
+    cloud = np.random.default_rng(3).permutation(shapes.sheet(60, 36, 0.06))
+    deformer = _deformer(cloud, 300)
+    handle = _at(deformer, (0.1, 0.0, 0.0), move)
+    moved = deformer.solve((handle,)).pose.points - deformer.points
+    share = moved @ np.array(move) / np.dot(move, move)
+    away = np.linalg.norm(deformer.points - handle.point, axis=1)
+    edges = np.array([0.03, 0.08, 0.13, 0.2, 0.3, 0.4])
+    rings = [share[(away > a) & (away <= b)].mean() for a, b in pairwise(edges)]
+    assert rings[0] > 0.4, "no spike"
+    assert (np.diff(rings) < 0).all(), "less and less with the distance"
+
+
+def test_two_handles_close_together_part_as_far_as_they_are_told():
+    deformer = _deformer(shapes.sheet(60, 36, 0.06), 300)
+    first, second = _at(deformer, (0.0, 0.0, 0.0)), _at(deformer, (0.05, 0.0, 0.0), (0.03, 0, 0))
+    assert first.control_point != second.control_point
+    pose = deformer.solve((first, second)).pose
+    for handle in (first, second):
+        reached = deformer.skin_points(handle.point, pose).points[0]
+        assert np.abs(reached - handle.target).max() < F64
