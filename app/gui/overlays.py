@@ -56,6 +56,12 @@ class Overlays:
         canvas = self._editor.view.canvas_from_image(image_xy)
         return self._on_canvas(canvas)
 
+    def _on_photo(self, image_xy: np.ndarray) -> list[Any]:
+        """Window positions of those image px (N, 2) that are on the photo."""
+        size = self._editor.photo_size
+        assert size is not None
+        return self._at(image_xy[((image_xy >= 0) & (image_xy <= size)).all(1)])
+
     def _on_canvas(self, canvas_xy: np.ndarray) -> list[Any]:
         xy = np.atleast_2d(canvas_xy) / self._ratio + (self._rect.x, self._rect.y)
         return [ImVec2(x, y) for x, y in xy.tolist()]
@@ -116,7 +122,7 @@ class Overlays:
         if document is None or thing is None or thing.lifted is None:
             return
         if thing.handles:
-            for at in self._at(editor.derived.anchors(document, editor.current)):
+            for at in self._on_photo(editor.derived.anchors(document, editor.current)):
                 self._draw_anchor(at)
             rests = np.array([h.point for h in thing.handles])
             starts = self._at(editor.derived.project(document, editor.current, rests))
@@ -135,7 +141,7 @@ class Overlays:
         """The control points, quietly, while there is no handle: here is something to drag."""
         editor = self._editor
         assert editor.document is not None
-        for at in self._at(editor.derived.control_points(editor.document, editor.current)):
+        for at in self._on_photo(editor.derived.control_points(editor.document, editor.current)):
             self._draw.add_circle_filled(at, theme.scale * 2.6, theme.u32(DARK, 0.5), 8)
             self._draw.add_circle_filled(at, theme.scale * 1.7, theme.u32(WHITE, 0.9), 8)
 
@@ -190,7 +196,7 @@ class Overlays:
         for a, b in editor.derived.links(editor.document, editor.current, MAX_LINKED):
             start, end = self._at(np.stack([a, b]))
             self._draw.add_line(start, end, theme.u32(WHITE, 0.3), 1.0)
-        for at in self._at(editor.derived.control_points(editor.document, editor.current)):
+        for at in self._on_photo(editor.derived.control_points(editor.document, editor.current)):
             self._draw.add_circle_filled(at, theme.pt(2), theme.u32(WHITE, 0.5), 8)
 
     # Place

@@ -40,7 +40,8 @@ log = logging.getLogger(__name__)
 
 SETTLE = 3  # frames drawn after the last event: ImGui lays out in two
 IDLE = 0.5  # s between two looks at the clock when nothing happens
-BUSY = 0.05  # s, while a job runs or a dialog is open
+BUSY = 0.2  # s, while a job runs; what it reports wakes the window besides
+SOON = 0.05  # s, while a dialog is open or an exact picture is due
 CONTROL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
 MODIFIERS = (("Ctrl", CONTROL), ("Shift", glfw.MOD_SHIFT), ("Alt", glfw.MOD_ALT))
 KEY_NAMES = {
@@ -150,9 +151,9 @@ class Window:
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""
         editor = self.editor
-        is_busy = editor.jobs.current is not None or self._dialogs.is_open
-        is_busy = is_busy or editor.derived.layers.is_waiting
-        patience = BUSY if is_busy else IDLE
+        patience = BUSY if editor.jobs.current is not None else IDLE
+        if self._dialogs.is_open or editor.derived.layers.is_waiting:
+            patience = SOON
         before = time.monotonic()
         glfw.wait_events_timeout(patience)
         is_event = time.monotonic() - before < 0.95 * patience
