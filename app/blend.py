@@ -28,6 +28,7 @@ REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one co
 def build_blend(derived: Derived, document: Document, view: View) -> F32:
     """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
     from objectmorpher_core.compose import composite
+    from objectmorpher_core.compose.plate import hole_margin
     from objectmorpher_core.raster.posed import TEXTURE_GAP
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
@@ -43,7 +44,7 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
         reach = REACH * splats.texture_gap / TEXTURE_GAP * max(thing.placement.scale, 1.0)
         if len(points):
             distance = np.minimum(distance, _distance(points, view, (height, width)) - reach)
-    margin = composite.hole_margin(*document.photo.size)
+    margin = hole_margin(*document.photo.size)
     ramp = (1 - composite.FEATHER_START) * margin
     return np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.arrays import Mask
-from objectmorpher_core.compose.composite import plate_picture, straight_cutout
+from objectmorpher_core.compose.composite import straight_cutout
+from objectmorpher_core.compose.plate import plate_picture
 from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import Picture, encode_mask, encode_picture

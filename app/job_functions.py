@@ -130,11 +130,11 @@ def render_exact(request: Request, progress: Progress) -> np.ndarray:
     return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)
 
 
-def inpaint(pixels: Pixels, hole: Mask, choice: Choice, progress: Progress) -> Plate:
+def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -> Plate:
     """The photo without its objects."""
     from objectmorpher_core.pipeline import make_plate
 
-    return make_plate(pixels, hole, choice.backend, progress=progress, seed=choice.seed)
+    return make_plate(pixels, covered, choice.backend, progress=progress, seed=choice.seed)
 
 
 def write_picture(document: Document, path: Path, quality: int, progress: Progress) -> None:

@@ -137,7 +137,7 @@ class Tasks:
         return True
 
     def _ask_plate(self, document: Document, masks: tuple[Mask | None, ...]) -> None:
-        from objectmorpher_core.pipeline import plate_hole
+        from objectmorpher_core.compose.plate import plate_cover
 
         editor = self._editor
 
@@ -150,7 +150,7 @@ class Tasks:
 
         editor.jobs.start(
             "Filling in the background", job_functions.inpaint, document.photo.pixels,
-            plate_hole(document), Choice(editor.settings.backends.inpaint, document.seed),
+            plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
             done=accept, failed=editor.complain_of, cancelled=retry_later, kind=PLATE,
         )  # fmt: skip
 

@@ -15,7 +15,8 @@ import numpy as np
 from . import compose, edits, lift, segment
 from .arrays import RGB, Mask, Pixels
 from .camera import Camera
-from .compose.composite import Composite, composite, object_texture, plate_hole
+from .compose.composite import Composite, composite, object_texture
+from .compose.plate import build_plate, plate_cover
 from .document import (
     Click,
     DeformSettings,
@@ -37,8 +38,6 @@ from .segment import Segmenter
 from .segment.matte import band_width, build_matte
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
-PLATE_CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
-LEAST_CONTEXT = 64  # px
 
 
 def open_photo(data: bytes, name: str, fov: float | None = None, seed: int = 0) -> Document:
@@ -104,27 +103,13 @@ def lift_mask(
 
 def make_plate(
     pixels: Pixels,
-    hole: Mask,
+    covered: Mask,
     backend: str = "auto",
     progress: Progress = silent,
     seed: int = 0,
 ) -> Plate:
-    """The photo with `hole` (H, W) painted out, as a crop around it."""  # fmt: skip
-    inpainter = compose.load(backend)
-    rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
-    extent = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
-    context = int(max(PLATE_CONTEXT * extent, LEAST_CONTEXT))
-    height, width = hole.shape
-    top, bottom = max(rows[0] - context, 0), min(rows[-1] + 1 + context, height)
-    left, right = max(columns[0] - context, 0), min(columns[-1] + 1 + context, width)
-    window = (slice(top, bottom), slice(left, right))
-    filled = inpainter.inpaint(pixels[window], hole[window], progress, seed)
-    inner = (
-        slice(rows[0] - top, rows[-1] + 1 - top),
-        slice(columns[0] - left, columns[-1] + 1 - left),
-    )
-    hole_crop = hole[window][inner]
-    return Plate(int(columns[0]), int(rows[0]), filled[inner], hole_crop, inpainter.name)
+    """The photo without what hides it at `covered` (H, W), as a crop."""  # fmt: skip
+    return build_plate(pixels, covered, compose.load(backend), progress, seed)
 
 
 def export(document: Document, puppets: dict[int, Puppet] | None = None) -> Picture:
@@ -219,9 +204,9 @@ def run_script(
     document, energies = _pose(document, puppet, script, progress, stopwatch)
     if document.objects[0].is_moved or needs_plate:
         with stopwatch.stage("inpaint"):
-            hole, pixels = plate_hole(document), document.photo.pixels
+            covered, pixels = plate_cover(document), document.photo.pixels
             step = part(progress, 0.6, 0.85)
-            plate = make_plate(pixels, hole, script.inpaint, step, script.seed)
+            plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
             document = edits.set_plate(document, plate)
     return _finished(document, puppet, energies, progress, stopwatch)
 

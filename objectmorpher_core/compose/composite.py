@@ -13,18 +13,16 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..camera import Camera
-from ..document import Document, EditObject, Matte, Plate
+from ..document import Document, EditObject, Matte
 from ..pixels import pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
 from ..raster.posed import PosedSplats, TextureLevels, build_levels
 from ..raster.reference import Picture3D
+from .plate import crop, hole_margin, plate_crop
 
-HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the matte
-MIN_HOLE_MARGIN = 4.0  # px
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha
-SEAM = 0.45  # x hole margin: width of the plate's seam around an object
 NEAR = 7  # px, window in which a left pixel looks for the object's new edge
 FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
 
@@ -49,45 +47,6 @@ class Composite:
     outside_footprint_changed: int  # px, 0 by construction; counted, not assumed
     shares: Shares
     layers: tuple[tuple[int, int, Picture3D], ...]  # x0, y0, each moved object's picture
-
-
-def hole_margin(width: int, height: int) -> float:
-    """How far, in px, the hole in a photo of this size reaches past the object."""
-    return max(MIN_HOLE_MARGIN, HOLE_MARGIN * float(np.hypot(width, height)))
-
-
-def plate_hole(document: Document) -> Mask:
-    """(H, W) what has to be invented behind the objects: their mattes, dilated."""
-    width, height = document.photo.size
-    covered = np.zeros((height, width), np.uint8)
-    for item in document.objects:
-        if item.matte is not None:
-            whole = (0, 0, width, height)
-            covered |= (_crop(item.matte.alpha, item.matte.box, whole) > 0).astype(np.uint8)
-        elif item.mask is not None:
-            covered |= item.mask.astype(np.uint8)
-    distance = cv2.distanceTransform(1 - covered, cv2.DIST_L2, 5)
-    return (distance < hole_margin(width, height)) if covered.any() else covered.astype(bool)
-
-
-def plate_weights(document: Document, box: tuple[int, int, int, int]) -> F32:
-    """(h, w) in [0, 1] for the crop `box`: how much of the plate to show behind the objects.
-
-    The hole reaches far past the matte so that the inpainter never copies an object's rim; shown
-    is only what lies under the matte and a narrow seam around it: beyond, the photo is true.
-    """
-    assert document.plate is not None
-    x0, y0, x1, y1 = box
-    hole = _crop(document.plate.hole, document.plate.box, box)
-    covered = np.zeros((y1 - y0, x1 - x0), bool)
-    for item in document.objects:
-        if item.matte is not None:
-            covered |= _crop(item.matte.alpha, item.matte.box, box) > 0
-    if not covered.any():
-        return hole.astype(np.float32)
-    seam = SEAM * hole_margin(*document.photo.size)
-    distance = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.where(hole, np.clip((seam - distance) / (0.6 * seam), 0, 1), 0).astype(np.float32)
 
 
 def object_texture(matte: Matte) -> TextureLevels:
@@ -159,9 +118,8 @@ class _Blend:
         self.invented = np.zeros((y1 - y0, x1 - x0), np.float32)
         self.colour = self.photo.copy()
         if document.plate is not None:
-            self.invented = plate_weights(document, box)
-            plate = unit_pixels(_plate_crop(photo, document.plate, box))
-            self.colour += self.invented[..., None] * (plate - self.photo)
+            self.invented = crop(document.plate.hole, document.plate.box, box).astype(np.float32)
+            self.colour = unit_pixels(plate_crop(photo, document.plate, box))
         self.from_photo = 1 - self.invented
         self.from_lifter = np.zeros_like(self.invented)
         self.moved = np.zeros(self.invented.shape, np.float32)  # px, see `displacement`
@@ -172,7 +130,7 @@ class _Blend:
         """Draws one moved object over what is there."""
         assert item.matte is not None
         x0, y0, x1, y1 = self.box
-        rest = _crop(item.matte.alpha, item.matte.box, self.box)
+        rest = crop(item.matte.alpha, item.matte.box, self.box)
         self.covered |= rest > 0
         if not item.is_visible:
             self.moved[rest > 0] = np.inf
@@ -273,13 +231,6 @@ def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -
     return pixels_from_unit(np.dstack([straight, alpha]), dtype)
 
 
-def plate_picture(document: Document) -> Pixels:
-    """(H, W, 3) the photo with its objects painted out."""
-    assert document.plate is not None, "make the plate first"
-    width, height = document.photo.size
-    return _plate_crop(document.photo.pixels, document.plate, (0, 0, width, height))
-
-
 def _drawn(
     splats: PosedSplats, texture: TextureLevels, window: Camera, camera: Camera
 ) -> Picture3D:
@@ -287,32 +238,3 @@ def _drawn(
 
     picture = tiles.render(splats, texture, window, camera)
     return replace(picture, alpha=np.minimum(picture.alpha, 1.0))
-
-
-def _plate_crop(photo: Pixels, plate: Plate, box: tuple[int, int, int, int]) -> Pixels:
-    """The photo in `box` with the plate's hole filled."""
-    x0, y0, x1, y1 = box
-    result = photo[y0:y1, x0:x1].copy()
-    left, top = max(x0, plate.box[0]), max(y0, plate.box[1])
-    right, bottom = min(x1, plate.box[2]), min(y1, plate.box[3])
-    if left < right and top < bottom:
-        source = (slice(top - plate.top, bottom - plate.top),
-                  slice(left - plate.left, right - plate.left))  # fmt: skip
-        target = result[top - y0 : bottom - y0, left - x0 : right - x0]
-        target[plate.hole[source]] = plate.pixels[source][plate.hole[source]]
-    return result
-
-
-def _crop(
-    image: np.ndarray, own: tuple[int, int, int, int], box: tuple[int, int, int, int]
-) -> np.ndarray:
-    """`image`, which covers the box `own` of the photo, cut or padded with 0 to `box`."""
-    x0, y0, x1, y1 = box
-    result = np.zeros((y1 - y0, x1 - x0), image.dtype)
-    left, top = max(x0, own[0]), max(y0, own[1])
-    right, bottom = min(x1, own[2]), min(y1, own[3])
-    if left < right and top < bottom:
-        result[top - y0 : bottom - y0, left - x0 : right - x0] = image[
-            top - own[1] : bottom - own[1], left - own[0] : right - own[0]
-        ]
-    return result

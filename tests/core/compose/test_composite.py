@@ -9,13 +9,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits
-from objectmorpher_core.compose.composite import (
-    composite,
-    hole_margin,
-    plate_hole,
-    plate_picture,
-    straight_cutout,
-)
+from objectmorpher_core.compose.composite import composite, straight_cutout
+from objectmorpher_core.compose.plate import hole_margin
 from objectmorpher_core.document import Document, Placement, Pose
 from tests import shapes
 
@@ -182,28 +177,6 @@ def test_the_nearer_of_two_objects_covers_the_farther():
         for order in (document.objects, document.objects[::-1])
     ]
     assert np.array_equal(pixels[0], pixels[1]), "the order of the list does not matter"
-
-
-def test_the_hole_is_the_object_and_a_margin():
-    scene = shapes.scene("ellipse")
-    hole = plate_hole(scene.document())
-    assert hole[scene.mask].all()
-    assert hole.sum() > scene.mask.sum()
-    assert not hole[:10].any()
-
-
-def test_a_document_without_objects_has_no_hole():
-    document = replace(shapes.scene("ellipse").document(), objects=())
-    assert not plate_hole(document).any()
-
-
-def test_the_plates_picture_is_the_photo_outside_its_hole():
-    scene = shapes.scene("ellipse")
-    document = scene.document()
-    picture = plate_picture(document)
-    hole = document.plate.hole
-    assert np.array_equal(picture[~hole], scene.pixels[~hole])
-    assert (picture[hole] == 128).all()
 
 
 def test_the_cut_out_is_the_object_on_nothing():

@@ -1,0 +1,130 @@
+"""The photo behind its objects: what is invented, and how it joins what is true.
+
+The inpainter fills a hole that reaches well past the object, so that it never copies the object's
+rim. Of the fill only what the object covers is kept, and a narrow seam: beyond, the photo is
+true. Where the two meet, the fill takes on the photo's colour (a membrane, as in Poisson image
+editing, Perez et al. 2003), so that no line shows where the object was.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, Mask, Pixels
+from ..document import Document, Plate
+from ..pixels import pixels_from_unit, unit_pixels
+from ..progress import Progress, part, silent
+from . import Inpainter
+
+HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
+MIN_HOLE_MARGIN = 4.0  # px
+SEAM = 0.45  # x hole margin, width of the seam around the object
+REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into the hole
+COARSE = 4.0  # px of hole margin at which the correction is computed
+SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
+CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
+LEAST_CONTEXT = 64  # px
+
+
+def hole_margin(width: int, height: int) -> float:
+    """How far, in px, the hole in a photo of this size reaches past the object."""
+    return max(MIN_HOLE_MARGIN, HOLE_MARGIN * float(np.hypot(width, height)))
+
+
+def plate_cover(document: Document) -> Mask:
+    """(H, W) True where an object hides the background, be it ever so little."""
+    width, height = document.photo.size
+    covered = np.zeros((height, width), bool)
+    for item in document.objects:
+        if item.matte is not None:
+            covered |= crop(item.matte.alpha, item.matte.box, (0, 0, width, height)) > 0
+        elif item.mask is not None:
+            covered |= item.mask
+    return covered
+
+
+def build_plate(
+    pixels: Pixels,
+    covered: Mask,
+    inpainter: Inpainter,
+    progress: Progress = silent,
+    seed: int = 0,
+) -> Plate:
+    """The photo (H, W, 3) without what hides it at `covered` (H, W), which must not be empty.
+
+    `Plate.hole` is where anything is invented.
+    """
+    height, width = covered.shape
+    margin = hole_margin(width, height)
+    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    hole = away < margin
+    rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
+    x0, y0, x1, y1 = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+    context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    top, left = max(y0 - context, 0), max(x0 - context, 0)
+    window = (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width)))
+    filled = inpainter.inpaint(pixels[window], hole[window], part(progress, 0.0, 0.9), seed)
+    progress(0.9, "joining it to the photo")
+    inner = (slice(y0, y1), slice(x0, x1))
+    fill = unit_pixels(filled[y0 - top : y1 - top, x0 - left : x1 - left])
+    photo, away = unit_pixels(pixels[inner]), away[inner]
+    weight = np.clip((SEAM * margin - away) / (0.6 * SEAM * margin), 0, 1)  # of the fill
+    is_invented = weight > 0
+    ring = hole[inner] & ~is_invented  # filled, and true
+    fill = np.clip(fill + _correction(photo - fill, ring, margin), 0, 1)
+    mixed = photo + weight[..., None] * (fill - photo)
+    joined = np.where(is_invented[..., None], pixels_from_unit(mixed, pixels.dtype), pixels[inner])
+    return Plate(int(x0), int(y0), joined, is_invented, inpainter.name)
+
+
+def _correction(difference: F32, ring: Mask, margin: float) -> F32:
+    """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards.
+
+    Shepard's interpolation with a heavy-tailed kernel, on a grid as coarse as the margin allows.
+    """
+    height, width = ring.shape
+    if not ring.any():
+        return np.zeros_like(difference)
+    scale = min(COARSE / margin, 1.0)
+    size = (max(round(width * scale), 1), max(round(height * scale), 1))
+    known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    values = cv2.resize(difference * ring[..., None], size, interpolation=cv2.INTER_AREA)
+    total, mean = np.zeros_like(known), np.zeros_like(values)
+    for n, sigma in enumerate(SIGMAS):
+        share = 100.0**-n
+        total += share * cv2.GaussianBlur(known, (0, 0), sigma)
+        mean += share * cv2.GaussianBlur(values, (0, 0), sigma)
+    mean /= np.maximum(total, 1e-12)[..., None]
+    away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
+    mean *= np.exp(-away / (REACH * margin * scale))[..., None]
+    return np.asarray(cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def plate_picture(document: Document) -> Pixels:
+    """(H, W, 3) the photo with its objects painted out."""
+    assert document.plate is not None, "make the plate first"
+    width, height = document.photo.size
+    return plate_crop(document.photo.pixels, document.plate, (0, 0, width, height))
+
+
+def plate_crop(photo: Pixels, plate: Plate, box: tuple[int, int, int, int]) -> Pixels:
+    """The photo in `box` with its objects painted out."""
+    x0, y0, x1, y1 = box
+    hole = crop(plate.hole, plate.box, box)
+    return np.where(hole[..., None], crop(plate.pixels, plate.box, box), photo[y0:y1, x0:x1])
+
+
+def crop(
+    image: np.ndarray, own: tuple[int, int, int, int], box: tuple[int, int, int, int]
+) -> np.ndarray:
+    """`image`, which covers the box `own` of the photo, cut or padded with 0 to `box`."""
+    x0, y0, x1, y1 = box
+    result = np.zeros((y1 - y0, x1 - x0, *image.shape[2:]), image.dtype)
+    left, top = max(x0, own[0]), max(y0, own[1])
+    right, bottom = min(x1, own[2]), min(y1, own[3])
+    if left < right and top < bottom:
+        result[top - y0 : bottom - y0, left - x0 : right - x0] = image[
+            top - own[1] : bottom - own[1], left - own[0] : right - own[0]
+        ]
+    return result
