@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import tifffile
 
 from app import cli
 from objectmorpher_core.compose import BACKENDS
@@ -73,6 +74,59 @@ def test_an_edit_writes_the_photo_and_nothing_else(folder, capsys):
 def test_nothing_to_do_gives_the_photo_back(folder):
     assert _edit() == 0
     assert np.array_equal(_pixels("out.png"), PIXELS)
+
+
+def _photo_of(kind: str) -> np.ndarray:
+    """The photo as OpenCV writes it: grey, BGR or BGRA; of 16 bits all are in use."""
+    color, bits = kind.split()
+    rng = np.random.default_rng(1)
+    pixels = PIXELS[..., ::-1].astype(np.uint16)
+    if color == "grey":
+        pixels = pixels[..., 1]
+    if color == "alpha":
+        pixels = np.dstack([pixels, rng.integers(0, 256, MASK.shape)]).astype(np.uint16)
+    if bits == "8":
+        return pixels.astype(np.uint8)
+    return pixels * 257 ^ rng.integers(0, 128, pixels.shape).astype(np.uint16)
+
+
+KINDS = [f"{color} {bits}" for color in ("grey", "color", "alpha") for bits in ("8", "16")]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_with_nothing_to_do_every_png_comes_back_to_the_last_bit(folder, kind):
+    photo = _photo_of(kind)
+    cv2.imwrite("any.png", photo)
+    assert _edit(photo="any.png") == 0
+    back = cv2.imread("out.png", cv2.IMREAD_UNCHANGED)
+    assert back.dtype == photo.dtype
+    assert np.array_equal(back, photo)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_with_nothing_to_do_every_tiff_comes_back_to_the_last_bit(folder, kind):
+    photo = _photo_of(kind)
+    is_grey, has_alpha = photo.ndim == 2, photo.shape[2:] == (4,)
+    tifffile.imwrite(
+        "any.tif", photo, photometric="minisblack" if is_grey else "rgb",
+        extrasamples=["unassalpha"] if has_alpha else None,
+    )  # fmt: skip
+    assert _edit(photo="any.tif", out="out.tif") == 0
+    back = tifffile.imread("out.tif")
+    assert back.dtype == photo.dtype
+    assert np.array_equal(back, photo)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_edit_leaves_what_is_far_from_it_to_the_last_bit(folder, kind):
+    photo = _photo_of(kind)
+    cv2.imwrite("any.png", photo)
+    assert _edit("--move", "6,0", photo="any.png") == 0
+    back = cv2.imread("out.png", cv2.IMREAD_UNCHANGED)
+    assert back.dtype == photo.dtype
+    away = cv2.distanceTransform((~MASK).astype(np.uint8), cv2.DIST_L2, 5) > 20
+    assert np.array_equal(back[away], photo[away])
+    assert not np.array_equal(back[MASK], photo[MASK])
 
 
 def test_two_runs_with_the_same_seed_give_the_same_bytes(folder):

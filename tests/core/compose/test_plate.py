@@ -39,7 +39,9 @@ class Off:
 
     def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
         assert rgb.shape == self._background.shape, "the context reaches to the frame here"
-        return np.where(hole[..., None], self._background.astype(int) + self._by, rgb).astype(rgb.dtype)
+        return np.where(hole[..., None], self._background.astype(int) + self._by, rgb).astype(
+            rgb.dtype
+        )
 
 
 def _background(dtype: type = np.uint8) -> Pixels:
