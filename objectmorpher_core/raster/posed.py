@@ -25,6 +25,7 @@ class PosedSplats:
     rest_covariances: F64  # (N, 3, 3) Sigma, world, at rest
     rest_pictures: F64  # (N, 2, 3) J0 Sigma: covariance of the rest picture with the rest world
     normals: F64  # (N, 3) outward at rest, world, unit
+    rest_cosines: F64  # (N,) of the normal with the direction to the camera, at rest
     u0: F32  # (N, 2) px in the photo
     visibility: F32  # (N,) 1 = seen in the photo
     solidity: F32  # (N,)
@@ -53,6 +54,7 @@ class SplatPoser:
         self._pictures = frozen(jacobians @ self._covariances)
         normals = gaussians.normals.astype(np.float64) @ linear.T
         self._normals = frozen(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+        self._cosines = frozen(-(self._normals * means).sum(1) / np.linalg.norm(means, axis=1))
         self._zoom = frozen(camera.focal / means[:, 2])
         self._lifted = lifted
         self._identity = frozen(np.broadcast_to(np.eye(3), (len(means), 3, 3)))
@@ -78,6 +80,7 @@ class SplatPoser:
             rest_covariances=self._covariances,
             rest_pictures=self._pictures,
             normals=self._normals,
+            rest_cosines=self._cosines,
             u0=texture.u0,
             visibility=texture.visibility,
             solidity=texture.solidity,

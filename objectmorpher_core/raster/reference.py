@@ -11,8 +11,9 @@ Surface splatting of photo-textured Gaussians (Zwicker et al. 2001 and 2002; DES
    then looked up once: neighbours differ by a fraction of a pixel in where they look, and a mean
    of positions stays sharp where a mean of colours would blur. Colours of what the photo does
    not show are averaged as colours.
-4. A layer's alpha is the matte's where the photo is carried along, and otherwise ends where the
-   kernel sum falls below a level, antialiased by the sum's own gradient.
+4. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
+   towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
+   by the sum's own gradient.
 5. Layers are composited front to back, premultiplied. Where two layers show the same point of
    the photo they are one surface that was split, and their coverage adds up under one matte.
 """
@@ -111,7 +112,8 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         lod=np.log2(np.maximum(singular[:, 0], 1.0)),
         photo=weight * carried,
         body=weight * (1 - carried) * solidity,
-        matted=_ramp(stretch, RULES.matte_end, RULES.matte_start),
+        matted=_ramp(stretch, RULES.matte_end, RULES.matte_start)
+        * _ramp(cosine - splats.rest_cosines[index], RULES.turned_end, RULES.turned_start),
         solidity=solidity,
         seen=seen,
         color=splats.colors[index].astype(np.float64),

@@ -42,6 +42,11 @@ class Rules(NamedTuple):
     matte_start: float = 0.55
     matte_end: float = 0.35
 
+    # Where the rim has turned towards the camera it is no silhouette any more, and the matte's
+    # edge would become a slit: from turned_start on the surface's own edge takes over, likewise.
+    turned_start: float = 0.15  # of the cosine, more than at rest
+    turned_end: float = 0.40
+
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.
     streak_start: float = 0.40

@@ -67,7 +67,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F64:
     fields = (
         splats.means, splats.linear, splats.rest_covariances, splats.rest_pictures,
         splats.normals, splats.u0, splats.visibility, splats.solidity, splats.colors,
-        splats.opacities, splats.rest_zoom,
+        splats.opacities, splats.rest_zoom, splats.rest_cosines,
     )  # fmt: skip
     near = RULES.near * splats.gap
     out = np.zeros((len(splats), SPAN))
@@ -105,7 +105,7 @@ def _depth_order(projected, width, height):
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _project(
     first, last, means, linear, rest, pictures, normals, u0, visibility, solidity, colors,
-    opacities, rest_zoom, view, photo, near, rules, out,
+    opacities, rest_zoom, rest_cosines, view, photo, near, rules, out,
 ):  # fmt: skip
     """Fills the rows first..last of `out`; see the columns above."""
     f = view[0]
@@ -186,7 +186,10 @@ def _project(
         out[i, LOD] = math.log2(max(largest, 1.0))
         out[i, PHOTO] = weight * carried
         out[i, BODY] = weight * (1.0 - carried) * solidity[i]
-        out[i, MATTED] = ramp(stretch, rules.matte_end, rules.matte_start)
+        turned = cosine - rest_cosines[i]
+        out[i, MATTED] = ramp(stretch, rules.matte_end, rules.matte_start) * ramp(
+            turned, rules.turned_end, rules.turned_start
+        )
         out[i, SOLID], out[i, SEEN] = solidity[i], visibility[i]
         out[i, RED], out[i, GREEN], out[i, BLUE] = colors[i, 0], colors[i, 1], colors[i, 2]
 
