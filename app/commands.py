@@ -97,6 +97,7 @@ COMMANDS: dict[str, Command] = {
     "save_as": Command("Save session as…", "Ctrl+Shift+S", _want(Dialog.SAVE)),
     "export": Command("Export photo…", "Ctrl+E", _want(Dialog.EXPORT)),
     "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close_document)),
+    "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.guard(e.quit), _always),
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo),
     "subject": Command("Select subject", "Ctrl+Shift+A", lambda e: e.select_subject()),

@@ -61,6 +61,7 @@ class Editor:
         self.hover = Hover()
         self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
         self.message: Message | None = None
+        self.is_over = False  # the window closes
 
     # What there is
 
@@ -143,6 +144,11 @@ class Editor:
         self.tasks.forget()
         self.history = self.preview = self.path = self.source = self.handle = None
         self.hover, self.rubber, self.message = Hover(), None, None
+
+    def quit(self) -> None:
+        """Closes the program; nothing is asked here."""
+        self.close_document()
+        self.is_over = True
 
     def apply(self, label: str, document: Document) -> None:
         """`document` is the next step."""

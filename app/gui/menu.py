@@ -13,7 +13,7 @@ from .theme import Icon, theme
 from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
-    "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close"),
+    "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
     "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
     "View": ("zoom_in", "zoom_out", "fit", "actual", "-", "split", "points", "-", "theme"),

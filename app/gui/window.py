@@ -15,6 +15,7 @@ from imgui_bundle import imgui  # before glfw: both must use one libglfw
 # isort: split
 import glfw
 
+from ..commands import run
 from ..derived import warm_up
 from ..editor import Editor
 from ..filing import Filing
@@ -131,11 +132,9 @@ class Window:
         if self._options.frames is not None:
             return drawn >= self._options.frames
         if glfw.window_should_close(self._handle):
-            if self.editor.is_saved:
-                return True
             glfw.set_window_should_close(self._handle, False)
-            self.editor.filing.guard(self._quit)
-        return False
+            run(self.editor, "quit")
+        return self.editor.is_over
 
     def _open_first(self) -> None:
         """What takes a second to import waits until the window has been drawn."""
@@ -143,10 +142,6 @@ class Window:
             self.editor.filing.open(self._options.file)
         elif self._options.frames is None:
             warm_up()
-
-    def _quit(self) -> None:
-        self.editor.close_document()
-        glfw.set_window_should_close(self._handle, True)
 
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""

@@ -200,3 +200,17 @@ def test_closing_asks_about_unsaved_changes(hands: Hands) -> None:
     time.sleep(0.3)
     hands.press("ctrl+z")
     hands.wait(lambda: "edited" not in hands.title(), "undoing")
+
+
+def test_the_window_closes_when_asked(hands: Hands) -> None:
+    hands.click(*screen_xy(*CENTRE))
+    hands.wait(lambda: "edited" in hands.title(), "selecting")
+    hands.press("ctrl+q")
+    time.sleep(0.4)
+    assert "edited" in hands.title()  # the question is there instead
+    hands.press("Escape")
+    time.sleep(0.3)
+    hands.press("ctrl+z")
+    hands.wait(lambda: "edited" not in hands.title(), "undoing")
+    hands.press("ctrl+q")
+    hands.wait(lambda: hands.title() == "", "closing")
