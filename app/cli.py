@@ -9,25 +9,17 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.progress import Progress, silent
-
 from . import __version__
 from .options import RENDERERS, WindowOptions
+from .terminal import PROGRAM
 
-PROGRAM = "objectmorpher"
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
 COMMANDS = ("edit", "select", "replay", "info", "models")
-
-
-class UsageError(ValueError):
-    """The command line asks for something impossible; one sentence."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -182,22 +174,6 @@ def _lazily(name: str) -> Callable[[argparse.Namespace], None]:
         getattr(cli_commands, f"run_{name}")(options)
 
     return run
-
-
-@contextmanager
-def progress_bar(title: str) -> Iterator[Progress]:
-    """A Progress that draws a bar on a terminal, and does nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield silent
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
-
-    columns = (TextColumn("{task.description:<28}"), BarColumn(), TimeElapsedColumn())
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task(title, total=1.0)
-        yield lambda fraction, note: bars.update(task, completed=fraction, description=note)
 
 
 def _joined_negatives(arguments: Sequence[str]) -> list[str]:

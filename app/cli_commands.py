@@ -24,8 +24,9 @@ from objectmorpher_core.script import (
     script_from,
 )
 
-from .cli import PICTURE_ENDINGS, PROGRAM, UsageError, progress_bar
+from .terminal import PROGRAM, UsageError, progress_bar
 
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and the endings each may have
     "session": (".omorph",), "save_mask": (".png",), "save_plate": PICTURE_ENDINGS,
