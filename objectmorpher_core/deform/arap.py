@@ -1,7 +1,7 @@
 """As-rigid-as-possible solve on the control points (paper Eq. 2-4; Sorkine & Alexa 2007).
 
-All sums over neighbours are dense matrix products: at the paper's link radius a control point
-has some eighty neighbours, and M = 512.
+The sums over neighbours are compiled loops over the links; the global step is two triangular
+solves. At the paper's link radius a control point has some eighty neighbours, and M = 512.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -83,87 +84,79 @@ class ArapSolver:
         self.weights = weights
         self.degree = weights.sum(1)
         self._laplacian = np.diag(self.degree) - weights
-        self._centre = self.points.mean(0)
-        self._centred = self.points - self._centre  # sums of squares lose no digits
-        self._weighted_points = weights @ self._centred  # W P
-        self._rest_energy = self._square_sum(self._centred, self._weighted_points)
+        self._links = _Links.of(self.points, weights)
         self.scale = float(np.abs(self.points - self.points.mean(0)).max()) or 1.0
 
-    def constrain(self, constraints: Constraints, is_free: np.ndarray) -> None:
+    def constrain(
+        self, constraints: Constraints, is_free: np.ndarray, held: np.ndarray | None = None
+    ) -> None:
         """Factors for these rows. `is_free` (M,): control points that the system may move.
 
-        The others keep an identity row and take no part. With C the rows, the minimiser of
+        The others keep an identity row and take no part. Those whose indices are `held` stay at
+        rest too, and the rest of the object hangs on them. With C the rows, the minimiser of
         Eq. 2 under C p' = t does not change when a multiple of C^T C is added to L; that makes
         the matrix positive definite as soon as each component has one constraint.
         """
         self.constraints = constraints
-        self.is_free = is_free
-        c = constraints.rows
+        held = np.empty(0, np.int32) if held is None else held
+        self._is_still = ~is_free
+        self._is_still[held] = True
+        self._still = self.points[self._is_still]
+        self._pull = self._laplacian[:, held] @ self.points[held]
+        self._rows = np.where(self._is_still, 0.0, constraints.rows)
+        self._stillness = constraints.rows[:, self._is_still] @ self._still
         self._stiffness = float(self.degree.max()) or 1.0
-        matrix = self._laplacian + self._stiffness * c.T @ c
-        matrix[~is_free] = 0.0
-        matrix[:, ~is_free] = 0.0
-        matrix[~is_free, ~is_free] = 1.0
+        matrix = self._laplacian + self._stiffness * (self._rows.T @ self._rows)
+        matrix[self._is_still] = 0.0
+        matrix[:, self._is_still] = 0.0
+        matrix[self._is_still, self._is_still] = 1.0
         try:
             self._factor = cho_factor(matrix, lower=True, check_finite=False)
         except np.linalg.LinAlgError:  # coincident points: the smallest push off singular
             jitter = 1e-10 * self._stiffness * np.eye(len(matrix))
             self._factor = cho_factor(matrix + jitter, lower=True, check_finite=False)
-        self._response = cho_solve(self._factor, c.T, check_finite=False)  # K^-1 C^T
-        self._inverse_schur = pinvh(c @ self._response, rtol=1e-10, check_finite=False)
+        self._response = cho_solve(self._factor, self._rows.T, check_finite=False)  # K^-1 C^T
+        self._inverse_schur = pinvh(self._rows @ self._response, rtol=1e-10, check_finite=False)
 
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
-        p, m = self._centred, len(self.points)
-        r = rotations.reshape(m, 9)
-        turned = (rotations @ p[:, :, None])[:, :, 0]  # R_j p_j
-        sums = self.weights @ np.concatenate([r, turned], axis=1)  # sum_j w_ij (R_j, R_j p_j)
-        arms = self.degree[:, None] * p - self._weighted_points
-        own = (rotations @ arms[:, :, None])[:, :, 0]
-        blended = (sums[:, :9].reshape(m, 3, 3) @ p[:, :, None])[:, :, 0]
-        right = 0.5 * (own + blended - sums[:, 9:])  # Eq. 3
-        c = self.constraints.rows
-        targets = self.constraints.targets(rotations)
-        right += self._stiffness * (c.T @ targets)
-        right[~self.is_free] = self.points[~self.is_free]
+        right = _right_side(*self._links, frozen(rotations))
+        targets = self.constraints.targets(rotations) - self._stillness
+        right += self._stiffness * (self._rows.T @ targets) - self._pull
+        right[self._is_still] = self._still
         loose = cho_solve(self._factor, right, check_finite=False)
-        multipliers = self._inverse_schur @ (targets - c @ loose)
+        multipliers = self._inverse_schur @ (targets - self._rows @ loose)
         return loose + self._response @ multipliers
 
     def rotations(self, positions: F64, warm: F64) -> F64:
         """Local step: rotations (M, 3, 3), det = +1, that minimise Eq. 2 for fixed positions."""
-        return _fit_rotations(frozen(self._covariances(positions)[0]), frozen(warm))
+        return self.fit(positions, warm)[0]
 
     def energy(self, positions: F64, rotations: F64) -> float:
         """Eq. 2, in object units squared."""
-        return self._energy(rotations, *self._covariances(positions))
+        return float(_energy(*self._links, frozen(positions), frozen(rotations)))
 
     def fit(self, positions: F64, warm: F64) -> tuple[F64, float]:
         """`rotations`, and the `energy` with them."""
-        covariances, posed = self._covariances(positions)
-        rotations = _fit_rotations(frozen(covariances), frozen(warm))
-        return rotations, self._energy(rotations, covariances, posed)
+        rotations = np.empty(warm.shape)
+        energy = _fit(*self._links, frozen(positions), frozen(warm), rotations)
+        return rotations, max(float(energy), 0.0)
 
-    def _energy(self, rotations: F64, covariances: F64, posed: float) -> float:
-        aligned = float(np.vdot(rotations, covariances))
-        return max(posed + self._rest_energy - 2.0 * aligned, 0.0)
 
-    def _covariances(self, positions: F64) -> tuple[F64, float]:
-        """sum_j w_ij e'_ij e_ij^T (M, 3, 3), the transpose of the paper's S_i; sum of w |e'|^2."""
-        p, m = self._centred, len(self.points)
-        q = positions - positions.mean(0)
-        outer = (q[:, :, None] * p[:, None, :]).reshape(m, 9)
-        sums = self.weights @ np.concatenate([outer, q], axis=1)  # sum_j w_ij (p'_j p_j^T, p'_j)
-        covariances = (
-            (sums[:, :9] + self.degree[:, None] * outer).reshape(m, 3, 3)
-            - q[:, :, None] * self._weighted_points[:, None, :]
-            - sums[:, 9:, None] * p[:, None, :]
-        )
-        return covariances, self._square_sum(q, sums[:, 9:])
+class _Links(NamedTuple):
+    """The links from each control point, one after the other: arguments of the kernels."""
 
-    def _square_sum(self, points: F64, weighted: F64) -> float:
-        """sum_ij w_ij |p_i - p_j|^2 of points (M, 3), `weighted` = W P."""
-        return 2.0 * float(np.vdot(points, self.degree[:, None] * points - weighted))
+    starts: I32  # (M + 1,) into the others
+    ends: I32  # (E,) control point at the other end
+    weights: F64  # (E,)
+    arms: F64  # (E, 3) p_j - p_i
+
+    @classmethod
+    def of(cls, points: F64, weights: F64) -> _Links:
+        i, j = np.nonzero(weights)
+        starts = np.searchsorted(i, np.arange(len(points) + 1)).astype(np.int32)
+        arms = points[j] - points[i]
+        return cls(frozen(starts), frozen(j, np.int32), frozen(weights[i, j]), frozen(arms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,55 +218,135 @@ def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
     return value - sum(w * (value - v) for w, (v, _) in zip(weights, history[:-1], strict=True))
 
 
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _right_side(starts, ends, weights, arms, r):
+    """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
+    count = len(starts) - 1
+    right = np.empty((count, 3))
+    for i in range(count):
+        b0 = b1 = b2 = m0 = m1 = m2 = 0.0
+        for e in range(starts[i], starts[i + 1]):
+            j = ends[e]
+            x, y, z = weights[e] * arms[e, 0], weights[e] * arms[e, 1], weights[e] * arms[e, 2]
+            m0 += x
+            m1 += y
+            m2 += z
+            b0 += r[j, 0, 0] * x + r[j, 0, 1] * y + r[j, 0, 2] * z
+            b1 += r[j, 1, 0] * x + r[j, 1, 1] * y + r[j, 1, 2] * z
+            b2 += r[j, 2, 0] * x + r[j, 2, 1] * y + r[j, 2, 2] * z
+        right[i, 0] = -0.5 * (b0 + r[i, 0, 0] * m0 + r[i, 0, 1] * m1 + r[i, 0, 2] * m2)
+        right[i, 1] = -0.5 * (b1 + r[i, 1, 0] * m0 + r[i, 1, 1] * m1 + r[i, 1, 2] * m2)
+        right[i, 2] = -0.5 * (b2 + r[i, 2, 0] * m0 + r[i, 2, 1] * m1 + r[i, 2, 2] * m2)
+    return right
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _energy(starts, ends, weights, arms, q, r):
+    """Eq. 2 of positions `q` (M, 3) and rotations `r`."""
+    total = 0.0
+    for i in range(len(starts) - 1):
+        for e in range(starts[i], starts[i + 1]):
+            j = ends[e]
+            for a in range(3):
+                turned = r[i, a, 0] * arms[e, 0] + r[i, a, 1] * arms[e, 1] + r[i, a, 2] * arms[e, 2]
+                gap = q[j, a] - q[i, a] - turned
+                total += weights[e] * gap * gap
+    return total
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _fit(starts, ends, weights, arms, q, warm, fitted):
+    """Local step into `fitted` (M, 3, 3); the energy with it.
+
+    The transpose of the paper's S_i is sum_j w_ij e'_ij e_ij^T.
+    """
+    total = 0.0
+    s = np.empty((3, 3))
+    for i in range(len(starts) - 1):
+        s00 = s01 = s02 = s10 = s11 = s12 = s20 = s21 = s22 = squares = 0.0
+        for e in range(starts[i], starts[i + 1]):
+            j, w = ends[e], weights[e]
+            x, y, z = arms[e, 0], arms[e, 1], arms[e, 2]
+            u, v, t = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]
+            squares += w * (u * u + v * v + t * t + x * x + y * y + z * z)
+            u, v, t = w * u, w * v, w * t
+            s00 += u * x
+            s01 += u * y
+            s02 += u * z
+            s10 += v * x
+            s11 += v * y
+            s12 += v * z
+            s20 += t * x
+            s21 += t * y
+            s22 += t * z
+        s[0, 0], s[0, 1], s[0, 2] = s00, s01, s02
+        s[1, 0], s[1, 1], s[1, 2] = s10, s11, s12
+        s[2, 0], s[2, 1], s[2, 2] = s20, s21, s22
+        r = fitted[i]
+        _fit_rotation(s, warm[i], r)
+        aligned = 0.0
+        for a in range(3):
+            for b in range(3):
+                aligned += r[a, b] * s[a, b]
+        total += squares - 2.0 * aligned
+    return total
+
+
 @numba.njit(cache=True, nogil=True)
 def _fit_rotations(covariances: F64, warm: F64) -> F64:
-    """Rotation nearest to each 3x3 matrix, from a warm start (Mueller et al. 2016).
+    """Rotation nearest to each 3x3 matrix (M, 3, 3), from a warm start."""
+    fitted = np.empty(warm.shape)
+    for i in range(len(covariances)):
+        _fit_rotation(covariances[i], warm[i], fitted[i])
+    return fitted
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _fit_rotation(a, warm, r):
+    """r := the rotation nearest to `a`, from a warm start (Mueller et al. 2016).
 
     The turn that aligns the current axes with the matrix's columns is repeated until it is
     nothing; a product of rotations never becomes a mirror image. From more than a right angle
     away the first turns are large but still in the right sense.
     """
-    fitted = np.empty(warm.shape)
-    for i in range(len(covariances)):
-        a, r = covariances[i], fitted[i]
-        size = 0.0
-        for j in range(3):
-            for k in range(3):
-                r[j, k] = warm[i, j, k]
-                size = max(size, abs(a[j, k]))
-        if size <= 1e-300:
-            continue
-        for _ in range(ROTATION_STEPS):
-            # omega = sum_k r_k x a_k / |sum_k r_k . a_k|, r_k and a_k the columns
-            ox = oy = oz = 0.0
-            dot = 0.0
-            for k in range(3):
-                ox += r[1, k] * a[2, k] - r[2, k] * a[1, k]
-                oy += r[2, k] * a[0, k] - r[0, k] * a[2, k]
-                oz += r[0, k] * a[1, k] - r[1, k] * a[0, k]
-                dot += r[0, k] * a[0, k] + r[1, k] * a[1, k] + r[2, k] * a[2, k]
-            scale = 1.0 / (abs(dot) + 1e-12 * size)
-            ox, oy, oz = ox * scale, oy * scale, oz * scale
-            square = ox * ox + oy * oy + oz * oz
-            angle = np.sqrt(square)
-            if angle > 1e-30:
-                _turn(r, ox / angle, oy / angle, oz / angle, angle)
-            if square < ROTATION_TOLERANCE:
-                break
-        _orthonormalise(r)
-    return fitted
+    size = 0.0
+    for j in range(3):
+        for k in range(3):
+            r[j, k] = warm[j, k]
+            size = max(size, abs(a[j, k]))
+    if size <= 1e-300:
+        return
+    for _ in range(ROTATION_STEPS):
+        # omega = sum_k r_k x a_k / |sum_k r_k . a_k|, r_k and a_k the columns
+        ox = oy = oz = 0.0
+        dot = 0.0
+        for k in range(3):
+            ox += r[1, k] * a[2, k] - r[2, k] * a[1, k]
+            oy += r[2, k] * a[0, k] - r[0, k] * a[2, k]
+            oz += r[0, k] * a[1, k] - r[1, k] * a[0, k]
+            dot += r[0, k] * a[0, k] + r[1, k] * a[1, k] + r[2, k] * a[2, k]
+        scale = 1.0 / (abs(dot) + 1e-12 * size)
+        ox, oy, oz = ox * scale, oy * scale, oz * scale
+        square = ox * ox + oy * oy + oz * oz
+        _turn(r, 0.5 * ox, 0.5 * oy, 0.5 * oz)
+        if square < ROTATION_TOLERANCE:
+            break
+    _orthonormalise(r)
 
 
 @numba.njit(cache=True)
-def _turn(r, x, y, z, angle):
-    """r := (turn by `angle` about the unit axis) r, by Rodrigues' formula."""
-    s, c = np.sin(angle), np.cos(angle)
+def _turn(r, x, y, z):
+    """r := (turn whose Gibbs vector, axis x tan(angle / 2), is x, y, z) r.
+
+    v + 2 / (1 + g.g) (g x v + g x (g x v)) for each column v: no sine, and 0 turns nothing.
+    """
+    share = 2.0 / (1.0 + x * x + y * y + z * z)
     for k in range(3):
         a, b, d = r[0, k], r[1, k], r[2, k]
-        along = (x * a + y * b + z * d) * (1.0 - c)
-        r[0, k] = a * c + (y * d - z * b) * s + x * along
-        r[1, k] = b * c + (z * a - x * d) * s + y * along
-        r[2, k] = d * c + (x * b - y * a) * s + z * along
+        u, v, w = y * d - z * b, z * a - x * d, x * b - y * a
+        r[0, k] = a + share * (u + y * w - z * v)
+        r[1, k] = b + share * (v + z * u - x * w)
+        r[2, k] = d + share * (w + x * v - y * u)
 
 
 @numba.njit(cache=True)

@@ -113,13 +113,12 @@ class Deformer:
         return Skinned(skinned.points, linear)
 
     def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, Mask]:
-        """Rows of the handles and anchors; factored again only when the set changed."""
+        """The handles' rows; factored again only when handles or anchors changed."""
         count = len(self.points)
         points = np.array([h.point for h in handles])
-        targets = np.array([h.target for h in handles])
-        rows = np.zeros((len(handles) + len(anchors), count))
-        offsets = np.zeros((len(rows), count, 3))
-        fixed = np.concatenate([targets, self.points[anchors]])
+        fixed = np.array([h.target for h in handles], np.float64)
+        rows = np.zeros((len(handles), count))
+        offsets = np.zeros((len(handles), count, 3))
         if self.settings.is_faithful:  # the paper constrains the control point itself
             for i, handle in enumerate(handles):
                 rows[i, handle.control_point] = 1.0
@@ -130,17 +129,17 @@ class Deformer:
                 nodes = binding.control_points[i]
                 rows[i, nodes] = binding.weights[i]
                 offsets[i, nodes] = points[i] - self.points[nodes]
-        rows[np.arange(len(handles), len(rows)), anchors] = 1.0
-        touched = np.unique(self.graph.components[np.flatnonzero(rows.any(0))])
-        is_free = np.isin(self.graph.components, touched)
+        anchors = anchors[~rows[:, anchors].any(0)]
+        held = np.concatenate([np.flatnonzero(rows.any(0)), anchors])
+        is_free = np.isin(self.graph.components, np.unique(self.graph.components[held]))
         constraints = Constraints(rows, fixed, offsets)
-        key = (rows.tobytes(), is_free.tobytes())
+        key = (rows.tobytes(), anchors.tobytes())
         if key == self._constrained:
             self._solver.constraints = constraints
         else:
             if not self.settings.is_faithful:
                 self._solver = ArapSolver(self.points, self._stiffened(handles))
-            self._solver.constrain(constraints, is_free)
+            self._solver.constrain(constraints, is_free, anchors)
             self._constrained = key
         return constraints, is_free
 
@@ -178,10 +177,8 @@ class Deformer:
         moves = np.array([h.target - h.point for h in handles])
         farthest = float(np.linalg.norm(moves, axis=1).max())
         steps = int(np.clip(np.ceil(farthest / (LARGE_MOVE * self.diameter)), 1, 20))
-        shift = np.zeros_like(constraints.fixed)
-        shift[: len(moves)] = moves
         for step in range(1, steps):
-            part = constraints.fixed - shift * (1 - step / steps)
+            part = constraints.fixed - moves * (1 - step / steps)
             self._solver.constraints = constraints.moved(part)
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
         self._solver.constraints = constraints

@@ -12,6 +12,7 @@ from ..arrays import F64, I32
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
 FALLOFF = 2.0  # x mean nearest-neighbour distance: the reach of a link's weight
+REACH = 3.0  # x falloff: a longer link would weigh 1 % of a short one
 LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
 
 
@@ -57,11 +58,14 @@ def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool =
     sparse = csr_matrix(auxiliary)
     geodesics = dijkstra(sparse, directed=False)
     lengths = geodesics if links == "geodesic" else distances
-    linked = lengths <= LINK_RADIUS * distances.max()
+    radius = LINK_RADIUS * distances.max()
+    falloff = FALLOFF * mean_spacing
+    if not is_faithful:
+        radius = min(radius, REACH * falloff)
+    linked = lengths <= radius
     np.fill_diagonal(linked, False)
     if not linked.any():
         linked = (auxiliary > 0) & ~np.eye(len(p), dtype=bool)
-    falloff = FALLOFF * mean_spacing
     if is_faithful and linked.any():
         falloff = float(lengths[linked].mean())
     weights = np.where(linked, np.exp(-(np.where(linked, lengths, 0) ** 2) / (2 * falloff**2)), 0)
