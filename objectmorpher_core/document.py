@@ -8,6 +8,7 @@ and pose invalidate nothing that is stored.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -114,7 +115,7 @@ class LiftedObject:
         object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
         object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
 
-    @property
+    @cached_property
     def diameter(self) -> float:
         """Largest distance between two control points, object units (paper's D_scene)."""
         p = self.control_points.astype(np.float64)
@@ -122,12 +123,12 @@ class LiftedObject:
         gaps = squares[:, None] + squares[None, :] - 2 * p @ p.T
         return float(np.sqrt(max(gaps.max(), 0.0)))
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """World units per object unit."""
         return float(np.cbrt(np.linalg.det(self.world_from_object[:3, :3])))
 
-    @property
+    @cached_property
     def centre(self) -> F64:
         """(3,) world; centre of the bounding box in camera axes at rest."""
         points = self.world_points(self.gaussians.means)

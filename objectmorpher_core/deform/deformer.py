@@ -43,7 +43,8 @@ class Deformer:
         self.graph: Graph = build_graph(self.points, settings.links, settings.is_faithful)
         self.binding = bind(lifted.gaussians.means, self.points, self.graph)
         self._solver = ArapSolver(self.points, self.graph.weights)
-        self._constrained: tuple[object, ...] = ()
+        self._constrained: tuple[object, ...] = ()  # what the solver is factored for
+        self._is_free = np.ones(len(self.points), bool)
 
     def rest(self) -> Pose:
         """The pose of the photo."""
@@ -113,35 +114,38 @@ class Deformer:
         return Skinned(skinned.points, linear)
 
     def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, Mask]:
-        """The handles' rows; factored again only when handles or anchors changed."""
-        count = len(self.points)
+        """The handles' rows; built and factored again only when handles or anchors changed."""
         points = np.array([h.point for h in handles])
+        nodes = np.array([h.control_point for h in handles])
         fixed = np.array([h.target for h in handles], np.float64)
-        rows = np.zeros((len(handles), count))
-        offsets = np.zeros((len(handles), count, 3))
         if self.settings.is_faithful:  # the paper constrains the control point itself
-            for i, handle in enumerate(handles):
-                rows[i, handle.control_point] = 1.0
-                fixed[i] += self.points[handle.control_point] - handle.point
-        else:
-            binding = bind(points, self.points, self.graph)
-            for i in range(len(handles)):
-                nodes = binding.control_points[i]
-                rows[i, nodes] = binding.weights[i]
-                offsets[i, nodes] = points[i] - self.points[nodes]
-        anchors = anchors[~rows[:, anchors].any(0)]
-        held = np.concatenate([np.flatnonzero(rows.any(0)), anchors])
-        is_free = np.isin(self.graph.components, np.unique(self.graph.components[held]))
-        constraints = Constraints(rows, fixed, offsets)
-        key = (rows.tobytes(), anchors.tobytes())
-        if key == self._constrained:
-            self._solver.constraints = constraints
-        else:
+            fixed += self.points[nodes] - points
+        key = (points.tobytes(), nodes.tobytes(), anchors.tobytes())
+        if key != self._constrained:
+            rows, offsets = self._rows(points, nodes)
+            anchors = anchors[~rows[:, anchors].any(0)]
+            held = np.concatenate([np.flatnonzero(rows.any(0)), anchors])
+            touched = np.unique(self.graph.components[held])
+            self._is_free = np.isin(self.graph.components, touched)
             if not self.settings.is_faithful:
                 self._solver = ArapSolver(self.points, self._stiffened(handles))
-            self._solver.constrain(constraints, is_free, anchors)
+            self._solver.constrain(Constraints(rows, fixed, offsets), self._is_free, anchors)
             self._constrained = key
-        return constraints, is_free
+        self._solver.constraints = self._solver.constraints.moved(fixed)
+        return self._solver.constraints, self._is_free
+
+    def _rows(self, points: F64, nodes: np.ndarray) -> tuple[F64, F64]:
+        """Each handle's row (H, M) and offsets (H, M, 3), see `Constraints`."""
+        rows = np.zeros((len(points), len(self.points)))
+        offsets = np.zeros((*rows.shape, 3))
+        if self.settings.is_faithful:
+            rows[np.arange(len(points)), nodes] = 1.0
+            return rows, offsets
+        binding = bind(points, self.points, self.graph)
+        for i, own in enumerate(binding.control_points):
+            rows[i, own] = binding.weights[i]
+            offsets[i, own] = points[i] - self.points[own]
+        return rows, offsets
 
     def _stiffened(self, handles: tuple[Handle, ...]) -> F64:
         """(M, M) the graph's weights, larger around each handle.

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
+import numba
 import numpy as np
 
 from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..deform.skinning import Skinned
 from ..document import LiftedObject
+from .threads import in_threads
 
 SURFACE_GAP = 2.5  # x spacing: samples farther apart in depth are different surfaces
 TEXTURE_GAP = 3.0  # x spacing in the photo: likewise for what they show of it
@@ -69,14 +72,19 @@ class SplatPoser:
     def pose(self, skinned: Skinned, placement: np.ndarray) -> PosedSplats:
         """`skinned` in the object frame, then the world motion `placement` (4, 4)."""
         world = self._rotation_scale
-        back = np.linalg.inv(world)
-        means = skinned.points @ world.T + self._translation
         motion = placement[:3, :3]
         texture, gaussians = self._lifted.texture, self._lifted.gaussians
         scale = float(np.cbrt(np.linalg.det(motion)))
+        before, offset = motion @ world, motion @ self._translation + placement[:3, 3]
+        means, linears = np.empty(skinned.points.shape), np.empty(skinned.linear.shape)
+        inputs: tuple[Any, ...] = (
+            frozen(skinned.points), frozen(skinned.linear), frozen(before), frozen(offset),
+            frozen(np.linalg.inv(world)), means, linears,
+        )  # fmt: skip
+        in_threads(lambda first, last: _move(first, last, *inputs), len(means))
         return PosedSplats(
-            means=means @ motion.T + placement[:3, 3],
-            linear=(motion @ world) @ skinned.linear @ back,
+            means=means,
+            linear=linears,
             rest_covariances=self._covariances,
             rest_pictures=self._pictures,
             normals=self._normals,
@@ -90,6 +98,28 @@ class SplatPoser:
             texture_gap=TEXTURE_GAP * self._spacing_px,
             rest_zoom=self._zoom,
         )
+
+
+@numba.njit(cache=True, nogil=True)
+def _move(first, last, points, linear, before, offset, after, means_out, linear_out):
+    """Rows first..last: means = before x + offset, linear = before F after."""
+    half = np.empty((3, 3))
+    for i in range(first, last):
+        for a in range(3):
+            mean = offset[a]
+            for b in range(3):
+                mean += before[a, b] * points[i, b]
+                half[a, b] = (
+                    before[a, 0] * linear[i, 0, b]
+                    + before[a, 1] * linear[i, 1, b]
+                    + before[a, 2] * linear[i, 2, b]
+                )
+            means_out[i, a] = mean
+        for a in range(3):
+            for b in range(3):
+                linear_out[i, a, b] = (
+                    half[a, 0] * after[0, b] + half[a, 1] * after[1, b] + half[a, 2] * after[2, b]
+                )
 
 
 def projection_jacobians(points: np.ndarray, focal: float) -> F64:
