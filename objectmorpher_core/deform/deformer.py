@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..arrays import F64, I32, Mask
 from ..document import DeformSettings, Handle, LiftedObject, Pose
@@ -40,7 +41,9 @@ class Deformer:
         self.settings = settings
         self.points = lifted.control_points.astype(np.float64)
         self.diameter = lifted.diameter
-        self.graph: Graph = build_graph(self.points, settings.links, settings.is_faithful)
+        self.graph: Graph = build_graph(
+            self.points, settings.links, settings.is_faithful, _normals_at(lifted, self.points)
+        )
         self.binding = bind(lifted.gaussians.means, self.points, self.graph)
         self._solver = ArapSolver(self.points, self.graph.weights)
         self._constrained: tuple[object, ...] = ()  # what the solver is factored for
@@ -208,3 +211,12 @@ class Deformer:
             positions[own] = positions[leader] + (self.points[own] - self.points[leader]) @ r.T
             rotations[own] = r
         return positions, rotations
+
+
+def _normals_at(lifted: LiftedObject, points: F64) -> F64:
+    """Outward normals (M, 3) of the surface at control points (M, 3), object frame."""
+    body = np.flatnonzero(lifted.texture.solidity > 0.5)
+    if len(body) == 0:
+        body = np.arange(len(lifted.gaussians))
+    nearest = body[KDTree(lifted.gaussians.means[body]).query(points)[1]]
+    return lifted.gaussians.normals[nearest].astype(np.float64)

@@ -8,11 +8,12 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from ..arrays import F64, I32
+from ..arrays import F64, I32, Mask
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
 FALLOFF = 2.0  # x mean nearest-neighbour distance: the reach of a link's weight
 REACH = 3.0  # x falloff: a longer link would weigh 1 % of a short one
+FACING = 0.3  # cosine of normal and link, from which a surface faces the link's other end
 LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
 
 
@@ -35,8 +36,13 @@ class Graph:
         return int(self.components.max()) + 1
 
 
-def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool = False) -> Graph:
-    """The paper's graph on control points (M, 3).
+def build_graph(
+    points: np.ndarray,
+    links: str = "geodesic",
+    is_faithful: bool = False,
+    normals: np.ndarray | None = None,
+) -> Graph:
+    """The paper's graph on control points (M, 3), with outward `normals` (M, 3) where known.
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
     the geodesics; points within 0.3 diameters along the surface are linked. `links="euclidean"`
@@ -45,6 +51,10 @@ def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool =
     behaves like a continuous body, and a dragged point takes its surroundings along. With
     `is_faithful` it is the mean length of a link, some five spacings: then every point is tied to
     so many far ones that a dragged one leaves its neighbours behind, and makes a spike.
+
+    Surfaces that face each other across a gap, as an arm and the body beside it do, are not
+    joined by the auxiliary graph although they are near: neither of the paper's two rules tells
+    them apart. The two sides of a thin limb face away from each other and stay joined.
     """
     if links not in ("geodesic", "euclidean"):
         raise ValueError(f"links must be geodesic or euclidean, not {links!r}")
@@ -55,6 +65,8 @@ def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool =
     auxiliary = np.where(off_diagonal <= AUXILIARY_RADIUS * mean_spacing, distances, 0.0)
     # A coincident pair would be "no edge" to scipy: keep it as a very short one.
     auxiliary[(off_diagonal <= AUXILIARY_RADIUS * mean_spacing) & (auxiliary == 0)] = 1e-12
+    if normals is not None and not is_faithful:
+        auxiliary[_face_each_other(p, normals, off_diagonal)] = 0.0
     sparse = csr_matrix(auxiliary)
     geodesics = dijkstra(sparse, directed=False)
     lengths = geodesics if links == "geodesic" else distances
@@ -73,3 +85,11 @@ def build_graph(points: np.ndarray, links: str = "geodesic", is_faithful: bool =
     count, components = connected_components(csr_matrix(weights), directed=False)
     assert count >= 1 and np.array_equal(weights, weights.T), "Eq. 3 needs symmetric weights"
     return Graph(weights, geodesics, components.astype(np.int32), mean_spacing)
+
+
+def _face_each_other(p: F64, normals: np.ndarray, distances: F64) -> Mask:
+    """(M, M) whether the surfaces at two points look at each other."""
+    n = normals.astype(np.float64)
+    towards = n @ p.T - (n * p).sum(1)[:, None]  # n_i . (p_j - p_i)
+    faces = towards > FACING * distances
+    return faces & faces.T

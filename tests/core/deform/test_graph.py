@@ -143,3 +143,38 @@ def test_size_and_motion_of_the_object_do_not_change_its_weights(scale):
     moved = scale * (points @ shapes.rotation(3).T) + scale * np.array([5.0, -2.0, 9.0])
     # 1e-7: coordinates of size 10 keep distances of size 0.1 to 1e-14 / 0.1, squared in exp
     assert np.abs(build_graph(moved).weights - build_graph(points).weights).max() < 1e-7
+
+
+def _two_legs(gap: float) -> tuple[np.ndarray, np.ndarray]:
+    """Two upright round bars `gap` apart, 1 long: points (N, 3) and outward normals."""
+    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 12, endpoint=False), np.linspace(0, 1, 25))
+    normals = np.stack([np.cos(around), np.sin(around), 0 * up], -1).reshape(-1, 3)
+    leg = 0.08 * normals + np.column_stack([0 * up.ravel(), 0 * up.ravel(), up.ravel()])
+    other = leg + [0.16 + gap, 0.0, 0.0]
+    return np.concatenate([leg, other]), np.concatenate([normals, normals])
+
+
+def test_legs_that_stand_close_together_are_two_parts():
+    points, normals = _two_legs(0.04)
+    half = len(points) // 2
+    spacing = build_graph(points).mean_spacing
+    assert AUXILIARY_RADIUS * spacing > 0.04
+    papers = np.count_nonzero(build_graph(points).weights[:half, half:])
+    ours = np.count_nonzero(build_graph(points, normals=normals).weights[:half, half:])
+    assert papers > 100
+    assert ours <= 0.01 * papers
+
+
+def test_the_two_sides_of_a_thin_sheet_stay_joined():
+    points = shapes.sheet(30, 18, thickness=0.02)
+    half = len(points) // 2
+    normals = np.repeat([[0.0, 0, 1], [0.0, 0, -1]], half, axis=0)
+    graph = build_graph(points, normals=normals)
+    assert graph.component_count == 1
+    assert (graph.weights[:half, half:] > 0).any(1).all(), "every point is linked through the sheet"
+
+
+def test_the_papers_graph_knows_no_normals():
+    points, normals = _two_legs(0.04)
+    weights = build_graph(points, is_faithful=True, normals=normals).weights
+    assert np.array_equal(weights, build_graph(points, is_faithful=True).weights)
