@@ -19,7 +19,7 @@ from .terminal import PROGRAM
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
-COMMANDS = ("edit", "select", "replay", "info", "models")
+COMMANDS = ("edit", "select", "replay", "info", "models", "bench")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,6 +60,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_select(commands.add_parser("select", help="write the mask of the chosen object"))
     _add_replay(commands.add_parser("replay", help="render a saved session again"))
     _add_info(commands.add_parser("info", help="what a session holds"))
+    _add_bench(commands.add_parser("bench", help="measure, on objects it makes itself"))
     _add_models(commands.add_parser("models", help="list, get and check learned weights"))
     return parser
 
@@ -157,6 +158,13 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", type=Path, metavar="SESSION")
     parser.add_argument("--json", action="store_true", help="as one JSON object")
     parser.set_defaults(run=_lazily("info"))
+
+
+def _add_bench(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("deform",))
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write there, not to stdout")
+    parser.add_argument("--quick", action="store_true", help="few repetitions, one size")
+    parser.set_defaults(run=_lazily("bench"))
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:

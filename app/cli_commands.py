@@ -169,6 +169,17 @@ def describe(document: Document) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def run_bench(options: argparse.Namespace) -> None:
+    """`objectmorpher bench`"""
+    from . import bench
+
+    figures = _json(bench.run_bench(options.what, options.quick))
+    if options.json:
+        write_all({options.json: figures})
+    else:
+        sys.stdout.write(figures.decode())
+
+
 def run_models(options: argparse.Namespace) -> None:
     """`objectmorpher models list|get|path|verify`"""
     from objectmorpher_core import models

@@ -18,6 +18,7 @@ from scipy.linalg import cho_factor, cho_solve, pinvh
 from ..arrays import F64, I32, frozen
 
 ANDERSON_WINDOW = 5  # previous steps that the acceleration combines
+FAST = {"reassoc", "contract", "nsz"}  # sums in any order, a * b + c at once
 ROTATION_STEPS = 40  # at most, per rotation fit; two or three from a warm start
 ROTATION_TOLERANCE = 1e-12  # rad^2, squared length of the last turn
 
@@ -218,7 +219,7 @@ def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
     return value - sum(w * (value - v) for w, (v, _) in zip(weights, history[:-1], strict=True))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _right_side(starts, ends, weights, arms, r):
     """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
     count = len(starts) - 1
@@ -240,7 +241,7 @@ def _right_side(starts, ends, weights, arms, r):
     return right
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _energy(starts, ends, weights, arms, q, r):
     """Eq. 2 of positions `q` (M, 3) and rotations `r`."""
     total = 0.0
@@ -254,7 +255,7 @@ def _energy(starts, ends, weights, arms, q, r):
     return total
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _fit(starts, ends, weights, arms, q, warm, fitted):
     """Local step into `fitted` (M, 3, 3); the energy with it.
 
@@ -301,7 +302,7 @@ def _fit_rotations(covariances: F64, warm: F64) -> F64:
     return fitted
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _fit_rotation(a, warm, r):
     """r := the rotation nearest to `a`, from a warm start (Mueller et al. 2016).
 

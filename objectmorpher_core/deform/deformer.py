@@ -102,6 +102,11 @@ class Deformer:
         positions, rotations = self._follow(minimum.positions, minimum.rotations, is_free)
         return Solution(Pose(positions, rotations), minimum.energies)
 
+    def prepare(self, handles: tuple[Handle, ...], has_auto_anchors: bool = True) -> None:
+        """Does now what the first solve with these handles would do: their factorisation."""
+        if handles:
+            self._constrain(handles, self.anchors(handles, has_auto_anchors))
+
     def skin_points(self, points: np.ndarray, pose: Pose) -> Skinned:
         """Rest surface points (N, 3) under `pose`, with the motion's Jacobian."""
         binding = bind(points, self.points, self.graph)

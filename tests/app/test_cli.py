@@ -493,6 +493,23 @@ def test_the_help_lists_the_subcommands(capsys):
     assert all(command in told for command in cli.COMMANDS)
 
 
+def test_the_bench_reports_what_the_design_names(folder):
+    assert cli.main(["bench", "deform", "--quick", "--json", "b.json"]) == 0
+    report = json.loads(Path("b.json").read_text())
+    assert set(report["machine"]) == {"cpu", "cores", "gl_renderer"}
+    rows = {row["mode"]: row for row in report["rows"]}
+    for mode in ("faithful", "default"):
+        row = rows[mode]
+        assert set(row) == {
+            "mode", "nodes", "links", "handles", "solve_ms", "solve_p99_ms", "set_handles_ms",
+            "energy_gap", "skin_ms", "gaussians",
+        }  # fmt: skip
+        assert row["nodes"] == 512
+        assert row["energy_gap"] > -1e-6, "no frame is better than the minimum"
+        assert 0 < row["solve_ms"] <= row["solve_p99_ms"]
+    assert rows["default"]["energy_gap"] < rows["faithful"]["energy_gap"]
+
+
 def test_the_version_is_told(capsys):
     from app import __version__
 
