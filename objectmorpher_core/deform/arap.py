@@ -7,6 +7,7 @@ solves. At the paper's link radius a control point has some eighty neighbours, a
 from __future__ import annotations
 
 import time
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -88,6 +89,15 @@ class ArapSolver:
         self._links = _Links.of(self.points, weights)
         self.scale = float(np.abs(self.points - self.points.mean(0)).max()) or 1.0
 
+    def reweighted(self, weights: np.ndarray) -> ArapSolver:
+        """A solver of the same points and links with other weights (M, M), symmetric."""
+        other = copy(self)
+        other.weights, other.degree = weights, weights.sum(1)
+        other._laplacian = np.diag(other.degree) - weights
+        links = self._links
+        other._links = links._replace(weights=frozen(weights[links.origins, links.ends]))
+        return other
+
     def constrain(
         self, constraints: Constraints, is_free: np.ndarray, held: np.ndarray | None = None
     ) -> None:
@@ -148,7 +158,8 @@ class _Links(NamedTuple):
     """The links from each control point, one after the other: arguments of the kernels."""
 
     starts: I32  # (M + 1,) into the others
-    ends: I32  # (E,) control point at the other end
+    origins: I32  # (E,) control point at this end
+    ends: I32  # (E,) and at the other
     weights: F64  # (E,)
     arms: F64  # (E, 3) p_j - p_i
 
@@ -157,7 +168,8 @@ class _Links(NamedTuple):
         i, j = np.nonzero(weights)
         starts = np.searchsorted(i, np.arange(len(points) + 1)).astype(np.int32)
         arms = points[j] - points[i]
-        return cls(frozen(starts), frozen(j, np.int32), frozen(weights[i, j]), frozen(arms))
+        ends = frozen(i, np.int32), frozen(j, np.int32)
+        return cls(frozen(starts), *ends, frozen(weights[i, j]), frozen(arms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +232,7 @@ def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _right_side(starts, ends, weights, arms, r):
+def _right_side(starts, origins, ends, weights, arms, r):
     """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
     count = len(starts) - 1
     right = np.empty((count, 3))
@@ -242,7 +254,7 @@ def _right_side(starts, ends, weights, arms, r):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _energy(starts, ends, weights, arms, q, r):
+def _energy(starts, origins, ends, weights, arms, q, r):
     """Eq. 2 of positions `q` (M, 3) and rotations `r`."""
     total = 0.0
     for i in range(len(starts) - 1):
@@ -256,7 +268,7 @@ def _energy(starts, ends, weights, arms, q, r):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(starts, ends, weights, arms, q, warm, fitted):
+def _fit(starts, origins, ends, weights, arms, q, warm, fitted):
     """Local step into `fitted` (M, 3, 3); the energy with it.
 
     The transpose of the paper's S_i is sum_j w_ij e'_ij e_ij^T.

@@ -18,6 +18,7 @@ ITERATIONS = 200  # at most; the solve ends earlier when nothing moves
 STEP_ITERATIONS = 4  # in the sub-steps of a large move
 LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
 GRIP = 20.0  # x a link's weight, in the hand of a handle
+LEAST_GRIP = 1e-3  # at less a point is not in the patch
 GRIP_RADIUS = 0.06  # x diameter, of the patch that a handle takes hold of
 GRIP_APART = 0.4  # x distance to the next handle, no patch is larger
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
@@ -136,7 +137,7 @@ class Deformer:
             touched = np.unique(self.graph.components[held])
             self._is_free = np.isin(self.graph.components, touched)
             if not self.settings.is_faithful:
-                self._solver = ArapSolver(self.points, self._stiffened(handles))
+                self._solver = self._solver.reweighted(self._stiffened(handles))
             self._solver.constrain(Constraints(rows, fixed, offsets), self._is_free, anchors)
             self._constrained = key
         self._solver.constraints = self._solver.constraints.moved(fixed)
@@ -171,7 +172,10 @@ class Deformer:
         grip = np.exp(-((distances / radii) ** 2))  # (M, H)
         factor = np.ones_like(self.graph.weights)
         for column in grip.T:
-            np.maximum(factor, 1 + (GRIP - 1) * np.outer(column, column), out=factor)
+            near = np.flatnonzero(column > LEAST_GRIP)
+            patch = np.ix_(near, near)
+            own = 1 + (GRIP - 1) * np.outer(column[near], column[near])
+            factor[patch] = np.maximum(factor[patch], own)
         return self.graph.weights * factor
 
     def _approach(
