@@ -6,9 +6,11 @@ import os
 import platform
 import time
 from collections.abc import Callable
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.camera import Camera
@@ -24,7 +26,7 @@ REPEATS, QUICK_REPEATS = 100, 5
 FRAME = 0.010  # s, the budget of a default frame
 LIMBS = 5
 LENGTH, RADIUS = 0.5, 0.07  # of a limb
-HELD_LIMBS = 4  # the fifth is bent
+PEER_VERTICES = 642
 STEPS = 60  # of a drag
 BEND = 90.0  # degrees
 
@@ -54,13 +56,13 @@ def _row(mode: str, nodes: int, gaussians: int, repeats: int) -> dict[str, Any]:
     deformer.prepare(handles)
     cold = deformer.solve(handles, start=deformer.rest(), seconds=FRAME)
     converged = _converged(deformer, handles, cold.pose)
-    poses: list[Pose | None] = [deformer.rest()]
+    there = [_handles(lifted, BEND * step / STEPS) for step in range(STEPS)]
+    drag, pose = cycle([*there, *reversed(there)]), deformer.rest()
 
     def frame() -> None:
         """One frame of a drag that goes to and fro."""
-        step = abs(len(poses) % (2 * STEPS) - STEPS) / STEPS
-        bent = _handles(lifted, BEND * step)
-        poses.append(deformer.solve(bent, start=poses[-1], seconds=FRAME).pose)
+        nonlocal pose
+        pose = deformer.solve(next(drag), start=pose, seconds=FRAME).pose
 
     frames = _times(frame, repeats)
     sets = [handles[:-1], handles]
@@ -97,19 +99,20 @@ def _converged(deformer: Deformer, handles: tuple[Handle, ...], start: Pose) -> 
 
 
 def _five_limbs(count: int, nodes: int) -> LiftedObject:
-    """Round limbs in a plane around a ball, `count` Gaussians, all of it closed and smooth."""
+    """Round limbs, open at their ends, in a plane around a ball: about `count` Gaussians."""
     rng = np.random.default_rng(0)
+    each = count // (LIMBS + 1)
     points, normals = [], []
     for limb in range(LIMBS):
         angle = 2 * np.pi * limb / LIMBS
         axis = np.array([np.cos(angle), np.sin(angle), 0.0])
         side = np.array([-axis[1], axis[0], 0.0])
-        around = rng.uniform(0, 2 * np.pi, count // LIMBS)
-        along = rng.uniform(0.3 * LENGTH, LENGTH, count // LIMBS)
+        around = rng.uniform(0, 2 * np.pi, each)
+        along = rng.uniform(0.3 * LENGTH, LENGTH, each)
         normal = np.cos(around)[:, None] * side + np.sin(around)[:, None] * [0.0, 0.0, 1.0]
         points.append(along[:, None] * axis + RADIUS * normal)
         normals.append(normal)
-    ball = rng.normal(size=(count // LIMBS, 3))
+    ball = rng.normal(size=(each, 3))
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
     means, outward = np.concatenate([*points, 0.18 * ball]), np.concatenate([*normals, ball])
     spacing = 0.01
@@ -156,12 +159,12 @@ def _handles(lifted: LiftedObject, degrees: float) -> tuple[Handle, ...]:
 
 
 def _libigl_row(repeats: int) -> dict[str, Any] | None:
-    """Three iterations of libigl on a sphere of 642 vertices, where it is installed."""
+    """Three iterations of libigl on a sphere, where it is installed."""
     try:
         import igl  # type: ignore[import-not-found]
     except ImportError:
         return None
-    vertices, faces = _sphere(3)
+    vertices, faces = _sphere(PEER_VERTICES)
     held = np.argsort(vertices[:, 2])[[0, 1, 2, 3, -1, -2, -3, -4]].astype(np.int32)
     data = igl.ARAPData()
     data.max_iter = 3
@@ -175,34 +178,18 @@ def _libigl_row(repeats: int) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _sphere(levels: int) -> tuple[F64, np.ndarray]:
-    """An icosahedron, each face cut in four `levels` times, on the unit sphere."""
-    g = (1 + 5**0.5) / 2
-    vertices = [
-        (-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g),
-        (0, -1, -g), (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1),
-    ]  # fmt: skip
-    points = [np.array(v) / np.linalg.norm(v) for v in vertices]
-    faces = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4),
-             (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8),
-             (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]  # fmt: skip
-    for _ in range(levels):
-        middles: dict[tuple[int, int], int] = {}
-
-        def middle(a: int, b: int, known: dict[tuple[int, int], int] = middles) -> int:
-            key = (min(a, b), max(a, b))
-            if key not in known:
-                known[key] = len(points)
-                between = points[a] + points[b]
-                points.append(between / np.linalg.norm(between))
-            return known[key]
-
-        finer = []
-        for a, b, c in faces:
-            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
-            finer += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-        faces = finer
-    return np.array(points), np.array(faces, np.int64)
+def _sphere(count: int) -> tuple[F64, np.ndarray]:
+    """Vertices (count, 3) spread evenly over the unit sphere, and triangles between them."""
+    k = np.arange(count) + 0.5
+    height, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    radius = np.sqrt(1 - height**2)
+    vertices = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    faces = ConvexHull(vertices).simplices.astype(np.int64)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normals * corners[:, 0]).sum(1) < 0
+    faces[inward] = faces[inward, ::-1]
+    return vertices, faces
 
 
 def _times(run: Callable[[], Any], repeats: int) -> list[float]:
@@ -223,9 +210,6 @@ def _cpu() -> str:
     """The processor's name as the system tells it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [
-                line.split(":", 1)[1].strip() for line in file if line.startswith("model name")
-            ]
-        return names[0]
-    except (OSError, IndexError):
+            return next(x.split(":", 1)[1].strip() for x in file if x.startswith("model name"))
+    except (OSError, StopIteration):
         return platform.processor() or platform.machine()

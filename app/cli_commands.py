@@ -13,7 +13,7 @@ from objectmorpher_core.compose.composite import straight_cutout
 from objectmorpher_core.compose.plate import plate_picture
 from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.image import ENDINGS, Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import Edited, open_photo, refuse_missing, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.script import (
@@ -26,10 +26,9 @@ from objectmorpher_core.script import (
 
 from .terminal import PROGRAM, UsageError, progress_bar
 
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and the endings each may have
-    "session": (".omorph",), "save_mask": (".png",), "save_plate": PICTURE_ENDINGS,
+    "session": (".omorph",), "save_mask": (".png",), "save_plate": ENDINGS,
     "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": (".ply",),
     "report": (".json",),
 }  # fmt: skip
@@ -44,7 +43,7 @@ def run_edit(options: argparse.Namespace) -> None:
     for item in items:
         photo, out = Path(item.photo or ""), Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
-        _check_outputs(inputs, {out: PICTURE_ENDINGS})
+        _check_outputs(inputs, {out: ENDINGS})
         _check_outputs(inputs, {path: EXTRAS[name] for name, path in extras.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
@@ -112,7 +111,7 @@ def run_replay(options: argparse.Namespace) -> None:
     """`objectmorpher replay`"""
     from objectmorpher_core.session_file import decode_session
 
-    wanted: dict[Path, tuple[str, ...]] = {options.out: PICTURE_ENDINGS}
+    wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
     _check_outputs([options.session], wanted)
@@ -221,8 +220,7 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
         read = parse_scripts(options.script.read_text(encoding="utf-8"))
         folder = options.script.parent
         items = [_beside(item, folder) for item in read]
-        names = _said(options)
-        items = [BatchItem(i.script.merged(said, names), i.photo, i.out) for i in items]
+        items = [BatchItem(i.script.merged(said, _said(options)), i.photo, i.out) for i in items]
     if len(items) > 1:
         single = [name for name in EXTRAS if getattr(options, name)]
         if options.photo or options.out or single:

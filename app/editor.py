@@ -304,7 +304,7 @@ class Editor:
                 return h
         target = self.derived.unplaced(self.document, k, seen.world)
         changed = edits.add_handle(self.document, k, seen.rest, target, is_pin)
-        self.preview = self.derived.solved(changed, k, item.pose, DRAG_SECONDS)
+        self.preview = self._restless = self.derived.solved(changed, k, item.pose, DRAG_SECONDS)
         self.handle = len(item.handles)
         return self.handle
 
@@ -321,11 +321,17 @@ class Editor:
         changed = edits.move_handle(self.document, k, handle, target)
         self.preview = self._restless = self.derived.solved(changed, k, start, DRAG_SECONDS)
 
-    def _relax(self) -> bool:
-        """Goes on with a drag's solve while the pointer holds still. Whether anything moved."""
+    @property
+    def is_restless(self) -> bool:
+        """Whether the previewed pose still moves towards its rest."""
+        return self._restless is not None and self._restless is self.preview
+
+    def relax(self) -> None:
+        """Goes on with a drag's solve: for a frame in which the pointer holds still."""
+        if not self.is_restless:
+            return
         document, self._restless = self._restless, None
-        if document is None or document is not self.preview:
-            return False
+        assert document is not None
         before = document.objects[self.current].pose
         after = self.derived.solved(document, self.current, before, DRAG_SECONDS)
         pose, lifted = after.objects[self.current].pose, after.objects[self.current].lifted
@@ -333,11 +339,11 @@ class Editor:
         self.preview = after
         if np.abs(pose.points - before.points).max() > AT_REST * lifted.diameter:
             self._restless = after
-        return True
 
     def settle(self) -> None:
-        """Lets the preview's pose come to rest: at the end of a drag."""
-        if self.preview is not None and self.object is not None:
+        """Lets the preview's pose come to rest: at the end of a stroke that changed something."""
+        document = self.history.document if self.history else None
+        if self.preview is not None and self.preview is not document and self.object is not None:
             self.preview = self.derived.solved(self.preview, self.current, self.object.pose)
 
     def nudge_handle(self, dx: float, dy: float) -> None:
@@ -411,7 +417,6 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
-        is_changed = self._relax() or is_changed
         return self.tasks.ensure_plate() or is_changed
 
     def set_theme(self, theme: str) -> None:

@@ -50,7 +50,7 @@ class Cut:
     mask: Mask
 
 
-class Reader:
+class PhotoMemory:
     """The worker's memory: its segmenter, and what it has made of the last photo."""
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class Reader:
         self._segmenter: Segmenter | None = None
         self._reading: Reading | None = None
 
-    def read(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
+    def reading(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
         """The photo as the segmenter sees it; at once where it is the last one."""
         from objectmorpher_core import segment
         from objectmorpher_core.pipeline import read_photo
@@ -72,21 +72,21 @@ class Reader:
         return self._reading
 
 
-_reader = Reader()
+_memory = PhotoMemory()
 
 
 def _is_same(a: Pixels, b: Pixels) -> bool:
     return a is b or (a.dtype == b.dtype and np.array_equal(a, b))
 
 
-def read_photo(pixels: Pixels, choice: Choice, progress: Progress) -> None:
+def read_photo(pixels: Pixels, backend: str, progress: Progress) -> None:
     """Prepares for clicks on a photo that was just opened."""
-    _reader.read(pixels, choice.backend, progress)
+    _memory.reading(pixels, backend, progress)
 
 
 def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
     """The mask of what the prompt means, and the backend that made it."""
-    reading = _reader.read(pixels, choice.backend, part(progress, 0.0, 0.6))
+    reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
 

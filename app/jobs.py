@@ -39,6 +39,12 @@ class JobError:
     sentence: str  # for the status line
     trace: str  # for "Details" and the log
 
+    @classmethod
+    def of(cls, error: Exception, what: str) -> JobError:
+        """From an exception that is being handled; `what` failed."""
+        name = type(error).__name__
+        return cls(name, str(error) or f"{what} failed ({name})", traceback.format_exc())
+
 
 @dataclass(eq=False)
 class Job:
@@ -95,10 +101,7 @@ class Worker:
             except OSError:  # the process is gone; the reader says so
                 return
             except Exception as error:  # a value that cannot be pickled: our mistake, said as data
-                trace = traceback.format_exc()
-                self._deliver(
-                    "failed", request[0], JobError(type(error).__name__, str(error), trace)
-                )
+                self._deliver("failed", request[0], JobError.of(error, "the request"))
 
     def _read(self) -> None:
         reader = Reader(self._connection)
@@ -237,7 +240,7 @@ def _accept(job: Job, value: Any) -> None:
         job.done(value)
     except Exception as error:
         log.exception("The answer of %s cannot be used", job.title)
-        job.failed(JobError(type(error).__name__, str(error), traceback.format_exc()))
+        job.failed(JobError.of(error, job.title))
 
 
 def _work(connection: Connection, stop: Event, warm: tuple[str, ...]) -> None:
@@ -257,9 +260,7 @@ def _work(connection: Connection, stop: Event, warm: tuple[str, ...]) -> None:
         except Cancelled:
             writer.write(("cancelled", number, None))
         except Exception as error:
-            sentence = str(error) or f"{function.__name__} failed ({type(error).__name__})"
-            failure = JobError(type(error).__name__, sentence, traceback.format_exc())
-            writer.write(("failed", number, failure))
+            writer.write(("failed", number, JobError.of(error, function.__name__)))
 
 
 def _lower_priority() -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import platformdirs
 
+from objectmorpher_core.lift import GAUSSIANS
+
 log = logging.getLogger(__name__)
 
 RECENT = 6  # files remembered
@@ -34,7 +36,7 @@ class Settings:
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
     is_motion_reduced: bool = False
     quality: int = 95  # of JPEG and WebP exports
-    gaussians: int = 16000  # of a lifted object
+    gaussians: int = GAUSSIANS  # of a lifted object
     recent: tuple[str, ...] = ()  # paths, newest first
     backends: Backends = field(default_factory=Backends)
 

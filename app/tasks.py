@@ -48,7 +48,7 @@ class Tasks:
             return
         editor.jobs.start(
             "Reading the photo", job_functions.read_photo, document.photo.pixels,
-            Choice(editor.settings.backends.segment, document.seed),
+            editor.settings.backends.segment,
             done=lambda _: None, failed=lambda error: None, kind=READ,
         )  # fmt: skip
 

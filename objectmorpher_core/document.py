@@ -132,7 +132,7 @@ class LiftedObject:
     def centre(self) -> F64:
         """(3,) world; centre of the bounding box in camera axes at rest."""
         points = self.world_points(self.gaussians.means)
-        return 0.5 * (points.min(0) + points.max(0))
+        return frozen(0.5 * (points.min(0) + points.max(0)))
 
     def world_points(self, points: np.ndarray) -> F64:
         """Object-frame points (..., 3) in the world, at rest."""

@@ -19,13 +19,13 @@ from ..tools.select_tool import SelectTool
 from ..view import ToolName
 from .layout import Rect
 
+log = logging.getLogger(__name__)
+
 TOOLS: dict[ToolName, Tool] = {
     ToolName.SELECT: SelectTool(),
     ToolName.POSE: PoseTool(),
     ToolName.PLACE: PlaceTool(),
 }
-log = logging.getLogger(__name__)
-
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
 FAR = 10  # px that an arrow with Shift moves
 
@@ -65,8 +65,8 @@ class Input:
 
     def _point(self, editor: Editor, rect: Rect, pointer: Pointer) -> None:
         """Hovering, beginning, going on: whichever it is."""
-        io, mouse = imgui.get_io(), imgui.get_io().mouse_pos
-        is_over = rect.contains(mouse.x, mouse.y) and not io.want_capture_mouse
+        io = imgui.get_io()
+        is_over = rect.contains(io.mouse_pos.x, io.mouse_pos.y) and not io.want_capture_mouse
         if editor.hand.is_busy:
             self._go_on(editor, pointer)
         elif editor.document is not None and is_over:
@@ -156,5 +156,7 @@ class Input:
         if self._last != (pointer.x, pointer.y) or pointer.wheel != 0:
             self._last = (pointer.x, pointer.y)
             editor.hand.move(pointer)  # before the release: both may come in one slow frame
+        else:
+            editor.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))

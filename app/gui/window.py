@@ -115,7 +115,7 @@ class Window:
                 lively = self._wait()
             else:
                 glfw.poll_events()
-            has_news = self.editor.poll()
+            has_news = self.editor.poll() or self.editor.is_restless
             lively = SETTLE if has_news else lively - 1
             self._frame()
             drawn += 1

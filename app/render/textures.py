@@ -34,18 +34,21 @@ class PictureTexture:
         self.texture.repeat_x = self.texture.repeat_y = False
         if self._has_mipmaps:
             self.texture.build_mipmaps()
+        self.texture.filter = (self._below, moderngl.LINEAR)
 
     @property
     def glo(self) -> int:
-        """OpenGL's number of the texture, drawn smooth below and above its size."""
-        self.texture.filter = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+        """OpenGL's number of the texture."""
         return self.texture.glo
+
+    @property
+    def _below(self) -> int:
+        return moderngl.LINEAR_MIPMAP_LINEAR if self._has_mipmaps else moderngl.LINEAR
 
     def use(self, unit: int, zoom: float) -> None:
         """Binds it: single pixels at high magnification, smooth below."""
         above = moderngl.NEAREST if zoom >= SHARP_FROM else moderngl.LINEAR
-        below = moderngl.LINEAR_MIPMAP_LINEAR if self._has_mipmaps else moderngl.LINEAR
-        self.texture.filter = (below, above)
+        self.texture.filter = (self._below, above)
         self.texture.use(unit)
 
     def _fitting(self, pixels: np.ndarray) -> np.ndarray:

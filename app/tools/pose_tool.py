@@ -56,8 +56,7 @@ class PoseTool:
                 if pointer.shift:  # along one axis of the picture
                     delta[np.abs(delta).argmin()] = 0.0
                 editor.drag_handle(handle, held.moved(delta, depth))
-        if is_moved or is_new:
-            editor.settle()
+        editor.settle()
         label = "Drag point" if is_moved else "Add pin" if start.alt else "Add handle"
         editor.commit(label if is_new or is_moved else "")
 

@@ -14,12 +14,12 @@ import numpy as np
 from ..arrays import F32, Mask, Pixels
 from ..camera import Camera
 from ..document import Document, EditObject, Matte
-from ..pixels import pixels_from_unit, unit_pixels
+from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
 from ..raster.posed import PosedSplats, TextureLevels, build_levels
 from ..raster.reference import Picture3D
-from .plate import crop, hole_margin, plate_crop
+from .plate import hole_margin, plate_crop
 
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha

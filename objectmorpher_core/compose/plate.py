@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..document import Document, Plate
-from ..pixels import pixels_from_unit, unit_pixels
+from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
 from . import Inpainter
 
@@ -113,18 +113,3 @@ def plate_crop(photo: Pixels, plate: Plate, box: tuple[int, int, int, int]) -> P
     x0, y0, x1, y1 = box
     hole = crop(plate.hole, plate.box, box)
     return np.where(hole[..., None], crop(plate.pixels, plate.box, box), photo[y0:y1, x0:x1])
-
-
-def crop(
-    image: np.ndarray, own: tuple[int, int, int, int], box: tuple[int, int, int, int]
-) -> np.ndarray:
-    """`image`, which covers the box `own` of the photo, cut or padded with 0 to `box`."""
-    x0, y0, x1, y1 = box
-    result = np.zeros((y1 - y0, x1 - x0, *image.shape[2:]), image.dtype)
-    left, top = max(x0, own[0]), max(y0, own[1])
-    right, bottom = min(x1, own[2]), min(y1, own[3])
-    if left < right and top < bottom:
-        result[top - y0 : bottom - y0, left - x0 : right - x0] = image[
-            top - own[1] : bottom - own[1], left - own[0] : right - own[0]
-        ]
-    return result

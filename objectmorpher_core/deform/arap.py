@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import time
 from copy import copy
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numba
@@ -37,40 +36,6 @@ class Constraints:
     fixed: F64  # (H, 3)
     offsets: F64  # (H, M, 3), x0 - p_j; 0 for a constraint on a control point itself
 
-    def targets(self, rotations: F64) -> F64:
-        """(H, 3) right-hand sides for rotations (M, 3, 3)."""
-        if self._turning.size == 0:
-            return self.fixed
-        targets = self.fixed.copy()
-        turned = rotations[self._nodes] @ self._arms[..., None]  # (T, N, 3, 1)
-        targets[self._turning] -= turned[..., 0].sum(1)
-        return targets
-
-    @cached_property
-    def _turning(self) -> I32:
-        """(T,) the rows whose targets depend on rotations."""
-        return np.flatnonzero((self.offsets != 0).any((1, 2))).astype(np.int32)
-
-    @cached_property
-    def _nodes(self) -> I32:
-        """(T, N) the control points that they depend on, the most heavily first."""
-        weights = np.abs(self.rows[self._turning])
-        count = int((weights > 0).sum(1).max())
-        return np.argsort(-weights, axis=1, kind="stable")[:, :count].astype(np.int32)
-
-    @cached_property
-    def _arms(self) -> F64:
-        """(T, N, 3) w_j (x0 - p_j) of those."""
-        weights = np.take_along_axis(self.rows[self._turning], self._nodes, 1)
-        arms = np.take_along_axis(self.offsets[self._turning], self._nodes[..., None], 1)
-        return weights[..., None] * arms
-
-    def moved(self, fixed: F64) -> Constraints:
-        """The same conditions with other targets (H, 3)."""
-        other = Constraints(self.rows, fixed, self.offsets)
-        other.__dict__.update({k: v for k, v in self.__dict__.items() if k[0] == "_"})
-        return other
-
 
 class ArapSolver:
     """Local-global minimisation of Eq. 2 under linear constraints.
@@ -86,7 +51,8 @@ class ArapSolver:
         self.weights = weights
         self.degree = weights.sum(1)
         self._laplacian = np.diag(self.degree) - weights
-        self._links = _Links.of(self.points, weights)
+        self._pairs = np.nonzero(weights)  # (E,) control points at this end, and at the other
+        self._links = _Links.of(self.points, weights, self._pairs)
         self.scale = float(np.abs(self.points - self.points.mean(0)).max()) or 1.0
 
     def reweighted(self, weights: np.ndarray) -> ArapSolver:
@@ -94,8 +60,7 @@ class ArapSolver:
         other = copy(self)
         other.weights, other.degree = weights, weights.sum(1)
         other._laplacian = np.diag(other.degree) - weights
-        links = self._links
-        other._links = links._replace(weights=frozen(weights[links.origins, links.ends]))
+        other._links = self._links._replace(weights=frozen(weights[self._pairs]))
         return other
 
     def constrain(
@@ -108,14 +73,15 @@ class ArapSolver:
         Eq. 2 under C p' = t does not change when a multiple of C^T C is added to L; that makes
         the matrix positive definite as soon as each component has one constraint.
         """
-        self.constraints = constraints
+        self._constraints = constraints
+        self._turning, self._turners, self._arms = _turning_parts(constraints)
         held = np.empty(0, np.int32) if held is None else held
         self._is_still = ~is_free
         self._is_still[held] = True
         self._still = self.points[self._is_still]
         self._pull = self._laplacian[:, held] @ self.points[held]
         self._rows = np.where(self._is_still, 0.0, constraints.rows)
-        self._stillness = constraints.rows[:, self._is_still] @ self._still
+        self._still_part = constraints.rows[:, self._is_still] @ self._still  # of the targets
         self._stiffness = float(self.degree.max()) or 1.0
         matrix = self._laplacian + self._stiffness * (self._rows.T @ self._rows)
         matrix[self._is_still] = 0.0
@@ -129,10 +95,16 @@ class ArapSolver:
         self._response = cho_solve(self._factor, self._rows.T, check_finite=False)  # K^-1 C^T
         self._inverse_schur = pinvh(self._rows @ self._response, rtol=1e-10, check_finite=False)
 
+    def aim(self, fixed: F64) -> None:
+        """Gives the constraints other targets (H, 3); nothing is factored for that."""
+        self._constraints = replace(self._constraints, fixed=fixed)
+
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
         right = _right_side(*self._links, frozen(rotations))
-        targets = self.constraints.targets(rotations) - self._stillness
+        targets = self._constraints.fixed - self._still_part
+        turned = rotations[self._turners] @ self._arms[..., None]  # (T, N, 3, 1)
+        targets[self._turning] -= turned[..., 0].sum(1)
         right += self._stiffness * (self._rows.T @ targets) - self._pull
         right[self._is_still] = self._still
         loose = cho_solve(self._factor, right, check_finite=False)
@@ -158,18 +130,27 @@ class _Links(NamedTuple):
     """The links from each control point, one after the other: arguments of the kernels."""
 
     starts: I32  # (M + 1,) into the others
-    origins: I32  # (E,) control point at this end
-    ends: I32  # (E,) and at the other
+    ends: I32  # (E,) control point at the other end
     weights: F64  # (E,)
     arms: F64  # (E, 3) p_j - p_i
 
     @classmethod
-    def of(cls, points: F64, weights: F64) -> _Links:
-        i, j = np.nonzero(weights)
+    def of(cls, points: F64, weights: F64, pairs: tuple[np.ndarray, ...]) -> _Links:
+        i, j = pairs
         starts = np.searchsorted(i, np.arange(len(points) + 1)).astype(np.int32)
-        arms = points[j] - points[i]
-        ends = frozen(i, np.int32), frozen(j, np.int32)
-        return cls(frozen(starts), *ends, frozen(weights[i, j]), frozen(arms))
+        arms = frozen(points[j] - points[i])
+        return cls(frozen(starts), frozen(j, np.int32), frozen(weights[pairs]), arms)
+
+
+def _turning_parts(constraints: Constraints) -> tuple[I32, I32, F64]:
+    """Rows (T,) whose targets turn, the control points (T, N) they turn with, w_j (x0 - p_j)."""
+    turning = np.flatnonzero((constraints.offsets != 0).any((1, 2)))
+    weights = constraints.rows[turning]
+    count = int((weights != 0).sum(1).max(initial=0))
+    turners = np.argsort(-np.abs(weights), axis=1, kind="stable")[:, :count]
+    offsets = np.take_along_axis(constraints.offsets[turning], turners[..., None], 1)
+    arms = np.take_along_axis(weights, turners, 1)[..., None] * offsets
+    return turning.astype(np.int32), turners.astype(np.int32), arms
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +213,7 @@ def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _right_side(starts, origins, ends, weights, arms, r):
+def _right_side(starts, ends, weights, arms, r):
     """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
     count = len(starts) - 1
     right = np.empty((count, 3))
@@ -254,7 +235,7 @@ def _right_side(starts, origins, ends, weights, arms, r):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _energy(starts, origins, ends, weights, arms, q, r):
+def _energy(starts, ends, weights, arms, q, r):
     """Eq. 2 of positions `q` (M, 3) and rotations `r`."""
     total = 0.0
     for i in range(len(starts) - 1):
@@ -268,7 +249,7 @@ def _energy(starts, origins, ends, weights, arms, q, r):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(starts, origins, ends, weights, arms, q, warm, fitted):
+def _fit(starts, ends, weights, arms, q, warm, fitted):
     """Local step into `fitted` (M, 3, 3); the energy with it.
 
     The transpose of the paper's S_i is sum_j w_ij e'_ij e_ij^T.
@@ -303,15 +284,6 @@ def _fit(starts, origins, ends, weights, arms, q, warm, fitted):
                 aligned += r[a, b] * s[a, b]
         total += squares - 2.0 * aligned
     return total
-
-
-@numba.njit(cache=True, nogil=True)
-def _fit_rotations(covariances: F64, warm: F64) -> F64:
-    """Rotation nearest to each 3x3 matrix (M, 3, 3), from a warm start."""
-    fitted = np.empty(warm.shape)
-    for i in range(len(covariances)):
-        _fit_rotation(covariances[i], warm[i], fitted[i])
-    return fitted
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..arrays import F64, I32, Mask
+from ..arrays import F64, I32
 from ..document import DeformSettings, Handle, LiftedObject, Pose
 from .arap import ArapSolver, Constraints, Minimum, minimise
 from .graph import Graph, build_graph
@@ -90,17 +90,17 @@ class Deformer:
         if not handles:
             return Solution(self.rest(), (0.0,))
         anchors = self.anchors(handles, has_auto_anchors)
-        constraints, is_free = self._constrain(handles, anchors)
+        self._constrain(handles, anchors)
         rotations = (start or self.rest()).rotations
         if self.settings.mode == "laplacian":
-            minimum = self._laplacian(constraints, is_free)
+            minimum = self._laplacian()
         elif self.settings.is_faithful:
             minimum = minimise(self._solver, rotations, FAITHFUL_ITERATIONS, tolerance=0.0)
         else:
             if start is None:
-                rotations = self._approach(constraints, is_free, handles, rotations)
+                rotations = self._approach(handles, rotations)
             minimum = minimise(self._solver, rotations, ITERATIONS, seconds=seconds)
-        positions, rotations = self._follow(minimum.positions, minimum.rotations, is_free)
+        positions, rotations = self._follow(minimum.positions, minimum.rotations)
         return Solution(Pose(positions, rotations), minimum.energies)
 
     def prepare(self, handles: tuple[Handle, ...], has_auto_anchors: bool = True) -> None:
@@ -122,26 +122,32 @@ class Deformer:
         linear = faithful_linear(self.binding, self.points, pose.points, pose.rotations, self.graph)
         return Skinned(skinned.points, linear)
 
-    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> tuple[Constraints, Mask]:
-        """The handles' rows; built and factored again only when handles or anchors changed."""
+    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> None:
+        """Aims the solver at the handles; it is factored again only when their set changed."""
         points = np.array([h.point for h in handles])
         nodes = np.array([h.control_point for h in handles])
-        fixed = np.array([h.target for h in handles], np.float64)
-        if self.settings.is_faithful:  # the paper constrains the control point itself
-            fixed += self.points[nodes] - points
+        fixed = self._fixed(handles)
         key = (points.tobytes(), nodes.tobytes(), anchors.tobytes())
-        if key != self._constrained:
-            rows, offsets = self._rows(points, nodes)
-            anchors = anchors[~rows[:, anchors].any(0)]
-            held = np.concatenate([np.flatnonzero(rows.any(0)), anchors])
-            touched = np.unique(self.graph.components[held])
-            self._is_free = np.isin(self.graph.components, touched)
-            if not self.settings.is_faithful:
-                self._solver = self._solver.reweighted(self._stiffened(handles))
-            self._solver.constrain(Constraints(rows, fixed, offsets), self._is_free, anchors)
-            self._constrained = key
-        self._solver.constraints = self._solver.constraints.moved(fixed)
-        return self._solver.constraints, self._is_free
+        if key == self._constrained:
+            self._solver.aim(fixed)
+            return
+        rows, offsets = self._rows(points, nodes)
+        anchors = anchors[~rows[:, anchors].any(0)]
+        held = np.concatenate([np.flatnonzero(rows.any(0)), anchors])
+        touched = np.unique(self.graph.components[held])
+        self._is_free = np.isin(self.graph.components, touched)
+        if not self.settings.is_faithful:
+            self._solver = self._solver.reweighted(self._stiffened(handles))
+        self._solver.constrain(Constraints(rows, fixed, offsets), self._is_free, anchors)
+        self._constrained = key
+
+    def _fixed(self, handles: tuple[Handle, ...], share: float = 1.0) -> F64:
+        """Where the rows must be (H, 3) when the handles have gone a `share` of their way."""
+        points = np.array([h.point for h in handles])
+        moves = np.array([h.target for h in handles]) - points
+        if self.settings.is_faithful:  # the paper constrains the control point itself
+            points = self.points[[h.control_point for h in handles]]
+        return points + share * moves
 
     def _rows(self, points: F64, nodes: np.ndarray) -> tuple[F64, F64]:
         """Each handle's row (H, M) and offsets (H, M, 3), see `Constraints`."""
@@ -178,13 +184,7 @@ class Deformer:
             factor[patch] = np.maximum(factor[patch], own)
         return self.graph.weights * factor
 
-    def _approach(
-        self,
-        constraints: Constraints,
-        is_free: Mask,
-        handles: tuple[Handle, ...],
-        rotations: F64,
-    ) -> F64:
+    def _approach(self, handles: tuple[Handle, ...], rotations: F64) -> F64:
         """Walks the targets from rest to where they belong; returns the rotations there.
 
         From a cold start a large turn ends in a false minimum; in steps of a tenth of the
@@ -194,20 +194,20 @@ class Deformer:
         farthest = float(np.linalg.norm(moves, axis=1).max())
         steps = int(np.clip(np.ceil(farthest / (LARGE_MOVE * self.diameter)), 1, 20))
         for step in range(1, steps):
-            part = constraints.fixed - moves * (1 - step / steps)
-            self._solver.constraints = constraints.moved(part)
+            self._solver.aim(self._fixed(handles, step / steps))
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
-        self._solver.constraints = constraints
+        self._solver.aim(self._fixed(handles))
         return rotations
 
-    def _laplacian(self, constraints: Constraints, is_free: Mask) -> Minimum:
+    def _laplacian(self) -> Minimum:
         """The ablation: Eq. 2 with R_i = identity."""
         rotations = self.rest().rotations
         positions = self._solver.positions(rotations)
         return Minimum(positions, rotations, (self._solver.energy(positions, rotations),))
 
-    def _follow(self, positions: F64, rotations: F64, is_free: Mask) -> tuple[F64, F64]:
+    def _follow(self, positions: F64, rotations: F64) -> tuple[F64, F64]:
         """Parts without a handle move rigidly with the nearest part that has one."""
+        is_free = self._is_free
         if is_free.all():
             return positions, rotations
         positions, rotations = positions.copy(), rotations.copy()

@@ -45,8 +45,9 @@ def build_graph(
     """The paper's graph on control points (M, 3), with outward `normals` (M, 3) where known.
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
-    the geodesics; points within 0.3 diameters along the surface are linked. `links="euclidean"`
-    is the ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
+    the geodesics; points within 0.3 diameters along the surface are linked, or within six
+    spacings where that is nearer: a longer link would weigh nothing. `links="euclidean"` is the
+    ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
     so that the Laplacian is too (DESIGN section 4). s is twice the mean spacing: the object
     behaves like a continuous body, and a dragged point takes its surroundings along. With
     `is_faithful` it is the mean length of a link, some five spacings: then every point is tied to

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from conftest import CENTRE, lift_ball, wait_for_jobs
 from PIL import Image
 
@@ -16,6 +17,7 @@ from app.filing import Dialog
 from app.tools.pointer import Button, Pointer
 from app.tools.pose_tool import PoseTool
 from app.view import ToolName
+from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
 from objectmorpher_core.session_file import decode_session
 
@@ -227,3 +229,40 @@ def test_the_editor_needs_no_window_and_no_heavy_modules() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root
     )
     assert result.stdout.strip() == "[]"
+
+
+def test_a_held_drag_comes_to_rest_and_is_then_left_alone(editor: Editor) -> None:
+    lift_ball(editor)
+    start = canvas_xy(editor, 90, 50)
+    handle = editor.start_handle(start, is_pin=False)
+    assert handle is not None
+    spot = editor.handle_position(handle)
+    editor.drag_handle(handle, spot.moved(np.array([30.0, -20.0]), 0.0))
+    assert editor.is_restless
+    for _ in range(500):
+        editor.relax()
+    assert not editor.is_restless
+    at_rest = editor.preview
+    editor.relax()
+    assert editor.preview is at_rest
+    editor.commit("")
+
+
+def test_a_click_beside_a_handle_on_its_control_point_is_no_step(editor: Editor) -> None:
+    lift_ball(editor)
+    start = canvas_xy(editor, 90, 50)
+    drag(editor, start, canvas_xy(editor, 110, 40))
+    document, thing = editor.document, editor.object
+    assert thing is not None and thing.lifted is not None
+    target = editor.view.canvas_from_image(editor.handle_positions()[0])
+    for angle in np.arange(0, 2 * np.pi, 0.1):  # just out of the handle's reach
+        at = target + 13.0 * np.array([np.cos(angle), np.sin(angle)])
+        seen = editor.surface_at(at)
+        if PoseTool().handle_at(editor, Pointer(*at)) is None and seen is not None:
+            node = edits.nearest_control_point(thing.lifted, seen.rest)
+            if node == thing.handles[0].control_point:
+                break
+    else:
+        pytest.fail("no such place was found")
+    drag(editor, at, at)
+    assert editor.document is document

@@ -7,7 +7,7 @@ import pytest
 
 from objectmorpher_core.arrays import F64 as Array
 from objectmorpher_core.arrays import frozen
-from objectmorpher_core.deform.arap import ArapSolver, Constraints, _fit_rotations, minimise
+from objectmorpher_core.deform.arap import ArapSolver, Constraints, _fit_rotation, minimise
 from objectmorpher_core.deform.graph import build_graph
 from tests import shapes
 
@@ -24,6 +24,14 @@ BAR = shapes.even(shapes.bar(3000), 150)
 
 def _solver(points: Array, weights: Array | None = None) -> ArapSolver:
     return ArapSolver(points, build_graph(points).weights if weights is None else weights)
+
+
+def _fit_rotations(matrices: Array, warm: Array) -> Array:
+    """The local step's rotation fit, for each 3x3 matrix (N, 3, 3)."""
+    fitted = np.empty(warm.shape)
+    for matrix, start, into in zip(matrices, warm, fitted, strict=True):
+        _fit_rotation(matrix, start, into)
+    return fitted
 
 
 def _hold(solver: ArapSolver, nodes: np.ndarray, targets: Array) -> Constraints:
