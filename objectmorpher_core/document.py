@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .arrays import F32, F64, Mask, Pixels, frozen
+from .arrays import F32, F64, I32, Mask, Pixels, frozen
 from .camera import Camera
 from .gaussians import Gaussians
 from .image import Picture
@@ -152,10 +152,14 @@ class Handle:
     point: F64  # (3,) object frame, the surface point that was clicked
     target: F64  # (3,) object frame; equal to `point` for a pin that was never dragged
     is_pin: bool = False
+    turn: F64 | None = None  # (3,) rotation vector, radians, any angle; None: as it comes
+    softness: float = 0.0  # 0: met exactly; 1: gives as much as the object itself does
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", frozen(self.point, np.float64))
         object.__setattr__(self, "target", frozen(self.target, np.float64))
+        if self.turn is not None:
+            object.__setattr__(self, "turn", frozen(self.turn, np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +211,37 @@ class DeformSettings:
     mode: str = "arap"  # or "laplacian"
     links: str = "geodesic"  # or "euclidean"
     is_faithful: bool = False  # the paper as printed: three iterations, Eq. 5
+    stiffness: float = 1.0  # x the usual radius within which control points are linked
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """Two regions of an object that are cut apart, or glued together."""
+
+    first: I32  # control points
+    second: I32
+    is_glued: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "first", frozen(self.first, np.int32))
+        object.__setattr__(self, "second", frozen(self.second, np.int32))
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """What the artist said about how an object's regions move. Control points by index."""
+
+    seams: tuple[Seam, ...] = ()
+    bodies: tuple[I32, ...] = ()  # groups that move as one rigid body, disjoint
+    held: I32 | None = None  # frozen where they are
+    stiffness: F64 | None = None  # (M,) of each control point, 1 = usual
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bodies", tuple(frozen(b, np.int32) for b in self.bodies))
+        if self.held is not None:
+            object.__setattr__(self, "held", frozen(self.held, np.int32))
+        if self.stiffness is not None:
+            object.__setattr__(self, "stiffness", frozen(self.stiffness, np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +256,7 @@ class EditObject:
     handles: tuple[Handle, ...] = ()
     has_auto_anchors: bool = True
     deform: DeformSettings = field(default_factory=DeformSettings)
+    rig: Rig = field(default_factory=Rig)
     pose: Pose | None = None  # None: at rest
     placement: Placement = Placement()
     is_visible: bool = True
@@ -238,8 +274,8 @@ class EditObject:
         return EditObject(self.name, prompt=prompt, mask=mask, deform=self.deform)
 
     def with_lifted(self, matte: Matte, lifted: LiftedObject) -> EditObject:
-        """A new lift: handles and pose named the old one's control points and are gone."""
-        return replace(self, matte=matte, lifted=lifted, handles=(), pose=None)
+        """A new lift: handles, rig and pose named the old one's control points and are gone."""
+        return replace(self, matte=matte, lifted=lifted, handles=(), rig=Rig(), pose=None)
 
 
 @dataclass(frozen=True, eq=False)
