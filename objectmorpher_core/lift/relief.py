@@ -22,12 +22,12 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, Matte, PhotoTexture
 from ..gaussians import Gaussians
+from ..poisson_disk import thin_to_spacing
 from ..progress import Progress
 from ..rotations import quats_from_matrices
 from ..segment.matte import band_width, extended_mask, frame_extension
 from . import LiftError
 from .membrane import solve_membrane
-from .poisson_disk import thin_to_spacing
 
 GRID = 256  # cells on the longer side of the crop in which the shape is found
 RIM_SLOPE = 2.0  # tangent of the angle, before FULLNESS, at which the front leaves the rim

@@ -13,7 +13,7 @@ from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..deform.skinning import Skinned
 from ..document import LiftedObject
-from .threads import in_threads
+from ..threads import in_threads
 
 SURFACE_GAP = 2.5  # x spacing: samples farther apart in depth are different surfaces
 TEXTURE_GAP = 3.0  # x spacing in the photo: likewise for what they show of it

@@ -14,10 +14,10 @@ import numpy as np
 
 from ..arrays import F64, frozen
 from ..camera import Camera
+from ..threads import in_threads
 from .posed import PosedSplats, TextureLevels
 from .reference import Picture3D
 from .rules import RULES, coverage, facing_weight, ramp
-from .threads import in_threads
 
 TILE = 16  # px
 PARTS = 8  # pieces of the picture for each thread: they are not equally full

@@ -12,10 +12,18 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
+FAST = {"reassoc", "contract", "nsz"}  # of kernels: sums in any order, a * b + c at once
+LEAST_ROWS = 2048  # of a light kernel, for which a second thread is woken
 
-def in_threads(run: Callable[[int, int], object], count: int, parts: int = 1) -> None:
-    """Calls `run(first, last)` for consecutive pieces of range(count), `parts` per core."""
-    pieces = min(max(core_count() * parts, 1), max(count, 1))
+
+def in_threads(
+    run: Callable[[int, int], object], count: int, parts: int = 1, least: int = 1
+) -> None:
+    """Calls `run(first, last)` for consecutive pieces of range(count), `parts` per core.
+
+    No piece is shorter than `least`: a few cheap rows are done before a thread wakes up.
+    """
+    pieces = min(max(core_count() * parts, 1), max(count // least, 1))
     bounds = [count * piece // pieces for piece in range(pieces + 1)]
     if pieces == 1:
         run(0, count)
@@ -34,4 +42,4 @@ def core_count() -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(core_count(), "raster")
+    return ThreadPoolExecutor(core_count(), "kernel")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..arrays import F64, frozen
+from .arrays import F64, frozen
 
 
 def thin_to_spacing(points: F64, spacing: float, order: np.ndarray) -> np.ndarray:
@@ -22,10 +22,10 @@ def thin_to_spacing(points: F64, spacing: float, order: np.ndarray) -> np.ndarra
         [(dx * size[1] + dy) * size[2] + dz
          for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)]
     )  # fmt: skip
-    neighbours = unique[:, None] + near[None]
+    neighbours = near[:, None] + unique[None]  # ascending rows: searched in half the time
     found = np.searchsorted(unique, neighbours)
     found[(found == len(unique)) | (unique[np.minimum(found, len(unique) - 1)] != neighbours)] = -1
-    inputs = [frozen(a) for a in (order, inverse, found)]
+    inputs = [frozen(a) for a in (order, inverse, found.T)]
     return np.flatnonzero(_thin(frozen(points, np.float64), float(spacing), *inputs))
 
 
