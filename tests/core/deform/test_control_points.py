@@ -6,19 +6,59 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.deform.control_points import COUNT, MIN_COUNT, sample_control_points
+from objectmorpher_core.deform.control_points import (
+    COUNT,
+    MAX_COUNT,
+    MIN_COUNT,
+    sample_control_points,
+)
 from tests import shapes
 
 F32 = 1e-6  # points come back as float32 of numbers below 1
+
+CLOUDS = {
+    "ball": shapes.ball(3000),
+    "horseshoe": shapes.horseshoe(1000) + 100.0,
+    "sheet": shapes.sheet(40, 30),  # a grid: many are equally far
+    "line": np.linspace(0, 1, 300)[:, None] * [1.0, 2.0, 3.0],
+    "outlier": np.concatenate([shapes.bar(500), [[1e6, 0, 0]]]),
+    "twins": np.repeat(shapes.ball(200), 3, axis=0),
+}
+clouds = pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS.keys())
 
 
 def _sample(points: np.ndarray, count: int, opacity: float = 1.0) -> np.ndarray:
     return sample_control_points(points, np.full(len(points), opacity), count)
 
 
+def _plain(points: np.ndarray, count: int) -> np.ndarray:
+    """The same sampling as one looks it up: every point, every time."""
+    chosen = [int(((points - points.mean(0)) ** 2).sum(1).argmax())]
+    nearest = np.full(len(points), np.inf)
+    while len(chosen) < count:
+        x, y, z = ((points - points[chosen[-1]]) ** 2).T
+        nearest = np.minimum(nearest, x + y + z)
+        if nearest.max() <= 0:
+            break
+        chosen.append(int(nearest.argmax()))
+    return points[chosen].astype(np.float32)
+
+
+@clouds
+@pytest.mark.parametrize("count", [4, 150, MAX_COUNT])
+def test_the_blocks_choose_what_the_plain_loop_chooses(cloud, count):
+    assert np.array_equal(_sample(cloud, count), _plain(cloud, min(count, len(cloud))))
+
+
 def test_the_same_cloud_gives_the_same_points():
     cloud = shapes.ball(500)
     assert np.array_equal(_sample(cloud, 64), _sample(cloud, 64))
+
+
+def test_the_order_of_the_gaussians_does_not_matter_where_none_are_equally_far():
+    cloud = shapes.ball(2000)
+    shuffled = cloud[np.random.default_rng(3).permutation(len(cloud))]
+    assert np.array_equal(_sample(shuffled, 200), _sample(cloud, 200))
 
 
 def test_control_points_are_distinct_gaussians():
@@ -69,12 +109,27 @@ def test_the_threshold_falls_where_too_few_are_solid():
     assert len(_sample(shapes.ball(100), 50, opacity=0.3)) == 50
 
 
-@pytest.mark.parametrize("cloud", [shapes.ball(MIN_COUNT - 1), np.zeros((50, 3))])
+@pytest.mark.parametrize("cloud", [np.empty((0, 3)), shapes.ball(MIN_COUNT - 1), np.zeros((50, 3))])
 def test_too_few_distinct_gaussians_are_refused(cloud):
     with pytest.raises(ValueError, match="distinct Gaussians, too few to deform"):
         _sample(cloud, 50)
 
 
-def test_too_few_control_points_are_refused():
-    with pytest.raises(ValueError, match="at least 4 are needed"):
-        _sample(shapes.ball(100), 3)
+@pytest.mark.parametrize(
+    ("count", "limit"), [(MIN_COUNT - 1, "at least 4 are needed"), (MAX_COUNT + 1, "at most 4096")]
+)
+def test_too_few_and_too_many_control_points_are_refused(count, limit):
+    with pytest.raises(ValueError, match=limit):
+        _sample(shapes.ball(100), count)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_gaussians_that_are_not_finite_are_refused(value):
+    cloud, opacities = shapes.ball(50), np.ones(50)
+    broken = cloud.copy()
+    broken[7, 1] = value
+    with pytest.raises(ValueError, match="not finite"):
+        sample_control_points(broken, opacities, 10)
+    opacities[7] = value
+    with pytest.raises(ValueError, match="not finite"):
+        sample_control_points(cloud, opacities, 10)
