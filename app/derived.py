@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 import numpy as np
 
 from objectmorpher_core import edits
-from objectmorpher_core.arrays import F32, F64, Mask
+from objectmorpher_core.arrays import F32, F64, Mask, Sparse
 from objectmorpher_core.document import Document, EditObject, Photo, Pose
 
 from .blend import build_blend
@@ -103,7 +104,9 @@ class Derived:
 
     def shape(self, photo: Photo, thing: EditObject) -> Shape:
         """Solver, poser and texture; a fraction of a second the first time."""
-        return self._shapes(lambda: _build_shape(photo, thing), thing.lifted, thing.deform)
+        return self._shapes(
+            lambda: _build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
+        )
 
     def prepare(self, document: Document, k: int) -> None:
         """Makes ready what the first drag of object `k` needs."""
@@ -158,13 +161,12 @@ class Derived:
         thing = document.objects[k]
         graph = self.shape(document.photo, thing).puppet.deformer.graph
         xy = self.control_points(document, k)
-        strongest = np.argsort(-graph.weights, axis=1)[:, :count]
-        pairs = {
-            (min(i, int(j)), max(i, int(j)))
-            for i, row in enumerate(strongest)
-            for j in row
-            if graph.weights[i, j] > 0
-        }
+        pairs = set()
+        weights: Sparse = graph.weights
+        for i, (first, last) in enumerate(pairwise(weights.indptr)):
+            strongest = np.argsort(-weights.data[first:last], kind="stable")[:count]
+            ends = weights.indices[first + strongest]
+            pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
         return [(xy[i], xy[j]) for i, j in sorted(pairs)]
 
     # Between the object's frame and the picture

@@ -5,92 +5,199 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import KDTree
 
 from ..arrays import F64, I32, Mask
+from ..document import DeformSettings, Seam
+from .surface_links import CHUNK, TINY, Edges, Surface, without_gaps
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
+LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
 FALLOFF = 2.0  # x mean nearest-neighbour distance: the reach of a link's weight
 REACH = 3.0  # x falloff: a longer link would weigh 1 % of a short one
-FACING = 0.3  # cosine of normal and link, from which a surface faces the link's other end
-LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
+NEIGHBOURS = 16  # control points along the surface that skinning chooses among
+SOFTEST, STIFFEST = 0.25, 4.0  # x the usual radius of the links
+USUAL = DeformSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class Graph:
     """Links between control points, and distances along the surface."""
 
-    weights: F64  # (M, M) symmetric, 0 = no link
-    geodesics: F64  # (M, M) object units, inf between components
+    weights: csr_array  # (M, M) symmetric, sorted, no diagonal and no stored zeros
+    auxiliary: csr_array  # (M, M) symmetric, lengths of the auxiliary edges, object units
+    neighbours: I32  # (M, min(16, M)) nearest along the surface, itself first; -1: no more
     components: I32  # (M,) component of each control point
     mean_spacing: float  # object units, mean nearest-neighbour distance
 
     @property
     def link_count(self) -> int:
         """Links, each counted once."""
-        return int(np.count_nonzero(self.weights)) // 2
+        return self.weights.nnz // 2
 
     @property
     def component_count(self) -> int:
         return int(self.components.max()) + 1
 
+    def distances_from(self, control_point: int) -> F64:
+        """(M,) object units along the surface, inf on other parts."""
+        return dijkstra(self.auxiliary, indices=control_point)
+
 
 def build_graph(
     points: np.ndarray,
-    links: str = "geodesic",
-    is_faithful: bool = False,
-    normals: np.ndarray | None = None,
+    settings: DeformSettings = USUAL,
+    surface: Surface | None = None,
+    seams: tuple[Seam, ...] = (),
 ) -> Graph:
-    """The paper's graph on control points (M, 3), with outward `normals` (M, 3) where known.
+    """The paper's graph on control points (M, 3), object frame.
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
     the geodesics; points within 0.3 diameters along the surface are linked, or within six
-    spacings where that is nearer: a longer link would weigh nothing. `links="euclidean"` is the
-    ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
+    spacings where that is nearer: a longer link would weigh nothing. `settings.links` "euclidean"
+    is the ablation that links by straight distance. Weights are exp(-g^2 / 2 s^2), and symmetric,
     so that the Laplacian is too (DESIGN section 4). s is twice the mean spacing: the object
     behaves like a continuous body, and a dragged point takes its surroundings along. With
-    `is_faithful` it is the mean length of a link, some five spacings: then every point is tied to
-    so many far ones that a dragged one leaves its neighbours behind, and makes a spike.
+    `settings.is_faithful` it is the mean length of a link, some five spacings: then every point
+    is tied to so many far ones that a dragged one leaves its neighbours behind, and makes a spike.
+    `settings.stiffness` scales the radius of the links, and s with it. Auxiliary edges are links
+    whatever the radius, so the links never split a part.
 
-    Surfaces that face each other across a gap, as an arm and the body beside it do, are not
-    joined by the auxiliary graph although they are near: neither of the paper's two rules tells
-    them apart. The two sides of a thin limb face away from each other and stay joined.
+    With a `surface` the default leaves out auxiliary edges that bridge a gap, as between an arm
+    and the body beside it: neither of the paper's two rules tells them apart. `seams` cut and
+    glue by hand: glue bridges a gap, and a cut wins over everything. Raises ValueError for points
+    that are not finite, a seam of other control points, and settings that do not exist.
     """
-    if links not in ("geodesic", "euclidean"):
-        raise ValueError(f"links must be geodesic or euclidean, not {links!r}")
-    p = points.astype(np.float64)
-    distances = np.sqrt(np.maximum(((p[:, None] - p[None]) ** 2).sum(-1), 0.0))
-    off_diagonal = distances + np.diag(np.full(len(p), np.inf))
-    mean_spacing = float(off_diagonal.min(1).mean())
-    auxiliary = np.where(off_diagonal <= AUXILIARY_RADIUS * mean_spacing, distances, 0.0)
-    # A coincident pair would be "no edge" to scipy: keep it as a very short one.
-    auxiliary[(off_diagonal <= AUXILIARY_RADIUS * mean_spacing) & (auxiliary == 0)] = 1e-12
-    if normals is not None and not is_faithful:
-        auxiliary[_face_each_other(p, normals, off_diagonal)] = 0.0
-    sparse = csr_matrix(auxiliary)
-    geodesics = dijkstra(sparse, directed=False)
-    lengths = geodesics if links == "geodesic" else distances
-    radius = LINK_RADIUS * distances.max()
-    falloff = FALLOFF * mean_spacing
-    if not is_faithful:
-        radius = min(radius, REACH * falloff)
-    linked = lengths <= radius
-    np.fill_diagonal(linked, False)
-    if not linked.any():
-        linked = (auxiliary > 0) & ~np.eye(len(p), dtype=bool)
-    if is_faithful and linked.any():
-        falloff = float(lengths[linked].mean())
-    weights = np.where(linked, np.exp(-(np.where(linked, lengths, 0) ** 2) / (2 * falloff**2)), 0)
-    weights = np.maximum(weights, weights.T)
-    count, components = connected_components(csr_matrix(weights), directed=False)
-    assert count >= 1 and np.array_equal(weights, weights.T), "Eq. 3 needs symmetric weights"
-    return Graph(weights, geodesics, components.astype(np.int32), mean_spacing)
+    _check(points, settings, seams)
+    centre = points.mean(0, dtype=np.float64)
+    p = points - centre  # far from the origin digits would be lost
+    spacing = _mean_spacing(p)
+    edges = Edges.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
+    if surface is not None and len(surface.means) and not settings.is_faithful:
+        centred = Surface(surface.means - centre, surface.normals)
+        edges = without_gaps(edges, p, spacing, centred)
+    edges = _sewn(edges, p, spacing, seams)
+    auxiliary = edges.matrix(len(p), edges.lengths)
+    radius = LINK_RADIUS * _diameter(p)
+    if not settings.is_faithful:
+        radius = min(radius, REACH * FALLOFF * spacing)
+    radius *= settings.stiffness
+    links, neighbours = _along(auxiliary, radius, spacing)
+    missing = edges.where(edges.lengths > radius)
+    if settings.links == "euclidean":
+        links, missing = Edges.within(p, radius, TINY * spacing), edges
+    links = links.and_also(missing, len(p)) if len(missing) else links
+    links = links.where(~_is_cut(links, len(p), seams))
+    weights = _weights(links, len(p), spacing, settings)
+    components = connected_components(weights, directed=False)[1]
+    return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing)
 
 
-def _face_each_other(p: F64, normals: np.ndarray, distances: F64) -> Mask:
-    """(M, M) whether the surfaces at two points look at each other."""
-    n = normals.astype(np.float64)
-    towards = n @ p.T - (n * p).sum(1)[:, None]  # n_i . (p_j - p_i)
-    faces = towards > FACING * distances
-    return faces & faces.T
+def _weights(links: Edges, count: int, spacing: float, settings: DeformSettings) -> csr_array:
+    """(M, M) exp(-g^2 / 2 s^2) of the links between `count` control points."""
+    falloff = FALLOFF * settings.stiffness * spacing
+    if settings.is_faithful and len(links):
+        falloff = float(links.lengths.mean())
+    # A link beyond the reach, an auxiliary edge, must hold its part together all the same.
+    weights = np.exp(-(np.minimum(links.lengths / falloff, REACH) ** 2) / 2)
+    return links.matrix(count, weights)
+
+
+def _check(points: np.ndarray, settings: DeformSettings, seams: tuple[Seam, ...]) -> None:
+    """Raises ValueError for what no graph can be built of."""
+    if settings.links not in ("geodesic", "euclidean"):
+        raise ValueError(f"links must be geodesic or euclidean, not {settings.links!r}")
+    if not SOFTEST <= settings.stiffness <= STIFFEST:
+        limits = f"between {SOFTEST:g} and {STIFFEST:g}"
+        raise ValueError(f"stiffness must be {limits}, not {settings.stiffness:g}")
+    if len(points) < 2:
+        raise ValueError(f"a graph needs at least two control points, not {len(points)}")
+    if not np.isfinite(points).all():
+        raise ValueError("the control points hold values that are not finite")
+    for seam in seams:
+        both = np.concatenate([seam.first, seam.second])
+        if len(both) and (both.min() < 0 or both.max() >= len(points)):
+            raise ValueError(f"a seam names control points that are not among the {len(points)}")
+
+
+def _mean_spacing(points: F64) -> float:
+    """Mean distance of points (M, 3) to their nearest neighbours; coincident ones count once."""
+    nearest = KDTree(points).query(points, k=2)[0][:, 1]
+    if not nearest.all():
+        distinct = np.unique(points, axis=0)
+        if len(distinct) == 1:
+            return 1.0  # any length will do
+        nearest = KDTree(distinct).query(distinct, k=2)[0][:, 1]
+    return float(nearest.mean())
+
+
+def _diameter(points: F64) -> float:
+    """Largest distance between two of points (M, 3) around the origin (paper's D_scene)."""
+    squares = (points * points).sum(1)
+    largest = 0.0
+    for start in range(0, len(points), CHUNK):
+        own = slice(start, start + CHUNK)
+        farthest = (squares - 2 * (points[own] @ points.T)).max(1)
+        largest = max(largest, float((squares[own] + farthest).max()))
+    return float(np.sqrt(largest))
+
+
+def _sewn(edges: Edges, points: F64, spacing: float, seams: tuple[Seam, ...]) -> Edges:
+    """The auxiliary edges with those of glue, and without those that are cut."""
+    for seam in seams:
+        if not (seam.is_glued and len(seam.first) and len(seam.second)):
+            continue
+        second, first = seam.second, seam.first
+        there = second[KDTree(points[second]).query(points[first])[1]]
+        back = first[KDTree(points[first]).query(points[second])[1]]
+        a, b = np.concatenate([first, second]), np.concatenate([there, back])
+        a, b = np.minimum(a, b)[a != b], np.maximum(a, b)[a != b]
+        edges = edges.and_also(Edges(a, b, np.full(len(a), spacing)), len(points))
+    return edges.where(~_is_cut(edges, len(points), seams))
+
+
+def _is_cut(edges: Edges, count: int, seams: tuple[Seam, ...]) -> Mask:
+    """(E,) whether an edge on `count` control points crosses a cut."""
+    crosses = np.zeros(len(edges), bool)
+    for seam in seams:
+        if not seam.is_glued:
+            first, second = np.zeros((2, count), bool)
+            first[seam.first], second[seam.second] = True, True
+            crosses |= first[edges.first] & second[edges.second]
+            crosses |= second[edges.first] & first[edges.second]
+    return crosses
+
+
+def _along(auxiliary: csr_array, radius: float, spacing: float) -> tuple[Edges, I32]:
+    """Pairs within `radius` along the surface, and each control point's nearest (M, 16)."""
+    parts = connected_components(auxiliary, directed=False)[1]
+    count = len(parts)
+    wanted = np.minimum(np.bincount(parts)[parts], NEIGHBOURS)
+    neighbours = np.empty((count, min(NEIGHBOURS, count)), np.int32)
+    limit = usual = max(radius, REACH * FALLOFF * spacing)
+    found: list[Edges] = []
+    rows = np.arange(count)
+    while len(rows):
+        for start in range(0, len(rows), CHUNK):
+            own = rows[start : start + CHUNK]
+            distances = dijkstra(auxiliary, indices=own, limit=limit)
+            neighbours[own] = _nearest(distances, neighbours.shape[1])
+            if limit == usual:
+                i, j = np.nonzero((distances <= radius) & (np.arange(count) > own[:, None]))
+                found.append(Edges(own[i], j, distances[i, j]))
+        # On a thin limb sixteen neighbours are far: once more for those who miss some.
+        rows = np.flatnonzero((neighbours >= 0).sum(1) < wanted)
+        limit *= 2
+    first, second = (np.concatenate([getattr(e, k) for e in found]) for k in ("first", "second"))
+    return Edges(first, second, np.concatenate([e.lengths for e in found])), neighbours
+
+
+def _nearest(distances: F64, count: int) -> I32:
+    """The `count` columns (R, count) of least distance (R, M) in each row; -1 where it is inf."""
+    nearest = np.sort(np.argpartition(distances, count - 1, axis=1)[:, :count], axis=1)
+    of_them = np.take_along_axis(distances, nearest, 1)
+    order = np.argsort(of_them, axis=1, kind="stable")
+    is_reached = np.isfinite(np.take_along_axis(of_them, order, 1))
+    return np.where(is_reached, np.take_along_axis(nearest, order, 1), -1).astype(np.int32)

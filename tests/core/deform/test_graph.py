@@ -1,14 +1,25 @@
-"""The deformable graph: symmetric, along the surface, robust against odd clouds."""
+"""The deformable graph: symmetric, along the surface, across no gap, robust against odd clouds."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from objectmorpher_core.deform.graph import AUXILIARY_RADIUS, LINK_RADIUS, build_graph
+from objectmorpher_core.deform.graph import (
+    AUXILIARY_RADIUS,
+    FALLOFF,
+    LINK_RADIUS,
+    REACH,
+    Graph,
+    build_graph,
+)
+from objectmorpher_core.document import DeformSettings, Seam
 from tests import shapes
 
 F64 = 1e-9
+FAITHFUL = DeformSettings(is_faithful=True)
+EUCLIDEAN = DeformSettings(links="euclidean")
+EVERY = {"default": DeformSettings(), "faithful": FAITHFUL, "euclidean": EUCLIDEAN}
 
 BALL = shapes.even(shapes.ball(3000), 60)
 CLOUDS = {
@@ -19,122 +30,188 @@ CLOUDS = {
     "two parts": np.concatenate([BALL, BALL + [3.0, 0, 0]]),
     "chance": shapes.ball(80),  # uneven: falls into many parts
 }
+ODD = {
+    "four": shapes.ball(4),
+    "line": np.linspace(0, 1, 30)[:, None] * [1.0, 2.0, 3.0],
+    "plane": shapes.sheet(),
+    "one place": np.ones((6, 3)),
+    "pairs": np.repeat(BALL, 2, axis=0),
+    "far point": np.concatenate([BALL, [[40.0, 0, 0]]]),
+}
 clouds = pytest.mark.parametrize("points", CLOUDS.values(), ids=CLOUDS.keys())
+odd = pytest.mark.parametrize("points", [*CLOUDS.values(), *ODD.values()], ids=[*CLOUDS, *ODD])
+every = pytest.mark.parametrize("settings", EVERY.values(), ids=EVERY.keys())
 
 
 def _distances(points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[:, None] - points[None], axis=-1)
 
 
-@clouds
-@pytest.mark.parametrize("links", ["geodesic", "euclidean"])
-def test_weights_are_symmetric_positive_and_free_of_self_links(points, links):
-    weights = build_graph(points, links).weights
-    assert np.array_equal(weights, weights.T)
-    assert weights.min() >= 0
-    assert weights.max() <= 1
-    assert not weights.diagonal().any()
+def _geodesics(graph: Graph) -> np.ndarray:
+    """(M, M) all distances along the surface."""
+    return np.stack([graph.distances_from(i) for i in range(len(graph.components))])
+
+
+@odd
+@every
+def test_weights_are_symmetric_positive_and_free_of_self_links(points, settings):
+    graph = build_graph(points, settings)
+    for matrix in (graph.weights, graph.auxiliary):
+        assert (matrix != matrix.T).nnz == 0
+        assert matrix.has_sorted_indices
+        assert not matrix.diagonal().any()
+        assert (matrix.data > 0).all() and np.isfinite(matrix.data).all()
+    assert graph.weights.max() <= 1
+
+
+@odd
+@every
+def test_links_hold_together_what_the_auxiliary_graph_does(points, settings):
+    graph = build_graph(points, settings)
+    reached = np.isfinite(_geodesics(graph))
+    together = graph.components[:, None] == graph.components
+    assert (together >= reached).all()
+    is_alone = (reached.sum(1) == 1) & (together.sum(1) == 1)
+    assert ((np.diff(graph.weights.indptr) > 0) | is_alone).all()
 
 
 @clouds
 def test_the_way_along_the_surface_is_never_shorter_than_the_straight_one(points):
-    graph = build_graph(points)
-    assert (graph.geodesics >= _distances(points) - F64).all()
+    assert (_geodesics(build_graph(points)) >= _distances(points) - F64).all()
 
 
 @clouds
 def test_distances_along_the_surface_obey_the_triangle_inequality(points):
-    g = build_graph(points).geodesics
+    g = _geodesics(build_graph(points))
     through = (g[:, :40, None] + g[None, :40, :]).min(1)
     assert (g <= through + F64).all()
 
 
 @clouds
-def test_no_link_is_longer_than_the_radius_and_none_within_it_is_missing(points):
-    graph = build_graph(points)
-    limit = LINK_RADIUS * _distances(points).max()
-    within = graph.geodesics <= limit
+@pytest.mark.parametrize("stiffness", [0.25, 1.0, 2.0])
+def test_no_link_is_longer_than_the_radius_and_none_within_it_is_missing(points, stiffness):
+    graph = build_graph(points, DeformSettings(stiffness=stiffness))
+    spacing = graph.mean_spacing
+    limit = stiffness * min(LINK_RADIUS * _distances(points).max(), REACH * FALLOFF * spacing)
+    geodesics = _geodesics(graph)
+    within = (geodesics <= limit) | (graph.auxiliary.toarray() > 0)
     np.fill_diagonal(within, False)
-    assert np.array_equal(graph.weights > 0, within)
+    assert np.array_equal(graph.weights.toarray() > 0, within)
+    expected = np.exp(
+        -((np.where(within, geodesics, 0) / (FALLOFF * stiffness * spacing)) ** 2) / 2
+    )
+    is_usual = within & (geodesics <= limit)
+    assert np.abs(graph.weights.toarray() - expected)[is_usual].max(initial=0) < F64
 
 
 @clouds
-def test_weights_fall_with_the_distance_along_the_surface(points):
+def test_the_faithful_graph_is_the_papers(points):
+    distances = _distances(points)
+    np.fill_diagonal(distances, np.inf)
+    spacing = distances.min(1).mean()
+    np.fill_diagonal(distances, 0)
+    g = np.where(distances <= AUXILIARY_RADIUS * spacing * (1 + F64), distances, np.inf)
+    for k in range(len(g)):  # Floyd and Warshall
+        g = np.minimum(g, g[:, k, None] + g[k])
+    linked = g <= LINK_RADIUS * distances.max()
+    np.fill_diagonal(linked, False)
+    falloff = g[linked].mean()
+    expected = np.where(linked, np.exp(-(np.where(linked, g, 0) ** 2) / (2 * falloff**2)), 0)
+    assert np.abs(build_graph(points, FAITHFUL).weights.toarray() - expected).max() < F64
+
+
+@odd
+def test_neighbours_are_the_nearest_along_the_surface(points):
     graph = build_graph(points)
-    linked = graph.weights > 0
-    order = np.argsort(graph.geodesics[linked])
-    assert (np.diff(graph.weights[linked][order]) <= F64).all()
+    geodesics = np.sort(_geodesics(graph), axis=1)[:, :16]
+    assert graph.neighbours.shape == geodesics.shape
+    assert np.array_equal(graph.neighbours[:, 0], np.arange(len(points)))
+    for i, own in enumerate(graph.neighbours):
+        known = own[own >= 0]
+        assert len(np.unique(known)) == len(known) == np.isfinite(geodesics[i]).sum()
+        found = graph.distances_from(i)[known]
+        assert np.abs(found - geodesics[i, : len(known)]).max() < F64
 
 
 def test_two_far_parts_are_two_components_without_a_link():
     graph = build_graph(CLOUDS["two parts"])
     assert graph.component_count == 2
-    assert not graph.weights[:60, 60:].any()
-    assert np.isinf(graph.geodesics[:60, 60:]).all()
+    assert graph.weights[:60, 60:].nnz == 0
+    assert np.isinf(graph.distances_from(0)[60:]).all()
     assert len(set(graph.components[:60])) == 1
 
 
 def test_each_link_is_counted_once():
     graph = build_graph(shapes.ball(50))
-    assert graph.link_count == np.count_nonzero(np.triu(graph.weights))
+    assert graph.link_count == np.count_nonzero(np.triu(graph.weights.toarray()))
 
 
 def test_the_ends_of_a_horseshoe_are_near_but_not_linked():
-    points = shapes.even(shapes.horseshoe(3000), 200)
+    points = CLOUDS["horseshoe"]
     tip = np.abs(np.arctan2(points[:, 1], points[:, 0])) < 0.4
     upper, lower = tip & (points[:, 1] > 0), tip & (points[:, 1] < 0)
-    between = np.ix_(np.flatnonzero(upper), np.flatnonzero(lower))
-    assert not build_graph(points).weights[between].any()
-    assert build_graph(points, "euclidean").weights[between].any(), "the ablation does link them"
+    assert build_graph(points).weights[upper][:, lower].nnz == 0
+    assert build_graph(points, EUCLIDEAN).weights[upper][:, lower].nnz > 0, "the ablation does"
 
 
 def test_sheets_farther_apart_than_the_auxiliary_radius_share_no_link():
     points = shapes.two_sheets(gap=0.4)
-    spacing = build_graph(points).mean_spacing
-    assert AUXILIARY_RADIUS * spacing < 0.4
+    graph = build_graph(points)
+    assert AUXILIARY_RADIUS * graph.mean_spacing < 0.4
     half = len(points) // 2
-    assert not build_graph(points).weights[:half, half:].any()
-    assert build_graph(points).component_count == 2
-
-
-def test_sheets_nearer_than_the_auxiliary_radius_do_share_links():
-    """What the paper's rule cannot tell apart: DESIGN section 4 says so, this pins it down."""
-    points = shapes.two_sheets(gap=0.05)
-    half = len(points) // 2
-    assert build_graph(points).weights[:half, half:].any()
-    assert build_graph(points).component_count == 1
+    assert graph.weights[:half, half:].nnz == 0
+    assert graph.component_count == 2
 
 
 def test_euclidean_links_ignore_the_surface():
-    points = shapes.even(shapes.horseshoe(3000), 200)
-    weights = build_graph(points, "euclidean").weights
-    limit = LINK_RADIUS * _distances(points).max()
+    points = CLOUDS["horseshoe"]
+    graph = build_graph(points, EUCLIDEAN)
+    limit = min(LINK_RADIUS * _distances(points).max(), REACH * FALLOFF * graph.mean_spacing)
     within = _distances(points) <= limit
     np.fill_diagonal(within, False)
-    assert np.array_equal(weights > 0, within)
-
-
-def test_an_unknown_kind_of_link_is_refused():
-    with pytest.raises(ValueError, match="links must be geodesic or euclidean, not 'magic'"):
-        build_graph(shapes.ball(20), "magic")
+    assert np.array_equal(graph.weights.toarray() > 0, within)
 
 
 def test_coincident_points_are_linked_and_break_nothing():
-    points = np.concatenate([BALL, BALL[:10]])
-    graph = build_graph(points)
-    twins = np.arange(10), np.arange(60, 70)
-    assert (graph.geodesics[twins] < F64).all()
-    assert (graph.weights[twins] > 0.99).all()
-    assert np.isfinite(graph.weights).all()
+    graph = build_graph(np.concatenate([BALL, BALL[:10]]))
+    for i in range(10):
+        assert graph.distances_from(i)[60 + i] < F64
+        assert graph.weights[i, 60 + i] > 0.99
     assert graph.component_count == 1
 
 
 def test_one_far_point_leaves_the_others_linked():
     """Its distance raises the mean spacing, not the links' radius below it."""
-    points = np.concatenate([BALL, [[40.0, 0, 0]]])
-    graph = build_graph(points)
+    graph = build_graph(ODD["far point"])
     assert graph.component_count == 2
     assert len(set(graph.components[:60])) == 1
+
+
+@every
+@clouds
+def test_a_stiffer_object_has_more_links(points, settings):
+    stiffness = (0.25, 0.5, 1.0, 2.0, 4.0)
+    settings = [DeformSettings(settings.mode, settings.links, settings.is_faithful, s)
+                for s in stiffness]  # fmt: skip
+    counts = [build_graph(points, s).link_count for s in settings]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+@pytest.mark.parametrize(
+    ("points", "settings", "sentence"),
+    [
+        (BALL, DeformSettings(links="magic"), "links must be geodesic or euclidean, not 'magic'"),
+        (BALL, DeformSettings(stiffness=5.0), "stiffness must be between 0.25 and 4, not 5"),
+        (BALL, DeformSettings(stiffness=np.nan), "stiffness must be between 0.25 and 4, not nan"),
+        (BALL[:1], DeformSettings(), "at least two control points, not 1"),
+        (np.where(BALL[3, 1] == BALL, np.nan, BALL), DeformSettings(), "not finite"),
+        (np.where(BALL[3, 1] == BALL, np.inf, BALL), DeformSettings(), "not finite"),
+    ],
+)
+def test_what_makes_no_graph_is_refused_in_one_sentence(points, settings, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        build_graph(points, settings)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -142,39 +219,68 @@ def test_size_and_motion_of_the_object_do_not_change_its_weights(scale):
     points = shapes.horseshoe(150)
     moved = scale * (points @ shapes.rotation(3).T) + scale * np.array([5.0, -2.0, 9.0])
     # 1e-7: coordinates of size 10 keep distances of size 0.1 to 1e-14 / 0.1, squared in exp
-    assert np.abs(build_graph(moved).weights - build_graph(points).weights).max() < 1e-7
+    assert abs(build_graph(moved).weights - build_graph(points).weights).max() < 1e-7
 
 
-def _two_legs(gap: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two upright round bars `gap` apart, 1 long: points (N, 3) and outward normals."""
-    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 12, endpoint=False), np.linspace(0, 1, 25))
-    normals = np.stack([np.cos(around), np.sin(around), 0 * up], -1).reshape(-1, 3)
-    leg = 0.08 * normals + np.column_stack([0 * up.ravel(), 0 * up.ravel(), up.ravel()])
-    other = leg + [0.16 + gap, 0.0, 0.0]
-    return np.concatenate([leg, other]), np.concatenate([normals, normals])
+# ---- seams ----------------------------------------------------------------------------------
+
+BAR = shapes.sheet(30, 18)
+LEFT, RIGHT = (np.flatnonzero(BAR[:, 0] * side > 0.0) for side in (-1, 1))
+LOWER_LEFT, LOWER_RIGHT = (i[BAR[i, 1] < 0.1] for i in (LEFT, RIGHT))
 
 
-def test_legs_that_stand_close_together_are_two_parts():
-    points, normals = _two_legs(0.04)
-    half = len(points) // 2
-    spacing = build_graph(points).mean_spacing
-    assert AUXILIARY_RADIUS * spacing > 0.04
-    papers = np.count_nonzero(build_graph(points).weights[:half, half:])
-    ours = np.count_nonzero(build_graph(points, normals=normals).weights[:half, half:])
-    assert papers > 100
-    assert ours <= 0.01 * papers
+@every
+def test_a_cut_through_makes_two_parts(settings):
+    graph = build_graph(BAR, settings, seams=(Seam(LEFT, RIGHT),))
+    assert graph.component_count == 2
+    assert graph.weights[LEFT][:, RIGHT].nnz == graph.auxiliary[LEFT][:, RIGHT].nnz == 0
 
 
-def test_the_two_sides_of_a_thin_sheet_stay_joined():
-    points = shapes.sheet(30, 18, thickness=0.02)
-    half = len(points) // 2
-    normals = np.repeat([[0.0, 0, 1], [0.0, 0, -1]], half, axis=0)
-    graph = build_graph(points, normals=normals)
+@every
+def test_the_way_leads_around_a_cut(settings):
+    whole = build_graph(BAR, settings)
+    graph = build_graph(BAR, settings, seams=(Seam(LOWER_LEFT, LOWER_RIGHT),))
     assert graph.component_count == 1
-    assert (graph.weights[:half, half:] > 0).any(1).all(), "every point is linked through the sheet"
+    assert graph.weights[LOWER_LEFT][:, LOWER_RIGHT].nnz == 0
+    assert (_geodesics(graph) >= _geodesics(whole) - F64).all()
+    i, j = LOWER_LEFT[BAR[LOWER_LEFT].sum(1).argmin()], LOWER_RIGHT[0]
+    assert graph.distances_from(i)[j] > whole.distances_from(i)[j] + F64
 
 
-def test_the_papers_graph_knows_no_normals():
-    points, normals = _two_legs(0.04)
-    weights = build_graph(points, is_faithful=True, normals=normals).weights
-    assert np.array_equal(weights, build_graph(points, is_faithful=True).weights)
+@every
+def test_glue_joins_two_parts(settings):
+    points = CLOUDS["two parts"]
+    first, second = np.argsort(points[:60, 0])[-5:], 60 + np.argsort(points[60:, 0])[:5]
+    graph = build_graph(points, settings, seams=(Seam(first, second, is_glued=True),))
+    assert graph.component_count == 1
+    glue = graph.auxiliary[first][:, second]
+    assert (np.diff(glue.indptr) > 0).all() and (np.diff(glue.T.tocsr().indptr) > 0).all()
+    assert np.allclose(glue.data, graph.mean_spacing, rtol=F64)
+    assert graph.weights[first][:, second].nnz >= glue.nnz
+    assert (graph.weights != graph.weights.T).nnz == 0
+
+
+def test_a_cut_wins_over_glue():
+    seams = Seam(LEFT, RIGHT), Seam(LEFT, RIGHT, is_glued=True)
+    assert build_graph(BAR, seams=seams).component_count == 2
+    assert build_graph(BAR, seams=seams[::-1]).component_count == 2
+
+
+@pytest.mark.parametrize("is_glued", [False, True])
+def test_an_empty_region_changes_nothing(is_glued):
+    none = np.empty(0, np.int32)
+    seams = Seam(LEFT, none, is_glued), Seam(none, RIGHT, is_glued)
+    assert (build_graph(BAR, seams=seams).weights != build_graph(BAR).weights).nnz == 0
+
+
+def test_a_region_glued_to_itself_and_cut_from_itself_is_no_error():
+    glued = build_graph(BAR, seams=(Seam(LEFT, LEFT, is_glued=True),))
+    assert not glued.auxiliary.diagonal().any()
+    cut = build_graph(BAR, seams=(Seam(LEFT, LEFT),))
+    assert cut.weights[LEFT][:, LEFT].nnz == 0
+
+
+@pytest.mark.parametrize("number", [-1, len(BAR)])
+def test_a_seam_of_other_control_points_is_refused(number):
+    with pytest.raises(ValueError, match="a seam names control points that are not among"):
+        build_graph(BAR, seams=(Seam(LEFT, np.array([number])),))
