@@ -1,27 +1,59 @@
-"""From control points to Gaussians: linear blend skinning (paper Eq. 5) and its Jacobian."""
+"""From control points to surface points: blended dual quaternions, and the motion's Jacobian.
+
+The paper (Eq. 5) blends the displaced points themselves; where control points turn against each
+other, that mean lies inside the body, and a twisted limb grows thin. Blending the rigid motions
+as dual quaternions (Kavan et al. 2008) keeps its volume. Control point j with weight w_j moves
+the rest point x by u_j = R_j (x - p_j) + p'_j - x and turns it by the unit quaternion q_j:
+
+    b = sum_j w_j q_j,  P = sum_j w_j u_j q_j (u_j as a pure quaternion),  n = |b|^2
+    x' = x + vec(P b*) / n = x + sum_j A_j u_j
+    A_j = w_j (s_j I - [v_j]x) / n  with  (s_j, v_j) = q_j b*,  so that sum_j A_j = I
+    F = R_b + sum_j g_j (grad w_j)^T
+    g_j = (vec(u_j q_j b* + P q_j*) - 2 (b . q_j) (x' - x)) / n
+
+with R_b the turn of b / |b|. With fixed weights x' is the motion of b, whose derivative is R_b;
+g_j is the derivative by w_j. The kernel works with y = x - centre, and without the displacement
+that all control points share, which comes out of the blend as it went in. In
+
+    u_j q_j = m_j + (0, 2 vec(q_j) x y),  m_j = ((R_j - I) (centre - p_j) + p'_j - p_j) q_j
+
+only the last term knows the point, and it is linear in q_j: the sums over j are of q_j and m_j,
+times the weights and their gradients. At rest each term is 0, however far the origin is.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
-from scipy.spatial import KDTree
 
-from ..arrays import F64, I32, frozen
-from .graph import Graph
+from ..arrays import F64, frozen
+from ..threads import FAST, LEAST_ROWS, in_threads
+from .binding import NEIGHBOURS, Binding
+from .jacobians import LEAST_STRETCH, MOST_STRETCH, limit_row, margin
 
-NEIGHBOURS = 4  # control points that move a Gaussian, paper 3.2.2
-CANDIDATES = 16  # geodesic neighbours of the nearest control point that may be among them
+ZERO = (0.0, 0.0, 0.0, 0.0)
+
+# A block of points in the kernel's working memory: a row a number, a column a point.
+LANES = 32  # points in a block
+NODES = 0  # rows of q and m of each control point
+SHARES = NODES + 8 * NEIGHBOURS  # of its weight and the weight's gradient
+PLACE = SHARES + 4 * NEIGHBOURS  # of 2 y
+SHIFT = PLACE + 3  # of x' - x
+LINEAR = SHIFT + 3  # of F
+MARGIN = LINEAR + 9  # see `jacobians.margin`
+ROWS = MARGIN + 1
 
 
 @dataclass(frozen=True, eq=False)
-class Binding:
-    """Which control points move each point of the rest shape, and how much."""
+class Motion:
+    """How the control points move."""
 
-    control_points: I32  # (N, K)
-    weights: F64  # (N, K), rows sum to 1
-    weight_gradients: F64  # (N, K, 3) per object unit, rows sum to 0
+    rest: np.ndarray  # (M, 3) object frame
+    points: F64  # (M, 3) posed
+    rotations: F64  # (M, 3, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,131 +64,263 @@ class Skinned:
     linear: F64  # (N, 3, 3) Jacobian of the motion there: F
 
 
-def bind(points: np.ndarray, control_points: np.ndarray, graph: Graph) -> Binding:
-    """Binds points (N, 3) to their K = 4 control points.
-
-    The nearest control point is found by straight distance, the others among its neighbours
-    along the surface (paper 3.2.2). Weights are (1 - d / d_5)^2, normalised, with d_5 the
-    distance of the next control point that is not used: a weight is 0 when its control point
-    enters or leaves the set, so the motion has no seams (embedded deformation, Sumner et al.
-    2007).
-    """
-    p = control_points.astype(np.float64)
-    x = np.atleast_2d(points).astype(np.float64)
-    nearest, row = np.unique(KDTree(p).query(x)[1], return_inverse=True)
-    geodesics = graph.geodesics[nearest]  # of those in use: picking binds a single point
-    order = np.argsort(geodesics, axis=1, kind="stable")[:, :CANDIDATES]
-    reach = np.take_along_axis(geodesics, order, 1)[row]
-    order = order[row]  # (N, C)
-    distances = np.linalg.norm(x[:, None] - p[order], axis=2)
-    distances[~np.isfinite(reach)] = np.inf
-    count = min(NEIGHBOURS, len(p) - 1)
-    rank = np.argsort(distances, axis=1, kind="stable")[:, : count + 1]
-    chosen = np.take_along_axis(order, rank, 1)  # (N, K + 1), the last one is not used
-    distances = np.take_along_axis(distances, rank, 1)
-    weights, gradients = _falloff(x, p[chosen], distances)
-    return Binding(chosen[:, :count].astype(np.int32), weights, gradients)
-
-
-def _falloff(x: F64, nodes: F64, distances: F64) -> tuple[F64, F64]:
-    """Normalised (1 - d_k / d_K+1)^2 of (N, K) control points, and its gradients (N, K, 3).
-
-    `nodes` (N, K + 1, 3) and `distances` (N, K + 1) are in the order of distance; inf marks one
-    on another part.
-    """
-    # In a part with few control points the farthest of it takes the place of the next one.
-    usable = np.isfinite(distances).sum(1)
-    last = np.maximum(usable - 1, 0)
-    rows = np.arange(len(x))
-    limit = distances[rows, last][:, None]
-    d = distances[:, :-1]
-    is_used = np.arange(d.shape[1])[None] < np.maximum(last, 1)[:, None]
-    d = np.where(is_used, d, 0.0)
-    safe = np.maximum(limit, 1e-300)
-    slack = np.where(is_used, 1 - d / safe, 0.0)
-    along = (x[:, None] - nodes[:, :-1]) / np.maximum(d, 1e-12)[..., None]
-    limit_along = (x - nodes[rows, last]) / safe
-    change = -along / safe[..., None] + (d / safe**2)[..., None] * limit_along[:, None]
-    weights = slack**2
-    gradients = 2 * slack[..., None] * change
-    total = weights.sum(1, keepdims=True)
-    # Equally far from all of them, or alone: equal shares that do not change.
-    even = total[:, 0] <= 1e-30
-    weights[even] = is_used[even]
-    gradients[even] = 0.0
-    total = weights.sum(1, keepdims=True)
-    weights /= total
-    gradients = (gradients - weights[..., None] * gradients.sum(1, keepdims=True)) / total[
-        ..., None
-    ]
-    return weights, gradients
-
-
-def skin(
-    points: np.ndarray,
-    binding: Binding,
-    control_points: np.ndarray,
-    pose_points: np.ndarray,
-    pose_rotations: np.ndarray,
-) -> Skinned:
-    """Moves rest points (N, 3) with their control points: paper Eq. 5, first line.
+def skin(points: np.ndarray, binding: Binding, motion: Motion) -> Skinned:
+    """Moves rest points (N, 3) with their control points.
 
     `linear` is the exact Jacobian of the motion, the change of the weights included, so that a
-    stretched limb stretches its Gaussians and leaves no gaps.
+    stretched limb stretches its Gaussians and leaves no gaps. Only where it exceeds the limits
+    of `jacobians` it is brought into them.
     """
-    return Skinned(
-        *_skin(
-            frozen(np.atleast_2d(points), np.float64),
-            frozen(binding.control_points),
-            frozen(binding.weights),
-            frozen(binding.weight_gradients),
-            frozen(control_points, np.float64),
-            frozen(pose_points),
-            frozen(pose_rotations),
-        )
+    x = frozen(np.atleast_2d(points), np.float64)
+    moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))
+    inputs: tuple[Any, ...] = (
+        x, frozen(binding.control_points), frozen(binding.weights),
+        frozen(binding.weight_gradients), *nodes_of(motion), moved, linear,
+    )  # fmt: skip
+    in_threads(lambda first, last: _skin(first, last, *inputs), len(x), least=LEAST_ROWS)
+    return Skinned(moved, linear)
+
+
+def coupling(binding: Binding, rotations: F64) -> F64:
+    """A (N, K, 3, 3): how the skinned points depend on their control points.
+
+    x' = x + sum_j A_j u_j with u_j = R_j (x - p_j) + p'_j - x: linear in p' for fixed
+    `rotations` (M, 3, 3), and sum_j A_j = I.
+    """
+    out = np.empty((*binding.weights.shape, 3, 3))
+    _coupling(frozen(binding.control_points), frozen(binding.weights), frozen(rotations), out)
+    return out
+
+
+def nodes_of(motion: Motion) -> tuple[F64, F64]:
+    """q_j and m_j of each control point (M, 8), and (2, 3): the centre, the mean displacement."""
+    nodes, frame = np.empty((len(motion.points), 8)), np.empty((2, 3))
+    _fill_nodes(
+        frozen(motion.rest, np.float64), frozen(motion.points, np.float64),
+        frozen(motion.rotations, np.float64), nodes, frame,
+    )  # fmt: skip
+    return frozen(nodes), frozen(frame)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _fill_nodes(rest, points, rotations, nodes, frame):
+    count = len(rest)
+    for a in range(3):
+        centre = drift = 0.0
+        for j in range(count):
+            centre += rest[j, a]
+            drift += points[j, a] - rest[j, a]
+        frame[0, a], frame[1, a] = centre / count, drift / count
+    shift = np.empty(3)
+    for j in range(count):
+        for a in range(3):  # how j moves the centre, beyond the mean displacement
+            shift[a] = points[j, a] - rest[j, a] - frame[1, a]
+            for b in range(3):
+                turned = rotations[j, a, b] - (1.0 if a == b else 0.0)
+                shift[a] += turned * (frame[0, b] - rest[j, b])
+        q = _quat(rotations, j)
+        m = _moment(shift[0], shift[1], shift[2], q)
+        for a in range(4):
+            nodes[j, a], nodes[j, 4 + a] = q[a], m[a]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _quat(r, j):
+    """Unit quaternion wxyz of rotation j, by its largest component (Shepperd 1978)."""
+    xx, yy, zz = r[j, 0, 0], r[j, 1, 1], r[j, 2, 2]
+    a, b, c = r[j, 2, 1] - r[j, 1, 2], r[j, 0, 2] - r[j, 2, 0], r[j, 1, 0] - r[j, 0, 1]
+    xy, xz, yz = r[j, 0, 1] + r[j, 1, 0], r[j, 0, 2] + r[j, 2, 0], r[j, 1, 2] + r[j, 2, 1]
+    if xx + yy + zz > 0.0:
+        q = (1.0 + xx + yy + zz, a, b, c)
+    elif xx >= yy and xx >= zz:
+        q = (a, 1.0 + xx - yy - zz, xy, xz)
+    elif yy >= zz:
+        q = (b, xy, 1.0 - xx + yy - zz, yz)
+    else:
+        q = (c, xz, yz, 1.0 - xx - yy + zz)
+    scale = 1.0 / np.sqrt(_dot(q, q))
+    return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _skin(first, last, x, control_points, weights, gradients, nodes, frame, moved, linear):
+    """Rows first..last of `Skinned`, a block after the other."""
+    s = np.ones(ROWS * LANES)
+    left, right = np.empty((3, 3)), np.empty((3, 3))
+    for start in range(first, last, LANES):
+        count = min(LANES, last - start)
+        for k in range(count):
+            i = start + k
+            for c in range(NEIGHBOURS):
+                j = control_points[i, c]
+                for a in range(8):
+                    s[(NODES + 8 * c + a) * LANES + k] = nodes[j, a]
+                s[(SHARES + 4 * c) * LANES + k] = weights[i, c]
+                for a in range(3):
+                    s[(SHARES + 4 * c + 1 + a) * LANES + k] = gradients[i, c, a]
+            for a in range(3):
+                s[(PLACE + a) * LANES + k] = 2.0 * (x[i, a] - frame[0, a])
+        _blend(s)
+        for k in range(count):
+            i = start + k
+            for a in range(3):
+                moved[i, a] = x[i, a] + (frame[1, a] + s[(SHIFT + a) * LANES + k])
+                for b in range(3):
+                    linear[i, a, b] = s[(LINEAR + 3 * a + b) * LANES + k]
+            if s[MARGIN * LANES + k] <= 0.0:
+                limit_row(linear[i], LEAST_STRETCH, MOST_STRETCH, left, right)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _blend(s):
+    """x' - x and F of a block of points, see the top of this file.
+
+    The loop is straight and touches one array only, so that it is compiled to vector
+    instructions, four points at a time: a third of the time. That is why its parts are called
+    once for each of the four control points, and not in a loop.
+
+    |b| >= w of the nearest >= 1 / K, for all signs agree with its own: nothing divides by 0.
+    """
+    for k in range(LANES):
+        nearest = _four(s, NODES, k)
+        sums = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
+        sums = _accumulate(s, 0, k, nearest, sums)
+        sums = _accumulate(s, 1, k, nearest, sums)
+        sums = _accumulate(s, 2, k, nearest, sums)
+        sums = _accumulate(s, 3, k, nearest, sums)
+        b, b0, b1, b2, p, p0, p1, p2 = sums
+        y = s[PLACE * LANES + k], s[(PLACE + 1) * LANES + k], s[(PLACE + 2) * LANES + k]
+        p, p0, p1, p2 = _placed(p, b, y), _placed(p0, b0, y), _placed(p1, b1, y), _placed(p2, b2, y)
+        scale = 1.0 / _dot(b, b)
+        v = _vector(p, b)
+        d = (v[0] * scale, v[1] * scale, v[2] * scale)
+        r = _rotation(b, scale)
+        f0, f1 = _column(b, p, d, b0, p0, scale), _column(b, p, d, b1, p1, scale)
+        f2 = _column(b, p, d, b2, p2, scale)
+        row0 = r[0] + f0[0], r[1] + f1[0], r[2] + f2[0]
+        row1 = r[3] + f0[1], r[4] + f1[1], r[5] + f2[1]
+        row2 = r[6] + f0[2], r[7] + f1[2], r[8] + f2[2]
+        _put(s, SHIFT, k, d)
+        _put(s, LINEAR, k, row0)
+        _put(s, LINEAR + 3, k, row1)
+        _put(s, LINEAR + 6, k, row2)
+        s[MARGIN * LANES + k] = margin(row0, row1, row2, LEAST_STRETCH, MOST_STRETCH)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _four(s, row, k):
+    """Four rows of the working memory, at point k of the block."""
+    start = row * LANES + k
+    return s[start], s[start + LANES], s[start + 2 * LANES], s[start + 3 * LANES]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _put(s, row, k, values):
+    """Three rows of the working memory, at point k of the block."""
+    start = row * LANES + k
+    s[start], s[start + LANES], s[start + 2 * LANES] = values
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _accumulate(s, c, k, nearest, sums):
+    """Adds control point c to sum w q, the columns of sum q (grad w)^T, and both for m."""
+    b, b0, b1, b2, p, p0, p1, p2 = sums
+    q, m = _four(s, NODES + 8 * c, k), _four(s, NODES + 8 * c + 4, k)
+    w, g0, g1, g2 = _four(s, SHARES + 4 * c, k)
+    sign = 1.0 if _dot(q, nearest) >= 0.0 else -1.0  # q and -q are the same turn
+    w, g0, g1, g2 = sign * w, sign * g0, sign * g1, sign * g2
+    b, b0, b1, b2 = _add(b, w, q), _add(b0, g0, q), _add(b1, g1, q), _add(b2, g2, q)
+    return b, b0, b1, b2, _add(p, w, m), _add(p0, g0, m), _add(p1, g1, m), _add(p2, g2, m)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _placed(p, b, y):
+    """p + (0, vec(b) x y): the sums of u q from those of m; `y` is the 2 y of above."""
+    return (
+        p[0],
+        p[1] + b[2] * y[2] - b[3] * y[1],
+        p[2] + b[3] * y[0] - b[1] * y[2],
+        p[3] + b[1] * y[1] - b[2] * y[0],
     )
 
 
-@numba.njit(cache=True, nogil=True)
-def _skin(x, nodes, weights, gradients, p, p_new, r):
-    n, count = nodes.shape
-    moved = np.zeros((n, 3))
-    linear = np.zeros((n, 3, 3))
-    for i in range(n):
-        for c in range(count):
-            w = weights[i, c]
-            j = nodes[i, c]
-            d0, d1, d2 = x[i, 0] - p[j, 0], x[i, 1] - p[j, 1], x[i, 2] - p[j, 2]
-            for a in range(3):
-                # the displacement, not the position: gradients sum to 0, so this loses no digits
-                y = r[j, a, 0] * d0 + r[j, a, 1] * d1 + r[j, a, 2] * d2 + p_new[j, a]
-                moved[i, a] += w * y
-                for b in range(3):
-                    linear[i, a, b] += w * r[j, a, b] + (y - x[i, a]) * gradients[i, c, b]
-    return moved, linear
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _column(b, p, d, turns, shifts, scale):
+    """A column of sum_j g_j (grad w_j)^T; `turns` and `shifts` (4,) are that of b's and of P's."""
+    v, w = _vector(shifts, b), _vector(p, turns)
+    s = 2.0 * _dot(b, turns)
+    return (
+        (v[0] + w[0] - s * d[0]) * scale,
+        (v[1] + w[1] - s * d[1]) * scale,
+        (v[2] + w[2] - s * d[2]) * scale,
+    )
 
 
-def faithful_linear(
-    binding: Binding,
-    control_points: np.ndarray,
-    pose_points: np.ndarray,
-    pose_rotations: np.ndarray,
-    graph: Graph,
-) -> F64:
-    """The paper's own Gaussian motion (N, 3, 3): Eq. 5, second and third line.
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _coupling(nodes, weights, rotations, out):
+    for i in range(len(nodes)):
+        q0 = _quat(rotations, nodes[i, 0])
+        b = ZERO
+        for c in range(nodes.shape[1]):
+            b = _add(b, weights[i, c], _aligned(_quat(rotations, nodes[i, c]), q0))
+        scale = 1.0 / _dot(b, b)
+        for c in range(nodes.shape[1]):
+            q = _aligned(_quat(rotations, nodes[i, c]), q0)
+            w = weights[i, c] * scale
+            x, y, z = _vector(q, b)
+            s, x, y, z = w * _dot(q, b), w * x, w * y, w * z
+            a = out[i, c]
+            a[0, 0], a[0, 1], a[0, 2] = s, z, -y
+            a[1, 0], a[1, 1], a[1, 2] = -z, s, x
+            a[2, 0], a[2, 1], a[2, 2] = y, -x, s
 
-    A rotation, the mean of the control points' quaternions (signs aligned before averaging),
-    times one scale, the mean ratio of their links' lengths.
-    """
-    from ..rotations import matrices_from_quats, quats_from_matrices
 
-    quats = quats_from_matrices(pose_rotations)[binding.control_points]  # (N, K, 4)
-    signs = np.sign((quats * quats[:, :1]).sum(-1, keepdims=True))
-    blended = (quats * np.where(signs == 0, 1, signs) * binding.weights[..., None]).sum(1)
-    linked = graph.weights > 0
-    rest = np.linalg.norm(control_points[:, None] - control_points[None], axis=-1)
-    posed = np.linalg.norm(pose_points[:, None] - pose_points[None], axis=-1)
-    ratios = np.where(linked, posed / np.where(rest > 0, rest, 1), 0)
-    stretch = ratios.sum(1) / np.maximum(linked.sum(1), 1)
-    scale = (stretch[binding.control_points] * binding.weights).sum(1)
-    return matrices_from_quats(blended) * scale[:, None, None]
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _aligned(q, reference):
+    """q or -q, the same turn: the one nearer to `reference`."""
+    sign = 1.0 if _dot(q, reference) >= 0.0 else -1.0
+    return sign * q[0], sign * q[1], sign * q[2], sign * q[3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _moment(x, y, z, q):
+    """The quaternion product (0, u) q."""
+    return (
+        -x * q[1] - y * q[2] - z * q[3],
+        x * q[0] + y * q[3] - z * q[2],
+        y * q[0] + z * q[1] - x * q[3],
+        z * q[0] + x * q[2] - y * q[1],
+    )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _vector(a, b):
+    """Vector part of the quaternion product a b*, b* the conjugate."""
+    return (
+        a[1] * b[0] - a[0] * b[1] - a[2] * b[3] + a[3] * b[2],
+        a[2] * b[0] - a[0] * b[2] - a[3] * b[1] + a[1] * b[3],
+        a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1],
+    )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _add(total, w, q):
+    """total + w q."""
+    return total[0] + w * q[0], total[1] + w * q[1], total[2] + w * q[2], total[3] + w * q[3]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _rotation(q, scale):
+    """The nine numbers of the rotation of q; `scale` is 1 / |q|^2."""
+    w, x, y, z = q
+    s = 2.0 * scale
+    return (
+        1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y),
+        s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x),
+        s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y),
+    )  # fmt: skip
