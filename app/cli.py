@@ -124,6 +124,9 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--deform", metavar="MODE", help="arap (default) or laplacian")
     add("--links", metavar="KIND", help="geodesic (default) or euclidean")
     add("--faithful", action="store_true", default=None, help="the paper as printed")
+    add("--nodes", type=int, metavar="N", help="control points, 4 to 4096, default 512")
+    add("--stiffness", type=float, metavar="S",
+        help="reach of the links between control points, 0.25 to 4, default 1")  # fmt: skip
     add = parser.add_argument_group("placing the whole object, after the handles").add_argument
     add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
     add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")

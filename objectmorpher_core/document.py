@@ -124,6 +124,12 @@ class LiftedObject:
         return float(np.sqrt(max(gaps.max(), 0.0)))
 
     @cached_property
+    def body(self) -> Gaussians:
+        """The Gaussians that are the object itself, not its soft edge."""
+        is_solid = self.texture.solidity > 0.5
+        return self.gaussians.select(is_solid) if is_solid.any() else self.gaussians
+
+    @cached_property
     def scale(self) -> float:
         """World units per object unit."""
         return float(np.cbrt(np.linalg.det(self.world_from_object[:3, :3])))
@@ -242,6 +248,42 @@ class Rig:
             object.__setattr__(self, "held", frozen(self.held, np.int32))
         if self.stiffness is not None:
             object.__setattr__(self, "stiffness", frozen(self.stiffness, np.float64))
+
+    def check(self, count: int) -> None:
+        """Raises ValueError where this is no rig of `count` control points."""
+        sides = [side for seam in self.seams for side in (seam.first, seam.second)]
+        held = () if self.held is None else (self.held,)
+        for region in (*sides, *self.bodies, *held):
+            if region.ndim != 1 or len(region) == 0:
+                raise ValueError("a region of the rig holds no control point")
+            if region.min() < 0 or region.max() >= count:
+                raise ValueError(f"the rig names a control point beyond the object's {count}")
+        for seam in self.seams:
+            if np.intersect1d(seam.first, seam.second).size:
+                raise ValueError("the two sides of a seam share a control point")
+        members = np.concatenate([*self.bodies, np.empty(0, np.int32)])
+        if len(np.unique(members)) < len(members):
+            raise ValueError("two rigid bodies share a control point")
+        if self.stiffness is not None:
+            if self.stiffness.shape != (count,):
+                raise ValueError(f"{self.stiffness.shape} stiffnesses for {count} control points")
+            if not ((self.stiffness > 0) & (self.stiffness < np.inf)).all():
+                raise ValueError("a control point's stiffness is not above 0")
+
+    def moved_to(self, nearest: np.ndarray) -> Rig:
+        """The rig of other control points, whose `nearest` (M',) old ones are these."""
+
+        def own(region: np.ndarray) -> I32:
+            return np.flatnonzero(np.isin(nearest, region)).astype(np.int32)
+
+        seams = (Seam(own(s.first), own(s.second), s.is_glued) for s in self.seams)
+        held = None if self.held is None else own(self.held)
+        return Rig(
+            tuple(s for s in seams if len(s.first) and len(s.second)),
+            tuple(body for body in map(own, self.bodies) if len(body) > 1),
+            held if held is not None and len(held) else None,
+            None if self.stiffness is None else self.stiffness[nearest],
+        )
 
 
 @dataclass(frozen=True, eq=False)

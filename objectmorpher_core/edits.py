@@ -18,6 +18,8 @@ from .document import (
     Plate,
     Pose,
     Prompt,
+    Rig,
+    Seam,
 )
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
@@ -102,6 +104,86 @@ def remove_handle(document: Document, k: int, h: int) -> Document:
     item = document.objects[k]
     handles = tuple(other for i, other in enumerate(item.handles) if i != h)
     return document.with_object(k, replace(item, handles=handles))
+
+
+def turn_handle(document: Document, k: int, h: int, turn: np.ndarray | None) -> Document:
+    """Handle `h` of object `k` is turned by `turn` (3,), a rotation vector; None: as it comes."""
+    item = document.objects[k]
+    turned = replace(item.handles[h], turn=turn)
+    handles = tuple(turned if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def soften_handle(document: Document, k: int, h: int, softness: float) -> Document:
+    """How much handle `h` of object `k` gives way: 0 = not at all."""
+    if not 0 <= softness < np.inf:
+        raise EditError(f"a softness of {softness:g} is not 0 or more")
+    item = document.objects[k]
+    soft = replace(item.handles[h], softness=float(softness))
+    handles = tuple(soft if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def set_rig(document: Document, k: int, rig: Rig) -> Document:
+    """How the regions of object `k` move; its pose was solved with the old rig and is gone."""
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before saying how its parts move")
+    try:
+        rig.check(len(item.lifted.control_points))
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    return document.with_object(k, replace(item, rig=rig, pose=None))
+
+
+def cut(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:
+    """Control points `first` and `second` of object `k` do not move each other directly."""
+    rig = document.objects[k].rig
+    return set_rig(document, k, replace(rig, seams=(*rig.seams, Seam(first, second))))
+
+
+def glue(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:
+    """Control points `first` and `second` of object `k` hang together as neighbours do."""
+    rig = document.objects[k].rig
+    return set_rig(document, k, replace(rig, seams=(*rig.seams, Seam(first, second, True))))
+
+
+def make_body(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points of object `k` move as one rigid body. They leave the bodies they were in."""
+    rig = document.objects[k].rig
+    others = (np.setdiff1d(body, nodes) for body in rig.bodies)
+    bodies = (*(body for body in others if len(body) > 1), np.unique(nodes))
+    return set_rig(document, k, replace(rig, bodies=bodies))
+
+
+def resample(document: Document, k: int, count: int) -> Document:
+    """Object `k` with `count` control points. Handles and rig go to the new ones; no pose.
+
+    Raises EditError for a count outside 4 to 4,096, and where two handles would have to share a
+    control point.
+    """
+    from scipy.spatial import KDTree  # heavy, and the window imports this module at its start
+
+    from .deform.control_points import sample_control_points
+
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before choosing its control points")
+    gaussians, old = item.lifted.body, item.lifted.control_points
+    try:
+        points = sample_control_points(gaussians.means, gaussians.opacities, count)
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    lifted = replace(item.lifted, control_points=points)
+    handles = tuple(
+        replace(h, control_point=nearest_control_point(lifted, h.point)) for h in item.handles
+    )
+    if len({h.control_point for h in handles}) < len(handles):
+        raise EditError(f"{count} control points are too few to tell the handles apart")
+    rig = item.rig.moved_to(np.asarray(KDTree(old).query(points)[1]))
+    return document.with_object(
+        k, replace(item, lifted=lifted, handles=handles, rig=rig, pose=None)
+    )
 
 
 def set_pose(document: Document, k: int, pose: Pose | None) -> Document:

@@ -198,7 +198,9 @@ def run_script(
             script.lift, script.gaussians or GAUSSIANS, part(progress, 0.3, 0.5), script.seed,
         )  # fmt: skip
         document = edits.set_lifted(document, 0, *lifted)
-    settings = DeformSettings(script.deform, script.links, script.faithful)
+    if script.nodes is not None:
+        document = edits.resample(document, 0, script.nodes)
+    settings = DeformSettings(script.deform, script.links, script.faithful, script.stiffness)
     document = edits.set_deform(document, 0, settings)
     puppet = puppet_of(document.objects[0], document.photo.camera)
     document, energies = _pose(document, puppet, script, progress, stopwatch)

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from .arrays import F64
 from .camera import Camera
 from .deform.deformer import Deformer
-from .document import DeformSettings, EditObject, LiftedObject, Placement, Pose
+from .document import DeformSettings, EditObject, LiftedObject, Placement, Pose, Rig
 from .gaussians import Gaussians
 from .raster import tiles
 from .raster.posed import PosedSplats, SplatPoser, TextureLevels
@@ -34,17 +34,24 @@ class SurfacePoint:
 class Puppet:
     """Poses, draws and picks one lifted object. Costly to make, cheap to use."""
 
-    def __init__(self, lifted: LiftedObject, settings: DeformSettings, camera: Camera) -> None:
+    def __init__(
+        self,
+        lifted: LiftedObject,
+        settings: DeformSettings,
+        camera: Camera,
+        rig: Rig | None = None,
+    ) -> None:
         """`camera` is the photo's."""
         self.lifted = lifted
         self.camera = camera
         self._settings = settings
+        self._rig = rig
         self._poser = SplatPoser(lifted, camera)
 
     @cached_property
     def deformer(self) -> Deformer:
         """The object's graph and solver; made when the object is first deformed."""
-        return Deformer(self.lifted, self._settings)
+        return Deformer(self.lifted, self._settings, self._rig)
 
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The object's Gaussians in the world after `pose`, then `placement`."""
@@ -134,4 +141,4 @@ class Puppet:
 def puppet_of(item: EditObject, camera: Camera) -> Puppet:
     """The puppet of a lifted object of the document."""
     assert item.lifted is not None, "only a lifted object can be moved"
-    return Puppet(item.lifted, item.deform, camera)
+    return Puppet(item.lifted, item.deform, camera, item.rig)

@@ -20,6 +20,14 @@ def matrices_from_quats(quats: np.ndarray) -> np.ndarray:
     )
 
 
+def matrix_from_vector(vector: np.ndarray) -> F64:
+    """Rotation matrix (3, 3) about `vector` (3,) by its length in radians, any angle."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector / max(angle, 1e-300)
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+
+
 def quats_from_matrices(matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (N, 4) wxyz, w >= 0, of rotation matrices (N, 3, 3).
 

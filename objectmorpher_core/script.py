@@ -51,6 +51,8 @@ class EditScript:
     deform: str = "arap"
     links: str = "geodesic"
     faithful: bool = False
+    nodes: int | None = None  # control points
+    stiffness: float = 1.0
     shadow: str = "auto"
     fov: float | None = None
     seed: int = 0
@@ -190,12 +192,23 @@ def _whole(least: int, most: int) -> Callable[[str, Any], int]:
     return parse
 
 
+def _between(least: float, most: float) -> Callable[[str, Any], float]:
+    def parse(key: str, value: Any) -> float:
+        number = _number(key, value)
+        if not least <= number <= most:
+            raise ScriptError(f"{key}: {value!r} is not a number from {least:g} to {most:g}")
+        return number
+
+    return parse
+
+
 PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "click": _points, "not_click": _points, "box": _numbers(4, 4), "subject": _flag,
     "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
     "splats": _text, "gaussians": _whole(100, 2_000_000), "pin": _points, "handle": _handles,
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
-    "faithful": _flag, "shadow": _one_of("auto", "none"), "fov": _number,
+    "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
+    "shadow": _one_of("auto", "none"), "fov": _number,
     "seed": _whole(0, 2**31 - 1),
 }  # fmt: skip

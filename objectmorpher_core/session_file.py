@@ -232,6 +232,11 @@ def _check_lifted(item: EditObject) -> None:
         _same("handle", (handle.point.shape, handle.target.shape), ((3,), (3,)))
         if not 0 <= handle.control_point < nodes:
             raise ValueError(f"a handle names control point {handle.control_point} of {nodes}")
+        if handle.turn is not None:
+            _same("a handle's turn", handle.turn.shape, (3,))
+        if not handle.softness >= 0:
+            raise ValueError(f"a handle's softness is {handle.softness:g}")
+    item.rig.check(nodes)
     if item.pose is not None:
         _same("pose", item.pose.points.shape, (nodes, 3))
         _same("rotations", item.pose.rotations.shape, (nodes, 3, 3))

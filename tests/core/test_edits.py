@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits
-from objectmorpher_core.document import DeformSettings, Document, Placement, Prompt
+from objectmorpher_core.document import (
+    DeformSettings,
+    Document,
+    Placement,
+    Prompt,
+    Rig,
+    Seam,
+)
 from objectmorpher_core.edits import EditError
 from tests import shapes
 
@@ -18,6 +25,71 @@ def document() -> Document:
 
 def _point(document: Document, index: int) -> np.ndarray:
     return document.objects[0].lifted.gaussians.means[index].astype(np.float64)
+
+
+REGIONS = np.array([0, 1, 2], np.int32), np.array([5, 6], np.int32)
+
+
+def test_a_handle_turns_and_softens(document):
+    changed = edits.add_handle(document, 0, _point(document, 5))
+    changed = edits.turn_handle(changed, 0, 0, np.array([0.0, 4.0, 0.0]))
+    changed = edits.soften_handle(changed, 0, 0, 0.5)
+    handle = changed.objects[0].handles[0]
+    assert handle.turn is not None
+    assert handle.turn.tolist() == [0.0, 4.0, 0.0], "more than half a turn stays as it is"
+    assert handle.softness == 0.5
+    assert edits.turn_handle(changed, 0, 0, None).objects[0].handles[0].turn is None
+    with pytest.raises(EditError, match="softness"):
+        edits.soften_handle(changed, 0, 0, -1.0)
+
+
+def test_regions_are_cut_glued_and_made_bodies(document):
+    changed = edits.cut(document, 0, *REGIONS)
+    changed = edits.glue(changed, 0, np.array([9]), np.array([11]))
+    assert [s.is_glued for s in changed.objects[0].rig.seams] == [False, True]
+    changed = edits.make_body(changed, 0, np.array([0, 1, 2, 3]))
+    changed = edits.make_body(changed, 0, np.array([3, 4, 3]))
+    assert [b.tolist() for b in changed.objects[0].rig.bodies] == [[0, 1, 2], [3, 4]]
+    assert document.objects[0].rig.seams == ()
+
+
+@pytest.mark.parametrize(("rig", "sentence"), [
+    (Rig(seams=(Seam([0, 1], [1, 2]),)), "two sides of a seam share"),
+    (Rig(seams=(Seam([], [1, 2]),)), "holds no control point"),
+    (Rig(bodies=([0, 1], [1, 2])), "two rigid bodies share"),
+    (Rig(held=[0, 100_000]), "beyond the object's"),
+    (Rig(held=[-1]), "beyond the object's"),
+    (Rig(stiffness=[1.0, 2.0]), "stiffnesses for"),
+])  # fmt: skip
+def test_impossible_rigs_are_refused(document, rig, sentence):
+    with pytest.raises(EditError, match=sentence):
+        edits.set_rig(document, 0, rig)
+
+
+def test_a_stiffness_must_be_above_nothing(document):
+    count = len(document.objects[0].lifted.control_points)
+    with pytest.raises(EditError, match="not above 0"):
+        edits.set_rig(document, 0, Rig(stiffness=np.zeros(count)))
+
+
+def test_other_control_points_keep_handles_and_regions_where_they_were(document):
+    points = document.objects[0].lifted.control_points
+    left = np.flatnonzero(points[:, 0] < -0.1)
+    right = np.flatnonzero(points[:, 0] > 0.1)
+    changed = edits.add_handle(document, 0, _point(document, 5))
+    changed = edits.make_body(edits.cut(changed, 0, left, right), 0, left)
+    changed = edits.resample(changed, 0, 60)
+    item = changed.objects[0]
+    assert len(item.lifted.control_points) == 60
+    assert item.lifted.gaussians is document.objects[0].lifted.gaussians
+    gaps = np.linalg.norm(item.lifted.control_points - item.handles[0].point, axis=1)
+    assert item.handles[0].control_point == gaps.argmin()
+    assert (item.lifted.control_points[item.rig.bodies[0], 0] < 0).all()
+    assert (item.lifted.control_points[item.rig.seams[0].second, 0] > 0).all()
+    assert item.pose is None
+    for count in (3, 5000):
+        with pytest.raises(EditError, match="control points"):
+            edits.resample(changed, 0, count)
 
 
 def test_a_change_leaves_the_document_it_was_made_from(document):

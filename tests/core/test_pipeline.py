@@ -154,6 +154,7 @@ def test_a_handle_that_stays_leaves_the_photo():
 
 @pytest.mark.parametrize("options", [
     {"deform": "laplacian"}, {"links": "euclidean"}, {"faithful": True},
+    {"nodes": 96, "stiffness": 0.7},
 ])  # fmt: skip
 def test_the_ablations_run_and_give_other_pictures(options):
     handle = [{"at": [110, 62], "to": [90, 20]}, {"at": [45, 62], "to": [45, 62]}]

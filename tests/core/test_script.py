@@ -20,7 +20,8 @@ FULL = {
     "splats": "s.ply", "gaussians": 500, "pin": [[7, 8]],
     "handle": [{"at": [1, 2], "to": [3, 4], "dz": -0.5}, {"at": [5, 6], "to": [7, 8]}],
     "move": [1, -2, 0.5], "turn": [10, 20, 30], "scale": 1.5, "deform": "laplacian",
-    "links": "euclidean", "faithful": True, "shadow": "none", "fov": 60, "seed": 7,
+    "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5,
+    "shadow": "none", "fov": 60, "seed": 7,
 }  # fmt: skip
 
 
@@ -86,6 +87,7 @@ def test_what_is_no_script_is_refused(text, sentence):
     ("handle", [{"at": [1, 2], "to": [1, 2], "dx": 1}]), ("move", [1]), ("move", [1, 2, 3, 4]),
     ("turn", [1, 2]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
     ("scale", float("nan")), ("deform", "jelly"), ("links", None), ("faithful", "yes"),
+    ("nodes", 3), ("nodes", 5000), ("nodes", 1.5), ("stiffness", 9),
     ("shadow", "dark"), ("fov", True), ("seed", -1), ("seed", 1.5), ("seed", 2**40),
 ])  # fmt: skip
 def test_wrong_values_are_refused_with_the_option_and_the_value(key, value):

@@ -25,6 +25,8 @@ from objectmorpher_core.document import (
     Plate,
     Pose,
     Prompt,
+    Rig,
+    Seam,
 )
 from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.image import Picture, encode_picture, read_picture
@@ -71,8 +73,10 @@ def full_document(photo: Picture, source: bytes) -> Document:
         "Cat", Prompt((Click(40.25, 50.5), Click(5.0, 6.0, False)), (1.0, 2.0, 90.0, 91.5), True),
         mask, matte, lifted_object(random),
         (Handle(3, random.normal(size=3), random.normal(size=3)),
-         Handle(5, random.normal(size=3), random.normal(size=3), is_pin=True)),
-        False, DeformSettings("laplacian", "euclidean", True),
+         Handle(5, random.normal(size=3), random.normal(size=3), True, random.normal(size=3), 0.5)),
+        False, DeformSettings("laplacian", "euclidean", True, 0.7),
+        Rig((Seam([0, 1], [2]), Seam([3], [4], True)), ([0, 2], [1, 4]), [5],
+            random.uniform(0.5, 2.0, NODES)),
         Pose(random.normal(size=(NODES, 3)), random.normal(size=(NODES, 3, 3))),
         Placement((0.1, -7.0), 1e-17, (15.0, 0.1 + 0.2, -3.0), 1.5), False,
     )  # fmt: skip
