@@ -164,7 +164,7 @@ def _libigl_row(repeats: int) -> dict[str, Any] | None:
         import igl  # type: ignore[import-not-found]
     except ImportError:
         return None
-    vertices, faces = _sphere(PEER_VERTICES)
+    vertices, faces = even_sphere(PEER_VERTICES)
     held = np.argsort(vertices[:, 2])[[0, 1, 2, 3, -1, -2, -3, -4]].astype(np.int32)
     data = igl.ARAPData()
     data.max_iter = 3
@@ -178,7 +178,7 @@ def _libigl_row(repeats: int) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _sphere(count: int) -> tuple[F64, np.ndarray]:
+def even_sphere(count: int) -> tuple[F64, np.ndarray]:
     """Vertices (count, 3) spread evenly over the unit sphere, and triangles between them."""
     k = np.arange(count) + 0.5
     height, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k

@@ -9,6 +9,7 @@ from functools import cache
 import cv2
 import numpy as np
 from PIL import Image
+from scipy.spatial import KDTree
 
 from objectmorpher_core.arrays import F32, F64, RGB, Mask, frozen
 from objectmorpher_core.camera import Camera
@@ -81,6 +82,56 @@ def horseshoe(count: int = 240, seed: int = 0) -> F64:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.05 * np.sin(around)])
 
 
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed surface."""
+
+    points: F64  # (N, 3)
+    normals: F64  # (N, 3) outward, unit
+    faces: np.ndarray  # (F, 3), anticlockwise from outside
+
+    def volume(self, points: F64) -> float:
+        """What the surface encloses when its points are at `points` (N, 3)."""
+        a, b, c = (points[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("na,na->", a, np.cross(b, c)) / 6)
+
+    def area(self, points: F64) -> float:
+        a, b, c = (points[self.faces[:, k]] for k in range(3))
+        return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def capsule(length: float = 1.0, radius: float = 0.08, around: int = 48) -> Mesh:
+    """A round bar along x with round ends, `length` from tip to tip, about even."""
+    step = 2 * np.pi * radius / around
+    straight = length / 2 - radius
+    cap = np.linspace(0, np.pi / 2, max(round(np.pi / 2 * radius / step), 3) + 1)[1:]
+    bar_x = np.linspace(-straight, straight, max(round(2 * straight / step), 2) + 1)
+    left = np.column_stack([-np.sin(cap[-2::-1]), np.cos(cap[-2::-1])])
+    right = np.column_stack([np.sin(cap[:-1]), np.cos(cap[:-1])])
+    tall = np.column_stack([np.zeros(len(bar_x)), np.ones(len(bar_x))])
+    profile = np.concatenate([left, tall, right])  # normal's x and radial part, ring by ring
+    x = np.concatenate([-straight + radius * left[:, 0], bar_x, straight + radius * right[:, 0]])
+    angle = 2 * np.pi * np.arange(around) / around
+    spokes = np.column_stack([np.cos(angle), np.sin(angle)])
+    rings = np.concatenate(
+        [np.repeat(profile[:, :1], around, 0), (profile[:, 1:, None] * spokes).reshape(-1, 2)], 1
+    )
+    points = np.column_stack([np.repeat(x, around), radius * rings[:, 1:]])
+    points = np.concatenate([points, [[-length / 2, 0, 0], [length / 2, 0, 0]]])
+    normals = np.concatenate([rings, [[-1.0, 0, 0], [1.0, 0, 0]]])
+    i = np.arange(around)
+    j = (i + 1) % around
+    faces = []
+    for ring in range(len(x) - 1):
+        a, b = ring * around, (ring + 1) * around
+        faces += [np.column_stack([a + i, b + j, b + i]), np.column_stack([a + i, a + j, b + j])]
+    first, last = len(points) - 2, len(points) - 1
+    top = (len(x) - 1) * around
+    faces += [np.column_stack([np.full(around, first), j, i])]
+    faces += [np.column_stack([np.full(around, last), top + i, top + j])]
+    return Mesh(points, normals, np.concatenate(faces))
+
+
 def even(points: np.ndarray, count: int) -> F64:
     """`count` of `points`, evenly spread, as control points are."""
     return sample_control_points(points, np.ones(len(points)), count).astype(np.float64)
@@ -113,11 +164,34 @@ def gaussians_at(points: np.ndarray, sigma: float = 0.02, seed: int = 0) -> Gaus
     )
 
 
+def lifted_surface(points: F64, normals: F64, count: int = 512) -> LiftedObject:
+    """An object of flat Gaussians at `points` (N, 3), along the surface whose `normals` these are.
+
+    They are spread over it in any order, and carry `count` control points.
+    """
+    order = np.random.default_rng(0).permutation(len(points))
+    points, normals = points[order], normals[order]
+    w = 1 + normals[:, 2]
+    quats = np.column_stack([w, -normals[:, 1], normals[:, 0], np.zeros(len(w))])
+    quats[w < 1e-9] = [0.0, 1.0, 0.0, 0.0]
+    spacing = float(np.median(KDTree(points).query(points, k=2)[0][:, 1]))
+    gaussians = Gaussians(
+        points, quats / np.linalg.norm(quats, axis=1, keepdims=True),
+        np.tile(spacing * np.array([0.7, 0.7, 0.1]), (len(points), 1)),
+        np.ones(len(points)), np.full((len(points), 3), 0.5),
+    )  # fmt: skip
+    return _standing(gaussians, even(points, count), 3.0)
+
+
 def lifted_cloud(
     points: np.ndarray, control_points: np.ndarray, depth: float = 3.0
 ) -> LiftedObject:
     """An object of Gaussians at `points` that stands `depth` before a 160 x 120 camera."""
-    gaussians = gaussians_at(points)
+    return _standing(gaussians_at(points), control_points, depth)
+
+
+def _standing(gaussians: Gaussians, control_points: np.ndarray, depth: float) -> LiftedObject:
+    points = gaussians.means
     world_from_object = np.eye(4)
     world_from_object[2, 3] = depth
     world = gaussians.means + world_from_object[:3, 3]

@@ -1,156 +1,203 @@
-"""As-rigid-as-possible solve on the control points (paper Eq. 2-4; Sorkine & Alexa 2007).
-
-The sums over neighbours are compiled loops over the links; the global step is two triangular
-solves. At the paper's link radius a control point has some eighty neighbours, and M = 512.
-"""
+"""As-rigid-as-possible solve on the control points (paper Eq. 2-4; Sorkine & Alexa 2007)."""
 
 from __future__ import annotations
 
 import time
-from copy import copy
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
 
-import numba
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, pinvh
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.csgraph import connected_components
 
-from ..arrays import F64, I32, frozen
+from ..arrays import F64, I32, Sparse
+from .anderson import Anderson
+from .bodies import Bodies, Pivot
+from .constraints import Constraints, HeldResponse, Patch, Targets
+from .links import Links, in_single
+from .response import build_response, product
 
-ANDERSON_WINDOW = 5  # previous steps that the acceleration combines
-FAST = {"reassoc", "contract", "nsz"}  # sums in any order, a * b + c at once
-ROTATION_STEPS = 40  # at most, per rotation fit; two or three from a warm start
-ROTATION_TOLERANCE = 1e-12  # rad^2, squared length of the last turn
-
-
-@dataclass(frozen=True, eq=False)
-class Constraints:
-    """Linear conditions `rows @ p' = targets`, met exactly.
-
-    A handle is the surface point x0 that the artist clicked: its skinned position
-    sum_j w_j (R_j (x0 - p_j) + p'_j) must be the target, so its row holds its skinning weights
-    and its target depends on the rotations: targets = fixed - sum_j w_j R_j offset_j.
-    """
-
-    rows: F64  # (H, M)
-    fixed: F64  # (H, 3)
-    offsets: F64  # (H, M, 3), x0 - p_j; 0 for a constraint on a control point itself
+NOISE = 1e-14  # x the weights' squares: what rounding may add to the energy
+SLACK = 1e-9  # x the energy: what a step may seem to rise by without being taken back
+SKINNED_SLACK = 1e-5  # the same where a handle's arms turn: the local step does not see them
 
 
 class ArapSolver:
-    """Local-global minimisation of Eq. 2 under linear constraints.
+    """Local-global minimisation of Eq. 2 under constraints.
 
-    The constructor does what depends on the rest shape; `constrain` factors once for a set of
-    rows; `step` is two triangular solves and M rotation fits.
+    The constructor factors for the links; `constrain` prepares a set of handles; `aim` gives
+    their targets; `positions` and `fit` are the two steps.
     """
 
-    def __init__(self, points: np.ndarray, weights: np.ndarray) -> None:
-        """`points` (M, 3) rest control points, `weights` (M, M) symmetric."""
-        assert np.array_equal(weights, weights.T), "Eq. 3 needs symmetric weights"
+    def __init__(self, points: np.ndarray, weights: Sparse, groups: tuple[I32, ...] = ()) -> None:
+        """`points` (M, 3) rest control points, `weights` (M, M) symmetric, no diagonal.
+
+        `groups` of control points move as one rigid body each; they are disjoint.
+        """
+        assert abs(weights - weights.T).max() == 0, "Eq. 3 needs symmetric weights"
         self.points = points.astype(np.float64)
-        self.weights = weights
-        self.degree = weights.sum(1)
-        self._laplacian = np.diag(self.degree) - weights
-        self._pairs = np.nonzero(weights)  # (E,) control points at this end, and at the other
-        self._links = _Links.of(self.points, weights, self._pairs)
         self.scale = float(np.abs(self.points - self.points.mean(0)).max()) or 1.0
+        self._bodies = Bodies(self.points, groups) if groups else None
+        weights = csr_array(weights).astype(np.float64)
+        if self._bodies:
+            weights = self._bodies.without_inner(weights)
+        weights.data = in_single(weights.data)
+        self.weights = weights
+        self._base = self._links = Links.of(self.points, weights)
+        matrix = self._merged(csr_array(diags_array(self._base.totals[0]) - weights))
+        self._typical = float(matrix.diagonal().mean()) or 1.0
+        components = connected_components(matrix, directed=False)[1]
+        # One unknown of each component is tied to the ground, which `constrain` takes back.
+        self._grounds = np.unique(components, return_index=True)[1]
+        ties = np.zeros(len(components))
+        ties[self._grounds] = self._typical
+        self._response = build_response(csr_array(matrix + diags_array(ties)))
+        self.components = components[self._unknown]  # (M,) bodies included
+        self.constrain(Constraints.on_nodes(np.empty(0, np.int32)))
+        self.aim(Targets(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3, 3))))
 
-    def reweighted(self, weights: np.ndarray) -> ArapSolver:
-        """A solver of the same points and links with other weights (M, M), symmetric."""
-        other = copy(self)
-        other.weights, other.degree = weights, weights.sum(1)
-        other._laplacian = np.diag(other.degree) - weights
-        other._links = self._links._replace(weights=frozen(weights[self._pairs]))
-        return other
+    def constrain(self, constraints: Constraints, stiffened: F64 | None = None) -> None:
+        """Prepares for these constraints; `aim` must follow.
 
-    def constrain(
-        self, constraints: Constraints, is_free: np.ndarray, held: np.ndarray | None = None
-    ) -> None:
-        """Factors for these rows. `is_free` (M,): control points that the system may move.
-
-        The others keep an identity row and take no part. Those whose indices are `held` stay at
-        rest too, and the rest of the object hangs on them. With C the rows, the minimiser of
-        Eq. 2 under C p' = t does not change when a multiple of C^T C is added to L; that makes
-        the matrix positive definite as soon as each component has one constraint.
+        `stiffened`: other weights for the links, in the order of `weights.data` and symmetric.
+        Control points of components without a constraint are not free: they stay at rest.
         """
         self._constraints = constraints
-        self._turning, self._turners, self._arms = _turning_parts(constraints)
-        held = np.empty(0, np.int32) if held is None else held
-        self._is_still = ~is_free
-        self._is_still[held] = True
-        self._still = self.points[self._is_still]
-        self._pull = self._laplacian[:, held] @ self.points[held]
-        self._rows = np.where(self._is_still, 0.0, constraints.rows)
-        self._still_part = constraints.rows[:, self._is_still] @ self._still  # of the targets
-        self._stiffness = float(self.degree.max()) or 1.0
-        matrix = self._laplacian + self._stiffness * (self._rows.T @ self._rows)
-        matrix[self._is_still] = 0.0
-        matrix[:, self._is_still] = 0.0
-        matrix[self._is_still, self._is_still] = 1.0
-        try:
-            self._factor = cho_factor(matrix, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:  # coincident points: the smallest push off singular
-            jitter = 1e-10 * self._stiffness * np.eye(len(matrix))
-            self._factor = cho_factor(matrix + jitter, lower=True, check_finite=False)
-        self._response = cho_solve(self._factor, self._rows.T, check_finite=False)  # K^-1 C^T
-        self._inverse_schur = pinvh(self._rows @ self._response, rtol=1e-10, check_finite=False)
+        held = np.concatenate([constraints.nodes.ravel(), constraints.held])
+        touched = np.unique(self.components[held])
+        self.is_free = np.isin(self.components, touched)  # (M,)
+        self._still = np.flatnonzero(~self.is_free)
+        self._is_given = np.zeros(len(self.points), bool)
+        self._is_given[constraints.turned] = True
+        for group in self._bodies.groups if self._bodies else ():
+            self._is_given[group] = True  # fitted as one
+        same = stiffened is None
+        self._links = self._base if same else self._base.reweighted(in_single(stiffened))
+        self._rows = constraints.rows(len(self.points))
+        rows = self._rows @ self._bodies.members if self._bodies else self._rows
+        give = np.concatenate([constraints.softness, np.zeros(len(constraints.held))])
+        patch = self._patch(self._grounds[touched])
+        self._held = HeldResponse(self._response, patch, csr_array(rows), give / self._typical)
+        nodes = constraints.nodes
+        self._follow = self._held.follow(len(nodes))[self._unknown]  # (M, H) of the handles
+        self._parting = self._follow[nodes] - self._follow[nodes[:, :1]]  # (H, K, H)
 
-    def aim(self, fixed: F64) -> None:
-        """Gives the constraints other targets (H, 3); nothing is factored for that."""
-        self._constraints = replace(self._constraints, fixed=fixed)
+    def aim(self, targets: Targets) -> None:
+        """Gives the constraints other targets: nothing is factored for that."""
+        self._targets = targets
+
+    def turned(self, rotations: F64) -> F64:
+        """`rotations` (M, 3, 3), with the given ones in their places."""
+        turned = self._constraints.turned
+        if len(turned):
+            rotations = rotations.copy()
+            rotations[turned] = self._targets.turns
+        return self._bodies.spread(rotations, turned) if self._bodies else rotations
 
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
-        right = _right_side(*self._links, frozen(rotations))
-        targets = self._constraints.fixed - self._still_part
-        turned = rotations[self._turners] @ self._arms[..., None]  # (T, N, 3, 1)
-        targets[self._turning] -= turned[..., 0].sum(1)
-        right += self._stiffness * (self._rows.T @ targets) - self._pull
-        right[self._is_still] = self._still
-        loose = cho_solve(self._factor, right, check_finite=False)
-        multipliers = self._inverse_schur @ (targets - self._rows @ loose)
-        return loose + self._response @ multipliers
-
-    def rotations(self, positions: F64, warm: F64) -> F64:
-        """Local step: rotations (M, 3, 3), det = +1, that minimise Eq. 2 for fixed positions."""
-        return self.fit(positions, warm)[0]
-
-    def energy(self, positions: F64, rotations: F64) -> float:
-        """Eq. 2, in object units squared."""
-        return float(_energy(*self._links, frozen(positions), frozen(rotations)))
+        constraints, forces = self._constraints, self._links.right_side(rotations)
+        fixed = self._targets.points - constraints.turned_arms(rotations)
+        targets = np.concatenate([fixed, self._targets.held])
+        if self._bodies:
+            arms = self._bodies.turned(rotations)
+            weights, degree = self._links.weights, self._links.totals[0]
+            forces = self._bodies.members.T @ (forces + weights @ arms - degree[:, None] * arms)
+            targets = targets - self._rows @ arms
+            positions = self._held.solve(forces, targets)[self._unknown] + arms
+        else:
+            positions = self._held.solve(forces, targets)
+        if not constraints.is_linear:
+            self._unbend(positions, rotations)
+        positions[self._still] = self.points[self._still]
+        return positions
 
     def fit(self, positions: F64, warm: F64) -> tuple[F64, float]:
-        """`rotations`, and the `energy` with them."""
-        rotations = np.empty(warm.shape)
-        energy = _fit(*self._links, frozen(positions), frozen(warm), rotations)
-        return rotations, max(float(energy), 0.0)
+        """Local step: rotations (M, 3, 3), det = +1, for fixed positions; and the energy."""
+        rotations, energy = self._links.fit(positions, warm, self._is_given)
+        if self._bodies:
+            pivots = self._fit_bodies(positions, rotations)
+            settled = self._bodies.settled(positions, rotations, pivots)
+            return rotations, self.energy(settled, rotations)
+        return rotations, energy + self._give(positions, rotations)
 
+    def energy(self, positions: F64, rotations: F64) -> float:
+        """Eq. 2, and what soft constraints add to it, object units squared."""
+        energies = self._links.energies(positions, rotations)
+        return float(energies.sum()) + self._give(positions, rotations)
 
-class _Links(NamedTuple):
-    """The links from each control point, one after the other: arguments of the kernels."""
+    def energies(self, positions: F64, rotations: F64) -> F64:
+        """(M,) each control point's share of Eq. 2, by the weights that no hand stiffened."""
+        return self._base.energies(positions, rotations)
 
-    starts: I32  # (M + 1,) into the others
-    ends: I32  # (E,) control point at the other end
-    weights: F64  # (E,)
-    arms: F64  # (E, 3) p_j - p_i
+    def is_higher(self, energy: float, before: float) -> bool:
+        """Whether an energy is above the one `before`, by more than comes of rounding."""
+        slack = SLACK if self._constraints.is_linear else SKINNED_SLACK
+        return energy > before * (1 + slack) + NOISE * float(self._links.totals[4].sum())
 
-    @classmethod
-    def of(cls, points: F64, weights: F64, pairs: tuple[np.ndarray, ...]) -> _Links:
-        i, j = pairs
-        starts = np.searchsorted(i, np.arange(len(points) + 1)).astype(np.int32)
-        arms = frozen(points[j] - points[i])
-        return cls(frozen(starts), frozen(j, np.int32), frozen(weights[pairs]), arms)
+    @property
+    def _unknown(self) -> np.ndarray:
+        """(M,) the unknown of each control point."""
+        return self._bodies.unknown if self._bodies else np.arange(len(self.points))
 
+    def _unbend(self, positions: F64, rotations: F64) -> None:
+        """Moves `positions` so that the surface points, as they are skinned, are at the targets.
 
-def _turning_parts(constraints: Constraints) -> tuple[I32, I32, F64]:
-    """Rows (T,) whose targets turn, the control points (T, N) they turn with, w_j (x0 - p_j)."""
-    turning = np.flatnonzero((constraints.offsets != 0).any((1, 2)))
-    weights = constraints.rows[turning]
-    count = int((weights != 0).sum(1).max(initial=0))
-    turners = np.argsort(-np.abs(weights), axis=1, kind="stable")[:, :count]
-    offsets = np.take_along_axis(constraints.offsets[turning], turners[..., None], 1)
-    arms = np.take_along_axis(weights, turners, 1)[..., None] * offsets
-    return turning.astype(np.int32), turners.astype(np.int32), arms
+        The global step met them for a linear blend. For fixed rotations the excess over it, e,
+        is linear in the positions, and these follow the targets linearly: one small system.
+        """
+        bends = self._constraints.bends(rotations)
+        excess = self._constraints.excess(bends, positions, rotations)
+        size = excess.size
+        system = np.einsum("hkab,hkg->hagb", bends, self._parting).reshape(size, size)
+        system.flat[:: size + 1] += 1.0
+        excess = np.linalg.solve(system, excess.ravel()).reshape(-1, 3)
+        positions -= product(self._follow, excess)
+
+    def _fit_bodies(self, positions: F64, rotations: F64) -> tuple[Pivot, ...]:
+        """Fits the bodies' `rotations`, in place; what they turn about."""
+        assert self._bodies is not None
+        nodes, pivots = self._constraints.nodes, []
+        points = self.points[nodes[:, 0]] + self._constraints.arms[:, 0]
+        for group in self._bodies.groups:
+            inside = np.isin(nodes, group).all(1)
+            handles = points[inside], self._targets.points[inside]
+            pivot = self._bodies.pivot(group, positions, handles)
+            pivots.append(pivot)
+            if not np.isin(group, self._constraints.turned).any():
+                pose = positions, rotations
+                rotations[group] = self._bodies.fit(self._links.weights, pose, group, pivot)
+        return tuple(pivots)
+
+    def _give(self, positions: F64, rotations: F64) -> float:
+        """Energy of the soft constraints' springs; Eq. 2 counts each link twice, so do they."""
+        soft = np.flatnonzero(self._constraints.softness)
+        if len(soft) == 0:
+            return 0.0
+        gaps = self._targets.points - self._constraints.placed(positions, rotations)
+        squares = (gaps[soft] ** 2).sum(1) / self._constraints.softness[soft]
+        return 2.0 * self._typical * float(squares.sum())
+
+    def _merged(self, matrix: Sparse) -> Sparse:
+        """A matrix of the control points as one of the unknowns."""
+        if self._bodies is None:
+            return matrix
+        members = self._bodies.members
+        return csr_array(members.T @ matrix @ members)
+
+    def _patch(self, grounds: np.ndarray) -> Patch:
+        """The Laplacian of the weights that were added, less the ties to the ground."""
+        base, data = self.weights, self._links.weights.data
+        changed = np.flatnonzero(data != base.data)
+        rows = self._unknown[np.searchsorted(base.indptr, changed, side="right") - 1]
+        ends = self._unknown[base.indices[changed]]
+        nodes = np.union1d(ends, grounds)  # symmetric: each end is another's other end
+        matrix = np.zeros((len(nodes), len(nodes)))
+        pairs = np.searchsorted(nodes, rows), np.searchsorted(nodes, ends)
+        np.subtract.at(matrix, pairs, data[changed] - base.data[changed])
+        np.fill_diagonal(matrix, matrix.diagonal() - matrix.sum(1))
+        tied = np.searchsorted(nodes, grounds)
+        matrix[tied, tied] -= self._typical
+        return Patch(nodes, matrix)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +206,18 @@ class Minimum:
 
     positions: F64  # (M, 3)
     rotations: F64  # (M, 3, 3)
-    energies: tuple[float, ...]  # Eq. 2 after each iteration
+    energies: tuple[float, ...]  # after each iteration
+
+
+def iterate(solver: ArapSolver, rotations: F64, iterations: int) -> Minimum:
+    """Plain local-global iterations from `rotations` (M, 3, 3): the paper's, and the twin."""
+    rotations = solver.turned(rotations)
+    positions, energies = solver.points, []
+    for _ in range(iterations):
+        positions = solver.positions(rotations)
+        rotations, energy = solver.fit(positions, rotations)
+        energies.append(energy)
+    return Minimum(positions, rotations, tuple(energies))
 
 
 def minimise(
@@ -169,30 +227,29 @@ def minimise(
     tolerance: float = 1e-4,
     seconds: float = np.inf,
 ) -> Minimum:
-    """Local-global iteration with Anderson acceleration from warm `rotations`.
+    """Local-global iteration with Anderson acceleration from warm `rotations` (M, 3, 3).
 
     The fixed-point map is rotations -> positions -> rotations; the acceleration extrapolates
-    the positions from the last five steps (Peng et al. 2018) and falls back to the plain step
-    whenever the energy would rise, so the energy never rises. Ends after `iterations` or when
-    the positions moved by less than `tolerance` x the object's size times 0.01, and begins no
-    iteration after `seconds`.
+    the positions and falls back to the plain step whenever the energy would rise, so the energy
+    never rises. Ends after `iterations` or when the positions moved by less than `tolerance` x
+    the object's size times 0.01, and begins no iteration after `seconds`.
     """
     end = time.perf_counter() + seconds
     limit = tolerance * 0.01 * solver.scale
+    history = Anderson(solver.points.size)
+    rotations = solver.turned(rotations)
     positions = solver.positions(rotations)
     rotations, energy = solver.fit(positions, rotations)
     energies = [energy]
-    history: list[tuple[F64, F64]] = []  # (map's value, residual)
     for _ in range(iterations - 1):
         plain = solver.positions(rotations)
-        residual = (plain - positions).ravel()
+        residual = plain - positions
         if np.abs(residual).max() < limit or time.perf_counter() > end:
             break
-        history = [*history[-ANDERSON_WINDOW:], (plain.ravel(), residual)]
-        trial = _extrapolate(history).reshape(plain.shape)
+        trial = history.mix(plain, residual)
         trial_rotations, energy = solver.fit(trial, rotations)
-        if len(history) > 1 and energy > energies[-1] * (1 + 1e-12):
-            history = history[-1:]
+        if trial is not plain and solver.is_higher(energy, energies[-1]):
+            history.forget()
             trial = plain
             trial_rotations, energy = solver.fit(trial, rotations)
         positions, rotations = trial, trial_rotations
@@ -200,151 +257,3 @@ def minimise(
     # One plain step last: the constraints depend on the rotations and are then met exactly.
     positions = solver.positions(rotations)
     return Minimum(positions, rotations, (*energies, solver.energy(positions, rotations)))
-
-
-def _extrapolate(history: list[tuple[F64, F64]]) -> F64:
-    """Anderson's combination of the last map values, weights least-squares on the residuals."""
-    value, residual = history[-1]
-    if len(history) == 1:
-        return value
-    gaps = np.stack([residual - r for _, r in history[:-1]], axis=1)
-    weights = np.linalg.lstsq(gaps, residual, rcond=1e-8)[0]
-    return value - sum(w * (value - v) for w, (v, _) in zip(weights, history[:-1], strict=True))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _right_side(starts, ends, weights, arms, r):
-    """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
-    count = len(starts) - 1
-    right = np.empty((count, 3))
-    for i in range(count):
-        b0 = b1 = b2 = m0 = m1 = m2 = 0.0
-        for e in range(starts[i], starts[i + 1]):
-            j = ends[e]
-            x, y, z = weights[e] * arms[e, 0], weights[e] * arms[e, 1], weights[e] * arms[e, 2]
-            m0 += x
-            m1 += y
-            m2 += z
-            b0 += r[j, 0, 0] * x + r[j, 0, 1] * y + r[j, 0, 2] * z
-            b1 += r[j, 1, 0] * x + r[j, 1, 1] * y + r[j, 1, 2] * z
-            b2 += r[j, 2, 0] * x + r[j, 2, 1] * y + r[j, 2, 2] * z
-        right[i, 0] = -0.5 * (b0 + r[i, 0, 0] * m0 + r[i, 0, 1] * m1 + r[i, 0, 2] * m2)
-        right[i, 1] = -0.5 * (b1 + r[i, 1, 0] * m0 + r[i, 1, 1] * m1 + r[i, 1, 2] * m2)
-        right[i, 2] = -0.5 * (b2 + r[i, 2, 0] * m0 + r[i, 2, 1] * m1 + r[i, 2, 2] * m2)
-    return right
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _energy(starts, ends, weights, arms, q, r):
-    """Eq. 2 of positions `q` (M, 3) and rotations `r`."""
-    total = 0.0
-    for i in range(len(starts) - 1):
-        for e in range(starts[i], starts[i + 1]):
-            j = ends[e]
-            for a in range(3):
-                turned = r[i, a, 0] * arms[e, 0] + r[i, a, 1] * arms[e, 1] + r[i, a, 2] * arms[e, 2]
-                gap = q[j, a] - q[i, a] - turned
-                total += weights[e] * gap * gap
-    return total
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(starts, ends, weights, arms, q, warm, fitted):
-    """Local step into `fitted` (M, 3, 3); the energy with it.
-
-    The transpose of the paper's S_i is sum_j w_ij e'_ij e_ij^T.
-    """
-    total = 0.0
-    s = np.empty((3, 3))
-    for i in range(len(starts) - 1):
-        s00 = s01 = s02 = s10 = s11 = s12 = s20 = s21 = s22 = squares = 0.0
-        for e in range(starts[i], starts[i + 1]):
-            j, w = ends[e], weights[e]
-            x, y, z = arms[e, 0], arms[e, 1], arms[e, 2]
-            u, v, t = q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]
-            squares += w * (u * u + v * v + t * t + x * x + y * y + z * z)
-            u, v, t = w * u, w * v, w * t
-            s00 += u * x
-            s01 += u * y
-            s02 += u * z
-            s10 += v * x
-            s11 += v * y
-            s12 += v * z
-            s20 += t * x
-            s21 += t * y
-            s22 += t * z
-        s[0, 0], s[0, 1], s[0, 2] = s00, s01, s02
-        s[1, 0], s[1, 1], s[1, 2] = s10, s11, s12
-        s[2, 0], s[2, 1], s[2, 2] = s20, s21, s22
-        r = fitted[i]
-        _fit_rotation(s, warm[i], r)
-        aligned = 0.0
-        for a in range(3):
-            for b in range(3):
-                aligned += r[a, b] * s[a, b]
-        total += squares - 2.0 * aligned
-    return total
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit_rotation(a, warm, r):
-    """r := the rotation nearest to `a`, from a warm start (Mueller et al. 2016).
-
-    The turn that aligns the current axes with the matrix's columns is repeated until it is
-    nothing; a product of rotations never becomes a mirror image. From more than a right angle
-    away the first turns are large but still in the right sense.
-    """
-    size = 0.0
-    for j in range(3):
-        for k in range(3):
-            r[j, k] = warm[j, k]
-            size = max(size, abs(a[j, k]))
-    if size <= 1e-300:
-        return
-    for _ in range(ROTATION_STEPS):
-        # omega = sum_k r_k x a_k / |sum_k r_k . a_k|, r_k and a_k the columns
-        ox = oy = oz = 0.0
-        dot = 0.0
-        for k in range(3):
-            ox += r[1, k] * a[2, k] - r[2, k] * a[1, k]
-            oy += r[2, k] * a[0, k] - r[0, k] * a[2, k]
-            oz += r[0, k] * a[1, k] - r[1, k] * a[0, k]
-            dot += r[0, k] * a[0, k] + r[1, k] * a[1, k] + r[2, k] * a[2, k]
-        scale = 1.0 / (abs(dot) + 1e-12 * size)
-        ox, oy, oz = ox * scale, oy * scale, oz * scale
-        square = ox * ox + oy * oy + oz * oz
-        _turn(r, 0.5 * ox, 0.5 * oy, 0.5 * oz)
-        if square < ROTATION_TOLERANCE:
-            break
-    _orthonormalise(r)
-
-
-@numba.njit(cache=True)
-def _turn(r, x, y, z):
-    """r := (turn whose Gibbs vector, axis x tan(angle / 2), is x, y, z) r.
-
-    v + 2 / (1 + g.g) (g x v + g x (g x v)) for each column v: no sine, and 0 turns nothing.
-    """
-    share = 2.0 / (1.0 + x * x + y * y + z * z)
-    for k in range(3):
-        a, b, d = r[0, k], r[1, k], r[2, k]
-        u, v, w = y * d - z * b, z * a - x * d, x * b - y * a
-        r[0, k] = a + share * (u + y * w - z * v)
-        r[1, k] = b + share * (v + z * u - x * w)
-        r[2, k] = d + share * (w + x * v - y * u)
-
-
-@numba.njit(cache=True)
-def _orthonormalise(r):
-    """Gram-Schmidt on the columns: takes away the rounding of a long chain of turns."""
-    for k in range(2):
-        for j in range(k):
-            dot = r[0, k] * r[0, j] + r[1, k] * r[1, j] + r[2, k] * r[2, j]
-            for a in range(3):
-                r[a, k] -= dot * r[a, j]
-        norm = np.sqrt(r[0, k] ** 2 + r[1, k] ** 2 + r[2, k] ** 2)
-        for a in range(3):
-            r[a, k] /= norm
-    r[0, 2] = r[1, 0] * r[2, 1] - r[2, 0] * r[1, 1]
-    r[1, 2] = r[2, 0] * r[0, 1] - r[0, 0] * r[2, 1]
-    r[2, 2] = r[0, 0] * r[1, 1] - r[1, 0] * r[0, 1]

@@ -1,0 +1,153 @@
+"""What holds an object: surface points with targets, held control points, patches gripped harder.
+
+Each of them adds a few rows to a system whose inverse is known (`response.py`), so that a change
+of the set costs the solution of a small system, not a factorisation (Woodbury's identity and a
+Schur complement in one).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from ..arrays import F64, I32, Sparse
+from .binding import Binding
+from .response import Response, product
+from .skinning import coupling
+
+TIE = 1e-12  # x the softest constraint's own give: constraints that contradict each other average
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """Surface points that must be somewhere, and control points that are held.
+
+    Where they must be is said later, and as often as a pointer moves (`Targets`).
+    """
+
+    nodes: I32  # (H, K) control points of each surface point
+    weights: F64  # (H, K) rows sum to 1
+    arms: F64  # (H, K, 3) x0 - p_j, object frame at rest
+    softness: F64  # (H,) give, in units of what one control point's links give; 0 = none
+    held: I32  # (P,) control points
+    turned: I32  # (T,) control points whose rotation is given
+
+    @classmethod
+    def on_nodes(cls, nodes: np.ndarray) -> Constraints:
+        """Control points themselves."""
+        count = len(nodes)
+        return cls(
+            np.asarray(nodes, np.int32)[:, None], np.ones((count, 1)), np.zeros((count, 1, 3)),
+            np.zeros(count), np.empty(0, np.int32), np.empty(0, np.int32),
+        )  # fmt: skip
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Whether all of them are control points: no blending between rotations."""
+        return not self.arms.any()
+
+    @cached_property
+    def _binding(self) -> Binding:
+        return Binding(self.nodes, self.weights, np.zeros((*self.nodes.shape, 3)))
+
+    def turned_arms(self, rotations: F64) -> F64:
+        """sum_j w_j R_j (x0 - p_j), (H, 3)."""
+        turned = rotations[self.nodes] @ self.arms[..., None]  # (H, K, 3, 1)
+        return (self.weights[..., None] * turned[..., 0]).sum(1)
+
+    def bends(self, rotations: F64) -> F64:
+        """(H, K, 3, 3) by how much skinning's matrices differ from the linear blend's.
+
+        Skinning blends rotations (`skinning.skin`): x' = x + sum_j A_j u_j, where a linear blend
+        has w_j for A_j. Their sums over j are the same.
+        """
+        return coupling(self._binding, rotations) - self.weights[..., None, None] * np.eye(3)
+
+    def excess(self, bends: F64, positions: F64, rotations: F64) -> F64:
+        """How far (H, 3) the surface points are from where a linear blend would put them."""
+        turned = rotations[self.nodes] @ self.arms[..., None]
+        near = turned[..., 0] + positions[self.nodes] - positions[self.nodes[:, :1]]
+        return (bends @ near[..., None])[..., 0].sum(1)
+
+    def placed(self, positions: F64, rotations: F64) -> F64:
+        """Where the surface points are (H, 3)."""
+        linear = (self.weights[..., None] * positions[self.nodes]).sum(1)
+        linear += self.turned_arms(rotations)
+        if self.is_linear:
+            return linear
+        return linear + self.excess(self.bends(rotations), positions, rotations)
+
+    def rows(self, count: int) -> Sparse:
+        """(H + P, count) what each constraint is of the control points, to first order."""
+        own, width = self.nodes.shape
+        data = np.concatenate([self.weights.ravel(), np.ones(len(self.held))])
+        nodes = np.concatenate([self.nodes.ravel(), self.held])
+        rows = np.concatenate([np.repeat(np.arange(own), width), own + np.arange(len(self.held))])
+        return csr_array((data, (rows, nodes)), shape=(own + len(self.held), count))
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Where the constraints are."""
+
+    points: F64  # (H, 3) of the surface points
+    held: F64  # (P, 3) of the held control points
+    turns: F64  # (T, 3, 3) of the turned ones
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Stiffness that is added to (or, the ground's, taken from) a few unknowns."""
+
+    nodes: np.ndarray  # (P,) unknowns
+    matrix: F64  # (P, P) symmetric
+
+
+class HeldResponse:
+    """K^-1 with a patch and constraints: one thin product more than K^-1 alone."""
+
+    def __init__(self, response: Response, patch: Patch, rows: Sparse, compliance: F64) -> None:
+        """`rows` (H, n) of the constraints, `compliance` (H,) what each gives to a unit force.
+
+        Unknowns p with (K + E D E^T) p + C^T f = b and C p - S f = t. With B = [E^T; C] and
+        G = K^-1 B^T: p = y - T (B y - [0; t]), y = K^-1 b, T = G blockdiag(D, 1) Z^-1,
+        Z = blockdiag(1, S) + B G blockdiag(D, 1).
+        """
+        self._response = response
+        own, count = len(patch.nodes), rows.shape[0]
+        select = _selection(patch.nodes, rows.shape[1])
+        self._rows: Sparse = vstack([select, rows], format="csr")
+        touched = np.unique(self._rows.indices)
+        columns = response.columns(touched)
+        local = self._rows[:, touched].toarray()
+        spread = columns @ local.T  # G, (n, P + H)
+        system = local @ spread[touched]
+        give = system.diagonal()[own:]
+        forces = spread.copy()
+        forces[:, :own] = spread[:, :own] @ patch.matrix
+        system[:, :own] = system[:, :own] @ patch.matrix
+        system[np.arange(own), np.arange(own)] += 1.0
+        rest = own + np.arange(count)
+        system[rest, rest] += compliance + TIE * float(np.abs(give).max(initial=0.0))
+        self._answers = np.ascontiguousarray(np.linalg.solve(system.T, forces.T).T)
+        self._own = own
+
+    def solve(self, forces: F64, targets: F64) -> F64:
+        """Unknowns (n, 3) under `forces` (n, 3), with the constraints at `targets` (H, 3)."""
+        loose = self._response.solve(forces)
+        gaps = self._rows @ loose
+        gaps[self._own :] -= targets
+        return loose - product(self._answers, gaps)
+
+    def follow(self, count: int) -> F64:
+        """(n, count) how the unknowns move when one of the first `count` targets does."""
+        return np.ascontiguousarray(self._answers[:, self._own : self._own + count])
+
+
+def _selection(nodes: np.ndarray, width: int) -> Sparse:
+    """(P, width) with a one in each row."""
+    steps = np.arange(len(nodes) + 1)
+    return csr_array((np.ones(len(nodes)), nodes, steps), shape=(len(nodes), width))

@@ -1,0 +1,46 @@
+"""The hand of a handle: links around it are stiffer.
+
+A load on one point of an elastic sheet makes a spike, however fine the sheet is. A hand takes
+hold of a patch, which then moves nearly as one body, and the strain is spread over what is
+around it.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..arrays import F64, Sparse, frozen
+
+GRIP = 20.0  # x a link's weight, in the middle of the hand
+LEAST = 1e-3  # at less a control point is not in the patch
+RADIUS = 0.06  # x diameter, of the patch
+APART = 0.4  # x distance to the next handle: no patch reaches another
+
+
+def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F64:
+    """Weights (E,) of the links, up to `GRIP` times larger around `handles` (H, 3).
+
+    `points` (M, 3) control points; `weights` (M, M) symmetric, and so is the result.
+    """
+    apart = np.linalg.norm(handles[:, None] - handles[None], axis=2)
+    apart[apart <= 1e-6 * diameter] = np.inf
+    radii = np.minimum(RADIUS * diameter, APART * apart.min(1))
+    distances = np.linalg.norm(points[:, None] - handles[None], axis=2)
+    grip = np.exp(-((distances / radii) ** 2)).T  # (H, M)
+    grip[grip < LEAST] = 0.0
+    data = weights.data.copy()
+    indices = frozen(weights.indptr), frozen(weights.indices)
+    _stiffen(*indices, frozen(weights.data), frozen(grip), data)
+    return data
+
+
+@numba.njit(cache=True)
+def _stiffen(starts, ends, weights, grip, data):
+    for h in range(len(grip)):
+        for i in range(len(starts) - 1):
+            own = grip[h, i]
+            if own == 0.0:
+                continue
+            for e in range(starts[i], starts[i + 1]):
+                data[e] = max(data[e], weights[e] * (1.0 + (GRIP - 1.0) * own * grip[h, ends[e]]))

@@ -1,0 +1,72 @@
+"""From handles to constraints: which rows a set of handles is, and where they must be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import F64, I32
+from ..document import Handle
+from ..rotations import matrix_from_vector
+from .binding import Binding
+from .constraints import Constraints, Targets
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """The rows of a set of handles. They depend on where the handles are at rest only."""
+
+    constraints: Constraints
+    owners: I32  # (H,) the handle of each row
+    places: F64  # (H, 3) the row's surface point from its handle's, at rest
+    turners: I32  # (T,) the handle of each turned control point
+    held: F64  # (P, 3) held control points, at rest
+
+    @classmethod
+    def of(cls, handles: tuple[Handle, ...], binding: Binding, points: F64, held: I32) -> Hold:
+        """`binding` of the handles' points to the control points (M, 3); `held`: further ones.
+
+        A handle is the surface point that the artist clicked. One that is turned too takes its
+        control points with it as one rigid body: a row each.
+        """
+        owners, nodes, weights, turned = [], [], [], []
+        width = binding.control_points.shape[1]
+        for h, handle in enumerate(handles):
+            shares = binding.weights[h]
+            own = np.where(shares > 0, binding.control_points[h], binding.control_points[h, 0])
+            if handle.turn is None:
+                nodes.append(own)
+                weights.append(shares)
+                owners.append(h)
+                continue
+            for node in np.unique(own):
+                nodes.append(np.full(width, node))
+                weights.append(np.eye(1, width)[0])
+                owners.append(h)
+                turned.append((node, h))
+        index, owner = np.array(nodes, np.int32), np.array(owners, np.int32)
+        clicked = np.array([h.point for h in handles])[owner]
+        is_turned = np.array([handles[h].turn is not None for h in owners])
+        surface = np.where(is_turned[:, None], points[index[:, 0]], clicked)
+        constraints = Constraints(
+            index, np.array(weights), surface[:, None] - points[index],
+            np.array([handles[h].softness for h in owners]),
+            np.setdiff1d(held, index).astype(np.int32),
+            np.array([node for node, _ in turned], np.int32),
+        )  # fmt: skip
+        turners = np.array([h for _, h in turned], np.int32)
+        rest = points[constraints.held]
+        return cls(constraints, owner, surface - clicked, turners, rest)
+
+    def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
+        """Where all must be when the handles have gone a `share` of their way."""
+        turns = np.stack([_turn(h, share) for h in handles])
+        ways = np.stack([h.point + share * (h.target - h.point) for h in handles])
+        turned = (turns[self.owners] @ self.places[..., None])[..., 0]
+        return Targets(ways[self.owners] + turned, self.held, turns[self.turners])
+
+
+def _turn(handle: Handle, share: float) -> F64:
+    """(3, 3) the handle's own turn, a `share` of it."""
+    return np.eye(3) if handle.turn is None else matrix_from_vector(share * handle.turn)
