@@ -50,13 +50,13 @@ def bench_deform(is_quick: bool) -> list[dict[str, Any]]:
 
 
 def _row(mode: str, nodes: int, gaussians: int, repeats: int) -> dict[str, Any]:
-    lifted = _five_limbs(gaussians, nodes)
+    lifted = five_limbs(gaussians, nodes)
     deformer = Deformer(lifted, DeformSettings(is_faithful=mode == "faithful"))
-    handles = _handles(lifted, BEND)
+    handles = limb_handles(lifted, BEND)
     deformer.prepare(handles)
     cold = deformer.solve(handles, start=deformer.rest(), seconds=FRAME)
     converged = _converged(deformer, handles, cold.pose)
-    there = [_handles(lifted, BEND * step / STEPS) for step in range(STEPS)]
+    there = [limb_handles(lifted, BEND * step / STEPS) for step in range(STEPS)]
     drag, pose = cycle([*there, *reversed(there)]), deformer.rest()
 
     def frame() -> None:
@@ -98,7 +98,7 @@ def _converged(deformer: Deformer, handles: tuple[Handle, ...], start: Pose) -> 
     return float(min(energies))
 
 
-def _five_limbs(count: int, nodes: int) -> LiftedObject:
+def five_limbs(count: int, nodes: int) -> LiftedObject:
     """Round limbs, open at their ends, in a plane around a ball: about `count` Gaussians."""
     rng = np.random.default_rng(0)
     each = count // (LIMBS + 1)
@@ -140,7 +140,7 @@ def _quats_along(normals: F64) -> F64:
     return quats / np.linalg.norm(quats, axis=1, keepdims=True)
 
 
-def _handles(lifted: LiftedObject, degrees: float) -> tuple[Handle, ...]:
+def limb_handles(lifted: LiftedObject, degrees: float) -> tuple[Handle, ...]:
     """Two handles at the end of each limb; the first limb's are turned about its root."""
     points = lifted.control_points.astype(np.float64)
     chosen: list[Handle] = []

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
-from ..arrays import F64
+from ..arrays import F64, frozen
+from ..threads import FAST
 
 WINDOW = 8  # previous steps that are combined
 RIDGE = 1e-12  # on the normalised Gram matrix of the steps: float64 squared leaves no more
@@ -39,13 +41,41 @@ class Anderson:
         size = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
         gram /= size[:, None] * size
         gram.flat[:: self._count + 1] += RIDGE
-        shares = np.linalg.solve(gram, (steps @ flat_residual) / size) / size
-        return value - (shares @ self._values[: self._count]).reshape(value.shape)
+        shares = np.linalg.solve(gram, _products(steps, flat_residual) / size) / size
+        mixed = np.empty(flat_value.size)
+        _less(frozen(flat_value), frozen(self._values), shares, mixed)
+        return mixed.reshape(value.shape)
 
     def _keep(self, value: F64, residual: F64) -> None:
         row, window = self._next, len(self._gram)
         self._residuals[row], self._values[row] = residual, value
         self._count = min(self._count + 1, window)
         self._next = (row + 1) % window
-        products = self._residuals[: self._count] @ residual
+        products = _products(self._residuals[: self._count], residual)
         self._gram[row, : self._count] = self._gram[: self._count, row] = products
+
+
+def _products(rows: F64, column: F64) -> F64:
+    """rows (k, n) times column (n,), in this thread: BLAS would wake others for it."""
+    out = np.empty(len(rows))
+    _multiply(frozen(rows), frozen(column), out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _multiply(rows, column, out):
+    for k in range(len(rows)):
+        total = 0.0
+        for i in range(len(column)):
+            total += rows[k, i] * column[i]
+        out[k] = total
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _less(value, rows, shares, out):
+    """out := value - sum_k shares_k rows_k."""
+    for i in range(len(value)):
+        out[i] = value[i]
+    for k in range(len(shares)):
+        for i in range(len(value)):
+            out[i] -= shares[k] * rows[k, i]

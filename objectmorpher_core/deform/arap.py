@@ -96,7 +96,8 @@ class ArapSolver:
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
         constraints, forces = self._constraints, self._links.right_side(rotations)
-        fixed = self._targets.points - constraints.turned_arms(rotations)
+        turned = constraints.turned_arms(rotations)
+        fixed = self._targets.points - constraints.mean(turned)
         targets = np.concatenate([fixed, self._targets.held])
         if self._bodies:
             arms = self._bodies.turned(rotations)
@@ -107,7 +108,7 @@ class ArapSolver:
         else:
             positions = self._held.solve(forces, targets)
         if not constraints.is_linear:
-            self._unbend(positions, rotations)
+            self._unbend(positions, turned, constraints.bends(rotations))
         positions[self._still] = self.points[self._still]
         return positions
 
@@ -139,14 +140,13 @@ class ArapSolver:
         """(M,) the unknown of each control point."""
         return self._bodies.unknown if self._bodies else np.arange(len(self.points))
 
-    def _unbend(self, positions: F64, rotations: F64) -> None:
+    def _unbend(self, positions: F64, turned: F64, bends: F64) -> None:
         """Moves `positions` so that the surface points, as they are skinned, are at the targets.
 
         The global step met them for a linear blend. For fixed rotations the excess over it, e,
         is linear in the positions, and these follow the targets linearly: one small system.
         """
-        bends = self._constraints.bends(rotations)
-        excess = self._constraints.excess(bends, positions, rotations)
+        excess = self._constraints.excess(bends, turned, positions)
         size = excess.size
         system = np.einsum("hkab,hkg->hagb", bends, self._parting).reshape(size, size)
         system.flat[:: size + 1] += 1.0

@@ -54,9 +54,12 @@ class Constraints:
         return Binding(self.nodes, self.weights, np.zeros((*self.nodes.shape, 3)))
 
     def turned_arms(self, rotations: F64) -> F64:
-        """sum_j w_j R_j (x0 - p_j), (H, 3)."""
-        turned = rotations[self.nodes] @ self.arms[..., None]  # (H, K, 3, 1)
-        return (self.weights[..., None] * turned[..., 0]).sum(1)
+        """R_j (x0 - p_j), (H, K, 3)."""
+        return (rotations[self.nodes] @ self.arms[..., None])[..., 0]
+
+    def mean(self, values: F64) -> F64:
+        """sum_j w_j of (H, K, 3): (H, 3)."""
+        return (self.weights[:, None] @ values)[:, 0]
 
     def bends(self, rotations: F64) -> F64:
         """(H, K, 3, 3) by how much skinning's matrices differ from the linear blend's.
@@ -66,19 +69,21 @@ class Constraints:
         """
         return coupling(self._binding, rotations) - self.weights[..., None, None] * np.eye(3)
 
-    def excess(self, bends: F64, positions: F64, rotations: F64) -> F64:
-        """How far (H, 3) the surface points are from where a linear blend would put them."""
-        turned = rotations[self.nodes] @ self.arms[..., None]
-        near = turned[..., 0] + positions[self.nodes] - positions[self.nodes[:, :1]]
+    def excess(self, bends: F64, turned: F64, positions: F64) -> F64:
+        """How far (H, 3) the surface points are from where a linear blend would put them.
+
+        `turned` are `turned_arms`, (H, K, 3).
+        """
+        near = turned + positions[self.nodes] - positions[self.nodes[:, :1]]
         return (bends @ near[..., None])[..., 0].sum(1)
 
     def placed(self, positions: F64, rotations: F64) -> F64:
         """Where the surface points are (H, 3)."""
-        linear = (self.weights[..., None] * positions[self.nodes]).sum(1)
-        linear += self.turned_arms(rotations)
+        turned = self.turned_arms(rotations)
+        linear = self.mean(positions[self.nodes] + turned)
         if self.is_linear:
             return linear
-        return linear + self.excess(self.bends(rotations), positions, rotations)
+        return linear + self.excess(self.bends(rotations), turned, positions)
 
     def rows(self, count: int) -> Sparse:
         """(H + P, count) what each constraint is of the control points, to first order."""
@@ -121,9 +126,8 @@ class HeldResponse:
         select = _selection(patch.nodes, rows.shape[1])
         self._rows: Sparse = vstack([select, rows], format="csr")
         touched = np.unique(self._rows.indices)
-        columns = response.columns(touched)
-        local = self._rows[:, touched].toarray()
-        spread = columns @ local.T  # G, (n, P + H)
+        local = self._rows[:, touched]
+        spread = (local @ response.columns(touched).T).T  # G, (n, P + H)
         system = local @ spread[touched]
         give = system.diagonal()[own:]
         forces = spread.copy()

@@ -14,7 +14,7 @@ from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
 from .graph import Graph, Surface, build_graph
 from .grip import stiffened
-from .hold import Hold
+from .hold import Grasp, Hold
 from .skinning import Motion, Skinned, skin
 from .strain import Strain, measure_strain
 
@@ -24,6 +24,8 @@ STEP_ITERATIONS = 4  # in the sub-steps of a large move
 LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
 LARGE_TURN = 0.3  # rad: likewise for a turn
 MOST_STEPS = 30
+TURNED_RADIUS = 0.06  # x diameter along the surface: what turns with a turned handle
+TURNED_APART = 0.3  # x distance to the next handle, likewise
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
 
 
@@ -90,8 +92,11 @@ class Deformer:
 
         With `start` the solve continues from there (a drag), for about so many `seconds`; without,
         large moves are made in sub-steps from rest, so the result is a function of the handles
-        alone.
+        alone. Raises ValueError for handles that are not finite.
         """
+        for h in handles:
+            if not all(np.isfinite(v).all() for v in (h.point, h.target, h.turn) if v is not None):
+                raise ValueError("a handle's point, target or turn is not finite")
         if not handles:
             return Solution(self.rest(), (0.0,))
         anchors = self.anchors(handles, has_auto_anchors)
@@ -142,17 +147,27 @@ class Deformer:
             if not self.settings.is_faithful:
                 hands = stiffened(self.points, self._solver.weights, points, self.diameter)
             held = anchors if self.rig.held is None else np.union1d(anchors, self.rig.held)
-            self._hold = Hold.of(handles, self._holding(handles, points), self.points, held)
+            self._hold = Hold.of(handles, self._grasp(handles, points), self.points, held)
             self._solver.constrain(self._hold.constraints, hands)
             self._constrained = key
         self._solver.aim(self._hold.targets(handles))
 
-    def _holding(self, handles: tuple[Handle, ...], points: F64) -> Binding:
-        """What holds each handle: the surface point itself; in the paper its control point."""
-        if not self.settings.is_faithful:
-            return bind(points, self.points, self.graph)
-        nodes = np.array([[h.control_point] for h in handles], np.int32)
-        return Binding(nodes, np.ones(nodes.shape), np.zeros((*nodes.shape, 3)))
+    def _grasp(self, handles: tuple[Handle, ...], points: F64) -> Grasp:
+        """The surface point itself, and what turns with it; in the paper its control point."""
+        if self.settings.is_faithful:
+            nodes = np.array([[h.control_point] for h in handles], np.int32)
+            binding = Binding(nodes, np.ones(nodes.shape), np.zeros((*nodes.shape, 3)))
+            return Grasp(binding, tuple(nodes))
+        around = []
+        for h in handles:
+            if h.turn is None:
+                around.append(np.empty(0, np.int32))
+                continue
+            distances = self.graph.distances_from(h.control_point)
+            others = [distances[o.control_point] for o in handles if o is not h]
+            reach = min([TURNED_RADIUS * self.diameter, *(TURNED_APART * d for d in others)])
+            around.append(np.flatnonzero(distances <= reach).astype(np.int32))
+        return Grasp(bind(points, self.points, self.graph), tuple(around))
 
     def _approach(self, handles: tuple[Handle, ...], rotations: F64) -> F64:
         """Walks the targets from rest to where they belong; returns the rotations there.

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 
 from ..arrays import F64, I32, Mask
 from ..document import DeformSettings, Seam
+from .struts import find_struts, weigh_struts
 from .surface_links import CHUNK, TINY, Edges, Surface, without_gaps
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
@@ -65,7 +66,7 @@ def build_graph(
     `settings.stiffness` scales the radius of the links, and s with it. Auxiliary edges are links
     whatever the radius, so the links never split a part.
 
-    With a `surface` the default leaves out auxiliary edges that bridge a gap, as between an arm
+    With a `surface` struts join opposite sides of the body (`struts.py`), and the default leaves out auxiliary edges that bridge a gap, as between an arm
     and the body beside it: neither of the paper's two rules tells them apart. `seams` cut and
     glue by hand: glue bridges a gap, and a cut wins over everything. Raises ValueError for points
     that are not finite, a seam of other control points, and settings that do not exist.
@@ -75,12 +76,14 @@ def build_graph(
     p = points - centre  # far from the origin digits would be lost
     spacing = _mean_spacing(p)
     edges = Edges.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
-    if surface is not None and len(surface.means) and not settings.is_faithful:
-        centred = Surface(surface.means - centre, surface.normals)
+    centred = surface and Surface(surface.means - centre, surface.normals)
+    is_solid = centred is not None and len(centred.means) > 0 and not settings.is_faithful
+    if is_solid:
         edges = without_gaps(edges, p, spacing, centred)
     edges = _sewn(edges, p, spacing, seams)
     auxiliary = edges.matrix(len(p), edges.lengths)
-    radius = LINK_RADIUS * _diameter(p)
+    diameter = _diameter(p)
+    radius = LINK_RADIUS * diameter
     if not settings.is_faithful:
         radius = min(radius, REACH * FALLOFF * spacing)
     radius *= settings.stiffness
@@ -92,7 +95,20 @@ def build_graph(
     links = links.where(~_is_cut(links, len(p), seams))
     weights = _weights(links, len(p), spacing, settings)
     components = connected_components(weights, directed=False)[1]
+    if is_solid and settings.links == "geodesic":
+        struts = find_struts(p, spacing, LINK_RADIUS * diameter, centred)
+        struts = struts.where(components[struts.first] == components[struts.second])
+        struts = struts.where(~_is_cut(struts, len(p), seams))
+        weights = _with_struts(weights, struts)
     return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing)
+
+
+def _with_struts(weights: csr_array, struts: Edges) -> csr_array:
+    """`weights` (M, M), and where a strut is the larger of its own and the link's."""
+    if len(struts) == 0:
+        return weights
+    degree = np.asarray(weights.sum(1)).ravel()
+    return weights.maximum(struts.matrix(len(degree), weigh_struts(struts, degree)))
 
 
 def _weights(links: Edges, count: int, spacing: float, settings: DeformSettings) -> csr_array:

@@ -13,9 +13,8 @@ import numpy as np
 from ..arrays import F64, Sparse, frozen
 
 GRIP = 20.0  # x a link's weight, in the middle of the hand
-LEAST = 1e-3  # at less a control point is not in the patch
-RADIUS = 0.06  # x diameter, of the patch
-APART = 0.4  # x distance to the next handle: no patch reaches another
+RADIUS = 0.1  # x diameter, of the patch
+APART = 0.6  # x distance to the next handle: two patches hardly meet
 
 
 def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F64:
@@ -27,8 +26,7 @@ def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F6
     apart[apart <= 1e-6 * diameter] = np.inf
     radii = np.minimum(RADIUS * diameter, APART * apart.min(1))
     distances = np.linalg.norm(points[:, None] - handles[None], axis=2)
-    grip = np.exp(-((distances / radii) ** 2)).T  # (H, M)
-    grip[grip < LEAST] = 0.0
+    grip = (np.maximum(1.0 - (distances / radii) ** 2, 0.0) ** 2).T  # (H, M)
     data = weights.data.copy()
     indices = frozen(weights.indptr), frozen(weights.indices)
     _stiffen(*indices, frozen(weights.data), frozen(grip), data)

@@ -14,6 +14,14 @@ from .constraints import Constraints, Targets
 
 
 @dataclass(frozen=True, eq=False)
+class Grasp:
+    """What a set of handles takes hold of."""
+
+    binding: Binding  # of the handles' points
+    around: tuple[I32, ...]  # control points that turn with each, if it is turned
+
+
+@dataclass(frozen=True, eq=False)
 class Hold:
     """The rows of a set of handles. They depend on where the handles are at rest only."""
 
@@ -24,13 +32,14 @@ class Hold:
     held: F64  # (P, 3) held control points, at rest
 
     @classmethod
-    def of(cls, handles: tuple[Handle, ...], binding: Binding, points: F64, held: I32) -> Hold:
-        """`binding` of the handles' points to the control points (M, 3); `held`: further ones.
+    def of(cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, held: I32) -> Hold:
+        """`points` (M, 3) control points at rest; those in `held` stay there.
 
-        A handle is the surface point that the artist clicked. One that is turned too takes its
-        control points with it as one rigid body: a row each.
+        A handle is the surface point that the artist clicked. One that is turned too takes the
+        control points around it along as one rigid body: a row each.
         """
         owners, nodes, weights, turned = [], [], [], []
+        binding = grasp.binding
         width = binding.control_points.shape[1]
         for h, handle in enumerate(handles):
             shares = binding.weights[h]
@@ -40,7 +49,7 @@ class Hold:
                 weights.append(shares)
                 owners.append(h)
                 continue
-            for node in np.unique(own):
+            for node in np.union1d(own, grasp.around[h]):
                 nodes.append(np.full(width, node))
                 weights.append(np.eye(1, width)[0])
                 owners.append(h)

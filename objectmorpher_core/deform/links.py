@@ -16,7 +16,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import F32, F64, Sparse, frozen
-from .rotation_fit import FAST, fit_rotations
+from ..threads import FAST
+from .rotation_fit import fit_rotations
 
 GROUP = 16  # control points whose rows are multiplied together; 8 and 32 are slower
 Packed = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]

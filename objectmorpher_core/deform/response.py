@@ -15,7 +15,7 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from ..arrays import F64, Sparse, frozen
-from .rotation_fit import FAST
+from ..threads import FAST
 
 SPARSE_FROM = 1500  # unknowns: from here two sparse triangular solves beat a dense product
 JITTER = 1e-10  # x the largest diagonal, where rounding makes a pivot negative
@@ -76,16 +76,17 @@ class SparseResponse:
         self._order = np.argsort(factor.perm_c)  # unknown at each row of the factor
         self._pivots = frozen(1.0 / factor.U.diagonal())
         self._lower = _triangle(csr_array(factor.L))
-        self._upper = _triangle(csr_array(factor.L.T))
+        # From its end backwards, L^T is lower triangular too.
+        self._upper = _triangle(csr_array(factor.L.T[::-1, ::-1]))
         self._columns: dict[int, F64] = {}
 
     def solve(self, forces: F64) -> F64:
         x = np.ascontiguousarray(forces[self._order])
-        _forward(*self._lower, x)
-        x *= self._pivots[:, None]
-        _backward(*self._upper, x)
+        _substitute(*self._lower, x)
+        x = np.ascontiguousarray((x * self._pivots[:, None])[::-1])
+        _substitute(*self._upper, x)
         out = np.empty(x.shape)
-        out[self._order] = x
+        out[self._order] = x[::-1]
         return out
 
     def columns(self, nodes: np.ndarray) -> F64:
@@ -152,25 +153,9 @@ def _product(matrix, columns, out):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _forward(starts, columns, values, x):
-    """x := L^-1 x, L unit lower triangular by rows, x (n, 3)."""
+def _substitute(starts, columns, values, x):
+    """x := L^-1 x, L unit lower triangular by rows without its diagonal, x (n, 3)."""
     for i in range(len(x)):
-        a = b = c = 0.0
-        for e in range(starts[i], starts[i + 1]):
-            j, v = columns[e], values[e]
-            a += v * x[j, 0]
-            b += v * x[j, 1]
-            c += v * x[j, 2]
-        x[i, 0] -= a
-        x[i, 1] -= b
-        x[i, 2] -= c
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _backward(starts, columns, values, x):
-    """x := L^-T x, L^T by rows."""
-    for k in range(len(x)):
-        i = len(x) - 1 - k
         a = b = c = 0.0
         for e in range(starts[i], starts[i + 1]):
             j, v = columns[e], values[e]

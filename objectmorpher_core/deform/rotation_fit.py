@@ -9,7 +9,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-FAST = {"reassoc", "contract", "nsz"}  # sums in any order, a * b + c at once
+from ..threads import FAST
+
 STEPS = 40  # at most; one or two from a warm start
 TOLERANCE = 1e-10  # rad^2, squared length of the last turn; what is left is its square
 DAMPING = 1e-9  # x the matrix's size: a turn that changes nothing is not made

@@ -1,0 +1,200 @@
+"""What the artist says about regions, through to the moved surface; and parts that lie close."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objectmorpher_core.arrays import F64
+from objectmorpher_core.deform.deformer import Deformer
+from objectmorpher_core.document import DeformSettings, Handle, LiftedObject, Pose, Rig, Seam
+from tests import shapes
+
+EXACT = 1e-9
+BAR = shapes.capsule()
+LIFTED = shapes.lifted_surface(BAR.points, BAR.normals)
+NODES = LIFTED.control_points.astype(np.float64)
+MIDDLE = np.flatnonzero(np.abs(NODES[:, 0]) < 0.12).astype(np.int32)
+LEFT = np.flatnonzero(NODES[:, 0] < 0.0).astype(np.int32)
+RIGHT = np.flatnonzero(NODES[:, 0] >= 0.0).astype(np.int32)
+
+
+def _handle(lifted: LiftedObject, at, move=(0.0, 0.0, 0.0), **more) -> Handle:
+    means = lifted.gaussians.means.astype(np.float64)
+    point = means[((means - at) ** 2).sum(1).argmin()]
+    node = int(((lifted.control_points - point) ** 2).sum(1).argmin())
+    return Handle(node, point, point + np.array(move), **more)
+
+
+def _bent(rig: Rig | None, move=(-0.2, 0.45, 0.0)) -> tuple[Deformer, Pose]:
+    """The bar with its left end held and its right end moved."""
+    deformer = Deformer(LIFTED, DeformSettings(), rig)
+    handles = (
+        _handle(LIFTED, (-0.5, 0, 0), turn=np.zeros(3)),
+        _handle(LIFTED, (0.5, 0, 0), move, turn=np.array([0, 0, 1.2])),
+    )
+    return deformer, deformer.solve(handles).pose
+
+
+def _shape(points: F64) -> F64:
+    return np.linalg.norm(points[:, None] - points[None], axis=2)
+
+
+def test_a_rigid_body_keeps_its_shape_and_its_surface():
+    _, free = _bent(None)
+    deformer, pose = _bent(Rig(bodies=(MIDDLE,)))
+    rest = _shape(NODES[MIDDLE])
+    assert np.abs(_shape(free.points[MIDDLE]) - rest).max() > 0.005
+    assert np.abs(_shape(pose.points[MIDDLE]) - rest).max() < EXACT
+    inner = BAR.points[np.abs(BAR.points[:, 0]) < 0.03][::20]
+    moved = deformer.skin_points(inner, pose).points
+    assert np.abs(_shape(moved) - _shape(inner)).max() < 1e-6
+
+
+def test_frozen_control_points_stay():
+    _, pose = _bent(Rig(held=MIDDLE))
+    assert np.abs(pose.points[MIDDLE] - NODES[MIDDLE]).max() < EXACT
+    _, free = _bent(None)
+    assert np.abs(free.points[MIDDLE] - NODES[MIDDLE]).max() > 0.05
+
+
+def test_a_stiff_part_bends_less_and_a_soft_one_more():
+    bends = []
+    for factor in (0.05, 1.0, 20.0):
+        stiffness = np.ones(len(NODES))
+        stiffness[MIDDLE] = factor
+        deformer, pose = _bent(Rig(stiffness=stiffness))
+        inner = np.abs(NODES[:, 0]) < 0.08
+        bends.append(float(np.ptp(_angles(pose, inner))))
+    assert bends[0] > 1.3 * bends[1] > 1.3 * 1.3 * bends[2]
+
+
+def _angles(pose: Pose, chosen: np.ndarray) -> F64:
+    r = pose.rotations[chosen]
+    return np.arctan2(r[:, 1, 0], r[:, 0, 0])
+
+
+def test_a_cut_bar_is_two():
+    deformer = Deformer(LIFTED, DeformSettings(), Rig(seams=(Seam(LEFT, RIGHT),)))
+    assert deformer.graph.component_count == 2
+    weights = deformer.graph.weights.toarray()
+    assert not weights[np.ix_(LEFT, RIGHT)].any()
+    handles = (
+        _handle(LIFTED, (-0.5, 0, 0), is_pin=True), _handle(LIFTED, (-0.2, 0.08, 0), is_pin=True),
+        _handle(LIFTED, (0.3, 0.08, 0), (0.0, 0.2, 0.0)),
+    )  # fmt: skip
+    pose = deformer.solve(handles).pose
+    assert np.abs(pose.points[LEFT] - NODES[LEFT]).max() < 1e-6
+    assert np.abs(pose.points[RIGHT] - NODES[RIGHT] - [0, 0.2, 0]).max() < 1e-6
+
+
+def test_glue_joins_two_bars():
+    points = np.concatenate([BAR.points, BAR.points + [1.3, 0, 0]])
+    normals = np.concatenate([BAR.normals, BAR.normals])
+    lifted = shapes.lifted_surface(points, normals, 600)
+    nodes = lifted.control_points
+    first = np.flatnonzero(np.abs(nodes[:, 0] - 0.45) < 0.06).astype(np.int32)
+    second = np.flatnonzero(np.abs(nodes[:, 0] - 0.85) < 0.06).astype(np.int32)
+    apart = Deformer(lifted, DeformSettings())
+    joined = Deformer(lifted, DeformSettings(), Rig(seams=(Seam(first, second, True),)))
+    assert (apart.graph.component_count, joined.graph.component_count) == (2, 1)
+    pins = _handle(lifted, (-0.5, 0, 0), is_pin=True), _handle(lifted, (0, 0.08, 0), is_pin=True)
+    pose = joined.solve((*pins, _handle(lifted, (1.8, 0, 0), (-0.3, 0.6, 0.0)))).pose
+    gaps = np.linalg.norm(pose.points[first].mean(0) - pose.points[second].mean(0))
+    rest = np.linalg.norm(nodes[first].mean(0) - nodes[second].mean(0))
+    assert gaps == pytest.approx(rest, rel=0.2), "the glued ends stay together"
+
+
+@pytest.mark.parametrize("stiffness", [0.5, 2.0])
+def test_the_reach_of_the_links_is_a_setting(stiffness):
+    usual = Deformer(LIFTED, DeformSettings()).graph
+    other = Deformer(LIFTED, DeformSettings(stiffness=stiffness)).graph
+    assert (other.link_count > usual.link_count) == (stiffness > 1)
+
+
+# ---- parts that lie close together ----------------------------------------------------------
+
+
+def _legs(gap: float) -> tuple[LiftedObject, np.ndarray]:
+    """Two upright legs `gap` apart, each its own part; and which Gaussians are the second's."""
+    leg = shapes.capsule(1.0, 0.08)
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    points, normals = leg.points @ turn.T, leg.normals @ turn.T
+    points = np.concatenate([points, points + [0.16 + gap, 0, 0]])
+    lifted = shapes.lifted_surface(points, np.concatenate([normals, normals]))
+    return lifted, lifted.gaussians.means[:, 0] > 0.08 + gap / 2
+
+
+def test_moving_one_leg_leaves_the_leg_beside_it_where_it_is():
+    lifted, is_second = _legs(0.04)
+    deformer = Deformer(lifted, DeformSettings())
+    assert 0.03 < deformer.graph.mean_spacing < 0.05
+    drag = np.array([0.0, 0.0, 0.3])
+    handles = (
+        _handle(lifted, (0, 0.5, 0), is_pin=True), _handle(lifted, (0.2, 0.5, 0), is_pin=True),
+        _handle(lifted, (0.2, -0.5, 0), is_pin=True), _handle(lifted, (0, -0.5, 0), drag),
+    )  # fmt: skip
+    pose = deformer.solve(handles).pose
+    means = lifted.gaussians.means
+    moved = np.linalg.norm(deformer.skin_gaussians(pose).points - means, axis=1)
+    assert moved[is_second].max() < 0.01 * 0.3
+    assert moved[~is_second].max() > 0.25
+    papers = Deformer(lifted, DeformSettings(is_faithful=True))
+    pose = papers.solve(handles).pose
+    moved = np.linalg.norm(papers.skin_gaussians(pose).points - means, axis=1)
+    assert moved[is_second].max() > 0.1 * 0.3, "the paper's rule drags it along"
+
+
+# ---- garbage --------------------------------------------------------------------------------
+
+
+def _odd_cloud(name: str) -> F64:
+    rng = np.random.default_rng(0)
+    if name == "line":
+        return np.column_stack([np.linspace(0, 1, 60), np.zeros((60, 2))])
+    if name == "plane":
+        return shapes.sheet()
+    if name == "coincident":
+        return np.repeat(rng.normal(size=(12, 3)), 5, axis=0)
+    if name == "four":
+        return rng.normal(size=(4, 3))
+    return np.concatenate([shapes.ball(100), [[500.0, 0, 0]]])  # one far away
+
+
+@pytest.mark.parametrize("name", ["line", "plane", "coincident", "four", "outlier"])
+@pytest.mark.parametrize("mode", ["default", "faithful"])
+def test_odd_clouds_have_a_defined_result(name, mode):
+    cloud = _odd_cloud(name)
+    lifted = shapes.lifted_cloud(cloud, shapes.even(cloud, 64))
+    deformer = Deformer(lifted, DeformSettings(is_faithful=mode == "faithful"))
+    first, second = lifted.control_points[[0, 1]].astype(np.float64)
+    handles = Handle(0, first, first), Handle(1, second, second + [0.0, 0.1, 0.2])
+    pose = deformer.solve(handles).pose
+    assert np.isfinite(pose.points).all()
+    assert np.abs(np.linalg.det(pose.rotations) - 1).max() < EXACT
+    skinned = deformer.skin_gaussians(pose)
+    assert np.isfinite(skinned.points).all() and np.isfinite(skinned.linear).all()
+
+
+@pytest.mark.parametrize("turn", [None, np.zeros(3)])
+def test_handles_on_one_point_with_two_targets_meet_in_the_middle(turn):
+    deformer = Deformer(LIFTED, DeformSettings())
+    pin = _handle(LIFTED, (-0.5, 0, 0), is_pin=True)
+    up = _handle(LIFTED, (0.5, 0, 0), (0.0, 0.2, 0.0), turn=turn)
+    down = _handle(LIFTED, (0.5, 0, 0), (0.0, -0.2, 0.0), turn=turn)
+    pose = deformer.solve((pin, up, down)).pose
+    reached = deformer.skin_points(up.point, pose).points[0]
+    assert np.abs(reached - up.point).max() < 0.02
+    assert np.isfinite(pose.points).all()
+    assert np.abs(pose.points - NODES).max() < 0.1
+
+
+def test_values_that_are_no_numbers_are_refused():
+    broken = NODES.copy()
+    broken[3, 1] = np.nan
+    with pytest.raises(ValueError, match="not finite"):
+        Deformer(shapes.lifted_cloud(BAR.points[:300], broken), DeformSettings())
+    deformer = Deformer(LIFTED, DeformSettings())
+    handles = _handle(LIFTED, (-0.5, 0, 0)), _handle(LIFTED, (0.5, 0, 0), (np.nan, 0, 0))
+    with pytest.raises(ValueError, match="not finite"):
+        deformer.solve(handles)
