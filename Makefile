@@ -96,3 +96,8 @@ test: .make/test
 .PHONY: gallery
 gallery: .make/run
 	@$(PYTHON) docs/gallery/make_gallery.py
+
+# Makes the tables and pictures of docs/deformation anew.
+.PHONY: ablations
+ablations: .make/test
+	@$(PYTHON) docs/deformation/make_ablations.py

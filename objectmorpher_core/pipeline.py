@@ -200,7 +200,9 @@ def run_script(
         document = edits.set_lifted(document, 0, *lifted)
     if script.nodes is not None:
         document = edits.resample(document, 0, script.nodes)
-    settings = DeformSettings(script.deform, script.links, script.faithful, script.stiffness)
+    settings = DeformSettings(
+        script.deform, script.links, script.faithful, script.stiffness, script.stretch_limit
+    )
     document = edits.set_deform(document, 0, settings)
     puppet = puppet_of(document.objects[0], document.photo.camera)
     document, energies = _pose(document, puppet, script, progress, stopwatch)

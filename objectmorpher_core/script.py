@@ -53,6 +53,7 @@ class EditScript:
     faithful: bool = False
     nodes: int | None = None  # control points
     stiffness: float = 1.0
+    stretch_limit: float | None = None
     shadow: str = "auto"
     fov: float | None = None
     seed: int = 0
@@ -209,6 +210,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
+    "stretch_limit": _between(1.01, 10.0),
     "shadow": _one_of("auto", "none"), "fov": _number,
     "seed": _whole(0, 2**31 - 1),
 }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -24,6 +24,7 @@ STEP_ITERATIONS = 4  # in the sub-steps of a large move
 LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
 LARGE_TURN = 0.3  # rad: likewise for a turn
 MOST_STEPS = 30
+LIMIT_STEPS = 7  # halvings of the way to the stretch limit: to 1 % of it
 TURNED_RADIUS = 0.06  # x diameter along the surface: what turns with a turned handle
 TURNED_APART = 0.3  # x distance to the next handle, likewise
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
@@ -35,6 +36,7 @@ class Solution:
 
     pose: Pose
     energies: tuple[float, ...]  # paper Eq. 2 after each iteration of the last sub-step
+    share: float = 1.0  # of the handles' ways that was gone; less where a limit stopped them
 
 
 class Deformer:
@@ -99,6 +101,37 @@ class Deformer:
                 raise ValueError("a handle's point, target or turn is not finite")
         if not handles:
             return Solution(self.rest(), (0.0,))
+        solution = self._solved(handles, has_auto_anchors, start, seconds)
+        if self.settings.stretch_limit is None or self._is_allowed(solution.pose):
+            return solution
+        return self._limited(handles, has_auto_anchors, seconds)
+
+    def _limited(
+        self, handles: tuple[Handle, ...], has_auto_anchors: bool, seconds: float
+    ) -> Solution:
+        """The farthest that all handles together can go before the stretch limit, by halving."""
+        best, low, high = Solution(self.rest(), (0.0,), 0.0), 0.0, 1.0
+        for _ in range(LIMIT_STEPS):
+            share = 0.5 * (low + high)
+            partly = tuple(_on_the_way(h, share) for h in handles)
+            solution = self._solved(partly, has_auto_anchors, best.pose, seconds / LIMIT_STEPS)
+            if self._is_allowed(solution.pose):
+                best, low = replace(solution, share=share), share
+            else:
+                high = share
+        return best
+
+    def _is_allowed(self, pose: Pose) -> bool:
+        limit = self.settings.stretch_limit
+        return limit is None or float(self.strain(pose).most.max()) <= limit
+
+    def _solved(
+        self,
+        handles: tuple[Handle, ...],
+        has_auto_anchors: bool,
+        start: Pose | None,
+        seconds: float,
+    ) -> Solution:
         anchors = self.anchors(handles, has_auto_anchors)
         self._constrain(handles, anchors)
         rotations = (start or self.rest()).rotations
@@ -207,6 +240,12 @@ class Deformer:
             positions[own] = positions[leader] + (self.points[own] - self.points[leader]) @ r.T
             rotations[own] = r
         return positions, rotations
+
+
+def _on_the_way(handle: Handle, share: float) -> Handle:
+    """The handle when it has gone a `share` of its way."""
+    target = handle.point + share * (handle.target - handle.point)
+    return replace(handle, target=target, turn=None if handle.turn is None else share * handle.turn)
 
 
 def _surface(lifted: LiftedObject) -> Surface:

@@ -66,20 +66,21 @@ def build_graph(
     `settings.stiffness` scales the radius of the links, and s with it. Auxiliary edges are links
     whatever the radius, so the links never split a part.
 
-    With a `surface` struts join opposite sides of the body (`struts.py`), and the default leaves out auxiliary edges that bridge a gap, as between an arm
-    and the body beside it: neither of the paper's two rules tells them apart. `seams` cut and
-    glue by hand: glue bridges a gap, and a cut wins over everything. Raises ValueError for points
-    that are not finite, a seam of other control points, and settings that do not exist.
+    With a `surface` struts join opposite sides of the body (`struts.py`), and auxiliary edges
+    that bridge a gap, as between an arm and the body beside it, are left out: neither of the
+    paper's two rules tells them apart. `seams` cut and glue by hand: glue bridges a gap, and a
+    cut wins over everything. Raises ValueError for points that are not finite, a seam of other
+    control points, and settings that do not exist.
     """
     _check(points, settings, seams)
     centre = points.mean(0, dtype=np.float64)
     p = points - centre  # far from the origin digits would be lost
     spacing = _mean_spacing(p)
     edges = Edges.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
-    centred = surface and Surface(surface.means - centre, surface.normals)
-    is_solid = centred is not None and len(centred.means) > 0 and not settings.is_faithful
-    if is_solid:
-        edges = without_gaps(edges, p, spacing, centred)
+    solid = None
+    if surface is not None and len(surface.means) and not settings.is_faithful:
+        solid = Surface(surface.means - centre, surface.normals)
+        edges = without_gaps(edges, p, spacing, solid)
     edges = _sewn(edges, p, spacing, seams)
     auxiliary = edges.matrix(len(p), edges.lengths)
     diameter = _diameter(p)
@@ -95,8 +96,8 @@ def build_graph(
     links = links.where(~_is_cut(links, len(p), seams))
     weights = _weights(links, len(p), spacing, settings)
     components = connected_components(weights, directed=False)[1]
-    if is_solid and settings.links == "geodesic":
-        struts = find_struts(p, spacing, LINK_RADIUS * diameter, centred)
+    if solid is not None and settings.links == "geodesic":
+        struts = find_struts(p, spacing, LINK_RADIUS * diameter, solid)
         struts = struts.where(components[struts.first] == components[struts.second])
         struts = struts.where(~_is_cut(struts, len(p), seams))
         weights = _with_struts(weights, struts)
@@ -108,7 +109,7 @@ def _with_struts(weights: csr_array, struts: Edges) -> csr_array:
     if len(struts) == 0:
         return weights
     degree = np.asarray(weights.sum(1)).ravel()
-    return weights.maximum(struts.matrix(len(degree), weigh_struts(struts, degree)))
+    return csr_array(weights.maximum(struts.matrix(len(degree), weigh_struts(struts, degree))))
 
 
 def _weights(links: Edges, count: int, spacing: float, settings: DeformSettings) -> csr_array:

@@ -15,14 +15,20 @@ from .surface_links import Edges, Surface
 SHARE = 0.3  # x the mean sum of a control point's links: what all its struts weigh together
 INWARD = 0.85  # cosine of strut and inward normal, at both ends
 OPPOSITE = -0.5  # cosine of the normals at its ends, at most
-NEAREST = 1.25  # x the shortest strut of either end: what lies beyond the other side is no flesh
 LONGEST = 12.0  # x mean spacing
+HIT = 0.8  # x mean spacing: a Gaussian this near to a point under the surface is met there
+EXIT = 0.3  # cosine of its normal and the way in, from which the way leaves the body
+ROOM = 1.0  # x mean spacing, that a strut may be longer than the body is thick
 
 
 def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> Edges:
-    """Pairs of control points (M, 3) on opposite sides of a limb, at most `reach` apart."""
+    """Pairs of control points (M, 3) on opposite sides of a limb, at most `reach` apart.
+
+    A strut ends where the body does: one from the far side of a finger through the next finger,
+    which touches it, would be a false link.
+    """
     radius = min(reach, LONGEST * spacing)
-    normals = surface.normals[KDTree(surface.means).query(points)[1]].astype(np.float64)
+    normals = surface.normals_near(points)
     pairs = KDTree(points).query_pairs(radius, output_type="ndarray")
     i, j = pairs.T
     ways = points[j] - points[i]
@@ -34,11 +40,25 @@ def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> 
     is_through = (inward > INWARD) & (lengths > 0)
     is_through &= np.einsum("na,na->n", normals[i], normals[j]) < OPPOSITE
     i, j, lengths = i[is_through], j[is_through], lengths[is_through]
-    shortest = np.full(len(points), np.inf)
-    np.minimum.at(shortest, i, lengths)
-    np.minimum.at(shortest, j, lengths)
-    is_near = lengths <= NEAREST * np.minimum(shortest[i], shortest[j])
-    return Edges(i[is_near], j[is_near], lengths[is_near])
+    limits = np.zeros(len(points))
+    asked = np.union1d(i, j)
+    depths = _thickness(points[asked], normals[asked], spacing, radius, surface)
+    limits[asked] = depths + ROOM * spacing
+    is_flesh = lengths <= np.minimum(limits[i], limits[j])
+    return Edges(i[is_flesh], j[is_flesh], lengths[is_flesh])
+
+
+def _thickness(points: F64, normals: F64, spacing: float, radius: float, surface: Surface) -> F64:
+    """How thick (M,) the body is under surface points (M, 3), seen against their normals.
+
+    The first of some points on the way in at which a surface faces outwards; 0 where there is none
+    within `radius`.
+    """
+    thickness = np.zeros(len(points))
+    for depth in spacing * np.arange(0.75, radius / spacing, 1.0)[::-1]:  # the nearest is last
+        met = surface.normals_near(points - depth * normals, HIT * spacing)
+        thickness[np.einsum("na,na->n", met, normals) < -EXIT] = depth
+    return thickness
 
 
 def weigh_struts(struts: Edges, degree: F64) -> F64:

@@ -11,6 +11,7 @@ too short, and exact where the way crosses no third cell (Mehlhorn 1988).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -46,6 +47,17 @@ class Surface:
 
     means: np.ndarray  # (N, 3) object frame
     normals: np.ndarray  # (N, 3) outward, unit
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        return KDTree(self.means, balanced_tree=False, compact_nodes=False)
+
+    def normals_near(self, points: F64, within: float = np.inf) -> F64:
+        """Normals (M, 3) of the Gaussians nearest to points (M, 3); 0 where none is `within`."""
+        index = self._tree.query(points, distance_upper_bound=within)[1]
+        normals = self.normals.take(index, 0, mode="clip").astype(np.float64)
+        normals[index == len(self.normals)] = 0.0
+        return normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +137,7 @@ def without_gaps(edges: Edges, points: F64, spacing: float, surface: Surface) ->
     surfaces that face each other have a gap between them. What hangs together by its surface
     still does so afterwards.
     """
-    nearest = KDTree(surface.means, balanced_tree=False, compact_nodes=False).query(points)[1]
-    normals = surface.normals[nearest].astype(np.float64)
+    normals = surface.normals_near(points)
     attitude = _Attitude.of(edges, points, normals)
     is_suspect = (attitude.outward > OUTSIDE) | (attitude.between < OPPOSED)
     if not is_suspect.any():

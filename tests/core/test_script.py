@@ -20,7 +20,7 @@ FULL = {
     "splats": "s.ply", "gaussians": 500, "pin": [[7, 8]],
     "handle": [{"at": [1, 2], "to": [3, 4], "dz": -0.5}, {"at": [5, 6], "to": [7, 8]}],
     "move": [1, -2, 0.5], "turn": [10, 20, 30], "scale": 1.5, "deform": "laplacian",
-    "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5,
+    "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5, "stretch-limit": 1.5,
     "shadow": "none", "fov": 60, "seed": 7,
 }  # fmt: skip
 

@@ -63,7 +63,7 @@ def test_a_stiff_part_bends_less_and_a_soft_one_more():
     for factor in (0.05, 1.0, 20.0):
         stiffness = np.ones(len(NODES))
         stiffness[MIDDLE] = factor
-        deformer, pose = _bent(Rig(stiffness=stiffness))
+        _, pose = _bent(Rig(stiffness=stiffness))
         inner = np.abs(NODES[:, 0]) < 0.08
         bends.append(float(np.ptp(_angles(pose, inner))))
     assert bends[0] > 1.3 * bends[1] > 1.3 * 1.3 * bends[2]
@@ -110,6 +110,21 @@ def test_the_reach_of_the_links_is_a_setting(stiffness):
     usual = Deformer(LIFTED, DeformSettings()).graph
     other = Deformer(LIFTED, DeformSettings(stiffness=stiffness)).graph
     assert (other.link_count > usual.link_count) == (stiffness > 1)
+
+
+def test_a_stretch_limit_stops_the_handles():
+    pulls = []
+    for limit in (None, 1.3):
+        deformer = Deformer(LIFTED, DeformSettings(stretch_limit=limit))
+        handles = (
+            _handle(LIFTED, (-0.5, 0, 0), is_pin=True),
+            _handle(LIFTED, (0.5, 0, 0), (0.9, 0.0, 0.0)),
+        )
+        solution = deformer.solve(handles)
+        pulls.append((deformer.strain(solution.pose).most.max(), solution.share))
+    assert pulls[0][0] > 1.5 and pulls[0][1] == 1.0
+    assert 1.2 < pulls[1][0] <= 1.3
+    assert 0.1 < pulls[1][1] < 0.9
 
 
 # ---- parts that lie close together ----------------------------------------------------------

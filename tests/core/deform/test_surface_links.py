@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from app.bench import _five_limbs
+from app.bench import five_limbs
 from objectmorpher_core.deform.graph import LINK_RADIUS, Graph, Surface, build_graph
 from objectmorpher_core.document import DeformSettings
 from tests import shapes
@@ -259,7 +259,7 @@ def test_few_gaussians_cut_nothing(surface, count):
 
 @pytest.mark.parametrize("gaussians", [5000, 16_000, 100_000])
 def test_limbs_stay_on_the_body_they_grow_from(gaussians):
-    own = _five_limbs(gaussians, 4).gaussians
+    own = five_limbs(gaussians, 4).gaussians
     assert _kept(Surface(own.means, own.normals)) > 0.98
 
 
