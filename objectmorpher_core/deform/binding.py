@@ -29,11 +29,15 @@ class Binding:
     weight_gradients: F64  # (N, K, 3) per object unit, rows sum to 0
 
 
-def bind(points: np.ndarray, control_points: np.ndarray, graph: Graph) -> Binding:
+def bind(
+    points: np.ndarray, control_points: np.ndarray, graph: Graph, normals: np.ndarray | None = None
+) -> Binding:
     """Binds points (N, 3) or (3,) to their K = 4 of control points (M, 3).
 
     The nearest control point is found by straight distance, the others among its neighbours
-    along the surface (paper 3.2.2). Weights are (1 - d / d_5)^2, normalised, with d_5 the
+    along the surface (paper 3.2.2). Where two surfaces come near each other the first is found
+    along the surface, too: by straight distance it could be on the other one. There `normals`
+    (N, 3) tell the sides of a contact apart. Weights are (1 - d / d_5)^2, normalised, with d_5 the
     distance of the next control point that is not used: a weight is 0 when its control point
     enters or leaves the set, so the motion has no seams (embedded deformation, Sumner et al.
     2007).
@@ -49,21 +53,30 @@ def bind(points: np.ndarray, control_points: np.ndarray, graph: Graph) -> Bindin
     nodes = np.empty((len(x), NEIGHBOURS), np.int32)
     weights = np.empty((len(x), NEIGHBOURS))
     gradients = np.empty((len(x), NEIGHBOURS, 3))
+    seeds = np.full(len(x), -1, np.int32)
     inputs: tuple[Any, ...] = (
-        x, p, frozen(order), frozen(p.take(order, 0)), axis, frozen(graph.neighbours, np.int32),
-        nodes, weights, gradients,
+        x, seeds, p, frozen(order), frozen(p.take(order, 0)), axis,
+        frozen(graph.neighbours, np.int32), nodes, weights, gradients,
     )  # fmt: skip
     in_threads(lambda first, last: _bind(first, last, *inputs), len(x), least=LEAST_ROWS)
+    if graph.cells is not None:
+        asked = np.flatnonzero(graph.cells.has_gap[nodes[:, 0]])
+        if len(asked):
+            own = None if normals is None else np.atleast_2d(normals)[asked]
+            seeds[asked] = graph.cells.owners_of(x[asked], own)
+            in_threads(lambda first, last: _bind(first, last, *inputs), len(x), least=LEAST_ROWS)
     return Binding(nodes, weights, gradients)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _bind(first, last, x, p, order, ordered, axis, neighbours, nodes, weights, gradients):
+def _bind(first, last, x, seeds, p, order, ordered, axis, neighbours, nodes, weights, gradients):
     """Rows first..last of a `Binding`."""
     near = np.empty(NEIGHBOURS + 1, np.int32)
     distances = np.empty(NEIGHBOURS + 1)
     for i in range(first, last):
-        nearest = order[_nearest(x[i, 0], x[i, 1], x[i, 2], ordered, axis)]
+        nearest = seeds[i]
+        if nearest < 0:
+            nearest = order[_nearest(x[i, 0], x[i, 1], x[i, 2], ordered, axis)]
         at = x[i, 0], x[i, 1], x[i, 2]
         count = _among_neighbours(at, p, neighbours, nearest, near, distances)
         _weigh(at, p, near, distances, count, i, weights, gradients)

@@ -25,7 +25,7 @@ LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
 LARGE_TURN = 0.3  # rad: likewise for a turn
 MOST_STEPS = 30
 LIMIT_STEPS = 7  # halvings of the way to the stretch limit: to 1 % of it
-TURNED_RADIUS = 0.06  # x diameter along the surface: what turns with a turned handle
+TURNED_RADIUS = 0.1  # x diameter along the surface: what turns with a turned handle
 TURNED_APART = 0.3  # x distance to the next handle, likewise
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
 
@@ -54,7 +54,7 @@ class Deformer:
         self.diameter = lifted.diameter
         self.graph: Graph = build_graph(self.points, settings, _surface(lifted), self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
-        self.binding = bind(self._means, self.points, self.graph)
+        self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
         weights = _weighed(self.graph.weights, self.rig.stiffness)
         self._solver = ArapSolver(self.points, weights, self.rig.bodies)
         self._constrained: tuple[object, ...] = ()  # what the solver is prepared for

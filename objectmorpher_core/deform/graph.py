@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ..arrays import F64, I32, Mask
 from ..document import DeformSettings, Seam
 from .struts import find_struts, weigh_struts
-from .surface_links import CHUNK, TINY, Edges, Surface, without_gaps
+from .surface_links import CHUNK, TINY, Cells, Edges, Surface, without_gaps
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
 LINK_RADIUS = 0.3  # x diameter, paper 3.2.1
@@ -32,6 +32,7 @@ class Graph:
     neighbours: I32  # (M, min(16, M)) nearest along the surface, itself first; -1: no more
     components: I32  # (M,) component of each control point
     mean_spacing: float  # object units, mean nearest-neighbour distance
+    cells: Cells | None = None  # which control point a place belongs to, where that is a question
 
     @property
     def link_count(self) -> int:
@@ -77,10 +78,10 @@ def build_graph(
     p = points - centre  # far from the origin digits would be lost
     spacing = _mean_spacing(p)
     edges = Edges.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
-    solid = None
+    solid = cells = None
     if surface is not None and len(surface.means) and not settings.is_faithful:
         solid = Surface(surface.means - centre, surface.normals)
-        edges = without_gaps(edges, p, spacing, solid)
+        edges, cells = without_gaps(edges, p, spacing, solid)
     edges = _sewn(edges, p, spacing, seams)
     auxiliary = edges.matrix(len(p), edges.lengths)
     diameter = _diameter(p)
@@ -101,7 +102,9 @@ def build_graph(
         struts = struts.where(components[struts.first] == components[struts.second])
         struts = struts.where(~_is_cut(struts, len(p), seams))
         weights = _with_struts(weights, struts)
-    return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing)
+    if cells is not None:
+        cells = replace(cells, points=cells.points + centre)
+    return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing, cells)
 
 
 def _with_struts(weights: csr_array, struts: Edges) -> csr_array:

@@ -2,7 +2,7 @@
 
 A load on one point of an elastic sheet makes a spike, however fine the sheet is. A hand takes
 hold of a patch, which then moves nearly as one body, and the strain is spread over what is
-around it.
+around it. Where two hands meet, each holds its own side.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..arrays import F64, Sparse, frozen
 
 GRIP = 20.0  # x a link's weight, in the middle of the hand
 RADIUS = 0.1  # x diameter, of the patch
-APART = 0.6  # x distance to the next handle: two patches hardly meet
+SHARED = 0.5  # x distance to the next handle: over this much two hands let go towards the middle
 
 
 def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F64:
@@ -22,11 +22,13 @@ def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F6
 
     `points` (M, 3) control points; `weights` (M, M) symmetric, and so is the result.
     """
-    apart = np.linalg.norm(handles[:, None] - handles[None], axis=2)
-    apart[apart <= 1e-6 * diameter] = np.inf
-    radii = np.minimum(RADIUS * diameter, APART * apart.min(1))
-    distances = np.linalg.norm(points[:, None] - handles[None], axis=2)
-    grip = (np.maximum(1.0 - (distances / radii) ** 2, 0.0) ** 2).T  # (H, M)
+    distances = np.linalg.norm(points[None] - handles[:, None], axis=2)  # (H, M)
+    grip = np.maximum(1.0 - (distances / (RADIUS * diameter)) ** 2, 0.0) ** 2
+    for h, handle in enumerate(handles):
+        apart = np.linalg.norm(handles - handle, axis=1)
+        for other in np.flatnonzero((apart > 1e-6 * diameter) & (apart < 2 * RADIUS * diameter)):
+            nearer = (distances[other] - distances[h]) / (SHARED * apart[other])
+            grip[h] *= np.clip(nearer, 0.0, 1.0)
     data = weights.data.copy()
     indices = frozen(weights.indptr), frozen(weights.indices)
     _stiffen(*indices, frozen(weights.data), frozen(grip), data)

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ..arrays import F64
 from .surface_links import Edges, Surface
 
-SHARE = 0.3  # x the mean sum of a control point's links: what all its struts weigh together
+SHARE = 0.2  # x the mean sum of a control point's links: what all its struts weigh together
 INWARD = 0.85  # cosine of strut and inward normal, at both ends
 OPPOSITE = -0.5  # cosine of the normals at its ends, at most
 LONGEST = 12.0  # x mean spacing

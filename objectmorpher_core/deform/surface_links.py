@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import F64, Mask
+from ..arrays import F64, I32, Mask
 from ..poisson_disk import thin_to_spacing
 
 # Lengths are in mean spacings of the control points, of which there are `EVEN_COUNT` or more.
@@ -38,6 +38,7 @@ AWAY = -0.1  # cosine of both normals and the line between the two sides of a wa
 CONTACT = -0.7  # cosine of the normals of two surfaces that touch without a crease
 GAP_RINGS = 2  # neighbours of neighbours are near a gap, too
 CHUNK = 256  # control points whose ways are held in memory together
+ASKED = 6  # Gaussians near a place, of which the first on its side of the surface counts
 TINY = 1e-9  # x mean spacing: coincident points; to scipy 0 is no edge
 
 
@@ -58,6 +59,29 @@ class Surface:
         normals = self.normals.take(index, 0, mode="clip").astype(np.float64)
         normals[index == len(self.normals)] = 0.0
         return normals
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Which control point each place of the surface belongs to, by the way along it."""
+
+    points: F64  # (K, 3) Gaussians, object frame
+    normals: F64  # (K, 3)
+    owners: I32  # (K,) control points
+    has_gap: Mask  # (M,) control points near which another surface is; elsewhere nothing is asked
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        return KDTree(self.points, balanced_tree=False, compact_nodes=False)
+
+    def owners_of(self, points: F64, normals: F64 | None = None) -> I32:
+        """(N,) control points that surface points (N, 3), with `normals` where known, belong to."""
+        count = 1 if normals is None else min(ASKED, len(self.points))
+        index = self._tree.query(points, k=count)[1].reshape(len(points), count)
+        if normals is None:
+            return self.owners[index[:, 0]]
+        is_same = np.einsum("nka,na->nk", self.normals[index], normals) > OPPOSED
+        return self.owners[index[np.arange(len(index)), is_same.argmax(1)]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +152,12 @@ class _Attitude:
         return _Attitude(np.maximum(there, back), np.minimum(there, back), between)
 
 
-def without_gaps(edges: Edges, points: F64, spacing: float, surface: Surface) -> Edges:
-    """Those of `edges` between control points (M, 3) that do not bridge a gap.
+def without_gaps(
+    edges: Edges, points: F64, spacing: float, surface: Surface
+) -> tuple[Edges, Cells | None]:
+    """Those of `edges` between control points (M, 3) that do not bridge a gap; the cells.
+
+    No cells where no gap was in question.
 
     `spacing` is the control points' mean one. An edge bridges a gap when it leaves the body, or
     joins opposed surfaces, and the way along the surface is longer than `DETOUR` times the edge.
@@ -141,7 +169,7 @@ def without_gaps(edges: Edges, points: F64, spacing: float, surface: Surface) ->
     attitude = _Attitude.of(edges, points, normals)
     is_suspect = (attitude.outward > OUTSIDE) | (attitude.between < OPPOSED)
     if not is_suspect.any():
-        return edges
+        return edges, None
     sheet = _Sheet.of(points, normals, spacing, surface)
     ends = np.stack([edges.first, edges.second])
     is_known = (sheet.counts >= LEAST_CELL)[ends].all(0)
@@ -153,7 +181,7 @@ def without_gaps(edges: Edges, points: F64, spacing: float, surface: Surface) ->
     asked = np.flatnonzero((is_suspect | is_at_gap) & is_known & ~is_inside)
     is_false[asked] = _is_detour(edges.where(asked), ways)
     is_false[_still_needed(edges, is_false, ways)] = False
-    return edges.where(~is_false)
+    return edges.where(~is_false), sheet.owned
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +191,7 @@ class _Sheet:
     cells: Edges  # of neighbouring cells, as long as the way between their control points
     counts: np.ndarray  # (M,) Gaussians of each cell
     has_gap: Mask  # (M,) whether another surface faces the cell or its surroundings
+    owned: Cells
 
     @staticmethod
     def of(points: F64, normals: F64, spacing: float, surface: Surface) -> _Sheet:
@@ -185,14 +214,15 @@ class _Sheet:
         is_owned = owners >= 0
         counts = np.bincount(owners[is_owned], minlength=count)
         gaps = np.bincount(owners[is_owned & is_near_gap], minlength=count)
-        return _Sheet(between.shortest(count), counts, gaps > 0)
+        owned = Cells(x[is_owned], n[is_owned], owners[is_owned].astype(np.int32), gaps > 0)
+        return _Sheet(between.shortest(count), counts, gaps > 0, owned)
 
 
 def _thinned(points: F64, normals: F64, grain: float, surface: Surface) -> tuple[F64, F64]:
     """Positions and normals (K, 3): control points, and Gaussians between, a `grain` apart."""
     x = np.concatenate([points, surface.means])
     n = np.concatenate([normals, surface.normals])
-    kept = thin_to_spacing(x, grain, np.arange(len(x)))
+    kept = thin_to_spacing(x, grain, np.arange(len(x)), n)
     kept = np.concatenate([np.arange(len(points)), kept[kept >= len(points)]])
     return x[kept], n[kept]
 
