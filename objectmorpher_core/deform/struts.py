@@ -17,6 +17,7 @@ INWARD = 0.85  # cosine of strut and inward normal, at both ends
 OPPOSITE = -0.5  # cosine of the normals at its ends, at most
 LONGEST = 12.0  # x mean spacing
 HIT = 0.8  # x mean spacing: a Gaussian this near to a point under the surface is met there
+MET = 6  # Gaussians that are looked at there: where two surfaces touch, some are of each
 EXIT = 0.3  # cosine of its normal and the way in, from which the way leaves the body
 ROOM = 1.0  # x mean spacing, that a strut may be longer than the body is thick
 
@@ -28,7 +29,7 @@ def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> 
     which touches it, would be a false link.
     """
     radius = min(reach, LONGEST * spacing)
-    normals = surface.normals_near(points)
+    normals = surface.normals_near(points)[:, 0]
     pairs = KDTree(points).query_pairs(radius, output_type="ndarray")
     i, j = pairs.T
     ways = points[j] - points[i]
@@ -56,8 +57,8 @@ def _thickness(points: F64, normals: F64, spacing: float, radius: float, surface
     """
     thickness = np.zeros(len(points))
     for depth in spacing * np.arange(0.75, radius / spacing, 1.0)[::-1]:  # the nearest is last
-        met = surface.normals_near(points - depth * normals, HIT * spacing)
-        thickness[np.einsum("na,na->n", met, normals) < -EXIT] = depth
+        met = surface.normals_near(points - depth * normals, MET, HIT * spacing)
+        thickness[(np.einsum("nka,na->nk", met, normals) < -EXIT).any(1)] = depth
     return thickness
 
 

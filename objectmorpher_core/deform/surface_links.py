@@ -53,9 +53,10 @@ class Surface:
     def _tree(self) -> KDTree:
         return KDTree(self.means, balanced_tree=False, compact_nodes=False)
 
-    def normals_near(self, points: F64, within: float = np.inf) -> F64:
-        """Normals (M, 3) of the Gaussians nearest to points (M, 3); 0 where none is `within`."""
-        index = self._tree.query(points, distance_upper_bound=within)[1]
+    def normals_near(self, points: F64, count: int = 1, within: float = np.inf) -> F64:
+        """Normals (M, count, 3) of the Gaussians nearest to points (M, 3); 0 beyond `within`."""
+        index = self._tree.query(points, count, distance_upper_bound=within)[1]
+        index = index.reshape(len(points), count)
         normals = self.normals.take(index, 0, mode="clip").astype(np.float64)
         normals[index == len(self.normals)] = 0.0
         return normals
@@ -165,7 +166,7 @@ def without_gaps(
     surfaces that face each other have a gap between them. What hangs together by its surface
     still does so afterwards.
     """
-    normals = surface.normals_near(points)
+    normals = surface.normals_near(points)[:, 0]
     attitude = _Attitude.of(edges, points, normals)
     is_suspect = (attitude.outward > OUTSIDE) | (attitude.between < OPPOSED)
     if not is_suspect.any():
