@@ -118,7 +118,7 @@ class HeldResponse:
         """`rows` (H, n) of the constraints, `compliance` (H,) what each gives to a unit force.
 
         Unknowns p with (K + E D E^T) p + C^T f = b and C p - S f = t. With B = [E^T; C] and
-        G = K^-1 B^T: p = y - T (B y - [0; t]), y = K^-1 b, T = G blockdiag(D, 1) Z^-1,
+        G = K^-1 B^T: p = y - G blockdiag(D, 1) Z^-1 (B y - [0; t]), y = K^-1 b,
         Z = blockdiag(1, S) + B G blockdiag(D, 1).
         """
         self._response = response
@@ -130,13 +130,14 @@ class HeldResponse:
         spread = (local @ response.columns(touched).T).T  # G, (n, P + H)
         system = local @ spread[touched]
         give = system.diagonal()[own:]
-        forces = spread.copy()
-        forces[:, :own] = spread[:, :own] @ patch.matrix
+        self._answers = np.empty(spread.shape)  # G blockdiag(D, 1)
+        self._answers[:, :own] = spread[:, :own] @ patch.matrix
+        self._answers[:, own:] = spread[:, own:]
         system[:, :own] = system[:, :own] @ patch.matrix
         system[np.arange(own), np.arange(own)] += 1.0
         rest = own + np.arange(count)
         system[rest, rest] += compliance + TIE * float(np.abs(give).max(initial=0.0))
-        self._answers = np.ascontiguousarray(np.linalg.solve(system.T, forces.T).T)
+        self._inverse = np.linalg.inv(system)  # Z^-1
         self._own = own
 
     def solve(self, forces: F64, targets: F64) -> F64:
@@ -144,11 +145,11 @@ class HeldResponse:
         loose = self._response.solve(forces)
         gaps = self._rows @ loose
         gaps[self._own :] -= targets
-        return loose - product(self._answers, gaps)
+        return loose - product(self._answers, product(self._inverse, gaps))
 
     def follow(self, count: int) -> F64:
         """(n, count) how the unknowns move when one of the first `count` targets does."""
-        return np.ascontiguousarray(self._answers[:, self._own : self._own + count])
+        return self._answers @ self._inverse[:, self._own : self._own + count]
 
 
 def _selection(nodes: np.ndarray, width: int) -> Sparse:

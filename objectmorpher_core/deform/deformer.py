@@ -96,9 +96,9 @@ class Deformer:
         large moves are made in sub-steps from rest, so the result is a function of the handles
         alone. Raises ValueError for handles that are not finite.
         """
-        for h in handles:
-            if not all(np.isfinite(v).all() for v in (h.point, h.target, h.turn) if v is not None):
-                raise ValueError("a handle's point, target or turn is not finite")
+        numbers = [v for h in handles for v in (h.point, h.target, h.turn) if v is not None]
+        if not np.isfinite(np.concatenate([*numbers, np.zeros(1)])).all():
+            raise ValueError("a handle's point, target or turn is not finite")
         if not handles:
             return Solution(self.rest(), (0.0,))
         solution = self._solved(handles, has_auto_anchors, start, seconds)

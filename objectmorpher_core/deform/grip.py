@@ -24,11 +24,11 @@ def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F6
     """
     distances = np.linalg.norm(points[None] - handles[:, None], axis=2)  # (H, M)
     grip = np.maximum(1.0 - (distances / (RADIUS * diameter)) ** 2, 0.0) ** 2
-    for h, handle in enumerate(handles):
-        apart = np.linalg.norm(handles - handle, axis=1)
-        for other in np.flatnonzero((apart > 1e-6 * diameter) & (apart < 2 * RADIUS * diameter)):
-            nearer = (distances[other] - distances[h]) / (SHARED * apart[other])
-            grip[h] *= np.clip(nearer, 0.0, 1.0)
+    apart = np.linalg.norm(handles[:, None] - handles[None], axis=2)
+    meeting = (apart > 1e-6 * diameter) & (apart < 2 * RADIUS * diameter)
+    for h, other in np.argwhere(meeting):
+        nearer = (distances[other] - distances[h]) / (SHARED * apart[h, other])
+        grip[h] *= np.clip(nearer, 0.0, 1.0)
     data = weights.data.copy()
     indices = frozen(weights.indptr), frozen(weights.indices)
     _stiffen(*indices, frozen(weights.data), frozen(grip), data)

