@@ -13,6 +13,7 @@ from ..threads import FAST, LEAST_ROWS, in_threads
 from .graph import Graph
 
 NEIGHBOURS = 4  # control points that move a Gaussian, paper 3.2.2
+STEEPEST = 3.0  # weight per mean spacing; one in 300 points would be steeper, twice as much at most
 TINY = 1e-150  # object units; its square is still a number
 
 
@@ -26,7 +27,7 @@ class Binding:
 
     control_points: I32  # (N, K)
     weights: F64  # (N, K), rows sum to 1
-    weight_gradients: F64  # (N, K, 3) per object unit, rows sum to 0
+    weight_gradients: F64  # (N, K, 3) per object unit, rows sum to 0; where too steep, less so
 
 
 def bind(
@@ -56,7 +57,8 @@ def bind(
     seeds = np.full(len(x), -1, np.int32)
     inputs: tuple[Any, ...] = (
         x, seeds, p, frozen(order), frozen(p.take(order, 0)), axis,
-        frozen(graph.neighbours, np.int32), nodes, weights, gradients,
+        frozen(graph.neighbours, np.int32), STEEPEST / graph.mean_spacing,
+        nodes, weights, gradients,
     )  # fmt: skip
     in_threads(lambda first, last: _bind(first, last, *inputs), len(x), least=LEAST_ROWS)
     if graph.cells is not None:
@@ -69,7 +71,9 @@ def bind(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _bind(first, last, x, seeds, p, order, ordered, axis, neighbours, nodes, weights, gradients):
+def _bind(
+    first, last, x, seeds, p, order, ordered, axis, neighbours, steepest, nodes, weights, gradients
+):
     """Rows first..last of a `Binding`."""
     near = np.empty(NEIGHBOURS + 1, np.int32)
     distances = np.empty(NEIGHBOURS + 1)
@@ -80,6 +84,7 @@ def _bind(first, last, x, seeds, p, order, ordered, axis, neighbours, nodes, wei
         at = x[i, 0], x[i, 1], x[i, 2]
         count = _among_neighbours(at, p, neighbours, nearest, near, distances)
         _weigh(at, p, near, distances, count, i, weights, gradients)
+        _flatten(i, steepest, gradients)
         for c in range(NEIGHBOURS):
             nodes[i, c] = near[c] if c < count - 1 else near[0]
 
@@ -180,3 +185,21 @@ def _weigh(x, p, near, distances, count, i, weights, gradients):
         gradients[i, c, 0] = (gradients[i, c, 0] - weights[i, c] * sum0) / total
         gradients[i, c, 1] = (gradients[i, c, 1] - weights[i, c] * sum1) / total
         gradients[i, c, 2] = (gradients[i, c, 2] - weights[i, c] * sum2) / total
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _flatten(i, steepest, gradients):
+    """Scales row i of `gradients` so that none is longer than `steepest`.
+
+    Where five control points are about as far away, the weights change by leaps within less than
+    a Gaussian's own size: their derivative there would draw it out to a needle.
+    """
+    longest = 0.0
+    for c in range(NEIGHBOURS):
+        x, y, z = gradients[i, c, 0], gradients[i, c, 1], gradients[i, c, 2]
+        longest = max(longest, x * x + y * y + z * z)
+    if longest > steepest * steepest:
+        scale = steepest / np.sqrt(longest)
+        for c in range(NEIGHBOURS):
+            for a in range(3):
+                gradients[i, c, a] *= scale
