@@ -129,6 +129,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         help="reach of the links between control points, 0.25 to 4, default 1")  # fmt: skip
     add("--stretch-limit", type=float, metavar="S",
         help="handles stop where a part would be S times as long as it was")  # fmt: skip
+    add("--split", action="store_true", default=None,
+        help="Gaussians that are stretched far become several")  # fmt: skip
     add = parser.add_argument_group("placing the whole object, after the handles").add_argument
     add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
     add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")

@@ -219,6 +219,7 @@ class DeformSettings:
     is_faithful: bool = False  # the paper as printed: three iterations, Eq. 5
     stiffness: float = 1.0  # x the usual radius within which control points are linked
     stretch_limit: float | None = None  # x its length at rest: handles go no farther than that
+    is_splitting: bool = False  # Gaussians that are stretched far become several
 
 
 @dataclass(frozen=True, eq=False)

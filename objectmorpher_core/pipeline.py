@@ -201,7 +201,12 @@ def run_script(
     if script.nodes is not None:
         document = edits.resample(document, 0, script.nodes)
     settings = DeformSettings(
-        script.deform, script.links, script.faithful, script.stiffness, script.stretch_limit
+        script.deform,
+        script.links,
+        script.faithful,
+        script.stiffness,
+        script.stretch_limit,
+        script.split,
     )
     document = edits.set_deform(document, 0, settings)
     puppet = puppet_of(document.objects[0], document.photo.camera)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,8 @@ from scipy.spatial import KDTree
 from .arrays import F64
 from .camera import Camera
 from .deform.deformer import Deformer
-from .document import DeformSettings, EditObject, LiftedObject, Placement, Pose, Rig
+from .deform.splitting import Split, split_stretched
+from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose, Rig
 from .gaussians import Gaussians
 from .raster import tiles
 from .raster.posed import PosedSplats, SplatPoser, TextureLevels
@@ -55,14 +56,38 @@ class Puppet:
 
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The object's Gaussians in the world after `pose`, then `placement`."""
+        if pose is None or not self._settings.is_splitting:
+            return self._posed_whole(pose, placement)
+        whole = self.deformer.skin_gaussians(pose)
+        split = split_stretched(self.lifted.gaussians, whole.linear)
+        if len(split.parents) == len(whole.points):
+            return self._posed_whole(pose, placement)
+        lifted = self._lifted_of(split)
+        pieces = lifted.gaussians
+        skinned = self.deformer.skin_points(pieces.means, pose, pieces.normals)
+        matrix = placement.matrix(self.lifted, self.camera)
+        return SplatPoser(lifted, self.camera).pose(skinned, matrix)
+
+    def _posed_whole(self, pose: Pose | None, placement: Placement) -> PosedSplats:
+        """The Gaussians as they were lifted, none of them split."""
         matrix = placement.matrix(self.lifted, self.camera)
         if pose is None:
             return self._poser.rest(matrix)
         return self._poser.pose(self.deformer.skin_gaussians(pose), matrix)
 
+    def _lifted_of(self, split: Split) -> LiftedObject:
+        """The object of these pieces at rest; each looks where it is in the photo."""
+        lifted, parents = self.lifted, split.parents
+        texture = lifted.texture
+        pieces = self.camera.project(lifted.world_points(split.gaussians.means))
+        whole = self.camera.project(lifted.world_points(lifted.gaussians.means))
+        u0 = texture.u0[parents] + (pieces - whole[parents])
+        own = PhotoTexture(u0, texture.visibility[parents], texture.solidity[parents])
+        return replace(lifted, gaussians=split.gaussians, texture=own)
+
     def posed_gaussians(self, pose: Pose | None, placement: Placement) -> Gaussians:
         """The object's solid Gaussians after the edit, in the photo camera's frame (y down)."""
-        splats = self.posed(pose, placement)
+        splats = self._posed_whole(pose, placement)
         motion = splats.linear @ self.lifted.world_from_object[:3, :3]
         moved = self.lifted.gaussians.moved(splats.means, motion)
         return moved.select(self.lifted.texture.solidity > 0.5)
@@ -102,7 +127,7 @@ class Puppet:
         skinning is inverted by Newton's method from the nearest Gaussian's own motion.
         """
         window = self.camera.windowed(xy[0] - 0.5, xy[1] - 0.5, 1, 1)
-        splats = self.posed(pose, placement)
+        splats = self._posed_whole(pose, placement)
         picture = tiles.render(splats, texture, window, self.camera)
         depth = float(picture.depth[0, 0])
         if picture.alpha[0, 0] < LEAST_ALPHA or not np.isfinite(depth):

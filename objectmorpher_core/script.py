@@ -54,6 +54,7 @@ class EditScript:
     nodes: int | None = None  # control points
     stiffness: float = 1.0
     stretch_limit: float | None = None
+    split: bool = False
     shadow: str = "auto"
     fov: float | None = None
     seed: int = 0
@@ -210,7 +211,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
-    "stretch_limit": _between(1.01, 10.0),
+    "stretch_limit": _between(1.01, 10.0), "split": _flag,
     "shadow": _one_of("auto", "none"), "fov": _number,
     "seed": _whole(0, 2**31 - 1),
 }  # fmt: skip

@@ -151,9 +151,14 @@ class Deformer:
         if handles:
             self._constrain(handles, self.anchors(handles, has_auto_anchors))
 
-    def skin_points(self, points: np.ndarray, pose: Pose) -> Skinned:
-        """Rest surface points (N, 3) under `pose`, with the motion's Jacobian."""
-        return self._skin(points, bind(points, self.points, self.graph), pose)
+    def skin_points(
+        self, points: np.ndarray, pose: Pose, normals: np.ndarray | None = None
+    ) -> Skinned:
+        """Rest surface points (N, 3) under `pose`, with the motion's Jacobian.
+
+        `normals` (N, 3), where they are known, tell the sides of a contact apart.
+        """
+        return self._skin(points, bind(points, self.points, self.graph, normals), pose)
 
     def skin_gaussians(self, pose: Pose) -> Skinned:
         """The object's Gaussians under `pose`."""

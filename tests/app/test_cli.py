@@ -465,7 +465,7 @@ def test_where_one_output_cannot_be_written_none_is(folder, capsys):
 DESIGN_OPTIONS = {
     "--click", "--not-click", "--box", "--subject", "--mask", "--segment", "--lift", "--inpaint",
     "--refine", "--splats", "--pin", "--handle", "--move", "--turn", "--scale", "--deform",
-    "--links", "--faithful", "--nodes", "--stiffness", "--stretch-limit",
+    "--links", "--faithful", "--nodes", "--stiffness", "--stretch-limit", "--split",
     "--script", "--session", "--save-mask",
     "--save-plate",    "--save-object", "--save-splats", "--report", "--seed", "--fov", "--shadow",
 }  # fmt: skip

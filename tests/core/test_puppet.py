@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from objectmorpher_core.deform.control_points import MIN_COUNT
-from objectmorpher_core.document import Handle, Placement, Pose
+from objectmorpher_core.document import DeformSettings, Handle, Placement, Pose
+from objectmorpher_core.puppet import Puppet
 from tests import shapes
 
 PIXEL = 1e-3  # px
@@ -116,3 +118,35 @@ def test_the_graph_is_made_only_when_it_is_needed():
     assert "deformer" not in vars(fresh)
     assert len(fresh.deformer.points) >= MIN_COUNT
     assert "deformer" in vars(fresh)
+
+
+def _pulled(scene: shapes.Scene) -> Pose:
+    """Two arms of the star pulled far apart."""
+    points = scene.lifted.control_points
+    left, right = int(points[:, 0].argmin()), int(points[:, 0].argmax())
+    far = 0.9 * scene.lifted.diameter
+    handles = (
+        shapes.handle(scene.lifted, left, np.array([-far, 0, 0])),
+        shapes.handle(scene.lifted, right, np.array([far, 0, 0])),
+    )
+    return scene.puppet.deformer.solve(handles).pose
+
+
+def test_stretched_gaussians_split_and_show_the_same_object(scene):
+    pose, place = _pulled(scene), Placement(scale=0.6)
+    splitting = Puppet(scene.lifted, DeformSettings(is_splitting=True), scene.camera)
+    whole, pieces = scene.puppet.posed(pose, place), splitting.posed(pose, place)
+    assert len(pieces) > 1.02 * len(whole)
+    stretches = [np.linalg.svd(s.linear, compute_uv=False)[:, 0] for s in (whole, pieces)]
+    assert stretches[0].max() > 1.1
+    pictures = [p.draw(pose, place, scene.texture, scene.camera) for p in (scene.puppet, splitting)]
+    inside = cv2.erode((pictures[0].alpha > 0.99).astype(np.uint8), np.ones((5, 5))) > 0
+    assert pictures[1].alpha[inside].min() > 0.98, "no gap"
+    gap = np.abs(pictures[0].color - pictures[1].color)[inside]
+    assert gap.mean() < 1 / 255
+
+
+def test_nothing_splits_where_nothing_is_stretched(scene, pose):
+    rest = Pose(scene.lifted.control_points, np.tile(np.eye(3), (len(pose.points), 1, 1)))
+    splitting = Puppet(scene.lifted, DeformSettings(is_splitting=True), scene.camera)
+    assert len(splitting.posed(rest, Placement())) == len(scene.lifted.gaussians)

@@ -21,7 +21,7 @@ FULL = {
     "handle": [{"at": [1, 2], "to": [3, 4], "dz": -0.5}, {"at": [5, 6], "to": [7, 8]}],
     "move": [1, -2, 0.5], "turn": [10, 20, 30], "scale": 1.5, "deform": "laplacian",
     "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5, "stretch-limit": 1.5,
-    "shadow": "none", "fov": 60, "seed": 7,
+    "split": True, "shadow": "none", "fov": 60, "seed": 7,
 }  # fmt: skip
 
 
