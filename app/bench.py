@@ -23,7 +23,7 @@ from objectmorpher_core.rotations import turn_matrix
 GAUSSIANS = 100_000
 QUICK_GAUSSIANS = 5_000
 REPEATS, QUICK_REPEATS = 100, 5
-FRAME = 0.010  # s, the budget of a default frame
+FRAME, LARGE_FRAME = 0.010, 0.016  # s, the budget of a default frame; with more than 512 nodes
 COLD = 9  # bends from rest, each in one frame; the first, which loads what is compiled, is not one
 LIMBS = 5
 LENGTH, RADIUS = 0.5, 0.07  # of a limb
@@ -54,8 +54,12 @@ def _row(mode: str, nodes: int, gaussians: int, repeats: int) -> dict[str, Any]:
     lifted = five_limbs(gaussians, nodes)
     deformer = Deformer(lifted, DeformSettings(is_faithful=mode == "faithful"))
     handles = limb_handles(lifted, BEND)
+    frame_seconds = FRAME if nodes <= 512 else LARGE_FRAME
     deformer.prepare(handles)
-    cold = [deformer.solve(handles, start=deformer.rest(), seconds=FRAME) for _ in range(COLD + 1)]
+    cold = [
+        deformer.solve(handles, start=deformer.rest(), seconds=frame_seconds)
+        for _ in range(COLD + 1)
+    ]
     converged = _converged(deformer, handles, cold[-1].pose)
     gap = float(np.median([c.energies[-1] for c in cold[1:]])) / converged - 1
     there = [limb_handles(lifted, BEND * step / STEPS) for step in range(STEPS)]
@@ -64,7 +68,7 @@ def _row(mode: str, nodes: int, gaussians: int, repeats: int) -> dict[str, Any]:
     def frame() -> None:
         """One frame of a drag that goes to and fro."""
         nonlocal pose
-        pose = deformer.solve(next(drag), start=pose, seconds=FRAME).pose
+        pose = deformer.solve(next(drag), start=pose, seconds=frame_seconds).pose
 
     frames = _times(frame, repeats)
     sets = [handles[:-1], handles]

@@ -18,6 +18,7 @@ from .binding import Binding
 from .response import Response, product
 from .skinning import coupling
 
+STEEP = 1e9  # condition from which an inverse loses what a solution keeps
 TIE = 1e-12  # x the softest constraint's own give: constraints that contradict each other average
 
 
@@ -138,6 +139,10 @@ class HeldResponse:
         rest = own + np.arange(count)
         system[rest, rest] += compliance + TIE * float(np.abs(give).max(initial=0.0))
         self._inverse = np.linalg.inv(system)  # Z^-1
+        if np.abs(self._inverse).max(initial=0.0) * np.abs(system).max(initial=0.0) > STEEP:
+            # Constraints that say the same: what is large in Z^-1 cancels only if solved for.
+            self._answers = np.ascontiguousarray(np.linalg.solve(system.T, self._answers.T).T)
+            self._inverse = np.eye(len(system))
         self._own = own
 
     def solve(self, forces: F64, targets: F64) -> F64:

@@ -71,10 +71,11 @@ class Deformer:
         """Control points that stay where they are although nobody pinned them.
 
         One handle alone is only a translation for ARAP, so the quarter of its part that is
-        farthest along the surface is held; with a second handle or a pin the artist has said
-        what holds.
+        farthest along the surface is held; with a second handle, a pin or frozen control points
+        the artist has said what holds.
         """
-        if len(handles) != 1 or handles[0].is_pin or not is_automatic:
+        is_said = len(handles) != 1 or handles[0].is_pin or self.rig.held is not None
+        if is_said or not is_automatic:
             return np.empty(0, np.int32)
         h = handles[0].control_point
         distances = self.graph.distances_from(h)
