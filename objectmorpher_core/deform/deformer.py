@@ -196,7 +196,7 @@ class Deformer:
         if self.settings.is_faithful:
             nodes = np.array([[h.control_point] for h in handles], np.int32)
             binding = Binding(nodes, np.ones(nodes.shape), np.zeros((*nodes.shape, 3)))
-            return Grasp(binding, tuple(nodes))
+            return Grasp(binding, tuple(nodes), is_on_nodes=True)
         around = []
         for h in handles:
             if h.turn is None:

@@ -19,6 +19,7 @@ class Grasp:
 
     binding: Binding  # of the handles' points
     around: tuple[I32, ...]  # control points that turn with each, if it is turned
+    is_on_nodes: bool = False  # the paper: the nearest control points themselves are held
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,7 @@ class Hold:
     """The rows of a set of handles. They depend on where the handles are at rest only."""
 
     constraints: Constraints
+    rest: F64  # (handles, 3) their points at rest
     owners: I32  # (H,) the handle of each row
     places: F64  # (H, 3) the row's surface point from its handle's, at rest
     turners: I32  # (T,) the handle of each turned control point
@@ -55,9 +57,9 @@ class Hold:
                 owners.append(h)
                 turned.append((node, h))
         index, owner = np.array(nodes, np.int32), np.array(owners, np.int32)
-        clicked = np.array([h.point for h in handles])[owner]
-        is_turned = np.array([handles[h].turn is not None for h in owners])
-        surface = np.where(is_turned[:, None], points[index[:, 0]], clicked)
+        clicked = np.array([h.point for h in handles])
+        is_node = np.array([grasp.is_on_nodes or handles[h].turn is not None for h in owners])
+        surface = np.where(is_node[:, None], points[index[:, 0]], clicked[owner])
         constraints = Constraints(
             index, np.array(weights), surface[:, None] - points[index],
             np.array([handles[h].softness for h in owners]),
@@ -65,13 +67,15 @@ class Hold:
             np.array([node for node, _ in turned], np.int32),
         )  # fmt: skip
         turners = np.array([h for _, h in turned], np.int32)
-        rest = points[constraints.held]
-        return cls(constraints, owner, surface - clicked, turners, rest)
+        held_at = points[constraints.held]
+        return cls(constraints, clicked, owner, surface - clicked[owner], turners, held_at)
 
     def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
         """Where all must be when the handles have gone a `share` of their way."""
+        ways = self.rest + share * (np.array([h.target for h in handles]) - self.rest)
+        if len(self.turners) == 0:
+            return Targets(ways[self.owners] + self.places, self.held, np.empty((0, 3, 3)))
         turns = np.stack([_turn(h, share) for h in handles])
-        ways = np.stack([h.point + share * (h.target - h.point) for h in handles])
         turned = (turns[self.owners] @ self.places[..., None])[..., 0]
         return Targets(ways[self.owners] + turned, self.held, turns[self.turners])
 

@@ -61,7 +61,7 @@ class Links:
     def right_side(self, rotations: F64) -> F64:
         """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
         out = np.empty((len(self.points), 3))
-        _right_side(*self._packed, self.totals, self._rest, _components(rotations), out)
+        _right_side(*self._packed, self.totals, self._rest, frozen(rotations), out)
         return out
 
     def fit(self, positions: F64, warm: F64, is_given: np.ndarray) -> tuple[F64, float]:
@@ -69,12 +69,10 @@ class Links:
 
         Where `is_given` (M,) the rotation stays as in `warm` (M, 3, 3).
         """
-        count = len(self.points)
-        centred = _components(positions - positions.sum(0) / count)
-        rotations = np.array(_components(warm))  # (9, M), written
-        given = frozen(np.flatnonzero(is_given), np.uint32)
-        energy = _fit(*self._packed, self.totals, self._rest, centred, given, rotations)
-        return rotations.T.reshape(count, 3, 3), max(float(energy), 0.0)
+        rotations = np.empty(warm.shape)
+        state = frozen(positions), frozen(warm), frozen(is_given), rotations
+        energy = _fit(*self._packed, self.totals, self._rest, *state)
+        return rotations, max(float(energy), 0.0)
 
     def energies(self, positions: F64, rotations: F64) -> F64:
         """(M,) each control point's share of Eq. 2, object units squared."""
@@ -87,7 +85,7 @@ class Links:
     @cached_property
     def _rest(self) -> F64:
         """(3, M) rest."""
-        return _components(self.points)
+        return frozen(self.points.T)
 
     @cached_property
     def _packed(self) -> Packed:
@@ -161,11 +159,6 @@ def _totals(starts, ends, weights, p, out):
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i] = d, x, y, z, squares
 
 
-def _components(values: np.ndarray) -> F64:
-    """(C, M) of (M, ...): an array for each component, as the kernels read them."""
-    return frozen(values.reshape(len(values), -1).T)
-
-
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _times(order, columns, column_starts, blocks, block_starts, x, out):
     """out (12, M) := W x for the twelve columns of x (M, 12).
@@ -217,32 +210,44 @@ def _right_side(order, columns, column_starts, blocks, block_starts, totals, p, 
     x, wx = np.empty((count, 12)), np.empty((12, count))
     for j in range(count):
         for a in range(3):
-            u, v, w = r[3 * a, j], r[3 * a + 1, j], r[3 * a + 2, j]
+            u, v, w = r[j, a, 0], r[j, a, 1], r[j, a, 2]
             x[j, 3 * a], x[j, 3 * a + 1], x[j, 3 * a + 2] = u, v, w
             x[j, 9 + a] = u * p[0, j] + v * p[1, j] + w * p[2, j]
     _times(order, columns, column_starts, blocks, block_starts, x, wx)
-    for a in range(3):
-        k = 3 * a
-        for i in range(count):
-            others = wx[k, i] * p[0, i] + wx[k + 1, i] * p[1, i] + wx[k + 2, i] * p[2, i]
-            own = r[k, i] * totals[1, i] + r[k + 1, i] * totals[2, i] + r[k + 2, i] * totals[3, i]
-            out[i, a] = 0.5 * (others - wx[9 + a, i] - own)
+    for i in range(count):
+        for a in range(3):
+            others = -wx[9 + a, i]
+            for b in range(3):
+                others += wx[3 * a + b, i] * p[b, i] - r[i, a, b] * totals[1 + b, i]
+            out[i, a] = 0.5 * others
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fit(order, columns, column_starts, blocks, block_starts, totals, p, q, given, r):
-    """Rotations r (9, M) from r itself, but for the `given`; the energy.
+def _fit(
+    order, columns, column_starts, blocks, block_starts, totals, p, positions, warm, is_given, out
+):
+    """Rotations into `out`, from `warm`; the energy.
 
     sum_j w p'_j e_ij^T = sum_j w p'_j p_j^T - (sum_j w p'_j) p_i^T, and
-    sum_ij w |e'|^2 = 2 sum_i p'_i . (sum_j w (p'_i - p'_j)): no link's squares are summed.
+    sum_ij w |e'|^2 = 2 sum_i p'_i . (sum_j w (p'_i - p'_j)): no link's squares are summed. The
+    positions are taken about their centroid: far from it these differences would lose digits.
     """
     count = p.shape[1]
+    q, r = np.empty((3, count)), np.empty((9, count))
+    for a in range(3):
+        mean = 0.0
+        for j in range(count):
+            mean += positions[j, a]
+        mean /= count
+        for j in range(count):
+            q[a, j] = positions[j, a] - mean
     x, s = np.empty((count, 12)), np.empty((12, count))
     for j in range(count):
         for a in range(3):
             x[j, 9 + a] = q[a, j]
             for b in range(3):
                 x[j, 3 * a + b] = q[a, j] * p[b, j]
+                r[3 * a + b, j] = warm[j, a, b]
     _times(order, columns, column_starts, blocks, block_starts, x, s)
     energy = 0.0
     for a in range(3):
@@ -251,16 +256,13 @@ def _fit(order, columns, column_starts, blocks, block_starts, totals, p, q, give
         for b in range(3):
             for i in range(count):
                 s[3 * a + b, i] -= s[9 + a, i] * p[b, i] + q[a, i] * totals[1 + b, i]
-    kept = np.empty((9, len(given)))
-    for k in range(len(given)):
-        kept[:, k] = r[:, given[k]]
     fit_rotations(s[:9], r)
-    for k in range(len(given)):
-        r[:, given[k]] = kept[:, k]
-    for k in range(9):
-        for i in range(count):
-            energy -= 2.0 * r[k, i] * s[k, i]
     for i in range(count):
+        for a in range(3):
+            for b in range(3):
+                k = 3 * a + b
+                out[i, a, b] = warm[i, a, b] if is_given[i] else r[k, i]
+                energy -= 2.0 * out[i, a, b] * s[k, i]
         energy += totals[4, i]
     return energy
 

@@ -1,7 +1,7 @@
 """Nearest rotations to many 3x3 matrices from a warm start, compiled: Newton's method on rotations.
 
-One step of all fits is one straight loop over arrays of their components, so that four of them
-are computed at once.
+A step of 32 fits is one straight loop over arrays of their components, so that four of them are
+computed at once.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import numpy as np
 
 from ..threads import FAST
 
+BLOCK = 32  # fits that are made together
 STEPS = 40  # at most; one or two from a warm start
-TOLERANCE = 1e-10  # rad^2, squared length of the last turn; what is left is its square
+TOLERANCE = 1e-6  # rad^2, of the last turns together; what is left is the turn's square, 1e-6 rad
 DAMPING = 1e-9  # x the matrix's size: a turn that changes nothing is not made
 AFAR = 0.02  # x the matrix's size: what keeps the system positive definite away from the maximum
 LONGEST = 1.0  # rad, of one turn
@@ -26,24 +27,37 @@ def fit_rotations(a, r):
     hardly tells, is found as quickly as its axis. From afar the second derivative is pushed to
     be positive definite, so that each turn still goes uphill.
     """
-    for _ in range(STEPS):
-        longest = _newton_step(a, r)
-        if longest < TOLERANCE:
-            break
+    f = np.empty(18 * BLOCK)
+    for first in range(0, a.shape[1], BLOCK):
+        count = min(BLOCK, a.shape[1] - first)
+        for k in range(9):
+            for i in range(BLOCK):  # what is too many repeats the last
+                j = first + min(i, count - 1)
+                f[BLOCK * k + i], f[BLOCK * (9 + k) + i] = a[k, j], r[k, j]
+        for _ in range(STEPS):
+            if _newton_step(f) < TOLERANCE:
+                break
+        for k in range(9):
+            for i in range(count):
+                r[k, first + i] = f[BLOCK * (9 + k) + i]
     _orthonormalise(r)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _newton_step(a, r):
-    """Turns each r once; the squared length of the longest turn, rad^2."""
-    longest = 0.0
-    for i in range(a.shape[1]):
-        a00, a01, a02 = a[0, i], a[1, i], a[2, i]
-        a10, a11, a12 = a[3, i], a[4, i], a[5, i]
-        a20, a21, a22 = a[6, i], a[7, i], a[8, i]
-        r00, r01, r02 = r[0, i], r[1, i], r[2, i]
-        r10, r11, r12 = r[3, i], r[4, i], r[5, i]
-        r20, r21, r22 = r[6, i], r[7, i], r[8, i]
+def _newton_step(f):
+    """Turns each r of a block once; the sum of the turns' squared lengths, rad^2.
+
+    The matrices' 9 x 32 numbers, then the rotations', are in one flat array at fixed distances:
+    only so the compiler sees that they do not overlap, and computes four at once.
+    """
+    total = 0.0
+    for i in range(BLOCK):
+        a00, a01, a02 = f[i], f[32 + i], f[64 + i]
+        a10, a11, a12 = f[96 + i], f[128 + i], f[160 + i]
+        a20, a21, a22 = f[192 + i], f[224 + i], f[256 + i]
+        r00, r01, r02 = f[288 + i], f[320 + i], f[352 + i]
+        r10, r11, r12 = f[384 + i], f[416 + i], f[448 + i]
+        r20, r21, r22 = f[480 + i], f[512 + i], f[544 + i]
         # B = a r^T; the torque sum_k r_k x a_k over the columns is twice B's axial vector
         b00, b01 = a00 * r00 + a01 * r01 + a02 * r02, a00 * r10 + a01 * r11 + a02 * r12
         b02, b10 = a00 * r20 + a01 * r21 + a02 * r22, a10 * r00 + a11 * r01 + a12 * r02
@@ -73,25 +87,25 @@ def _newton_step(a, r):
         oy = scale * (c1 * tx + d1 * ty + d2 * tz)
         oz = scale * (c2 * tx + d2 * ty + d3 * tz)
         square = ox * ox + oy * oy + oz * oz
-        longest = max(longest, square)
+        total += square
         scale = 0.5 * min(1.0, LONGEST / np.sqrt(square + 1e-300))
         # The turn whose Gibbs vector, axis x tan(angle / 2), is g: for each column v of r
         # v + 2 / (1 + g.g) (g x v + g x (g x v)). No sine, and 0 turns nothing.
         gx, gy, gz = scale * ox, scale * oy, scale * oz
         share = 2.0 / (1.0 + gx * gx + gy * gy + gz * gz)
         u, v, w = gy * r20 - gz * r10, gz * r00 - gx * r20, gx * r10 - gy * r00
-        r[0, i] = r00 + share * (u + gy * w - gz * v)
-        r[3, i] = r10 + share * (v + gz * u - gx * w)
-        r[6, i] = r20 + share * (w + gx * v - gy * u)
+        f[288 + i] = r00 + share * (u + gy * w - gz * v)
+        f[384 + i] = r10 + share * (v + gz * u - gx * w)
+        f[480 + i] = r20 + share * (w + gx * v - gy * u)
         u, v, w = gy * r21 - gz * r11, gz * r01 - gx * r21, gx * r11 - gy * r01
-        r[1, i] = r01 + share * (u + gy * w - gz * v)
-        r[4, i] = r11 + share * (v + gz * u - gx * w)
-        r[7, i] = r21 + share * (w + gx * v - gy * u)
+        f[320 + i] = r01 + share * (u + gy * w - gz * v)
+        f[416 + i] = r11 + share * (v + gz * u - gx * w)
+        f[512 + i] = r21 + share * (w + gx * v - gy * u)
         u, v, w = gy * r22 - gz * r12, gz * r02 - gx * r22, gx * r12 - gy * r02
-        r[2, i] = r02 + share * (u + gy * w - gz * v)
-        r[5, i] = r12 + share * (v + gz * u - gx * w)
-        r[8, i] = r22 + share * (w + gx * v - gy * u)
-    return longest
+        f[352 + i] = r02 + share * (u + gy * w - gz * v)
+        f[448 + i] = r12 + share * (v + gz * u - gx * w)
+        f[544 + i] = r22 + share * (w + gx * v - gy * u)
+    return total
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

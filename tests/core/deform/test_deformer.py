@@ -70,6 +70,18 @@ def test_the_ablations_reach_their_handles_too(settings):
         assert np.abs(reached - handle.target).max() < F64
 
 
+def test_the_paper_moves_the_control_point_by_as_much_as_the_clicked_one():
+    deformer = _deformer(shapes.bar(3000), settings=DeformSettings(is_faithful=True))
+    fixed, moving = (
+        _surface_handle(deformer, 3, np.zeros(3)),
+        _surface_handle(deformer, 202, np.array([0.1, 0.3, 0.0])),
+    )
+    assert np.abs(deformer.points[moving.control_point] - moving.point).max() > 1e-3
+    pose = deformer.solve((fixed, moving)).pose
+    moved = pose.points[moving.control_point] - deformer.points[moving.control_point]
+    assert np.abs(moved - [0.1, 0.3, 0.0]).max() < F64
+
+
 def test_laplacian_editing_turns_nothing():
     deformer = _deformer(shapes.bar(3000), settings=DeformSettings(mode="laplacian"))
     handles = (_at(deformer, (-0.5, 0, 0)), _at(deformer, (0.5, 0, 0), (-0.3, 0.5, 0.0)))
