@@ -68,8 +68,8 @@ def skin(points: np.ndarray, binding: Binding, motion: Motion) -> Skinned:
     """Moves rest points (N, 3) with their control points.
 
     `linear` is the exact Jacobian of the motion, the change of the weights included, so that a
-    stretched limb stretches its Gaussians and leaves no gaps. Only where it exceeds the limits
-    of `jacobians` it is brought into them.
+    stretched limb stretches its Gaussians and leaves no gaps. Only where the weights change
+    steeply (`binding`), and where it exceeds the limits of `jacobians`, it is less.
     """
     x = frozen(np.atleast_2d(points), np.float64)
     moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))

@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import F64, frozen
 from ..camera import Camera
 from ..threads import in_threads
+from .depth_order import depth_order
 from .posed import PosedSplats, TextureLevels
 from .reference import Picture3D
 from .rules import RULES, coverage, facing_weight, ramp
@@ -99,7 +100,7 @@ def _depth_order(projected, width, height):
     visible = (projected[:, PHOTO] + projected[:, BODY] > 0) & (low > 0).all(1)
     visible &= (high[:, 0] < width) & (high[:, 1] < height)
     keep = np.flatnonzero(visible)
-    return keep, np.argsort(projected[keep, Z], kind="stable")
+    return keep, depth_order(projected[keep, Z])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

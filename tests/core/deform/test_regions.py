@@ -213,3 +213,16 @@ def test_values_that_are_no_numbers_are_refused():
     handles = _handle(LIFTED, (-0.5, 0, 0)), _handle(LIFTED, (0.5, 0, 0), (np.nan, 0, 0))
     with pytest.raises(ValueError, match="not finite"):
         deformer.solve(handles)
+
+
+@pytest.mark.slow
+def test_five_million_gaussians_deform():
+    from app.bench import five_limbs, limb_handles
+
+    lifted = five_limbs(5_000_000, 512)
+    deformer = Deformer(lifted, DeformSettings())
+    assert deformer.graph.component_count == 1
+    handles = limb_handles(lifted, 30.0)
+    skinned = deformer.skin_gaussians(deformer.solve(handles).pose)
+    assert np.isfinite(skinned.points).all()
+    assert len(skinned.linear) == len(lifted.gaussians)

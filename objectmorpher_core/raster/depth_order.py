@@ -1,0 +1,60 @@
+"""The order of Gaussians from near to far: a radix sort on float32 depths, compiled."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..arrays import F64, frozen
+from ..threads import FAST
+
+BITS = 8  # of a digit: more of them would write to more places than a processor keeps in reach
+PASSES = 4
+
+
+def depth_order(depths: F64) -> np.ndarray:
+    """Rows (N,) of `depths` (N,), all > 0, ascending; equal float32 depths stay in order.
+
+    The bits of positive float32 numbers ascend as they do. A fraction of the time of
+    `np.argsort(depths, kind="stable")`.
+    """
+    keys = frozen(depths, np.float32).view(np.uint32)
+    pairs, spare = np.empty(len(keys), np.uint64), np.empty(len(keys), np.uint64)
+    order = np.empty(len(keys), np.int64)
+    _sort(keys, pairs, spare, order)
+    return order
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _sort(keys, pairs, spare, order):
+    """Rows in the order of `keys` (N,) u32 into `order`. A pair: key and row in one number."""
+    size = 1 << BITS
+    last = np.uint64(size - 1)
+    counts = np.zeros((PASSES, size), np.uint32)  # unsigned: no index is looked at for its sign
+    for i in range(len(keys)):
+        key = np.uint64(keys[i])
+        pairs[i] = (key << np.uint64(32)) | np.uint64(i)
+        for p in range(PASSES):
+            counts[p, (key >> np.uint64(p * BITS)) & last] += np.uint32(1)
+    for p in range(PASSES):
+        start = np.uint32(0)
+        for d in range(size):
+            own = counts[p, d]
+            counts[p, d] = start
+            start += own
+    for p in range(0, PASSES, 2):
+        _scatter(pairs, spare, counts[p], np.uint64(32 + p * BITS))
+        _scatter(spare, pairs, counts[p + 1], np.uint64(32 + (p + 1) * BITS))
+    for i in range(len(order)):
+        order[i] = np.int64(pairs[i] & np.uint64(0xFFFFFFFF))
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _scatter(source, target, starts, shift):
+    """Puts the pairs in the order of the digit at `shift`, those of one digit as they come."""
+    last = np.uint64((1 << BITS) - 1)
+    for i in range(len(source)):
+        pair = source[i]
+        d = (pair >> shift) & last
+        target[starts[d]] = pair
+        starts[d] += np.uint32(1)

@@ -1,0 +1,17 @@
+"""From near to far, and stable."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objectmorpher_core.raster.depth_order import depth_order
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5000])
+def test_it_is_the_order_of_a_stable_sort(count):
+    rng = np.random.default_rng(0)
+    even, ties = rng.uniform(2, 4, count), rng.integers(1, 9, count) / 3.0
+    for depths in (even, ties, 10.0 ** rng.uniform(-30, 30, count)):
+        slow = np.argsort(depths.astype(np.float32), kind="stable")
+        assert np.array_equal(depth_order(depths), slow)
