@@ -9,6 +9,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ..arrays import F64, I32, frozen
 from ..document import DeformSettings, Handle, LiftedObject, Pose, Rig
+from ..rotations import matrix_from_vector
 from .arap import ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
@@ -27,6 +28,8 @@ MOST_STEPS = 30
 LIMIT_STEPS = 7  # halvings of the way to the stretch limit: to 1 % of it
 TURNED_RADIUS = 0.1  # x diameter along the surface: what turns with a turned handle
 TURNED_APART = 0.3  # x distance to the next handle, likewise
+SAME = 1e-9  # x diameter, and rad: handles that are moved as one body
+LINE = 1e-6  # x the handles' spread along it: what they spread beside a line
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
 
 
@@ -102,10 +105,32 @@ class Deformer:
             raise ValueError("a handle's point, target or turn is not finite")
         if not handles:
             return Solution(self.rest(), (0.0,))
+        if (rigid := self._rigid(handles)) is not None:
+            return Solution(rigid, (0.0,))
         solution = self._solved(handles, has_auto_anchors, start, seconds)
         if self.settings.stretch_limit is None or self._is_allowed(solution.pose):
             return solution
         return self._limited(handles, has_auto_anchors, seconds)
+
+    def _rigid(self, handles: tuple[Handle, ...]) -> Pose | None:
+        """The pose of handles that are all moved as one body: that motion, with no energy."""
+        is_usual = self.settings.mode == "arap" and not self.settings.is_faithful
+        if len(handles) < 3 or not is_usual or self.rig.held is not None:
+            return None
+        rest, goal = (np.array([getattr(h, name) for h in handles]) for name in ("point", "target"))
+        centre, to = rest.mean(0), goal.mean(0)
+        u, spread, vt = np.linalg.svd((goal - to).T @ (rest - centre))
+        if spread[1] <= LINE * spread[0]:  # all in a line: turned about it by any angle
+            return None
+        r = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        gaps = [np.abs((rest - centre) @ r.T + to - goal).max() / self.diameter]
+        gaps += [
+            np.abs(matrix_from_vector(h.turn) - r).max() for h in handles if h.turn is not None
+        ]
+        if max(gaps) > SAME:
+            return None
+        turned = np.broadcast_to(r, (len(self.points), 3, 3))
+        return Pose((self.points - centre) @ r.T + to, turned)
 
     def _limited(
         self, handles: tuple[Handle, ...], has_auto_anchors: bool, seconds: float

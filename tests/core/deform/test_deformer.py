@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -120,9 +121,28 @@ def test_three_rigidly_moved_handles_carry_the_whole_object(bar):
         handle = _at(bar, place)
         handles.append(Handle(handle.control_point, handle.point, r @ handle.point + t))
     solution = bar.solve(tuple(handles))
-    # The default stopping rule ends within 1e-5 of the size where a bar's twist is involved.
-    assert np.abs(solution.pose.points - bar.points @ r.T - t).max() < 1e-4
-    assert solution.energies[-1] < 1e-6
+    assert np.abs(solution.pose.points - bar.points @ r.T - t).max() < F64
+    assert np.abs(solution.pose.rotations - r).max() < F64
+    means = bar.lifted.gaussians.means
+    skinned = bar.skin_gaussians(solution.pose)
+    assert np.abs(skinned.points - means @ r.T - t).max() < F64
+    assert np.abs(skinned.linear - r).max() < 1e-8  # weights' gradients x rounding
+    assert solution.energies[-1] < F64
+
+
+def test_handles_that_are_nearly_moved_as_one_body_nearly_are(bar):
+    """No leap where the rigid answer ends and the solver's begins."""
+    r, places = (
+        shapes.rotation(8),
+        ((-0.5, 0, 0.06), (0.5, 0.06, 0), (0.0, -0.06, 0), (0.1, 0.06, 0)),
+    )
+    handles = [_at(bar, place) for place in places]
+    moved = [Handle(h.control_point, h.point, r @ h.point) for h in handles]
+    nudged = replace(moved[1], target=moved[1].target + [1e-7, 0, 0])
+    rigid, solved = bar.solve(tuple(moved)), bar.solve((moved[0], nudged, *moved[2:]))
+    assert rigid.energies == (0.0,)
+    assert len(solved.energies) > 1
+    assert np.abs(rigid.pose.points - solved.pose.points).max() < 1e-4
 
 
 def test_one_handle_holds_the_far_quarter(bar):
