@@ -191,7 +191,7 @@ def test_an_export_that_cannot_be_written_says_so(editor: Editor, tmp_path: Path
 
 
 def test_unsaved_changes_are_asked_about(editor: Editor, photo_path: Path) -> None:
-    editor.select_subject()
+    editor.add_click(*CENTRE, True)
     wait_for_jobs(editor)
     document = editor.document
     editor.filing.open(photo_path)
