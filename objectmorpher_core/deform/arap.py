@@ -97,8 +97,10 @@ class ArapSolver:
     def positions(self, rotations: F64) -> F64:
         """Global step: control points (M, 3) that minimise Eq. 2 for fixed rotations."""
         constraints, forces = self._constraints, self._links.right_side(rotations)
-        turned = constraints.turned_arms(rotations)
-        fixed = self._targets.points - constraints.mean(turned)
+        turned, fixed = None, self._targets.points
+        if not constraints.is_linear:
+            turned = constraints.turned_arms(rotations)
+            fixed = fixed - constraints.mean(turned)
         targets = np.concatenate([fixed, self._targets.held])
         if self._bodies:
             arms = self._bodies.turned(rotations)
@@ -108,9 +110,10 @@ class ArapSolver:
             positions = self._held.solve(forces, targets)[self._unknown] + arms
         else:
             positions = self._held.solve(forces, targets)
-        if not constraints.is_linear:
+        if turned is not None:
             self._unbend(positions, turned, constraints.bends(rotations))
-        positions[self._still] = self.points[self._still]
+        if len(self._still):
+            positions[self._still] = self.points[self._still]
         return positions
 
     def fit(self, positions: F64, warm: F64) -> tuple[F64, float]:

@@ -10,12 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numba
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from ..arrays import F64, I32, Sparse
+from ..arrays import F64, I32, Sparse, frozen
+from ..threads import FAST
 from .binding import Binding
-from .response import Response, product
+from .response import Response
 from .skinning import coupling
 
 STEEP = 1e9  # condition from which an inverse loses what a solution keeps
@@ -147,14 +149,47 @@ class HeldResponse:
 
     def solve(self, forces: F64, targets: F64) -> F64:
         """Unknowns (n, 3) under `forces` (n, 3), with the constraints at `targets` (H, 3)."""
-        loose = self._response.solve(forces)
-        gaps = self._rows @ loose
-        gaps[self._own :] -= targets
-        return loose - product(self._answers, product(self._inverse, gaps))
+        unknowns = np.array(self._response.solve(forces), order="C")
+        rows = self._rows
+        _hold(
+            frozen(rows.indptr), frozen(rows.indices), frozen(rows.data), self._own,
+            frozen(targets), frozen(self._inverse), frozen(self._answers), unknowns,
+        )  # fmt: skip
+        return unknowns
 
     def follow(self, count: int) -> F64:
         """(n, count) how the unknowns move when one of the first `count` targets does."""
         return self._answers @ self._inverse[:, self._own : self._own + count]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _hold(starts, nodes, values, own, targets, inverse, answers, unknowns):
+    """unknowns -= answers inverse (B unknowns - [0; targets])."""
+    count = len(inverse)
+    gaps, pulls = np.zeros((3, count)), np.empty((3, count))
+    for k in range(count):
+        for e in range(starts[k], starts[k + 1]):
+            for a in range(3):
+                gaps[a, k] += values[e] * unknowns[nodes[e], a]
+        if k >= own:
+            for a in range(3):
+                gaps[a, k] -= targets[k - own, a]
+    for k in range(count):
+        x = y = z = 0.0
+        for m in range(count):
+            x += inverse[k, m] * gaps[0, m]
+            y += inverse[k, m] * gaps[1, m]
+            z += inverse[k, m] * gaps[2, m]
+        pulls[0, k], pulls[1, k], pulls[2, k] = x, y, z
+    for i in range(len(unknowns)):
+        x = y = z = 0.0
+        for m in range(count):
+            x += answers[i, m] * pulls[0, m]
+            y += answers[i, m] * pulls[1, m]
+            z += answers[i, m] * pulls[2, m]
+        unknowns[i, 0] -= x
+        unknowns[i, 1] -= y
+        unknowns[i, 2] -= z
 
 
 def _selection(nodes: np.ndarray, width: int) -> Sparse:
