@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numba
@@ -12,6 +13,7 @@ from ..arrays import F64, I32, frozen
 from ..threads import FAST, LEAST_ROWS, in_threads
 from .graph import Graph
 
+LANES = 32  # points that are skinned together
 NEIGHBOURS = 4  # control points that move a Gaussian, paper 3.2.2
 STEEPEST = 3.0  # weight per mean spacing; one in 300 points would be steeper, twice as much at most
 TINY = 1e-150  # object units; its square is still a number
@@ -28,6 +30,19 @@ class Binding:
     control_points: I32  # (N, K)
     weights: F64  # (N, K), rows sum to 1
     weight_gradients: F64  # (N, K, 3) per object unit, rows sum to 0; where too steep, less so
+
+    @cached_property
+    def shares(self) -> F64:
+        """(blocks, 4 K x LANES): of 32 points each the weights and gradients, one after the other.
+
+        As `skinning` reads them; the rest of the last block is 0.
+        """
+        count, own = self.weights.shape
+        blocks = -(-count // LANES)
+        rows = np.zeros((blocks * LANES, own, 4))
+        rows[:count, :, 0], rows[:count, :, 1:] = self.weights, self.weight_gradients
+        columns = rows.reshape(blocks, LANES, 4 * own).transpose(0, 2, 1)
+        return frozen(columns.reshape(blocks, 4 * own * LANES))
 
 
 def bind(

@@ -31,13 +31,12 @@ import numpy as np
 
 from ..arrays import F64, frozen
 from ..threads import FAST, LEAST_ROWS, in_threads
-from .binding import NEIGHBOURS, Binding
+from .binding import LANES, NEIGHBOURS, Binding
 from .jacobians import LEAST_STRETCH, MOST_STRETCH, limit_row, margin
 
 ZERO = (0.0, 0.0, 0.0, 0.0)
 
 # A block of points in the kernel's working memory: a row a number, a column a point.
-LANES = 32  # points in a block
 NODES = 0  # rows of q and m of each control point
 SHARES = NODES + 8 * NEIGHBOURS  # of its weight and the weight's gradient
 PLACE = SHARES + 4 * NEIGHBOURS  # of 2 y
@@ -74,10 +73,13 @@ def skin(points: np.ndarray, binding: Binding, motion: Motion) -> Skinned:
     x = frozen(np.atleast_2d(points), np.float64)
     moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))
     inputs: tuple[Any, ...] = (
-        x, frozen(binding.control_points), frozen(binding.weights),
-        frozen(binding.weight_gradients), *nodes_of(motion), moved, linear,
+        x, frozen(binding.control_points.view(np.uint32)), binding.shares,
+        *nodes_of(motion), moved, linear,
     )  # fmt: skip
-    in_threads(lambda first, last: _skin(first, last, *inputs), len(x), least=LEAST_ROWS)
+    in_threads(
+        lambda first, last: _skin(first, last, *inputs), len(binding.shares),
+        least=LEAST_ROWS // LANES,
+    )  # fmt: skip
     return Skinned(moved, linear)
 
 
@@ -143,21 +145,21 @@ def _quat(r, j):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _skin(first, last, x, control_points, weights, gradients, nodes, frame, moved, linear):
-    """Rows first..last of `Skinned`, a block after the other."""
+def _skin(first, last, x, control_points, shares, nodes, frame, moved, linear):
+    """Blocks first..last of the rows of `Skinned`."""
     s = np.ones(ROWS * LANES)
     left, right = np.empty((3, 3)), np.empty((3, 3))
-    for start in range(first, last, LANES):
-        count = min(LANES, last - start)
+    for block in range(first, last):
+        start = block * LANES
+        count = min(LANES, len(x) - start)
+        for m in range(4 * NEIGHBOURS * LANES):
+            s[SHARES * LANES + m] = shares[block, m]
         for k in range(count):
             i = start + k
             for c in range(NEIGHBOURS):
                 j = control_points[i, c]
                 for a in range(8):
                     s[(NODES + 8 * c + a) * LANES + k] = nodes[j, a]
-                s[(SHARES + 4 * c) * LANES + k] = weights[i, c]
-                for a in range(3):
-                    s[(SHARES + 4 * c + 1 + a) * LANES + k] = gradients[i, c, a]
             for a in range(3):
                 s[(PLACE + a) * LANES + k] = 2.0 * (x[i, a] - frame[0, a])
         _blend(s)
