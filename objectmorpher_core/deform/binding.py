@@ -13,7 +13,7 @@ from ..arrays import F64, I32, frozen
 from ..threads import FAST, LEAST_ROWS, in_threads
 from .graph import Graph
 
-LANES = 32  # points that are skinned together
+LANES = 64  # points that are skinned together
 NEIGHBOURS = 4  # control points that move a Gaussian, paper 3.2.2
 STEEPEST = 3.0  # weight per mean spacing; one in 300 points would be steeper, twice as much at most
 TINY = 1e-150  # object units; its square is still a number
@@ -33,7 +33,7 @@ class Binding:
 
     @cached_property
     def shares(self) -> F64:
-        """(blocks, 4 K x LANES): of 32 points each the weights and gradients, one after the other.
+        """(blocks, 4 K x LANES): of 64 points each the weights and gradients, one after the other.
 
         As `skinning` reads them; the rest of the last block is 0.
         """

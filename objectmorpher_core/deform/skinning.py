@@ -154,22 +154,22 @@ def _skin(first, last, x, control_points, shares, nodes, frame, moved, linear):
         count = min(LANES, len(x) - start)
         for m in range(4 * NEIGHBOURS * LANES):
             s[SHARES * LANES + m] = shares[block, m]
-        for k in range(count):
-            i = start + k
+        for lane in range(count):
+            i, k = np.uint64(start + lane), np.uint64(lane)  # unsigned: no look at their signs
             for c in range(NEIGHBOURS):
-                j = control_points[i, c]
+                j = np.uint64(control_points[i, c])
                 for a in range(8):
-                    s[(NODES + 8 * c + a) * LANES + k] = nodes[j, a]
+                    s[np.uint64((NODES + 8 * c + a) * LANES) + k] = nodes[j, a]
             for a in range(3):
-                s[(PLACE + a) * LANES + k] = 2.0 * (x[i, a] - frame[0, a])
+                s[np.uint64((PLACE + a) * LANES) + k] = 2.0 * (x[i, a] - frame[0, a])
         _blend(s)
-        for k in range(count):
-            i = start + k
+        for lane in range(count):
+            i, k = np.uint64(start + lane), np.uint64(lane)
             for a in range(3):
-                moved[i, a] = x[i, a] + (frame[1, a] + s[(SHIFT + a) * LANES + k])
+                moved[i, a] = x[i, a] + (frame[1, a] + s[np.uint64((SHIFT + a) * LANES) + k])
                 for b in range(3):
-                    linear[i, a, b] = s[(LINEAR + 3 * a + b) * LANES + k]
-            if s[MARGIN * LANES + k] <= 0.0:
+                    linear[i, a, b] = s[np.uint64((LINEAR + 3 * a + b) * LANES) + k]
+            if s[np.uint64(MARGIN * LANES) + k] <= 0.0:
                 limit_row(linear[i], LEAST_STRETCH, MOST_STRETCH, left, right)
 
 
