@@ -18,7 +18,7 @@ from objectmorpher_core.deform.control_points import sample_control_points
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.document import DeformSettings, Handle, LiftedObject, PhotoTexture, Pose
 from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_core.rotations import quats_along, turn_matrix
 
 GAUSSIANS = 100_000
 QUICK_GAUSSIANS = 5_000
@@ -126,7 +126,7 @@ def five_limbs(count: int, nodes: int) -> LiftedObject:
     grey = np.full((len(means), 3), 0.5, np.float32)
     solid = np.ones(len(means), np.float32)
     gaussians = Gaussians(
-        means.astype(np.float32), _quats_along(outward).astype(np.float32), scales, solid, grey
+        means.astype(np.float32), quats_along(outward).astype(np.float32), scales, solid, grey
     )
     control_points = sample_control_points(gaussians.means, gaussians.opacities, nodes)
     world_from_object = np.eye(4)
@@ -136,14 +136,6 @@ def five_limbs(count: int, nodes: int) -> LiftedObject:
     seen = np.ones(len(means), np.float32)
     texture = PhotoTexture(u0, seen, seen)
     return LiftedObject(gaussians, texture, control_points, world_from_object, spacing, "bench")
-
-
-def _quats_along(normals: F64) -> F64:
-    """Quaternions (N, 4) wxyz that turn +z into the normals (N, 3)."""
-    w = 1 + normals[:, 2]
-    quats = np.column_stack([w, -normals[:, 1], normals[:, 0], np.zeros(len(w))])
-    quats[w < 1e-9] = [0.0, 1.0, 0.0, 0.0]
-    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
 
 
 def limb_handles(lifted: LiftedObject, degrees: float) -> tuple[Handle, ...]:

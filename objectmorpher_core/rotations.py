@@ -53,6 +53,15 @@ def quats_from_matrices(matrices: np.ndarray) -> np.ndarray:
     return np.where(quats[:, :1] < 0, -quats, quats)
 
 
+def quats_along(normals: F64) -> F64:
+    """Quaternions (N, 4) wxyz of frames whose z axis is the normal (N, 3), unit."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    x = np.cross(helper, normals)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    frames = np.stack([x, np.cross(normals, x), normals], axis=2)
+    return quats_from_matrices(frames)
+
+
 def turn_matrix(yaw: float, pitch: float, roll: float) -> F64:
     """R_z(roll) R_x(pitch) R_y(yaw) (3, 3), degrees, right-handed, camera axes."""
     (cy, cx, cz), (sy, sx, sz) = (f(np.radians([yaw, pitch, roll])) for f in (np.cos, np.sin))

@@ -32,7 +32,7 @@ from objectmorpher_core.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.posed import TextureLevels
-from objectmorpher_core.rotations import matrices_from_quats
+from objectmorpher_core.rotations import matrices_from_quats, quats_along
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
 MASKS = ("disc", "ellipse", "thin", "frame", "parts", "ring", "star")
@@ -171,12 +171,9 @@ def lifted_surface(points: F64, normals: F64, count: int = 512) -> LiftedObject:
     """
     order = np.random.default_rng(0).permutation(len(points))
     points, normals = points[order], normals[order]
-    w = 1 + normals[:, 2]
-    quats = np.column_stack([w, -normals[:, 1], normals[:, 0], np.zeros(len(w))])
-    quats[w < 1e-9] = [0.0, 1.0, 0.0, 0.0]
     spacing = float(np.median(KDTree(points).query(points, k=2)[0][:, 1]))
     gaussians = Gaussians(
-        points, quats / np.linalg.norm(quats, axis=1, keepdims=True),
+        points, quats_along(normals),
         np.tile(spacing * np.array([0.7, 0.7, 0.1]), (len(points), 1)),
         np.ones(len(points)), np.full((len(points), 3), 0.5),
     )  # fmt: skip

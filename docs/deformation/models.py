@@ -30,7 +30,7 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.deform.control_points import sample_control_points
 from objectmorpher_core.document import Handle, LiftedObject, PhotoTexture
 from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import matrix_from_vector, turn_matrix
+from objectmorpher_core.rotations import matrix_from_vector, quats_along, turn_matrix
 
 CONTROL_POINTS = 512
 CAMERA = Camera.from_fov(1000, 1000, 30.0)
@@ -71,7 +71,7 @@ class Model:
         colors = tones * np.array([0.95, 0.60, 0.30]) + (1 - tones) * np.array([0.98, 0.92, 0.80])
         scales = np.tile(self.mesh.spacing * np.array(FLAT), (count, 1))
         ones = np.ones(count)
-        gaussians = Gaussians(points, _quats_along(normals), scales, ones, colors)
+        gaussians = Gaussians(points, quats_along(normals), scales, ones, colors)
         order = np.random.default_rng(0).permutation(count)  # rows of a grid are no fair order
         control_points = sample_control_points(points[order], ones, CONTROL_POINTS)
         world_from_object = np.eye(4)
@@ -101,14 +101,6 @@ class Model:
                 Handle(handle.control_point, handle.point, target, is_pin=is_pin),
             )
         return tuple(found.values())
-
-
-def _quats_along(normals: F64) -> F64:
-    """Quaternions (N, 4) wxyz that turn +z into the normals (N, 3)."""
-    w = 1 + normals[:, 2]
-    quats = np.column_stack([w, -normals[:, 1], normals[:, 0], np.zeros(len(w))])
-    quats[w < 1e-9] = [0.0, 1.0, 0.0, 0.0]
-    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
 
 
 def turned_about(pivot: tuple, vector: tuple) -> Callable[[F64], F64]:

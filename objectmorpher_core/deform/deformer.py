@@ -245,7 +245,8 @@ class Deformer:
         largest = np.linalg.norm(turns, axis=1).max() / LARGE_TURN
         steps = int(np.clip(np.ceil(max(farthest, largest)), 1, MOST_STEPS))
         for step in range(1, steps):
-            self._solver.aim(self._hold.targets(handles, step / steps))
+            partly = tuple(_on_the_way(h, step / steps) for h in handles)
+            self._solver.aim(self._hold.targets(partly))
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
         self._solver.aim(self._hold.targets(handles))
         return rotations

@@ -99,15 +99,14 @@ def build_graph(
     components = connected_components(weights, directed=False)[1]
     if solid is not None and settings.links == "geodesic":
         struts = find_struts(p, spacing, LINK_RADIUS * diameter, solid)
-        struts = struts.where(components[struts.first] == components[struts.second])
-        struts = struts.where(~_is_cut(struts, len(p), seams))
-        weights = _with_struts(weights, struts)
+        is_within = components[struts.first] == components[struts.second]
+        weights = _braced(weights, struts.where(is_within & ~_is_cut(struts, len(p), seams)))
     if cells is not None:
         cells = replace(cells, points=cells.points + centre)
     return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing, cells)
 
 
-def _with_struts(weights: csr_array, struts: Edges) -> csr_array:
+def _braced(weights: csr_array, struts: Edges) -> csr_array:
     """`weights` (M, M), and where a strut is the larger of its own and the link's."""
     if len(struts) == 0:
         return weights

@@ -27,7 +27,6 @@ class Hold:
     """The rows of a set of handles. They depend on where the handles are at rest only."""
 
     constraints: Constraints
-    rest: F64  # (handles, 3) their points at rest
     owners: I32  # (H,) the handle of each row
     places: F64  # (H, 3) the row's surface point from its handle's, at rest
     turners: I32  # (T,) the handle of each turned control point
@@ -68,18 +67,15 @@ class Hold:
         )  # fmt: skip
         turners = np.array([h for _, h in turned], np.int32)
         held_at = points[constraints.held]
-        return cls(constraints, clicked, owner, surface - clicked[owner], turners, held_at)
+        return cls(constraints, owner, surface - clicked[owner], turners, held_at)
 
-    def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
-        """Where all must be when the handles have gone a `share` of their way."""
-        ways = self.rest + share * (np.array([h.target for h in handles]) - self.rest)
+    def targets(self, handles: tuple[Handle, ...]) -> Targets:
+        """Where all must be for handles that have the same points at rest."""
+        goals = np.array([h.target for h in handles])
         if len(self.turners) == 0:
-            return Targets(ways[self.owners] + self.places, self.held, np.empty((0, 3, 3)))
-        turns = np.stack([_turn(h, share) for h in handles])
+            return Targets(goals[self.owners] + self.places, self.held, np.empty((0, 3, 3)))
+        turns = np.stack(
+            [np.eye(3) if h.turn is None else matrix_from_vector(h.turn) for h in handles]
+        )
         turned = (turns[self.owners] @ self.places[..., None])[..., 0]
-        return Targets(ways[self.owners] + turned, self.held, turns[self.turners])
-
-
-def _turn(handle: Handle, share: float) -> F64:
-    """(3, 3) the handle's own turn, a `share` of it."""
-    return np.eye(3) if handle.turn is None else matrix_from_vector(share * handle.turn)
+        return Targets(goals[self.owners] + turned, self.held, turns[self.turners])

@@ -1,15 +1,12 @@
-"""What is done to the Jacobians F of many points: limits on their stretch, covariances by them."""
+"""Limits on the stretch of the Jacobians F of a motion."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
-import numpy as np
 
-from ..arrays import F64, frozen
-from ..threads import FAST, LEAST_ROWS, in_threads
+from ..threads import FAST
 
 # Five times its length a Gaussian still looks like the surface it lies on; what is stretched
 # farther comes from two neighbours that went different ways, and would be drawn as a needle
@@ -18,28 +15,6 @@ LEAST_STRETCH, MOST_STRETCH = 0.2, 5.0
 SWEEPS = 30  # of the Jacobi iteration, at most; six are enough
 ORTHOGONAL = 1e-15  # cosine of two columns that need no further turn
 VANISHED = 1e-9  # x largest stretch: a direction so much shorter has no axis of its own
-
-
-def limited(linear: F64, least: float = LEAST_STRETCH, most: float = MOST_STRETCH) -> F64:
-    """`linear` (N, 3, 3) with its stretches (singular values) brought into [least, most].
-
-    The rotations on both sides of them stay. A mirror image becomes the nearest matrix that is
-    none.
-    """
-    result = np.array(linear, np.float64)
-    bounds = float(least), float(most)
-    in_threads(
-        lambda first, last: _limit(first, last, bounds, result), len(result), least=LEAST_ROWS
-    )
-    return result
-
-
-def covariances(linear: F64, rest: F64) -> F64:
-    """F Sigma F^T (N, 3, 3) of symmetric `rest` covariances Sigma (N, 3, 3)."""
-    result = np.empty(rest.shape)
-    inputs: tuple[Any, ...] = (frozen(linear, np.float64), frozen(rest, np.float64), result)
-    in_threads(lambda first, last: _covariances(first, last, *inputs), len(rest), least=LEAST_ROWS)
-    return result
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -57,21 +32,12 @@ def margin(row0, row1, row2, least, most):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _limit(first, last, bounds, linear):
-    """Limits rows first..last of `linear` in place."""
-    least, most = bounds
-    left, right = np.empty((3, 3)), np.empty((3, 3))
-    for i in range(first, last):
-        row0 = linear[i, 0, 0], linear[i, 0, 1], linear[i, 0, 2]
-        row1 = linear[i, 1, 0], linear[i, 1, 1], linear[i, 1, 2]
-        row2 = linear[i, 2, 0], linear[i, 2, 1], linear[i, 2, 2]
-        if margin(row0, row1, row2, least, most) <= 0.0:
-            limit_row(linear[i], least, most, left, right)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def limit_row(f, least, most, left, right):
-    """Limits `f` (3, 3) in place; `left` and `right` (3, 3) are room to work in."""
+    """Brings the stretches (singular values) of `f` (3, 3) into [least, most], in place.
+
+    The rotations on both sides of them stay. A mirror image becomes the nearest matrix that is
+    none. `left` and `right` (3, 3) are room to work in.
+    """
     s0, s1, s2 = _decompose(f, left, right)
     if least <= s2 and s0 <= most:
         return  # as it was, to the last digit
@@ -160,19 +126,3 @@ def _complete(u, s0, s1):
     u[0, 2] = u[1, 0] * u[2, 1] - u[2, 0] * u[1, 1]
     u[1, 2] = u[2, 0] * u[0, 1] - u[0, 0] * u[2, 1]
     u[2, 2] = u[0, 0] * u[1, 1] - u[1, 0] * u[0, 1]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _covariances(first, last, linear, rest, out):
-    """Rows first..last of F Sigma F^T; only six numbers of the symmetric matrices are worked."""
-    for i in range(first, last):
-        s, f, c = rest[i], linear[i], out[i]
-        s00, s01, s02, s11, s12, s22 = s[0, 0], s[0, 1], s[0, 2], s[1, 1], s[1, 2], s[2, 2]
-        for a in range(3):
-            x, y, z = f[a, 0], f[a, 1], f[a, 2]
-            u = x * s00 + y * s01 + z * s02
-            v = x * s01 + y * s11 + z * s12
-            w = x * s02 + y * s12 + z * s22
-            for b in range(a + 1):
-                c[a, b] = u * f[b, 0] + v * f[b, 1] + w * f[b, 2]
-                c[b, a] = c[a, b]

@@ -158,13 +158,11 @@ def without_gaps(
 ) -> tuple[Edges, Cells | None]:
     """Those of `edges` between control points (M, 3) that do not bridge a gap; the cells.
 
-    No cells where no gap was in question.
-
-    `spacing` is the control points' mean one. An edge bridges a gap when it leaves the body, or
-    joins opposed surfaces, and the way along the surface is longer than `DETOUR` times the edge.
-    Edges through the inside of a limb or sheet stay. Where Gaussians are too few to say,
-    surfaces that face each other have a gap between them. What hangs together by its surface
-    still does so afterwards.
+    There are no cells where no gap is in question. `spacing` is the control points' mean one. An
+    edge bridges a gap when it leaves the body, or joins opposed surfaces, and the way along the
+    surface is longer than `DETOUR` times the edge. Edges through the inside of a limb or sheet
+    stay. Where Gaussians are too few to say, surfaces that face each other have a gap between
+    them. What hangs together by its surface still does so afterwards.
     """
     normals = surface.normals_near(points)[:, 0]
     attitude = _Attitude.of(edges, points, normals)

@@ -24,7 +24,7 @@ from ..document import LiftedObject, Matte, PhotoTexture
 from ..gaussians import Gaussians
 from ..poisson_disk import thin_to_spacing
 from ..progress import Progress
-from ..rotations import quats_from_matrices
+from ..rotations import quats_along
 from ..segment.matte import band_width, extended_mask, frame_extension
 from . import LiftError
 from .membrane import solve_membrane
@@ -279,7 +279,7 @@ def _assemble(
     scales = np.column_stack([along, along, across]) * sigma
     gaussians = Gaussians(
         means.astype(np.float32),
-        _quats_along(normals).astype(np.float32),
+        quats_along(normals).astype(np.float32),
         scales.astype(np.float32),
         np.ones(len(means), np.float32),
         _colours(surface.xy, matte, spacing),
@@ -306,15 +306,6 @@ def _world_normals(normals: F64, ray: F64, z: F64, unit: float, focal: float) ->
     wz = -nh / unit - wx * ray[:, 0] - wy * ray[:, 1]
     world = np.column_stack([wx, wy, wz])
     return world / np.linalg.norm(world, axis=1, keepdims=True)
-
-
-def _quats_along(normals: F64) -> F64:
-    """Quaternions (N, 4) of frames whose z axis is the normal."""
-    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    x = np.cross(helper, normals)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    frames = np.stack([x, np.cross(normals, x), normals], axis=2)
-    return quats_from_matrices(frames)
 
 
 def _colours(xy: F64, matte: Matte, spacing: float) -> F32:
