@@ -29,7 +29,6 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
     """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
     from objectmorpher_core.compose import composite
     from objectmorpher_core.compose.plate import hole_margin
-    from objectmorpher_core.raster.posed import TEXTURE_GAP
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
     distance = np.full((height, width), 1e9, np.float32)  # photo px to what moved
@@ -38,10 +37,10 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
         if thing.lifted is None or not thing.is_moved:
             continue
         splats = derived.posed(document, k)
-        rest = splats.u0.astype(np.float64)
+        rest = splats.rest.lifted.texture.u0.astype(np.float64)
         now = camera.project(splats.means) if thing.is_visible else None
         points = _moved_points(rest, now, max(composite.STILL, TOLERANCE / view.zoom))
-        reach = REACH * splats.texture_gap / TEXTURE_GAP * max(thing.placement.scale, 1.0)
+        reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
         if len(points):
             distance = np.minimum(distance, _distance(points, view, (height, width)) - reach)
     margin = hole_margin(*document.photo.size)

@@ -24,7 +24,8 @@ from .view import View
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import Puppet, SurfacePoint
-    from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+    from objectmorpher_core.raster.posed import PosedSplats
+    from objectmorpher_core.raster.texture import TextureLevels
 
 T = TypeVar("T")
 

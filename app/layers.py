@@ -24,8 +24,10 @@ from objectmorpher_core.document import Document
 from .view import View
 
 if TYPE_CHECKING:
-    from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+    from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.reference import Picture3D
+    from objectmorpher_core.raster.texture import TextureLevels
+    from objectmorpher_core.raster.tiles import Drawable
 
     from .derived import Derived
 
@@ -33,7 +35,6 @@ FRAME = 0.028  # s, what rendering may take of a frame
 STILL = 0.12  # s without a change, after which the exact picture is asked for
 COARSEST = 6  # canvas px per px of a draft
 FIRST_RATE = 2.5e-7  # s per px, before anything has been measured
-MARGIN = 8.0  # px around the Gaussians' centres, besides their own size
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +111,7 @@ class Layers:
             for k, o in enumerate(document.objects)
             if o.lifted and o.is_moved and o.is_visible
         }
-        return dict(sorted(moved.items(), key=lambda kv: -float(np.median(kv[1].means[:, 2]))))
+        return dict(sorted(moved.items(), key=lambda kv: -kv[1].middle_depth))
 
     def _layer(self, document: Document, k: int, splats: PosedSplats, view: View) -> Layer | None:
         key = (view.left, view.top, view.zoom, view.width, view.height)
@@ -119,23 +120,31 @@ class Layers:
         if work is not None and work.splats is splats and work.view == key:
             self._want_exact(work)
             return work.shown
-        box = _bounds(splats, camera, view)
+        drawable = _prepare(splats, view.camera(camera), camera)
+        box = drawable.box()
         if box is None:
             self._works.pop(k, None)
             return None
         texture = self._derived.shape(document.photo, thing).texture
-        request = Request(splats, texture, _window(view, camera, box), camera)
-        shown = self._first(request, box)
+        request = Request(splats, texture, view.camera(camera, box), camera)
+        shown = self._first(request, box, drawable)
         self._works[k] = _Work(splats, key, request, box, shown, time.monotonic())
         return shown
 
-    def _first(self, request: Request, box: tuple[int, int, int, int]) -> Layer:
+    def _first(
+        self, request: Request, box: tuple[int, int, int, int], drawable: Drawable
+    ) -> Layer:
         """Exact where the time allows, else a draft."""
+        from objectmorpher_core.raster import tiles
+
         pixels = (box[2] - box[0]) * (box[3] - box[1])
         excess = pixels * self._rate / self.frame_time
         coarse = 1 if excess <= 1 else min(max(math.ceil(math.sqrt(excess)), 2), COARSEST)
         start = time.perf_counter()
-        picture = render(replace(request, window=_coarser(request.window, coarse)))
+        if coarse == 1:
+            picture = tiles.draw(drawable, request.texture, box)
+        else:
+            picture = render(replace(request, window=_coarser(request.window, coarse)))
         self._learn(time.perf_counter() - start, pixels / coarse**2)
         rgba = np.dstack([picture.color, picture.alpha])
         height, width = picture.alpha.shape
@@ -172,33 +181,16 @@ def render(request: Request) -> Picture3D:
     return tiles.render(request.splats, request.texture, request.window, request.camera)
 
 
-def _window(view: View, camera: Camera, box: tuple[int, int, int, int]) -> Camera:
-    """The photo's camera through a part of the canvas."""
-    x0, y0, x1, y1 = box
-    left, top = view.left + x0 / view.zoom, view.top + y0 / view.zoom
-    return camera.windowed(left, top, x1 - x0, y1 - y0, view.zoom)
+def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
+    from objectmorpher_core.raster import tiles
+
+    return tiles.prepare(splats, camera, photo_camera)
 
 
 def _coarser(window: Camera, coarse: int) -> Camera:
     """The same window with `coarse` times fewer px across and down."""
     width, height = -(-window.width // coarse), -(-window.height // coarse)
     return window.windowed(0.0, 0.0, width, height, 1.0 / coarse)
-
-
-def _bounds(
-    splats: PosedSplats, camera: Camera, view: View
-) -> tuple[int, int, int, int] | None:  # fmt: skip
-    """The part of the canvas that the object may touch, canvas px; None outside it."""
-    means = splats.means[splats.means[:, 2] > 0]
-    if len(means) == 0:
-        return None
-    xy = view.canvas_from_image(camera.project(means))
-    margin = MARGIN + 2 * splats.gap * camera.focal / float(means[:, 2].min()) * view.zoom
-    low = np.floor(xy.min(0) - margin).clip(0, (view.width, view.height)).astype(int)
-    high = np.ceil(xy.max(0) + margin).clip(0, (view.width, view.height)).astype(int)
-    if (high <= low).any():
-        return None
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
 def _looks(picture: Picture3D) -> F32:

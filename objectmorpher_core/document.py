@@ -110,6 +110,7 @@ class LiftedObject:
     world_from_object: F64  # (4, 4) similarity at rest: the registration to the photo
     spacing: float  # object units, mean distance of neighbouring Gaussians on the surface
     backend: str
+    splatting: str = "surface"  # how its Gaussians become a picture: "surface", "mip", "classic"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))

@@ -15,8 +15,9 @@ from .deform.splitting import Split, split_stretched
 from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose, Rig
 from .gaussians import Gaussians
 from .raster import tiles
-from .raster.posed import PosedSplats, SplatPoser, TextureLevels
+from .raster.posed import PosedSplats, RestSplats
 from .raster.reference import Picture3D
+from .raster.texture import TextureLevels
 
 PICK_NEIGHBOURS = 12  # Gaussians near the picked point of which the best fitting is inverted
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
@@ -47,7 +48,7 @@ class Puppet:
         self.camera = camera
         self._settings = settings
         self._rig = rig
-        self._poser = SplatPoser(lifted, camera)
+        self._rest = RestSplats(lifted, camera)
 
     @cached_property
     def deformer(self) -> Deformer:
@@ -66,14 +67,13 @@ class Puppet:
         pieces = lifted.gaussians
         skinned = self.deformer.skin_points(pieces.means, pose, pieces.normals)
         matrix = placement.matrix(self.lifted, self.camera)
-        return SplatPoser(lifted, self.camera).pose(skinned, matrix)
+        return PosedSplats(RestSplats(lifted, self.camera), skinned, matrix)
 
     def _posed_whole(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The Gaussians as they were lifted, none of them split."""
         matrix = placement.matrix(self.lifted, self.camera)
-        if pose is None:
-            return self._poser.rest(matrix)
-        return self._poser.pose(self.deformer.skin_gaussians(pose), matrix)
+        motion = None if pose is None else self.deformer.gaussians_motion(pose)
+        return PosedSplats(self._rest, motion, matrix)
 
     def _lifted_of(self, split: Split) -> LiftedObject:
         """The object of these pieces at rest; each looks where it is in the photo."""

@@ -31,7 +31,7 @@ from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.raster.posed import TextureLevels
+from objectmorpher_core.raster.texture import TextureLevels
 from objectmorpher_core.rotations import matrices_from_quats, quats_along
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos

@@ -12,7 +12,8 @@ from objectmorpher_core.document import Plate
 from ..layers import Layer
 
 if TYPE_CHECKING:
-    from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+    from objectmorpher_core.raster.posed import PosedSplats
+    from objectmorpher_core.raster.texture import TextureLevels
 
 Colour = tuple[float, float, float]  # sRGB in [0, 1]
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.posed import PosedSplats, TextureLevels
+from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.rules import RULES
+from objectmorpher_core.raster.texture import TextureLevels
 
 from .shaders import build_program, set_uniforms
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,9 @@ from PIL import Image, ImageDraw, ImageFont
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.posed import PosedSplats, SplatPoser, build_levels
+from objectmorpher_core.raster import projection, tiles
+from objectmorpher_core.raster.posed import PosedSplats, RestSplats
+from objectmorpher_core.raster.texture import build_levels
 
 SUPERSAMPLE = 3
 MARGIN = 10  # px around what is drawn
@@ -60,7 +61,8 @@ class Panel:
 
 def posed(model: Model, skinned: Skinned, normals: F64, colors: F64 | None = None) -> PosedSplats:
     """The model's Gaussians where `skinned` puts them, lit there by the surface's `normals`."""
-    return lit(SplatPoser(model.lifted, CAMERA).pose(skinned, np.eye(4)), model, normals, colors)
+    splats = PosedSplats(RestSplats(model.lifted, CAMERA), skinned, np.eye(4))
+    return lit(splats, model, normals, colors)
 
 
 def lit(splats: PosedSplats, model: Model, normals: F64, colors: F64 | None = None) -> PosedSplats:
@@ -68,10 +70,8 @@ def lit(splats: PosedSplats, model: Model, normals: F64, colors: F64 | None = No
     world = normals @ model.lifted.world_from_object[:3, :3].T
     light = LIGHT / np.linalg.norm(LIGHT)
     shade = AMBIENT + (1 - AMBIENT) * ((1 + world @ light) / 2) ** 1.5
-    own = splats.colors if colors is None else colors
-    # A rest zoom without bounds makes every Gaussian show its own colour, not the photo.
-    zoom = np.full(len(splats), 1e12)
-    return replace(splats, colors=np.float32(own * shade[:, None]), rest_zoom=zoom)
+    own = splats.rest.lifted.gaussians.colors if colors is None else colors
+    return splats.painted(own * shade[:, None])
 
 
 def draw_figure(
@@ -126,7 +126,7 @@ def _draw_panel(panel: Panel, camera: Camera) -> Image.Image:
     image = Image.fromarray(np.uint8(np.clip(rgb, 0, 1) * 255 + 0.5))
     draw = ImageDraw.Draw(image)
     if panel.has_outlines:
-        _draw_outlines(draw, tiles.project(panel.splats, camera, CAMERA))
+        _draw_outlines(draw, projection.project(panel.splats, camera, CAMERA))
     for mark in panel.marks:
         if isinstance(mark, Lines):
             starts, ends = (_seen(panel, camera, p) for p in (mark.starts, mark.ends))
@@ -144,10 +144,13 @@ def _draw_outlines(draw: ImageDraw.ImageDraw, projected: F64) -> None:
     """Each Gaussian that faces the camera, as an ellipse of half a standard deviation."""
     angle = np.linspace(0, 2 * np.pi, 25)
     circle = OUTLINE * np.stack([np.cos(angle), np.sin(angle)])
-    for row in projected[projected[:, tiles.BODY] > 0.5]:
-        xx, xy, yy = row[[tiles.QXX, tiles.QXY, tiles.QYY]]
-        root = np.linalg.cholesky(np.linalg.inv([[xx, xy], [xy, yy]]))
-        at = row[[tiles.CX, tiles.CY]] + (root @ circle).T
+    for row in projected[projected[:, projection.BODY] > 0.5]:
+        # the covariance from its parts, see `projection`
+        yy = 1 / row[projection.RYY]
+        xy = -row[projection.TILT] * yy
+        xx = 1 / row[projection.QXX] + xy * xy / yy
+        root = np.linalg.cholesky(np.array([[xx, xy], [xy, yy]], np.float64))
+        at = row[[projection.CX, projection.CY]] + (root @ circle).T
         draw.line(at.ravel().tolist(), INK, SUPERSAMPLE)
 
 

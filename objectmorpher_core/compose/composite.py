@@ -17,8 +17,9 @@ from ..document import Document, EditObject, Matte
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
-from ..raster.posed import PosedSplats, TextureLevels, build_levels
+from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
+from ..raster.texture import TextureLevels, build_levels
 from .plate import hole_margin, plate_crop
 
 STILL = 0.05  # px: a surface that moved less is where it was

@@ -16,7 +16,7 @@ from .faithful_skinning import skin_faithful
 from .graph import Graph, Surface, build_graph
 from .grip import stiffened
 from .hold import Grasp, Hold
-from .skinning import Motion, Skinned, skin
+from .skinning import Motion, Skin, Skinned, skin
 from .strain import Strain, measure_strain
 
 FAITHFUL_ITERATIONS = 3  # paper 3.2.2
@@ -189,6 +189,13 @@ class Deformer:
     def skin_gaussians(self, pose: Pose) -> Skinned:
         """The object's Gaussians under `pose`."""
         return self._skin(self._means, self.binding, pose)
+
+    def gaussians_motion(self, pose: Pose) -> Skin | Skinned:
+        """The same, left to the renderer where it can be: it projects what is still in reach."""
+        if self.settings.is_faithful:
+            return self.skin_gaussians(pose)
+        motion = Motion(self.points, pose.points, pose.rotations)
+        return Skin(self._means, self.binding, motion)
 
     def _skin(self, points: np.ndarray, binding: Binding, pose: Pose) -> Skinned:
         motion = Motion(self.points, pose.points, pose.rotations)

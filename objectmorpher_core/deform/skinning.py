@@ -63,6 +63,32 @@ class Skinned:
     linear: F64  # (N, 3, 3) Jacobian of the motion there: F
 
 
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Points with what moves them: a motion that has not been carried out yet."""
+
+    points: F64  # (N, 3) at rest, object frame
+    binding: Binding
+    motion: Motion
+
+    def inputs(self) -> tuple[Any, ...]:
+        """What `skin_block` reads: x, control points, shares, nodes, frame."""
+        x = frozen(np.atleast_2d(self.points), np.float64)
+        nodes = frozen(self.binding.control_points.view(np.uint32))
+        return x, nodes, self.binding.shares, *nodes_of(self.motion)
+
+    def run(self) -> Skinned:
+        """The points after the motion, and its Jacobian."""
+        inputs = self.inputs()
+        x = inputs[0]
+        moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))
+        in_threads(
+            lambda first, last: _skin(first, last, *inputs, moved, linear),
+            len(self.binding.shares), least=LEAST_ROWS // LANES,
+        )  # fmt: skip
+        return Skinned(moved, linear)
+
+
 def skin(points: np.ndarray, binding: Binding, motion: Motion) -> Skinned:
     """Moves rest points (N, 3) with their control points.
 
@@ -70,17 +96,7 @@ def skin(points: np.ndarray, binding: Binding, motion: Motion) -> Skinned:
     stretched limb stretches its Gaussians and leaves no gaps. Only where the weights change
     steeply (`binding`), and where it exceeds the limits of `jacobians`, it is less.
     """
-    x = frozen(np.atleast_2d(points), np.float64)
-    moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))
-    inputs: tuple[Any, ...] = (
-        x, frozen(binding.control_points.view(np.uint32)), binding.shares,
-        *nodes_of(motion), moved, linear,
-    )  # fmt: skip
-    in_threads(
-        lambda first, last: _skin(first, last, *inputs), len(binding.shares),
-        least=LEAST_ROWS // LANES,
-    )  # fmt: skip
-    return Skinned(moved, linear)
+    return Skin(points, binding, motion).run()
 
 
 def coupling(binding: Binding, rotations: F64) -> F64:
@@ -148,29 +164,44 @@ def _quat(r, j):
 def _skin(first, last, x, control_points, shares, nodes, frame, moved, linear):
     """Blocks first..last of the rows of `Skinned`."""
     s = np.ones(ROWS * LANES)
-    left, right = np.empty((3, 3)), np.empty((3, 3))
+    left, right, one = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for block in range(first, last):
         start = block * LANES
         count = min(LANES, len(x) - start)
-        for m in range(4 * NEIGHBOURS * LANES):
-            s[SHARES * LANES + m] = shares[block, m]
+        skin_block(block, count, x, control_points, shares, nodes, frame, s, left, right, one)
         for lane in range(count):
             i, k = np.uint64(start + lane), np.uint64(lane)  # unsigned: no look at their signs
-            for c in range(NEIGHBOURS):
-                j = np.uint64(control_points[i, c])
-                for a in range(8):
-                    s[np.uint64((NODES + 8 * c + a) * LANES) + k] = nodes[j, a]
-            for a in range(3):
-                s[np.uint64((PLACE + a) * LANES) + k] = 2.0 * (x[i, a] - frame[0, a])
-        _blend(s)
-        for lane in range(count):
-            i, k = np.uint64(start + lane), np.uint64(lane)
             for a in range(3):
                 moved[i, a] = x[i, a] + (frame[1, a] + s[np.uint64((SHIFT + a) * LANES) + k])
                 for b in range(3):
                     linear[i, a, b] = s[np.uint64((LINEAR + 3 * a + b) * LANES) + k]
-            if s[np.uint64(MARGIN * LANES) + k] <= 0.0:
-                limit_row(linear[i], LEAST_STRETCH, MOST_STRETCH, left, right)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def skin_block(block, count, x, control_points, shares, nodes, frame, s, left, right, one):
+    """Fills the rows SHIFT (without frame[1]) and LINEAR of `s` for the `count` points of a block.
+
+    `left`, `right`, `one` (3, 3) are room to work in.
+    """
+    start = block * LANES
+    for m in range(4 * NEIGHBOURS * LANES):
+        s[SHARES * LANES + m] = shares[block, m]
+    for lane in range(count):
+        i, k = np.uint64(start + lane), np.uint64(lane)  # unsigned: no look at their signs
+        for c in range(NEIGHBOURS):
+            j = np.uint64(control_points[i, c])
+            for a in range(8):
+                s[np.uint64((NODES + 8 * c + a) * LANES) + k] = nodes[j, a]
+        for a in range(3):
+            s[np.uint64((PLACE + a) * LANES) + k] = 2.0 * (x[i, a] - frame[0, a])
+    _blend(s)
+    for k in range(count):
+        if s[MARGIN * LANES + k] <= 0.0:
+            for m in range(9):
+                one[m // 3, m % 3] = s[(LINEAR + m) * LANES + k]
+            limit_row(one, LEAST_STRETCH, MOST_STRETCH, left, right)
+            for m in range(9):
+                s[(LINEAR + m) * LANES + k] = one[m // 3, m % 3]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

@@ -2,124 +2,182 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-import cv2
-import numba
 import numpy as np
 
-from ..arrays import F32, F64, frozen
+from ..arrays import F64, frozen
 from ..camera import Camera
-from ..deform.skinning import Skinned
+from ..deform.binding import LANES
+from ..deform.skinning import Skin, Skinned
 from ..document import LiftedObject
-from ..threads import in_threads
+from .rules import SPLATTINGS, Splatting
 
-SURFACE_GAP = 2.5  # x spacing: samples farther apart in depth are different surfaces
+SURFACE_GAP = 5.0  # x spacing: samples farther apart in depth are different surfaces
 TEXTURE_GAP = 3.0  # x spacing in the photo: likewise for what they show of it
 
+# Rows of a block of Gaussians at rest, see `RestSplats.blocks`.
+COVARIANCE = 3  # after the mean: xx, xy, xz, yy, yz, zz
+PICTURE = COVARIANCE + 6  # covariance of the rest picture with the rest object, row by row
+NORMAL = PICTURE + 6
+U0 = NORMAL + 3
+VISIBILITY, SOLIDITY, OPACITY, ZOOM, COSINE = range(U0 + 2, U0 + 7)
+COLOUR = COSINE + 1
+REST_ROWS = COLOUR + 3
 
-@dataclass(frozen=True, eq=False)
-class PosedSplats:
-    """World-space Gaussians of one object, with what each carries of the photo."""
+ENDLESS = 1e12  # px per world unit, of a photo that cannot be carried along
+BEYOND = 1.3  # x half the photo: Jacobians are taken no farther out (Kerbl et al. 2023)
 
-    means: F64  # (N, 3) world
-    linear: F64  # (N, 3, 3) F, motion of the surroundings of each mean, world from rest world
-    rest_covariances: F64  # (N, 3, 3) Sigma, world, at rest
-    rest_pictures: F64  # (N, 2, 3) J0 Sigma: covariance of the rest picture with the rest world
-    normals: F64  # (N, 3) outward at rest, world, unit
-    rest_cosines: F64  # (N,) of the normal with the direction to the camera, at rest
-    u0: F32  # (N, 2) px in the photo
-    visibility: F32  # (N,) 1 = seen in the photo
-    solidity: F32  # (N,)
-    colors: F32  # (N, 3)
-    opacities: F32  # (N,)
-    gap: float  # world units, see SURFACE_GAP
-    texture_gap: float  # px of the photo, see TEXTURE_GAP
-    rest_zoom: F64  # (N,) focal / depth at rest, px per world unit
+
+class RestSplats:
+    """One lifted object in the photo: all that does not depend on how it is moved."""
+
+    def __init__(self, lifted: LiftedObject, camera: Camera) -> None:
+        """`camera` is the photo's."""
+        self.lifted = lifted
+        self.splatting: Splatting = SPLATTINGS[lifted.splatting]
+        self.world_from_object = lifted.world_from_object
+        self.means = frozen(lifted.gaussians.means, np.float64)  # (N, 3) object frame
+        world = lifted.world_points(self.means)
+        self.zoom = frozen(camera.focal / world[:, 2])  # (N,) px per world unit
+        self.spacing = lifted.spacing * lifted.scale  # world units
+        self.spacing_px = self.spacing * float(np.median(self.zoom))
+        self._jacobians = projection_jacobians(world, camera.focal)
 
     def __len__(self) -> int:
         return len(self.means)
 
+    @cached_property
+    def is_textured(self) -> bool:
+        """Whether any of the Gaussians shows the photo."""
+        return bool(self.lifted.texture.visibility.any())
 
-class SplatPoser:
-    """Poses one lifted object. The constructor does what depends on the rest shape only."""
+    def painted(self, colors: np.ndarray) -> RestSplats:
+        """The same object in plain `colors` (N, 3), with nothing of the photo on it."""
+        other = copy.copy(self)
+        gaussians = replace(self.lifted.gaussians, colors=np.asarray(colors, np.float32))
+        other.lifted = replace(self.lifted, gaussians=gaussians)
+        # The photo's part ends where the motion stretches it too much: here everywhere.
+        other.zoom = frozen(np.full(len(self), ENDLESS))
+        other.is_textured = False
+        blocks = self.blocks.copy()
+        table = np.zeros((blocks.shape[0] * LANES, 3))
+        table[: len(self)] = gaussians.colors
+        blocks[:, COLOUR:] = table.reshape(-1, LANES, 3).transpose(0, 2, 1)
+        blocks[:, ZOOM] = ENDLESS
+        other.blocks = frozen(blocks)
+        return other
 
-    def __init__(self, lifted: LiftedObject, camera: Camera) -> None:
-        """`camera` is the photo's."""
-        gaussians = lifted.gaussians
-        self._rotation_scale = lifted.world_from_object[:3, :3]
-        self._translation = lifted.world_from_object[:3, 3]
-        linear = self._rotation_scale
-        self._covariances = frozen(linear @ gaussians.covariances() @ linear.T)
-        means = lifted.world_points(gaussians.means.astype(np.float64))
-        jacobians = projection_jacobians(means, camera.focal)
-        self._pictures = frozen(jacobians @ self._covariances)
-        normals = gaussians.normals.astype(np.float64) @ linear.T
-        self._normals = frozen(normals / np.linalg.norm(normals, axis=1, keepdims=True))
-        self._cosines = frozen(-(self._normals * means).sum(1) / np.linalg.norm(means, axis=1))
-        self._zoom = frozen(camera.focal / means[:, 2])
-        self._lifted = lifted
-        self._identity = frozen(np.broadcast_to(np.eye(3), (len(means), 3, 3)))
-        self._spacing = lifted.spacing * lifted.scale  # world units
-        self._spacing_px = self._spacing * float(np.median(self._zoom))
+    @cached_property
+    def covariances(self) -> F64:
+        """Sigma (N, 3, 3), world."""
+        linear = self.world_from_object[:3, :3]
+        return frozen(linear @ self.lifted.gaussians.covariances() @ linear.T)
 
-    def rest(self, placement: np.ndarray) -> PosedSplats:
-        """The undeformed object after the world motion `placement` (4, 4)."""
-        means = self._lifted.gaussians.means.astype(np.float64)
-        return self.pose(Skinned(means, self._identity), placement)
+    @cached_property
+    def pictures(self) -> F64:
+        """J0 Sigma (N, 2, 3): covariance of the rest picture, px, with the rest world."""
+        return frozen(self._jacobians @ self.covariances)
 
-    def pose(self, skinned: Skinned, placement: np.ndarray) -> PosedSplats:
-        """`skinned` in the object frame, then the world motion `placement` (4, 4)."""
-        world = self._rotation_scale
-        motion = placement[:3, :3]
-        texture, gaussians = self._lifted.texture, self._lifted.gaussians
-        scale = float(np.cbrt(np.linalg.det(motion)))
-        before, offset = motion @ world, motion @ self._translation + placement[:3, 3]
-        means, linears = np.empty(skinned.points.shape), np.empty(skinned.linear.shape)
-        inputs: tuple[Any, ...] = (
-            frozen(skinned.points), frozen(skinned.linear), frozen(before), frozen(offset),
-            frozen(np.linalg.inv(world)), means, linears,
-        )  # fmt: skip
-        in_threads(lambda first, last: _move(first, last, *inputs), len(means))
-        return PosedSplats(
-            means=means,
-            linear=linears,
-            rest_covariances=self._covariances,
-            rest_pictures=self._pictures,
-            normals=self._normals,
-            rest_cosines=self._cosines,
-            u0=texture.u0,
-            visibility=texture.visibility,
-            solidity=texture.solidity,
-            colors=gaussians.colors,
-            opacities=gaussians.opacities,
-            gap=SURFACE_GAP * self._spacing * scale,
-            texture_gap=TEXTURE_GAP * self._spacing_px,
-            rest_zoom=self._zoom,
-        )
+    @cached_property
+    def normals(self) -> F64:
+        """(N, 3) outward, world, unit."""
+        normals = self.lifted.gaussians.normals.astype(np.float64)
+        normals = normals @ self.world_from_object[:3, :3].T
+        return frozen(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+    @cached_property
+    def cosines(self) -> F64:
+        """(N,) of the normal with the direction to the camera."""
+        world = self.lifted.world_points(self.means)
+        return frozen(-(self.normals * world).sum(1) / np.linalg.norm(world, axis=1))
+
+    @cached_property
+    def blocks(self) -> F64:
+        """(blocks, REST_ROWS, LANES): 64 Gaussians side by side, in the object's frame.
+
+        As `projection` reads them, for vector instructions; the rest of the last block is 0.
+        """
+        gaussians, texture = self.lifted.gaussians, self.lifted.texture
+        covariances = gaussians.covariances()
+        pictures = self._jacobians @ self.world_from_object[:3, :3] @ covariances
+        rows = [
+            self.means, covariances[:, 0], covariances[:, 1, 1:], covariances[:, 2, 2:],
+            pictures[:, 0], pictures[:, 1], gaussians.normals, texture.u0,
+            texture.visibility[:, None], texture.solidity[:, None], gaussians.opacities[:, None],
+            self.zoom[:, None], self.cosines[:, None], gaussians.colors,
+        ]  # fmt: skip
+        count = -(-len(self) // LANES)
+        table = np.zeros((count * LANES, REST_ROWS))
+        table[: len(self)] = np.hstack(rows)
+        return frozen(table.reshape(count, LANES, REST_ROWS).transpose(0, 2, 1))
 
 
-@numba.njit(cache=True, nogil=True)
-def _move(first, last, points, linear, before, offset, after, means_out, linear_out):
-    """Rows first..last: means = before x + offset, linear = before F after."""
-    half = np.empty((3, 3))
-    for i in range(first, last):
-        for a in range(3):
-            mean = offset[a]
-            for b in range(3):
-                mean += before[a, b] * points[i, b]
-                half[a, b] = (
-                    before[a, 0] * linear[i, 0, b]
-                    + before[a, 1] * linear[i, 1, b]
-                    + before[a, 2] * linear[i, 2, b]
-                )
-            means_out[i, a] = mean
-        for a in range(3):
-            for b in range(3):
-                linear_out[i, a, b] = (
-                    half[a, 0] * after[0, b] + half[a, 1] * after[1, b] + half[a, 2] * after[2, b]
-                )
+@dataclass(frozen=True, eq=False)
+class PosedSplats:
+    """An object's Gaussians after the edit, with what each carries of the photo."""
+
+    rest: RestSplats
+    motion: Skin | Skinned | None  # in the object's frame; None: as they were lifted
+    placement: F64  # (4, 4) world motion after it
+
+    def __len__(self) -> int:
+        return len(self.rest)
+
+    def painted(self, colors: np.ndarray) -> PosedSplats:
+        """The same in plain `colors` (N, 3), see `RestSplats.painted`."""
+        return replace(self, rest=self.rest.painted(colors))
+
+    @property
+    def scale(self) -> float:
+        """How much the placement enlarges."""
+        return float(np.cbrt(np.linalg.det(self.placement[:3, :3])))
+
+    @property
+    def gap(self) -> float:
+        """World units, see SURFACE_GAP."""
+        return SURFACE_GAP * self.rest.spacing * self.scale
+
+    @property
+    def texture_gap(self) -> float:
+        """Px of the photo, see TEXTURE_GAP."""
+        return TEXTURE_GAP * self.rest.spacing_px
+
+    @property
+    def world_from_object(self) -> F64:
+        """(4, 4) where the deformed object stands."""
+        return self.placement @ self.rest.world_from_object
+
+    @cached_property
+    def skinned(self) -> Skinned:
+        """The deformation alone, object frame."""
+        if isinstance(self.motion, Skin):
+            return self.motion.run()
+        if self.motion is None:
+            turns = np.broadcast_to(np.eye(3), (len(self), 3, 3))
+            return Skinned(self.rest.means, turns)
+        return self.motion
+
+    @cached_property
+    def means(self) -> F64:
+        """(N, 3) world."""
+        matrix = self.world_from_object
+        return self.skinned.points @ matrix[:3, :3].T + matrix[:3, 3]
+
+    @cached_property
+    def linear(self) -> F64:
+        """F (N, 3, 3): motion of the surroundings of each mean, world from rest world."""
+        world = self.rest.world_from_object[:3, :3]
+        return self.world_from_object[:3, :3] @ self.skinned.linear @ np.linalg.inv(world)
+
+    @cached_property
+    def middle_depth(self) -> float:
+        """World units: median depth of the control points, or of the Gaussians without a rig."""
+        points = self.motion.motion.points if isinstance(self.motion, Skin) else self.skinned.points
+        matrix = self.world_from_object
+        return float(np.median(points @ matrix[2, :3] + matrix[2, 3]))
 
 
 def projection_jacobians(points: np.ndarray, focal: float) -> F64:
@@ -132,26 +190,8 @@ def projection_jacobians(points: np.ndarray, focal: float) -> F64:
     return jacobians
 
 
-@dataclass(frozen=True, eq=False)
-class TextureLevels:
-    """The object's straight colours and alpha, with halved copies for minification."""
-
-    levels: tuple[F32, ...]  # each (h, w, 4), level l halved l times
-    left: float  # px in the photo, corner of the crop
-    top: float
-
-
-def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> TextureLevels:
-    """Texture from straight `foreground` (h, w, 3) in [0, 1] and `alpha` (h, w).
-
-    `left`, `top`: px in the photo of the crop's corner, which may lie outside it.
-    """
-    level = np.dstack([foreground, alpha]).astype(np.float32)
-    levels = [level]
-    while min(level.shape[:2]) >= 4 and len(levels) < 8:
-        height, width = level.shape[:2]
-        padded = cv2.copyMakeBorder(level, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
-        size = (padded.shape[1] // 2, padded.shape[0] // 2)
-        level = cv2.resize(padded, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-        levels.append(level)
-    return TextureLevels(tuple(frozen(v) for v in levels), left, top)
+def view_limits(camera: Camera) -> tuple[float, float]:
+    """|x / z| and |y / z| of the directions in which `camera` sees at most, and a little more."""
+    across = max(camera.cx, camera.width - camera.cx)
+    down = max(camera.cy, camera.height - camera.cy)
+    return BEYOND * across / camera.focal, BEYOND * down / camera.focal

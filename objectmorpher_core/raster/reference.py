@@ -1,21 +1,28 @@
 """The specification of the picture, slow and clear; every other renderer is compared with it.
 
-Surface splatting of photo-textured Gaussians (Zwicker et al. 2001 and 2002; DESIGN section 3):
-
-1. Each Gaussian is projected (EWA). Its kernel at a pixel is k = o f (exp(-q/2) - exp(-7/2)),
-   q the squared Mahalanobis distance, f its facing weight, o its opacity.
+1. Each Gaussian is projected (EWA, Zwicker et al. 2002). Its alpha on a pixel is
+   w (exp(-q/2) - tail), q the squared Mahalanobis distance and w its opacity, times the facing
+   weight of a surface; `rules.SPLATTINGS` says what differs between kinds of assets: the screen
+   filter, the tail, the least and most alpha.
 2. From the same covariances follows the affine map that says which point of the photo it shows
-   at a pixel: u0 + A d, A = J0 Sigma F^T J1^T (J1 F Sigma F^T J1^T)^-1.
-3. Along a pixel, from front to back, samples that agree in depth and in what they show of the
-   photo form one layer. Within a layer the *points of the photo* are averaged, and the photo is
-   then looked up once: neighbours differ by a fraction of a pixel in where they look, and a mean
-   of positions stays sharp where a mean of colours would blur. Colours of what the photo does
-   not show are averaged as colours.
-4. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
+   at a pixel: u0 + A d, A = J0 Sigma F^T J1^T (J1 F Sigma F^T J1^T)^-1 (DESIGN section 3).
+3. Gaussians that show nothing of the photo, and are no surface, are composited one by one, front
+   to back by the depth of their means, premultiplied: 3D Gaussian splatting.
+4. All others are put together in layers, pixel by pixel (surface splatting, Zwicker et al. 2001).
+   A layer begins at its *front*: the nearest sample that is no mere tail and not in a layer
+   before. What agrees with the front in depth and in what it shows of the photo belongs to it;
+   membership fades, so that no sample jumps from layer to layer. Nothing depends on the order in
+   which Gaussians come, and nothing has to be sorted. The last layer takes what is left.
+5. Within a layer the *points of the photo* are averaged, and the photo is then looked up once:
+   neighbours differ by a fraction of a pixel in where they look, and a mean of positions stays
+   sharp where a mean of colours would blur. Colours of what the photo does not show are averaged
+   as colours.
+6. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
    towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
-   by the sum's own gradient.
-5. Layers are composited front to back, premultiplied. Where two layers show the same point of
-   the photo they are one surface that was split, and their coverage adds up under one matte.
+   by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets).
+7. Layers are composited front to back, premultiplied. Where two successive layers show the same
+   point of the photo they are one surface that was split, and their coverage adds up under one
+   matte.
 """
 
 from __future__ import annotations
@@ -26,8 +33,11 @@ import numpy as np
 
 from ..arrays import F32, F64
 from ..camera import Camera
-from .posed import PosedSplats, TextureLevels, projection_jacobians
-from .rules import RULES
+from .posed import PosedSplats, projection_jacobians, view_limits
+from .rules import LAYERS, RULES, Splatting
+from .texture import TextureLevels, sample_texture
+
+MEDIAN = 0.5  # of alpha: where a cloud without surface is
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +46,9 @@ class Picture3D:
 
     color: F32  # (h, w, 3) sRGB in [0, 1], premultiplied
     alpha: F32  # (h, w)
-    depth: F32  # (h, w) world units, of the front layer; inf where there is none
+    depth: F32  # (h, w) world units, of the first visible layer; inf where there is none
     from_photo: F32  # (h, w) share of the pixel that shows the photo at its own pixels' detail
-    shift: F32  # (h, w, 2) photo px from where the pixel is to where it looks, front layer
+    shift: F32  # (h, w, 2) photo px from where the pixel is to where it looks, the same layer
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +57,15 @@ class Projected:
 
     centre: F64  # (N, 2) view px
     conic: F64  # (N, 3) inverse of the filtered screen covariance: xx, xy, yy
-    extent: F64  # (N, 2) view px, half-size of the box outside which the kernel is 0
+    extent: F64  # (N, 2) view px, half-size of the box outside which alpha is 0
     depth: F64  # (N,) world units
     slope: F64  # (N, 2) depth per view px, within the Gaussian
     shift: F64  # (N, 2) photo px: u0 minus the photo point at `centre`
     shift_slope: F64  # (N, 2, 2) per view px: A minus that of the unmoved photo
-    lod: F64  # (N,) log2 of photo px per view px
-    photo: F64  # (N,) kernel weight of the photo part
-    body: F64  # (N,) kernel weight of the rest
+    magnified: F64  # (N,) photo px per view px, the larger
+    weight: F64  # (N,) alpha's, see step 1
+    photo: F64  # (N,) share of alpha that shows the photo
+    body: F64  # (N,) share that shows the Gaussian's own colour
     matted: F64  # (N,) how much the matte's edge is to be trusted
     solidity: F64  # (N,) alpha of the photo part where it is not
     seen: F64  # (N,) 1 = the photo part was visible in the photo
@@ -63,43 +74,47 @@ class Projected:
 
 def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projected:
     """Step 1 and 2. `camera` is the view's, `photo_camera` the photo's."""
+    rest, kind = splats.rest, splats.rest.splatting
+    texture, gaussians = rest.lifted.texture, rest.lifted.gaussians
     near = RULES.near * splats.gap
-    index = np.flatnonzero((splats.means[:, 2] > near) & np.isfinite(splats.means).all(1))
+    is_there = (splats.means[:, 2] > near) & np.isfinite(splats.means).all(1)
+    index = np.flatnonzero(is_there & np.isfinite(splats.linear).all((1, 2)))
     means, motion = splats.means[index], splats.linear[index]
-    jacobian = projection_jacobians(means, camera.focal)
-    rest = splats.rest_covariances[index]
-    world = motion @ rest @ motion.transpose(0, 2, 1)
+    jacobian = projection_jacobians(_flattened(means, photo_camera, kind), camera.focal)
+    world = motion @ rest.covariances[index] @ motion.transpose(0, 2, 1)
     screen = jacobian @ world @ jacobian.transpose(0, 2, 1)
     ridge = RULES.ridge * np.trace(screen, axis1=1, axis2=2) + 1e-12
     inverse = np.linalg.inv(screen + ridge[:, None, None] * np.eye(2))
-    pictures = splats.rest_pictures[index]
-    a = pictures @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
-    filtered = screen + RULES.filter * np.eye(2)
-    conic = np.linalg.inv(filtered).astype(np.float64)
-    # The filter spreads a small Gaussian over more pixels: it must not gain weight by that.
-    compensation = np.sqrt(np.linalg.det(screen).clip(0) / np.linalg.det(filtered))
+    a = rest.pictures[index] @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
+    filtered = screen + kind.filter * np.eye(2)
+    conic = np.linalg.inv(filtered)
+    # Where the filter spreads a small Gaussian over more pixels, it must not gain weight by that.
+    larger = np.sqrt(np.linalg.det(screen).clip(0) / np.linalg.det(filtered))
+    compensation = larger if kind.is_compensated else np.ones(len(index))
     singular = np.linalg.svd(a, compute_uv=False)
     volume = np.cbrt(np.abs(np.linalg.det(motion)))
-    zoom = camera.focal / means[:, 2] / splats.rest_zoom[index]
+    zoom = camera.focal / means[:, 2] / rest.zoom[index]
     stretch = singular[:, 1] * zoom * volume
     carried = _ramp(stretch, RULES.streak_end, RULES.streak_start)
-    seen = splats.visibility[index].astype(np.float64)
-    cofactor = np.linalg.inv(motion).transpose(0, 2, 1)
-    normals = (cofactor @ splats.normals[index][:, :, None])[:, :, 0]
-    towards = -means
-    cosine = (normals * towards).sum(1) / np.maximum(
-        np.linalg.norm(normals, axis=1) * np.linalg.norm(towards, axis=1), 1e-30
-    )
-    solidity = splats.solidity[index].astype(np.float64)
-    ramp = RULES.facing_ramp
-    front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
-    brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
-    facing = solidity * front + (1 - solidity) * brim
-    weight = splats.opacities[index] * facing * compensation
+    seen = texture.visibility[index].astype(np.float64)
+    cosine = _cosines(rest.normals[index], motion, means)
+    solidity = texture.solidity[index].astype(np.float64)
+    photo, body = carried, (1 - carried) * solidity
+    facing = np.ones(len(index))
+    if kind.is_surface:
+        ramp = RULES.facing_ramp
+        front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
+        brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
+        facing = solidity * front + (1 - solidity) * brim
+    else:
+        photo, body = seen * carried, 1 - seen * carried
+        seen = np.ones(len(index))
+    weight = gaussians.opacities[index] * facing * compensation
     centre = camera.project(means)
     ratio = photo_camera.focal / camera.focal  # photo px per view px
     unmoved = (centre - [camera.cx, camera.cy]) * ratio + [photo_camera.cx, photo_camera.cy]
-    extent = np.sqrt(RULES.cutoff * np.stack([filtered[:, 0, 0], filtered[:, 1, 1]], axis=1))
+    ends = -2 * np.log((kind.tail + kind.least / np.maximum(weight, 1e-30)).clip(1e-30, 1))
+    extent = np.sqrt(ends[:, None] * np.stack([filtered[:, 0, 0], filtered[:, 1, 1]], axis=1))
     covariance_z = (world @ jacobian.transpose(0, 2, 1))[:, 2]  # (N, 2) depth against screen
     projected = Projected(
         centre=centre,
@@ -107,100 +122,216 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         extent=extent,
         depth=means[:, 2],
         slope=(covariance_z[:, None] @ inverse)[:, 0],
-        shift=splats.u0[index] - unmoved,
+        shift=texture.u0[index] - unmoved,
         shift_slope=a - ratio * np.eye(2),
-        lod=np.log2(np.maximum(singular[:, 0], 1.0)),
-        photo=weight * carried,
-        body=weight * (1 - carried) * solidity,
+        magnified=singular[:, 0],
+        weight=weight,
+        photo=photo,
+        body=body,
         matted=_ramp(stretch, RULES.matte_end, RULES.matte_start)
-        * _ramp(cosine - splats.rest_cosines[index], RULES.turned_end, RULES.turned_start),
-        solidity=solidity,
+        * _ramp(cosine - rest.cosines[index], RULES.turned_end, RULES.turned_start),
+        solidity=solidity if kind.is_surface else np.ones(len(index)),
         seen=seen,
-        color=splats.colors[index].astype(np.float64),
+        color=gaussians.colors[index].astype(np.float64),
     )
-    order = np.argsort(projected.depth, kind="stable")
+    order = np.argsort(projected.depth.astype(np.float32), kind="stable")
     return Projected(**{name: getattr(projected, name)[order] for name in vars(projected)})
 
 
-class _Layer:
-    """Sums over the samples of the layer that is being collected, per pixel."""
+def _flattened(means: F64, photo_camera: Camera, kind: Splatting) -> F64:
+    """Where the Jacobians are taken: for clouds not far beyond the photo's edge, as in 3DGS.
 
-    def __init__(self, height: int, width: int) -> None:
-        self.total = np.zeros((height, width))  # kernel sum
-        self.body = np.zeros((height, width))  # of it, what the photo does not give
-        self.slope = np.zeros((height, width, 2))  # gradient of `total`
-        self.body_slope = np.zeros((height, width, 2))
-        self.depth = np.zeros((height, width))
-        self.deepest = np.zeros((height, width))
-        self.shift = np.zeros((height, width, 2))
-        self.matted = np.zeros((height, width))
-        self.unmatted = np.zeros((height, width))  # solidity of the part that is not matted
-        self.lod = np.zeros((height, width))
-        self.seen = np.zeros((height, width))
-        self.color = np.zeros((height, width, 3))
+    There the projection is anything but affine, and would smear a large Gaussian over the picture.
+    """
+    if kind.is_surface:
+        return means
+    x, y = view_limits(photo_camera)
+    sides = np.clip(means[:, :2] / means[:, 2:], [-x, -y], [x, y])
+    return np.concatenate([sides * means[:, 2:], means[:, 2:]], axis=1)
+
+
+def _cosines(normals: F64, motion: F64, means: F64) -> F64:
+    """(N,) of the moved normals with the directions to the camera. Normals move by cofactors."""
+    cofactor = np.stack(
+        [np.cross(motion[:, (k + 1) % 3], motion[:, (k + 2) % 3]) for k in range(3)], axis=1
+    )
+    moved = np.sign(np.linalg.det(motion))[:, None] * (cofactor @ normals[:, :, None])[:, :, 0]
+    lengths = np.linalg.norm(moved, axis=1) * np.linalg.norm(means, axis=1)
+    return -(moved * means).sum(1) / np.maximum(lengths, 1e-30)
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """One Gaussian at the pixels of its box."""
+
+    window: tuple[slice, slice]
+    alpha: F64  # (h, w)
+    gradient: F64  # (h, w, 2) of alpha, per px
+    depth: F64  # (h, w)
+    shift: F64  # (h, w, 2)
+
+
+def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> _Samples | None:
+    """Gaussian `i` on the pixels that it may touch, None where there are none."""
+    kind = splats.rest.splatting
+    x0, y0 = np.floor(p.centre[i] - p.extent[i]).astype(int).clip(0, (camera.width, camera.height))
+    x1, y1 = np.ceil(p.centre[i] + p.extent[i]).astype(int).clip(0, (camera.width, camera.height))
+    if x0 >= x1 or y0 >= y1 or p.weight[i] * (p.photo[i] + p.body[i]) <= 0:
+        return None
+    dx, dy = np.meshgrid(
+        np.arange(x0, x1) + 0.5 - p.centre[i, 0], np.arange(y0, y1) + 0.5 - p.centre[i, 1]
+    )
+    xx, xy, yy = p.conic[i]
+    bell = np.exp(-0.5 * (xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy))
+    alpha = np.minimum(p.weight[i] * (bell - kind.tail), kind.most)
+    alpha = np.where((alpha > 0) & (alpha >= kind.least), alpha, 0.0)
+    gradient = -p.weight[i] * bell[..., None] * np.stack([xx * dx + xy * dy, xy * dx + yy * dy], -1)
+    depth = p.depth[i] + p.slope[i, 0] * dx + p.slope[i, 1] * dy
+    shift = p.shift[i] + np.stack([dx, dy], -1) @ p.shift_slope[i].T
+    window = (slice(y0, y1), slice(x0, x1))
+    return _Samples(window, alpha, np.where(alpha[..., None] > 0, gradient, 0), depth, shift)
 
 
 def render(
     splats: PosedSplats, texture: TextureLevels, camera: Camera, photo_camera: Camera
 ) -> Picture3D:
     """The object as `camera` sees it. `camera` gives the size of the picture."""
-    height, width = camera.height, camera.width
     p = project(splats, camera, photo_camera)
-    layer = _Layer(height, width)
-    out = _Composite(texture, camera, photo_camera)
-    for i in range(len(p.depth)):
-        x0, y0 = np.floor(p.centre[i] - p.extent[i]).astype(int).clip(0, (width, height))
-        x1, y1 = np.ceil(p.centre[i] + p.extent[i]).astype(int).clip(0, (width, height))
-        if x0 >= x1 or y0 >= y1 or p.photo[i] + p.body[i] <= 0:
-            continue
-        window = (slice(y0, y1), slice(x0, x1))
-        dx, dy = np.meshgrid(
-            np.arange(x0, x1) + 0.5 - p.centre[i, 0], np.arange(y0, y1) + 0.5 - p.centre[i, 1]
-        )
-        xx, xy, yy = p.conic[i]
-        q = xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy
-        bell = np.exp(-0.5 * q)
-        kernel = np.where(q < RULES.cutoff, bell - RULES.tail, 0.0)
-        hit = kernel > 0
-        gradient = -bell[..., None] * np.stack([xx * dx + xy * dy, xy * dx + yy * dy], -1)
-        depth = p.depth[i] + p.slope[i, 0] * dx + p.slope[i, 1] * dy
-        offset = np.stack([dx, dy], -1)
-        shift = p.shift[i] + offset @ p.shift_slope[i].T
-        total = layer.total[window]
-        photo = total - layer.body[window]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = depth - layer.deepest[window] > splats.gap
-            looks = np.linalg.norm(shift - layer.shift[window] / photo[..., None], axis=-1)
-        apart |= (photo > 0) & (p.photo[i] > 0) & (looks > splats.texture_gap)
-        closed = hit & (total > 0) & apart
-        if closed.any():
-            out.add(layer, window, closed)
-        kernel = np.where(hit, kernel, 0.0)
-        gradient = np.where(hit[..., None], gradient, 0.0)
-        both = p.photo[i] + p.body[i]
-        layer.total[window] += kernel * both
-        layer.body[window] += kernel * p.body[i]
-        layer.slope[window] += gradient * both
-        layer.body_slope[window] += gradient * p.body[i]
-        layer.depth[window] += kernel * both * depth
-        deepest = layer.deepest[window]
-        layer.deepest[window] = np.where(hit, np.maximum(deepest, depth), deepest)
-        layer.matted[window] += kernel * p.photo[i] * p.matted[i]
-        layer.unmatted[window] += kernel * p.photo[i] * (1 - p.matted[i]) * p.solidity[i]
-        layer.shift[window] += (kernel * p.photo[i])[..., None] * shift
-        layer.lod[window] += kernel * p.photo[i] * p.lod[i]
-        layer.seen[window] += kernel * p.photo[i] * p.seen[i]
-        layer.color[window] += (kernel * p.body[i])[..., None] * p.color[i]
-    everything = (slice(0, height), slice(0, width))
-    out.add(layer, everything, layer.total > 0)
+    samples = [_sampled(p, i, splats, camera) for i in range(len(p.depth))]
+    there = [(i, s) for i, s in enumerate(samples) if s is not None]
+    if not splats.rest.splatting.is_surface and not splats.rest.is_textured:
+        return _composite_one_by_one(p, there, camera)
+    out = _Composite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
+    fronts: list[_Front] = []
+    for layer in range(LAYERS):
+        shares = {i: _remaining(p, i, s, fronts, splats) for i, s in there}
+        front = _find_front(p, there, shares, camera)
+        if np.isinf(front.depth).all():
+            break
+        sums = _Sums(camera.height, camera.width)
+        for i, s in there:
+            member = shares[i] * (front.depth[s.window] < np.inf)
+            if layer < LAYERS - 1:
+                member = member * _membership(p, i, s, front, splats)
+            sums.add(p, i, s, member)
+        out.add(sums)
+        fronts.append(front)
     return out.picture()
 
 
-class _Composite:
-    """Closed layers over one another, front to back (steps 4 and 5)."""
+def _composite_one_by_one(
+    p: Projected, there: list[tuple[int, _Samples]], camera: Camera
+) -> Picture3D:
+    """Step 3. The depth is that of the sample with which alpha reaches a half, else the mean."""
+    shape = (camera.height, camera.width)
+    color, alpha = np.zeros((*shape, 3)), np.zeros(shape)
+    median, mean = np.full(shape, np.inf), np.zeros(shape)
+    for i, s in there:
+        through = (1 - alpha[s.window]) * s.alpha
+        color[s.window] += through[..., None] * p.color[i]
+        mean[s.window] += through * s.depth
+        alpha[s.window] += through
+        is_half = np.isinf(median[s.window]) & (alpha[s.window] >= MEDIAN)
+        median[s.window] = np.where(is_half, s.depth, median[s.window])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fallback = np.where(alpha > 0, mean / alpha, np.inf)
+    depth = np.where(np.isinf(median), fallback, median)
+    nothing = np.zeros(shape)
+    arrays = (color, alpha, depth, nothing, np.dstack([nothing, nothing]))
+    return Picture3D(*(a.astype(np.float32) for a in arrays))
 
-    def __init__(self, texture: TextureLevels, camera: Camera, photo_camera: Camera) -> None:
+
+@dataclass(frozen=True, eq=False)
+class _Front:
+    """Where a layer begins, pixel by pixel."""
+
+    depth: F64  # (h, w), inf where there is no further layer
+    shift: F64  # (h, w, 2)
+    is_photo: np.ndarray  # (h, w) whether it shows the photo
+
+
+def _find_front(
+    p: Projected, there: list[tuple[int, _Samples]], shares: dict[int, F64], camera: Camera
+) -> _Front:
+    """The nearest samples of those that are left: `shares` of each, (h, w) of its box."""
+    shape = (camera.height, camera.width)
+    depth, shift = np.full(shape, np.inf), np.zeros((*shape, 2))
+    is_photo = np.zeros(shape, bool)
+    for i, s in there:
+        alpha = shares[i] * s.alpha * (p.photo[i] + p.body[i])
+        nearer = (alpha >= RULES.least_front) & (s.depth < depth[s.window])
+        depth[s.window] = np.where(nearer, s.depth, depth[s.window])
+        shift[s.window] = np.where(nearer[..., None], s.shift, shift[s.window])
+        is_photo[s.window] = np.where(nearer, p.photo[i] > 0, is_photo[s.window])
+    return _Front(depth, shift, is_photo)
+
+
+def _membership(p: Projected, i: int, s: _Samples, front: _Front, splats: PosedSplats) -> F64:
+    """(h, w) of a box: how much of a sample belongs to the layer of `front`."""
+    depth, shift = front.depth[s.window], front.shift[s.window]
+    there = np.isfinite(depth)
+    away = np.where(there, np.abs(s.depth - np.where(there, depth, 0)) / splats.gap, 1e9)
+    if p.photo[i] > 0:
+        looks = np.linalg.norm(s.shift - shift, axis=-1) / splats.texture_gap
+        away = np.where(front.is_photo[s.window], np.maximum(away, looks), away)
+    return _ramp(away**2, RULES.fade**2, 1.0)
+
+
+def _remaining(p: Projected, i: int, s: _Samples, fronts: list[_Front], splats: PosedSplats) -> F64:
+    """(h, w) of a box: the share of a sample that belongs to none of the layers so far."""
+    left = np.ones(s.alpha.shape)
+    for front in fronts:
+        left = left * (1 - _membership(p, i, s, front, splats))
+    return left
+
+
+class _Sums:
+    """Over the samples of one layer, per pixel."""
+
+    def __init__(self, height: int, width: int) -> None:
+        self.total = np.zeros((height, width))  # of alpha
+        self.body = np.zeros((height, width))  # of it, what the photo does not give
+        self.slope = np.zeros((height, width, 2))  # gradient of `total`
+        self.body_slope = np.zeros((height, width, 2))
+        self.clear = np.ones((height, width))  # product of 1 - alpha
+        self.body_clear = np.ones((height, width))
+        self.depth = np.zeros((height, width))
+        self.shift = np.zeros((height, width, 2))
+        self.matted = np.zeros((height, width))
+        self.unmatted = np.zeros((height, width))  # solidity of the part that is not matted
+        self.magnified = np.zeros((height, width))
+        self.seen = np.zeros((height, width))
+        self.color = np.zeros((height, width, 3))
+
+    def add(self, p: Projected, i: int, s: _Samples, member: F64) -> None:
+        """Adds a Gaussian's samples; `member` (h, w) is how much of them belongs here."""
+        at, alpha = s.window, member * s.alpha
+        gradient = member[..., None] * s.gradient
+        photo, body = alpha * p.photo[i], alpha * p.body[i]
+        both = p.photo[i] + p.body[i]
+        self.total[at] += alpha * both
+        self.body[at] += body
+        self.slope[at] += gradient * both
+        self.body_slope[at] += gradient * p.body[i]
+        self.clear[at] *= 1 - np.minimum(alpha * both, 1)
+        self.body_clear[at] *= 1 - np.minimum(body, 1)
+        self.depth[at] += alpha * both * s.depth
+        self.shift[at] += photo[..., None] * s.shift
+        self.matted[at] += photo * p.matted[i]
+        self.unmatted[at] += photo * (1 - p.matted[i]) * p.solidity[i]
+        self.magnified[at] += photo * max(p.magnified[i] / RULES.sharp, 1.0)
+        self.seen[at] += photo * p.seen[i]
+        self.color[at] += body[..., None] * p.color[i]
+
+
+class _Composite:
+    """Layers over one another, front to back (steps 5 to 7)."""
+
+    def __init__(
+        self, texture: TextureLevels, camera: Camera, photo_camera: Camera, is_surface: bool
+    ) -> None:
         self.texture, self.camera, self.photo_camera = texture, camera, photo_camera
+        self.is_surface = is_surface
         shape = (camera.height, camera.width)
         self.color = np.zeros((*shape, 3))
         self.alpha = np.zeros(shape)
@@ -211,23 +342,27 @@ class _Composite:
         self.last_through = np.ones(shape)  # transmittance before it
         self.last_whole = np.zeros(shape)  # its coverage
 
-    def add(self, layer: _Layer, window: tuple[slice, slice], closed: np.ndarray) -> None:
-        """Composites the layer at the pixels `closed` of `window` and empties it there."""
-        rows, columns = np.nonzero(closed)
-        rows, columns = rows + window[0].start, columns + window[1].start
-        at = (rows, columns)
+    def add(self, layer: _Sums) -> None:
+        """Composites the next layer."""
+        at = np.nonzero(layer.total > 0)
         total, body = layer.total[at], layer.body[at]
         photo = np.maximum(total - body, 0)
+        is_photo = photo > 1e-6 * total
         weight = np.maximum(photo, 1e-30)
         shift = layer.shift[at] / weight[:, None]
         ratio = self.photo_camera.focal / self.camera.focal
-        xy = np.stack([columns, rows], 1) + 0.5 - [self.camera.cx, self.camera.cy]
+        xy = np.stack([at[1], at[0]], 1) + 0.5 - [self.camera.cx, self.camera.cy]
         look = xy * ratio + [self.photo_camera.cx, self.photo_camera.cy] + shift
-        sample = sample_texture(self.texture, look, layer.lod[at] / weight)
+        look = np.where(is_photo[:, None], look, 0)
+        lod = np.log2(np.maximum(layer.magnified[at] / weight, 1.0))
+        sample = sample_texture(self.texture, look, lod)
         matte = (sample[:, 3] * layer.matted[at] + layer.unmatted[at]) / weight
-        matte = np.where(photo > 1e-9 * total, matte, 0.0)
-        whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
-        solid = _coverage(body, np.linalg.norm(layer.body_slope[at], axis=1))
+        matte = np.where(is_photo, matte, 0.0)
+        if self.is_surface:
+            whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
+            solid = _coverage(body, np.linalg.norm(layer.body_slope[at], axis=1))
+        else:
+            whole, solid = 1 - layer.clear[at], 1 - layer.body_clear[at]
         alpha = matte * whole + (1 - matte) * solid
         shown = photo * matte
         mixed = (shown[:, None] * sample[:, :3] + layer.color[at]) / np.maximum(
@@ -238,20 +373,19 @@ class _Composite:
         seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
         with np.errstate(invalid="ignore"):
             same = np.linalg.norm(shift - self.last_shift[at], axis=1) < RULES.same_point
+        same &= is_photo
         clear = 1 - self.alpha[at]
         before = np.where(same, self.last_through[at], clear)
         through = before * np.where(same, 1 - self.last_whole[at], 1) * alpha
         self.last_through[at] = before
         self.last_whole[at] = np.where(same, 1 - (1 - self.last_whole[at]) * (1 - whole), whole)
-        self.last_shift[at] = np.where((photo > 1e-9 * total)[:, None], shift, np.inf)
-        first = (self.depth[at] == np.inf) & (alpha > 0)
+        self.last_shift[at] = np.where(is_photo[:, None], shift, np.inf)
+        first = np.isinf(self.depth[at]) & (alpha > RULES.visible)
         self.depth[at] = np.where(first, layer.depth[at] / total, self.depth[at])
-        self.shift[at] = np.where(first[:, None], shift, self.shift[at])
+        self.shift[at] = np.where((first & is_photo)[:, None], shift, self.shift[at])
         self.color[at] += through[:, None] * mixed
         self.from_photo[at] += through * seen
         self.alpha[at] += through
-        for array in vars(layer).values():
-            array[at] = 0.0
 
     def picture(self) -> Picture3D:
         arrays = (self.color, self.alpha, self.depth, self.from_photo, self.shift)
@@ -266,54 +400,3 @@ def _ramp(value: np.ndarray, zero: float, one: float) -> np.ndarray:
 def _coverage(total: np.ndarray, slope: np.ndarray) -> np.ndarray:
     edge = (total - RULES.surface_level) / (RULES.edge_width * slope + 1e-6)
     return np.clip(0.5 + edge, 0, 1)
-
-
-def sample_texture(texture: TextureLevels, look: np.ndarray, lod: np.ndarray) -> np.ndarray:
-    """Straight colour and alpha (n, 4) at photo px (n, 2), filtered for `lod` (n,).
-
-    The two nearest levels are mixed; the full-size one is sampled bicubically (Catmull-Rom: it
-    returns a pixel's own value at its centre), halved ones bilinearly. Outside the crop alpha
-    is 0.
-    """
-    lod = np.clip(lod, 0, len(texture.levels) - 1)
-    lower = np.floor(lod).astype(int)
-    result = np.zeros((len(look), 4))
-    for level, image in enumerate(texture.levels):
-        for use, mix in ((lower == level, 1 - (lod - lower)), (lower + 1 == level, lod - lower)):
-            at = np.flatnonzero(use & (mix > 0))
-            if len(at):
-                xy = (look[at] - [texture.left, texture.top]) / 2**level - 0.5
-                values = _cubic(image, xy) if level == 0 else _linear(image, xy)
-                result[at] += mix[at, None] * values
-    return result
-
-
-def _linear(image: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    return _taps(image, xy, (0, 1), lambda t: [1 - t, t])
-
-
-def _cubic(image: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    def weights(t: np.ndarray) -> list[np.ndarray]:
-        return [
-            ((-0.5 * t + 1.0) * t - 0.5) * t,
-            (1.5 * t - 2.5) * t * t + 1.0,
-            ((-1.5 * t + 2.0) * t + 0.5) * t,
-            (0.5 * t - 0.5) * t * t,
-        ]
-
-    return np.clip(_taps(image, xy, (-1, 0, 1, 2), weights), 0, 1)
-
-
-def _taps(image, xy, offsets, weights):
-    height, width = image.shape[:2]
-    base = np.floor(xy).astype(int)
-    wx, wy = weights(xy[:, 0] - base[:, 0]), weights(xy[:, 1] - base[:, 1])
-    result = np.zeros((len(xy), 4))
-    for oy, a in zip(offsets, wy, strict=True):
-        for ox, b in zip(offsets, wx, strict=True):
-            j, i = base[:, 0] + ox, base[:, 1] + oy
-            is_inside = (j >= 0) & (j < width) & (i >= 0) & (i < height)
-            value = image[i.clip(0, height - 1), j.clip(0, width - 1)].astype(np.float64)
-            value[~is_inside, 3] = 0.0
-            result += (a * b)[:, None] * value
-    return result

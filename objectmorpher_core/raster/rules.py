@@ -13,17 +13,45 @@ from typing import NamedTuple
 
 import numba
 
-CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian is 0
+CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian of a surface is 0
+LAYERS = 4  # of a pixel; all that is left belongs to the last one
+
+
+class Splatting(NamedTuple):
+    """How the Gaussians of an asset become a picture: they look right as they were made.
+
+    A Gaussian's alpha on a pixel is min(most, weight (exp(-q/2) - tail)), and 0 below `least`.
+    """
+
+    is_surface: bool  # photo-textured surface: coverage from the kernels' sum; else 1 - prod(1 - a)
+    filter: float  # px^2, added to the screen covariance: the screen's own low-pass
+    is_compensated: bool  # whether a Gaussian that the filter enlarges loses opacity by it
+    tail: float = 0.0  # subtracted: the kernel ends without a step
+    most: float = 0.99  # alpha
+    least: float = 1 / 255  # alpha
+
+
+SPLATTINGS = {
+    # The photo is looked up, so a filter blurs nothing; this much keeps Gaussians that are smaller
+    # than a pixel from falling between pixels.
+    "surface": Splatting(True, 0.15, True, math.exp(-CUTOFF / 2), 1e30, 0.0),
+    # Mip-Splatting (Yu et al. 2024), with which TRELLIS was trained
+    "mip": Splatting(False, 0.1, True),
+    # 3D Gaussian Splatting (Kerbl et al. 2023)
+    "classic": Splatting(False, 0.3, False),
+}
 
 
 class Rules(NamedTuple):
     """Everything that is a number in the definition of the picture."""
 
-    cutoff: float = CUTOFF
-    tail: float = math.exp(-CUTOFF / 2)  # subtracted: the kernel ends without a step
-    filter: float = 0.15  # px^2 added to the screen covariance: none falls between pixels
     ridge: float = 1e-6  # x trace, added to the covariance before inversion
     near: float = 1e-3  # x the object's gap: nothing nearer to the camera is drawn
+
+    # A layer begins at the sample nearest to the camera whose alpha is at least this much. What
+    # lies within the gaps of it belongs to it; beyond, membership falls to 0 at `fade` x the gap.
+    least_front: float = 0.01
+    fade: float = 1.5
 
     # The kernels' sum is about 2 where the surface is whole (spacing 1, sigma 0.66).
     surface_level: float = 0.35  # kernel sum at which the surface ends
@@ -52,7 +80,13 @@ class Rules(NamedTuple):
     streak_start: float = 0.40
     streak_end: float = 0.18
 
+    # Photo px per view px up to which the full-size photo is looked up: what aliasing that brings
+    # cannot be seen, and halved copies would blur all that turns a little.
+    sharp: float = 1.19
+
     same_point: float = 1.0  # px of the photo: layers that look so close together are one surface
+    visible: float = 1 / 255  # alpha of the layer whose depth and shift a pixel has
+    opaque: float = 0.999  # alpha from which what lies behind is not looked at
 
 
 RULES = Rules()
@@ -67,7 +101,7 @@ def ramp(value, zero, one):
 
 @numba.njit(cache=True, nogil=True)
 def facing_weight(cosine, is_seen, solidity, rules):
-    """Weight of a Gaussian whose normal makes this cosine with the direction to the camera."""
+    """Weight of a surface's Gaussian whose normal makes this cosine with the way to the camera."""
     width = rules.facing_ramp
     front = min(max((cosine - width * (1.0 - is_seen)) / width + 1.0, 0.0), 1.0)
     brim = ramp(abs(cosine), rules.brim_end, rules.brim_start)

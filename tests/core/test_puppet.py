@@ -106,7 +106,7 @@ def test_exported_gaussians_are_the_bodys_where_they_are_drawn(scene, pose):
     splats = scene.puppet.posed(pose, place)
     assert len(gaussians) == body.sum()
     assert np.abs(gaussians.means - splats.means[body]).max() < 1e-5
-    expected = splats.linear @ splats.rest_covariances @ splats.linear.transpose(0, 2, 1)
+    expected = splats.linear @ splats.rest.covariances @ splats.linear.transpose(0, 2, 1)
     assert np.abs(gaussians.covariances() - expected[body]).max() < 1e-6
 
 

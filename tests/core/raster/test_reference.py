@@ -7,9 +7,8 @@ import pytest
 
 from objectmorpher_core.document import Placement
 from objectmorpher_core.raster import reference
-from objectmorpher_core.raster.posed import TextureLevels, build_levels
-from objectmorpher_core.raster.reference import sample_texture
 from objectmorpher_core.raster.rules import RULES, coverage, facing_weight, ramp
+from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes
 
 F32 = 1e-5

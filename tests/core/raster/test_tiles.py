@@ -11,10 +11,11 @@ import pytest
 
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document import PhotoTexture, Placement
 from objectmorpher_core.raster import reference, tiles
-from objectmorpher_core.raster.posed import PosedSplats, SplatPoser, TextureLevels, build_levels
+from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.reference import Picture3D
+from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from tests import shapes
 
 PIXEL = 2 / 255  # where a sample falls on the other side of a layer's limit by rounding
@@ -79,7 +80,7 @@ def _random_scene(seed: int) -> tuple[PosedSplats, TextureLevels]:
     lifted = replace(lifted, texture=texture, gaussians=gaussians)
     linear = np.eye(3) + rng.normal(size=(count, 3, 3)) * 0.4
     means = gaussians.means.astype(np.float64) + rng.normal(size=(count, 3)) * 0.02
-    splats = SplatPoser(lifted, shapes.camera()).pose(Skinned(means, linear), np.eye(4))
+    splats = PosedSplats(RestSplats(lifted, shapes.camera()), Skinned(means, linear), np.eye(4))
     noise = rng.random((120, 160, 4)).astype(np.float32)
     noise = cv2.GaussianBlur(noise, (0, 0), 2)
     noise[..., 3] = np.clip((noise[..., 3] - 0.4) * 5, 0, 1)
@@ -108,7 +109,7 @@ def test_tiles_equal_the_reference_on_a_bent_object(window):
     scene = shapes.scene("frame", 300)
     view = _views(scene)[window]
     placement = Placement(turn=(20.0, 30.0, 0.0)).matrix(scene.lifted, scene.camera)
-    splats = SplatPoser(scene.lifted, scene.camera).pose(_bent(scene), placement)
+    splats = PosedSplats(RestSplats(scene.lifted, scene.camera), _bent(scene), placement)
     largest, mean = _difference(
         tiles.render(splats, scene.texture, view, scene.camera),
         reference.render(splats, scene.texture, view, scene.camera),
@@ -135,10 +136,12 @@ def test_the_further_channels_agree_too(seed):
     camera = shapes.camera()
     fast = tiles.render(splats, texture, camera, camera)
     slow = reference.render(splats, texture, camera, camera)
-    seen = slow.alpha > 0.01
     assert np.abs(fast.from_photo - slow.from_photo).max() <= PIXEL
-    assert np.abs(fast.depth[seen] - slow.depth[seen]).max() < 1e-3  # world units, of a depth of 3
-    assert np.abs(fast.shift - slow.shift)[seen].max() < 0.02  # px
+    # At a few pixels the first layer is just visible, or just not.
+    same = np.isfinite(fast.depth) == np.isfinite(slow.depth)
+    same &= ~(np.abs(fast.depth - slow.depth) > 1e-4)  # world units, of a depth of 3
+    same &= np.abs(fast.shift - slow.shift).max(-1) < 0.02  # px
+    assert same.mean() > 0.999
 
 
 # ---- what holds of any picture --------------------------------------------------------------
@@ -154,7 +157,7 @@ def test_alpha_and_colour_stay_in_range(seed):
     assert picture.alpha.max() <= 1 + rounding
     assert (picture.color <= picture.alpha[..., None] + rounding).all(), "premultiplied"
     assert (picture.from_photo <= picture.alpha + rounding).all()
-    assert np.isfinite(picture.depth[picture.alpha > 0]).all()
+    assert np.isfinite(picture.depth[picture.alpha > 0.05]).all()
 
 
 def test_the_same_picture_twice_is_bit_equal():
@@ -179,22 +182,30 @@ def test_the_order_of_the_gaussians_does_not_matter():
     splats, texture = _random_scene(1)
     camera = shapes.camera()
     order = np.random.default_rng(0).permutation(len(splats))
-    mixed = replace(splats, **{
-        name: value[order] for name, value in vars(splats).items() if isinstance(value, np.ndarray)
-    })  # fmt: skip
+    mixed = _chosen(splats, order)
     one = tiles.render(splats, texture, camera, camera)
     two = tiles.render(mixed, texture, camera, camera)
     assert _difference(one, two)[0] < 1e-6
 
 
+def _chosen(splats: PosedSplats, index: np.ndarray) -> PosedSplats:
+    """The Gaussians at `index`."""
+    lifted = splats.rest.lifted
+    texture = PhotoTexture(
+        lifted.texture.u0[index], lifted.texture.visibility[index], lifted.texture.solidity[index]
+    )
+    lifted = replace(lifted, gaussians=lifted.gaussians.select(index), texture=texture)
+    moved = Skinned(splats.skinned.points[index], splats.skinned.linear[index])
+    return PosedSplats(RestSplats(lifted, shapes.camera()), moved, splats.placement)
+
+
 def _with(splats: PosedSplats, extra: np.ndarray, means: np.ndarray) -> PosedSplats:
-    """`splats` and copies of those at `extra`, the copies at `means`."""
-    more = {
-        name: np.concatenate([value, value[extra]])
-        for name, value in vars(splats).items() if isinstance(value, np.ndarray)
-    }  # fmt: skip
-    more["means"] = np.concatenate([splats.means, means])
-    return replace(splats, **more)
+    """`splats` and copies of those at `extra`, the copies at `means`, world."""
+    more = _chosen(splats, np.concatenate([np.arange(len(splats)), extra]))
+    object_from_world = np.linalg.inv(splats.world_from_object)
+    points = means @ object_from_world[:3, :3].T + object_from_world[:3, 3]
+    points = np.concatenate([splats.skinned.points, points])
+    return replace(more, motion=Skinned(points, more.skinned.linear))
 
 
 @pytest.mark.parametrize("z", [-3.0, 0.0, -1e-9, float("nan")])
@@ -241,7 +252,7 @@ def test_what_stands_in_front_hides_what_is_behind(is_red_nearer):
     lifted = replace(lifted, gaussians=flat)
     depths = (-0.5, 0.5) if is_red_nearer else (0.5, -0.5)
     means = np.array([[0.0, 0, depths[0]], [0.0, 0, depths[1]]])
-    splats = SplatPoser(lifted, camera).pose(
+    splats = PosedSplats(RestSplats(lifted, camera),
         Skinned(means, np.tile(np.eye(3), (2, 1, 1))), np.eye(4)
     )
     photo = np.zeros((120, 160, 3), np.float32)

@@ -1,0 +1,155 @@
+"""A tile's sums become pixels: steps 5 to 7 of `reference`, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from ..threads import FAST
+from . import tile_memory as m
+from .sampling import HALF, ONE, TWO, ZERO, sample, sample_inside
+
+TINY = np.float32(1e-30)
+LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows no photo
+NOWHERE = np.float32(1e18)
+INFINITE = np.float32(np.inf)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def composite_layer(
+    s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
+    rules, kind,
+):  # fmt: skip
+    """Puts the layer behind what is there already; whether more may follow."""
+    for k in range(m.ALL):
+        total = s[m.TOTAL + k]
+        shown = max(total - s[m.BODIED + k], ZERO)
+        is_photo = shown > LEAST_PHOTO * total
+        inverse = ONE / max(shown, TINY)
+        inverse = inverse if is_photo else ZERO
+        s[m.IS_PHOTO + k] = ONE if is_photo else ZERO
+        s[m.SHX + k] *= inverse
+        s[m.SHY + k] *= inverse
+        s[m.MAG + k] = ONE + s[m.MAG + k] * inverse
+        s[m.MATTES + k] = max(ONE - s[m.MATTES + k] * inverse, ZERO)  # not below 0 by rounding
+        s[m.SOLIDS + k] *= inverse
+        s[m.SEES + k] = max(ONE - s[m.SEES + k] * inverse, ZERO)
+    _look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top)
+    if kind.is_surface:
+        _cover(s, m.TOTAL, m.GX, m.GY, m.CLEAR, rules)
+        _cover(s, m.BODIED, m.BGX, m.BGY, m.BODY_CLEAR, rules)
+    visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
+    if layer == 0:
+        _put_first(s, visible, opaque)
+    else:
+        _put_behind(s, np.float32(rules.same_point * rules.same_point), visible, opaque)
+    rest = ZERO
+    for k in range(m.ALL):
+        rest = max(rest, s[m.OPEN + k] * s[m.LEFT + k])
+    return rest >= np.float32(rules.least_front)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top):
+    """What the photo shows where the layer looks."""
+    room = np.empty(16, np.float32)
+    ratio = photo[0] / view[0]
+    height, width = shapes[0, 0], shapes[0, 1]
+    u0 = (left + 0.5 - view[1]) * ratio + photo[1]
+    for y in range(rows):
+        v0 = (top + y + 0.5 - view[2]) * ratio + photo[2]
+        for x in range(columns):
+            k = m.pixel_index(x, y)
+            if s[m.IS_PHOTO + k] == ZERO:
+                s[m.T_R + k] = s[m.T_G + k] = s[m.T_B + k] = s[m.T_A + k] = ZERO
+                continue
+            u = u0 + x * ratio + s[m.SHX + k]
+            v = v0 + s[m.SHY + k]
+            is_within = (u > 0.0) & (v > 0.0) & (u < photo[3]) & (v < photo[4])
+            s[m.WITHIN + k] = ONE if is_within else ZERO  # elsewhere the photo is made up
+            i, j = u - crop_left - 0.5, v - crop_top - 0.5
+            is_inside = (i >= 1.0) & (j >= 1.0) & (i < width - 2.0) & (j < height - 2.0)
+            if is_inside and s[m.MAG + k] < TWO:  # most often so, and one call less
+                texel = sample_inside(texels, shapes, i, j, s[m.MAG + k], room)
+            else:
+                texel = sample(texels, shapes, u - crop_left, v - crop_top, s[m.MAG + k], room)
+            s[m.T_R + k], s[m.T_G + k], s[m.T_B + k], s[m.T_A + k] = texel
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _cover(s, total, across, down, clear, rules):
+    """1 - coverage, see `rules.coverage`, into the row `clear`."""
+    level, width = np.float32(rules.surface_level), np.float32(rules.edge_width)
+    for k in range(m.ALL):
+        gx, gy = s[across + k], s[down + k]
+        slope = width * math.sqrt(gx * gx + gy * gy) + np.float32(1e-6)
+        edge = HALF + (s[total + k] - level) / slope
+        s[clear + k] = ONE - min(max(edge, ZERO), ONE)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _put_first(s, visible, opaque):
+    """The first layer: nothing is in front of it."""
+    for k in range(m.ALL):
+        total, body, is_photo = s[m.TOTAL + k], s[m.BODIED + k], s[m.IS_PHOTO + k]
+        photo = max(total - body, ZERO) * is_photo
+        matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
+        whole, solid = ONE - s[m.CLEAR + k], ONE - s[m.BODY_CLEAR + k]
+        alpha = matte * whole + (ONE - matte) * solid
+        alpha = alpha if total > ZERO else ZERO
+        x, y = s[m.SHX + k], s[m.SHY + k]
+        s[m.LAST_WHOLE + k] = whole
+        s[m.LAST_X + k] = x if is_photo > ZERO else NOWHERE
+        s[m.LAST_Y + k] = y
+        shown = photo * matte
+        scale = alpha / max(shown + body, TINY)
+        depth = s[m.DEPTH + k] / max(total, TINY)
+        s[m.O_DEPTH + k] = depth if alpha > visible else INFINITE
+        s[m.O_X + k] = x if alpha > visible else ZERO
+        s[m.O_Y + k] = y if alpha > visible else ZERO
+        s[m.O_R + k] = scale * (shown * s[m.T_R + k] + s[m.R + k])
+        s[m.O_G + k] = scale * (shown * s[m.T_G + k] + s[m.G + k])
+        s[m.O_B + k] = scale * (shown * s[m.T_B + k] + s[m.B + k])
+        s[m.O_PHOTO + k] = scale * shown * s[m.SEES + k] * s[m.WITHIN + k]
+        s[m.O_A + k] = alpha
+        s[m.OPEN + k] = ZERO if alpha > opaque else ONE
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _put_behind(s, same_point, visible, opaque):
+    """A later layer."""
+    for lane in range(int(m.ALL)):
+        k = np.uint64(lane)
+        total, body, is_open = s[m.TOTAL + k], s[m.BODIED + k], s[m.OPEN + k]
+        if not total * is_open > ZERO:
+            continue
+        is_photo = s[m.IS_PHOTO + k]
+        photo = max(total - body, ZERO) * is_photo
+        matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
+        whole, solid = ONE - s[m.CLEAR + k], ONE - s[m.BODY_CLEAR + k]
+        alpha = matte * whole + (ONE - matte) * solid
+        x, y = s[m.SHX + k], s[m.SHY + k]
+        ex, ey = x - s[m.LAST_X + k], y - s[m.LAST_Y + k]
+        if ex * ex + ey * ey < same_point and is_photo > ZERO:
+            before, covered = s[m.LAST_THROUGH + k], s[m.LAST_WHOLE + k]
+        else:
+            before, covered = ONE - s[m.O_A + k], ZERO
+        through = before * (ONE - covered) * alpha
+        s[m.LAST_THROUGH + k] = before
+        s[m.LAST_WHOLE + k] = ONE - (ONE - covered) * (ONE - whole)
+        s[m.LAST_X + k] = x if is_photo > ZERO else NOWHERE
+        s[m.LAST_Y + k] = y
+        shown = photo * matte
+        scale = through / max(shown + body, TINY)
+        if alpha > visible and s[m.O_DEPTH + k] == INFINITE:
+            s[m.O_DEPTH + k] = s[m.DEPTH + k] / total
+            s[m.O_X + k], s[m.O_Y + k] = x, y
+        s[m.O_R + k] += scale * (shown * s[m.T_R + k] + s[m.R + k])
+        s[m.O_G + k] += scale * (shown * s[m.T_G + k] + s[m.G + k])
+        s[m.O_B + k] += scale * (shown * s[m.T_B + k] + s[m.B + k])
+        s[m.O_PHOTO + k] += scale * shown * s[m.SEES + k] * s[m.WITHIN + k]
+        s[m.O_A + k] += through
+        if s[m.O_A + k] > opaque:
+            s[m.OPEN + k] = ZERO

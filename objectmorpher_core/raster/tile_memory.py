@@ -1,0 +1,59 @@
+"""A tile's working memory: where each quantity lies, shared by the kernels that draw in it.
+
+A row of 256 numbers per quantity, one for each pixel of the tile: first the left half of the tile,
+row by row, then the right half.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .binning import TILE
+from .rules import LAYERS
+
+PIXELS = TILE * TILE
+STRIP = 8  # px, columns that lie side by side
+STRIPS = TILE // STRIP
+# Indices are unsigned: a signed one is looked at for its sign, and the loop is no vector code.
+ALL = np.uint64(PIXELS)
+
+
+def _rows(first: int, count: int) -> tuple[np.uint64, ...]:
+    """Where so many rows begin, from row `first` on."""
+    return tuple(np.uint64(row * PIXELS) for row in range(first, first + count))
+
+
+# The front of the layer that is being drawn, and after it those of the layers before.
+F_DEPTH, F_X, F_Y, F_PHOTO, FRONT = _rows(0, 5)
+SUMS = 4 * LAYERS
+
+# The sums of the layer that is being drawn; see `reference._Sums`. MAG, MATTES and SEES hold what
+# is missing to 1 or goes beyond it: nothing where the photo is carried along as it was.
+(
+    TOTAL, BODIED, GX, GY, BGX, BGY, DEPTH, SHX, SHY, MAG, SEES, MATTES, SOLIDS, R, G, B,
+    LEFT,  # what belongs to later layers
+    CLEAR, BODY_CLEAR,
+) = _rows(SUMS, 19)  # fmt: skip
+RESULTS = SUMS + 19
+
+# What has been composited, and what the next layer has to know of it.
+(
+    O_R, O_G, O_B, O_A, O_DEPTH, O_PHOTO, O_X, O_Y, LAST_X, LAST_Y, LAST_THROUGH, LAST_WHOLE,
+    OPEN,  # 1 where it is not opaque yet
+) = _rows(RESULTS, 13)  # fmt: skip
+OUTPUTS = 8  # the first of them: colour, alpha, depth, from_photo, shift
+ROOM = RESULTS + 13
+
+# Room to work in: what the photo shows; whether it does, and whether within the photo; what no
+# layer before has taken of a sample; its alpha and gradient; the pixel's column and row.
+T_R, T_G, T_B, T_A, IS_PHOTO, WITHIN, SHARE, ALPHA, SLOPE_X, SLOPE_Y, STEP_X, STEP_Y = _rows(
+    ROOM, 12
+)
+ROWS = ROOM + 12
+
+
+@numba.njit(cache=True, nogil=True)
+def pixel_index(x, y):
+    """Where the pixel in column x and row y of the tile lies in a row of the memory."""
+    return np.uint64(x // STRIP * (STRIP * TILE) + y * STRIP + x % STRIP)
