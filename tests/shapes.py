@@ -15,6 +15,7 @@ from objectmorpher_core.arrays import F32, F64, RGB, Mask, frozen
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.control_points import sample_control_points
+from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.document import (
     DeformSettings,
     Document,
@@ -31,7 +32,8 @@ from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.raster.texture import TextureLevels
+from objectmorpher_core.raster.posed import PosedSplats, RestSplats
+from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from objectmorpher_core.rotations import matrices_from_quats, quats_along
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
@@ -325,3 +327,50 @@ def scene(name: str = "ellipse", count: int = 800, seed: int = 0) -> Scene:
     """The lifted object of one of MASKS in a made photo."""
     inside = mask(name)
     return lifted_scene(picture(inside, seed), inside, count, seed)
+
+
+# ---- clouds of Gaussians of every kind ------------------------------------------------------
+
+
+def random_splats(
+    seed: int, splatting: str = "surface", is_textured: bool = True, count: int = 160
+) -> tuple[PosedSplats, TextureLevels]:
+    """Gaussians before a 160 x 120 camera, moved every way, and a noisy texture.
+
+    Huge and tiny ones, flat ones seen edge-on, many on one another, some behind the camera or at
+    it, some of an opacity of a thousandth.
+    """
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-0.7, 0.7, (count, 3))
+    points[: count // 4] = rng.normal(0, 0.06, (count // 4, 3)) + [0.1, -0.05, 0]  # on one another
+    lifted = lifted_cloud(points, ball(10))
+    sizes = np.exp(rng.uniform(np.log(0.3), np.log(5), (count, 1)))
+    sizes[rng.choice(count, 6, replace=False)] = 25.0
+    sizes[rng.choice(count, 12, replace=False)] = 0.02
+    opacities = rng.uniform(0.2, 1.0, count)
+    opacities[rng.choice(count, 12, replace=False)] = 1e-3
+    gaussians = replace(
+        lifted.gaussians, scales=lifted.gaussians.scales * sizes.astype(np.float32),
+        opacities=opacities,
+    )  # fmt: skip
+    edge_on = rng.choice(count, 12, replace=False)
+    quats = gaussians.quats.copy()
+    across = rng.normal(size=(12, 3)) * [1, 1, 0]
+    quats[edge_on] = quats_along(across / np.linalg.norm(across, axis=1, keepdims=True))
+    scales = gaussians.scales.copy()
+    scales[edge_on, 2] *= 0.02
+    gaussians = replace(gaussians, quats=quats, scales=scales)
+    visible = (rng.random(count) < 0.7) if is_textured else np.zeros(count)
+    texture = replace(
+        lifted.texture, visibility=visible,
+        solidity=(rng.random(count) < 0.8).astype(np.float32),
+    )  # fmt: skip
+    lifted = replace(lifted, gaussians=gaussians, texture=texture, splatting=splatting)
+    linear = np.eye(3) + rng.normal(size=(count, 3, 3)) * 0.3
+    means = points + rng.normal(size=(count, 3)) * 0.02
+    near = rng.choice(count, 16, replace=False)
+    means[near, 2] = rng.uniform(-4.0, -2.6, 16)  # at the camera, which is at -3, and behind it
+    noise = cv2.GaussianBlur(rng.random((HEIGHT, WIDTH, 4)).astype(np.float32), (0, 0), 2)
+    noise[..., 3] = np.clip((noise[..., 3] - 0.4) * 5, 0, 1)
+    splats = PosedSplats(RestSplats(lifted, camera()), Skinned(means, linear), np.eye(4))
+    return splats, build_levels(noise[..., :3], noise[..., 3], 0, 0)

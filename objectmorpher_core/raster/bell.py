@@ -9,10 +9,10 @@ import numpy as np
 
 from ..threads import FAST
 from . import projection as p
-from . import tile_memory as m
 from .sampling import ONE, ZERO
+from .tile_memory import STRIP, STRIPS
 
-STRIP_END = np.float32(m.STRIP - 1)
+STRIP_END = np.float32(STRIP - 1)
 # exp(-t), 0 <= t <= 0.7: interpolated at Chebyshev points, right to 1e-7
 E0, E1, E2, E3, E4, E5 = (
     np.float32(v)
@@ -20,6 +20,10 @@ E0, E1, E2, E3, E4, E5 = (
 )
 SIXTEENTH = np.float32(1 / 16)
 LIMIT = np.float32(11.2)
+BATCH = np.uint64(64)  # Gaussians whose rows are found together
+CX, CY, TILT, EX, EY = (
+    np.uint64(column * 64) for column in (p.CX, p.CY, p.TILT, p.EX, p.EY)
+)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -41,8 +45,8 @@ def strip_rows(g, cut, dx, dy, strip, rows):
     ex, ey = g[p.EX], math.sqrt(cut / g[p.RYY])
     if cut < g[p.CUT]:
         ex *= math.sqrt(cut / g[p.CUT])
-    left = max(dx + np.float32(strip * m.STRIP), -ex)
-    right = min(dx + np.float32(strip * m.STRIP) + STRIP_END, ex)
+    left = max(dx + np.float32(strip * STRIP), -ex)
+    right = min(dx + np.float32(strip * STRIP) + STRIP_END, ex)
     if left > right:
         return 0, 0
     # at dx its rows are lean dx +- reach sqrt(1 - (dx / ex)^2)
@@ -56,3 +60,34 @@ def strip_rows(g, cut, dx, dy, strip, rows):
     high = lean * ex * x + reach * math.sqrt(max(ONE - x * x, ZERO))
     start = int(max(low - dy, ZERO))
     return start, int(min(max(high - dy + ONE, ZERO), np.float32(rows)))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def batch_rows(batch, x0, y0, rows, first, last):
+    """`strip_rows` of 64 projected Gaussians, whose columns are the rows of `batch`.
+
+    `x0`, `y0`: centre of the tile's first pixel. From the rows `first` and `last` of `batch` on:
+    first and last + 1 of the rows of each strip; to be cut off to integers.
+    """
+    for strip in range(STRIPS):
+        begin, end = first + np.uint64(strip) * BATCH, last + np.uint64(strip) * BATCH
+        offset = x0 + np.float32(strip * STRIP)
+        for j in range(BATCH):
+            tilt = batch[TILT + j]
+            ex = batch[EX + j]
+            ey = batch[EY + j]
+            dx = offset - batch[CX + j]
+            dy = y0 - batch[CY + j]
+            left, right = max(dx, -ex), min(dx + STRIP_END, ex)
+            turned = ey / ex
+            lean = -tilt * turned * turned * ex
+            reach = math.sqrt(max(ey * ey - lean * lean, ZERO))
+            lowest = lean / turned
+            x = min(max(-lowest, left), right) / ex
+            low = lean * x - reach * math.sqrt(max(ONE - x * x, ZERO))
+            x = min(max(lowest, left), right) / ex
+            high = lean * x + reach * math.sqrt(max(ONE - x * x, ZERO))
+            start = max(low - dy, ZERO)
+            stop = min(max(high - dy + ONE, ZERO), rows)
+            batch[begin + j] = start
+            batch[end + j] = stop if left <= right else ZERO

@@ -44,64 +44,91 @@ def bin_tiles(
     parts = min(core_count(), max(len(order) // LEAST_SHARE, 1))
     bounds = np.linspace(0, len(order), parts + 1).astype(np.int64)
     counts = np.zeros((parts, across * down), np.int64)
-    nothing = np.empty(0, np.uint32)
-    inputs = (frozen(projected), frozen(order), across, left, top, width, height)
+    boxes = np.empty((len(order), 4), np.int32)
+    inputs = (frozen(projected), frozen(order), boxes, across, left, top, width, height)
 
-    def pass_over(members: np.ndarray) -> None:
-        def run(first: int, last: int) -> None:
-            for part in range(first, last):
-                a, b = int(bounds[part]), int(bounds[part + 1])
-                _bin(a, b, *inputs, counts[part], members)
+    def count(first: int, last: int) -> None:
+        for part in range(first, last):
+            _count(int(bounds[part]), int(bounds[part + 1]), *inputs, counts[part])
 
-        in_threads(run, parts)
-
-    pass_over(nothing)
+    in_threads(count, parts)
     sizes = counts.sum(0)
     starts = np.concatenate([[0], np.cumsum(sizes)])
     # where each part puts its first member of each tile
     counts[:] = starts[:-1] + np.cumsum(np.vstack([np.zeros_like(sizes), counts[:-1]]), axis=0)
     members = np.empty(int(starts[-1]), np.uint32)
-    if len(members):
-        pass_over(members)
+
+    def fill(first: int, last: int) -> None:
+        for part in range(first, last):
+            _fill(int(bounds[part]), int(bounds[part + 1]), *inputs, counts[part], members)
+
+    in_threads(fill, parts)
     return Bins(starts, members, across, down)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _bin(first, last, projected, order, across, left, top, width, height, at, members):
-    """Counts the members of each tile in `at`, or, where there is room, puts them there."""
-    is_counting = len(members) == 0
-    for n in range(first, last):
+def _count(first, last, projected, order, boxes, across, left, top, width, height, counts):
+    """Tiles of the box around each Gaussian, `boxes` (M, 4): x0, y0, x1, y1; and their members."""
+    scale = np.float32(1 / TILE)
+    zero, half = np.float32(0), np.float32(0.5)
+    right, bottom = np.float32(width) - half, np.float32(height) - half
+    left, top = np.float32(left), np.float32(top)
+    for n in range(np.uint64(first), np.uint64(last)):
+        g = projected[order[n]]
+        box = boxes[n]
+        cx, cy, ex, ey = g[CX] - left, g[CY] - top, g[EX], g[EY]
+        # the first and last pixel whose centre is inside
+        x0, x1 = max(cx - ex, half), min(cx + ex, right)
+        y0, y1 = max(cy - ey, half), min(cy + ey, bottom)
+        if not (g[WEIGHT] > zero and x0 <= x1 and y0 <= y1):
+            box[2] = box[3] = -1
+            box[0] = box[1] = 0
+            continue
+        box[0], box[1] = np.int32((x0 + half) * scale), np.int32((y0 + half) * scale)
+        box[2], box[3] = np.int32((x1 - half) * scale), np.int32((y1 - half) * scale)
+        for row in range(box[1], box[3] + 1):
+            start, end = _columns(g, box, row, cx, cy)
+            for column in range(start, end + 1):
+                counts[row * across + column] += 1
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _fill(first, last, projected, order, boxes, across, left, top, width, height, at, members):
+    """Puts the Gaussians where `at` says that their tiles' next members belong."""
+    for n in range(np.uint64(first), np.uint64(last)):
+        box = boxes[n]
+        if box[2] < box[0]:
+            continue
         i = order[n]
-        if not projected[i, WEIGHT] > 0.0:
-            continue
-        cx, cy = projected[i, CX] - left, projected[i, CY] - top
-        ex, ey = projected[i, EX], projected[i, EY]
-        # rows and columns of pixels whose centres are inside the box
-        upper = max(math.ceil(cy - ey - 0.5), 0.0)
-        lower = min(math.floor(cy + ey - 0.5), height - 1.0)
-        if upper > lower or cx + ex < 0.5 or cx - ex > width - 0.5:
-            continue
-        reach = math.sqrt(projected[i, CUT] / projected[i, QXX])  # half the ellipse's row at cy
-        tilt = projected[i, TILT]
-        lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left
-        for row in range(int(upper) // TILE, int(lower) // TILE + 1):
-            low = max(row * TILE + 0.5 - cy, -ey)  # dy of the tile's rows
-            high = min(row * TILE + (TILE - 0.5) - cy, ey)
-            start = _edge(min(max(lean, low), high), tilt, ey, reach, -1.0)
-            end = _edge(min(max(-lean, low), high), tilt, ey, reach, 1.0)
-            start, end = math.ceil(cx + start - 0.51), math.floor(cx + end - 0.49)
-            if end < 0 or start > width - 1 or start > end:
-                continue
-            for column in range(int(max(start, 0)) // TILE, int(min(end, width - 1)) // TILE + 1):
+        g = projected[i]
+        cx, cy = g[CX] - np.float32(left), g[CY] - np.float32(top)
+        for row in range(box[1], box[3] + 1):
+            start, end = _columns(g, box, row, cx, cy)
+            for column in range(start, end + 1):
                 tile = row * across + column
-                if not is_counting:
-                    members[at[tile]] = i
+                members[at[tile]] = i
                 at[tile] += 1
-    return
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _columns(g, box, row, cx, cy):
+    """First and last of the box's tiles in a row that the ellipse touches."""
+    if (box[2] - box[0]) * (box[3] - box[1]) <= 1:  # little to gain
+        return box[0], box[2]
+    ex, ey, tilt = g[EX], g[EY], g[TILT]
+    low = max(np.float32(row * TILE) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
+    high = min(np.float32(row * TILE) + np.float32(TILE - 0.5) - cy, ey)
+    lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left
+    reach = math.sqrt(g[CUT] / g[QXX])  # half its row at dy = 0
+    start = cx + _edge(min(max(lean, low), high), tilt, ey, reach, np.float32(-1))
+    end = cx + _edge(min(max(-lean, low), high), tilt, ey, reach, np.float32(1))
+    scale, slack = np.float32(1 / TILE), np.float32(0.51)
+    first = max(np.int32(max(start - slack, np.float32(0)) * scale), box[0])
+    return first, min(np.int32(max(end + slack, np.float32(0)) * scale), box[2])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _edge(dy, tilt, ey, reach, side):
     """dx of the ellipse's left (side -1) or right (1) edge at dy."""
     y = dy / ey
-    return side * reach * math.sqrt(max(1.0 - y * y, 0.0)) - tilt * dy
+    return side * reach * math.sqrt(max(np.float32(1) - y * y, np.float32(0))) - tilt * dy

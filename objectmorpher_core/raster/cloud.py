@@ -1,7 +1,7 @@
 """Plainly coloured Gaussians, one by one: step 3 of `reference`, compiled.
 
-The tile's pixels lie as in `surface`. Members come in the order of their depth, and what lies
-behind a tile that is opaque everywhere is not looked at.
+The tile's pixels lie as in `surface`. Members come in the order of their depth, 64 at a time: their
+numbers are laid side by side first, and the rows that they touch computed for all of them.
 """
 
 from __future__ import annotations
@@ -12,14 +12,22 @@ import numpy as np
 from ..threads import FAST
 from . import projection as p
 from . import tile_memory as m
-from .bell import bell, strip_rows
+from .bell import BATCH, batch_rows, bell
 from .binning import TILE
 from .sampling import HALF, ONE, ZERO
 
 CLEAR, R, G, B, MEAN, MEDIAN, STEP_X, STEP_Y = (np.uint64(row * m.PIXELS) for row in range(8))
 ROWS = 8
 INFINITE = np.float32(np.inf)
-OFTEN = 4  # Gaussians after which one looks whether the tile is opaque
+PLAIN = 15  # columns of a projected Gaussian that are needed, the first
+START, END = (np.uint64((PLAIN + row) * 64) for row in (0, m.STRIPS))  # of a strip's rows
+BATCH_ROWS = PLAIN + 2 * m.STRIPS
+CX, CY, QXX, TILT, RYY, Z, ZX, ZY, WEIGHT, RED, GREEN, BLUE = (
+    np.uint64(column * 64)
+    for column in (
+        p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.Z, p.ZX, p.ZY, p.WEIGHT, p.RED, p.GREEN, p.BLUE,
+    )
+)  # fmt: skip
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -28,69 +36,75 @@ def draw_one_by_one(
 ):
     """Draws the tiles first..last of `out` (height, width, 8); see `surface.draw_layers`."""
     s = np.zeros(ROWS * m.PIXELS, np.float32)
-    for k in range(m.ALL):
-        i = int(k)
-        s[STEP_X + k] = np.float32(i // (m.STRIP * TILE) * m.STRIP + i % m.STRIP)
-        s[STEP_Y + k] = np.float32(i // m.STRIP % TILE)
+    batch = np.ones(BATCH_ROWS * int(BATCH), np.float32)
+    m.number_pixels(s, STEP_X, STEP_Y)
     through = ONE - np.float32(rules.opaque)
     for tile in range(first, last):
         column, row = (tile % across) * TILE, (tile // across) * TILE
         rows, columns = min(TILE, height - row), min(TILE, width - column)
-        x0, y0 = np.float32(left + column), np.float32(top + row)
+        x0, y0 = np.float32(left + column) + HALF, np.float32(top + row) + HALF
         for k in range(m.ALL):
-            s[CLEAR + k], s[MEDIAN + k] = ONE, INFINITE
-            s[R + k] = s[G + k] = s[B + k] = s[MEAN + k] = ZERO
-        since = 0
-        for slot in range(starts[tile], starts[tile + 1]):
-            _draw(s, projected[members[slot]], x0, y0, rows, kind)
-            since += 1
-            if since == OFTEN:
-                since = 0
-                clearest = ZERO
-                for k in range(m.ALL):
-                    clearest = max(clearest, s[CLEAR + k])
-                if clearest < through:
-                    break
+            s[CLEAR + k] = ONE
+            s[R + k] = s[G + k] = s[B + k] = s[MEAN + k] = s[MEDIAN + k] = ZERO
+        for start in range(starts[tile], starts[tile + 1], int(BATCH)):
+            count = min(starts[tile + 1] - start, int(BATCH))
+            for j in range(np.uint64(count)):
+                g = projected[members[np.uint64(start) + j]]
+                for c in range(PLAIN):
+                    batch[np.uint64(c) * BATCH + j] = g[c]
+            batch_rows(batch, x0, y0, np.float32(rows), START, END)
+            if not _draw(s, batch, count, x0, y0, through, kind):
+                break
         for y in range(rows):
             for x in range(columns):
-                k = m.pixel_index(x, y)
-                o = out[row + y, column + x]
-                alpha = ONE - s[CLEAR + k]
-                o[0], o[1], o[2], o[3] = s[R + k], s[G + k], s[B + k], alpha
-                depth = s[MEDIAN + k]
-                if depth == INFINITE and alpha > ZERO:
-                    depth = s[MEAN + k] / alpha
-                o[4], o[5], o[6], o[7] = depth, ZERO, ZERO, ZERO
+                _put(out[row + y, column + x], s, m.pixel_index(x, y))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _draw(s, g, x0, y0, rows, kind):
-    """One Gaussian behind those that are there."""
-    dx0, dy0 = x0 + HALF - g[p.CX], y0 + HALF - g[p.CY]  # of the tile's first pixel
-    z, zx, zy = g[p.Z], g[p.ZX], g[p.ZY]
-    qxx, tilt, ryy, weight = g[p.QXX], g[p.TILT], g[p.RYY], g[p.WEIGHT]
-    red, green, blue = g[p.RED], g[p.GREEN], g[p.BLUE]
+def _draw(s, batch, count, x0, y0, through, kind):
+    """A batch of Gaussians behind those that are there; whether one still sees through."""
     tail, most, least = np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least)
-    for strip in range(m.STRIPS):
-        start, end = strip_rows(g, g[p.CUT], dx0, dy0, strip, rows)
-        if start >= end:
-            continue
-        at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)
-        for k in range(np.uint64((end - start) * m.STRIP)):
-            dx, dy = dx0 + s[STEP_X + at + k], dy0 + s[STEP_Y + at + k]
-            e = dx + tilt * dy
-            alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
-            is_there = (alpha >= least) & (alpha > ZERO)
-            alpha = alpha if is_there else ZERO
-            clear = s[CLEAR + at + k]
-            shown = clear * alpha
-            behind = clear - shown
-            depth = z + zx * dx + zy * dy
-            median = s[MEDIAN + at + k]
-            is_half = (clear > HALF) & (behind <= HALF)
-            s[MEDIAN + at + k] = depth if is_half else median
-            s[CLEAR + at + k] = behind
-            s[MEAN + at + k] += shown * depth
-            s[R + at + k] += shown * red
-            s[G + at + k] += shown * green
-            s[B + at + k] += shown * blue
+    for j in range(np.uint64(count)):
+        dx0, dy0 = x0 - batch[CX + j], y0 - batch[CY + j]
+        z, zx, zy = batch[Z + j], batch[ZX + j], batch[ZY + j]
+        qxx, tilt = batch[QXX + j], batch[TILT + j]
+        ryy, weight = batch[RYY + j], batch[WEIGHT + j]
+        red, green = batch[RED + j], batch[GREEN + j]
+        blue = batch[BLUE + j]
+        for strip in range(m.STRIPS):
+            start = int(batch[START + np.uint64(strip) * BATCH + j])
+            end = int(batch[END + np.uint64(strip) * BATCH + j])
+            if start >= end:
+                continue
+            at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)
+            for k in range(np.uint64((end - start) * m.STRIP)):
+                dx, dy = dx0 + s[STEP_X + at + k], dy0 + s[STEP_Y + at + k]
+                e = dx + tilt * dy
+                alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
+                clear = s[CLEAR + at + k]
+                is_seen = (alpha >= least) & (clear > through)
+                shown = clear * alpha
+                shown = shown if is_seen else ZERO
+                behind = clear - shown
+                depth = z + zx * dx + zy * dy
+                is_half = (clear > HALF) & (behind <= HALF)  # of one Gaussian only
+                s[MEDIAN + at + k] += depth if is_half else ZERO
+                s[CLEAR + at + k] = behind
+                s[MEAN + at + k] += shown * depth
+                s[R + at + k] += shown * red
+                s[G + at + k] += shown * green
+                s[B + at + k] += shown * blue
+    clear = ZERO  # a sum, of which vector code can be made, unlike of a maximum
+    for k in range(m.ALL):
+        clear += ONE if s[CLEAR + k] > through else ZERO
+    return clear > ZERO
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _put(o, s, k):
+    """A pixel's results, see `reference.Picture3D`."""
+    alpha, depth = ONE - s[CLEAR + k], s[MEDIAN + k]
+    if depth == ZERO:
+        depth = s[MEAN + k] / alpha if alpha > ZERO else INFINITE
+    o[0], o[1], o[2], o[3] = s[R + k], s[G + k], s[B + k], alpha
+    o[4], o[5], o[6], o[7] = depth, ZERO, ZERO, ZERO

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..threads import FAST
 from . import tile_memory as m
+from .rules import ramp
 from .sampling import HALF, ONE, TWO, ZERO, sample, sample_inside
 
 TINY = np.float32(1e-30)
 LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows no photo
-NOWHERE = np.float32(1e18)
 INFINITE = np.float32(np.inf)
 
 
@@ -44,11 +44,11 @@ def composite_layer(
     if layer == 0:
         _put_first(s, visible, opaque)
     else:
-        _put_behind(s, np.float32(rules.same_point * rules.same_point), visible, opaque)
-    rest = ZERO
+        _put_behind(s, rules)
+    least, more = np.float32(rules.least_front), ZERO
     for k in range(m.ALL):
-        rest = max(rest, s[m.OPEN + k] * s[m.LEFT + k])
-    return rest >= np.float32(rules.least_front)
+        more += ONE if s[m.OPEN + k] * s[m.LEFT + k] >= least else ZERO
+    return more > ZERO
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -101,8 +101,9 @@ def _put_first(s, visible, opaque):
         alpha = alpha if total > ZERO else ZERO
         x, y = s[m.SHX + k], s[m.SHY + k]
         s[m.LAST_WHOLE + k] = whole
-        s[m.LAST_X + k] = x if is_photo > ZERO else NOWHERE
+        s[m.LAST_X + k] = x
         s[m.LAST_Y + k] = y
+        s[m.LAST_SHARE + k] = photo / max(total, TINY)
         shown = photo * matte
         scale = alpha / max(shown + body, TINY)
         depth = s[m.DEPTH + k] / max(total, TINY)
@@ -118,8 +119,10 @@ def _put_first(s, visible, opaque):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _put_behind(s, same_point, visible, opaque):
+def _put_behind(s, rules):
     """A later layer."""
+    near, far = np.float32(rules.same_point), np.float32(rules.apart)
+    visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
     for lane in range(int(m.ALL)):
         k = np.uint64(lane)
         total, body, is_open = s[m.TOTAL + k], s[m.BODIED + k], s[m.OPEN + k]
@@ -132,15 +135,15 @@ def _put_behind(s, same_point, visible, opaque):
         alpha = matte * whole + (ONE - matte) * solid
         x, y = s[m.SHX + k], s[m.SHY + k]
         ex, ey = x - s[m.LAST_X + k], y - s[m.LAST_Y + k]
-        if ex * ex + ey * ey < same_point and is_photo > ZERO:
-            before, covered = s[m.LAST_THROUGH + k], s[m.LAST_WHOLE + k]
-        else:
-            before, covered = ONE - s[m.O_A + k], ZERO
-        through = before * (ONE - covered) * alpha
-        s[m.LAST_THROUGH + k] = before
-        s[m.LAST_WHOLE + k] = ONE - (ONE - covered) * (ONE - whole)
-        s[m.LAST_X + k] = x if is_photo > ZERO else NOWHERE
-        s[m.LAST_Y + k] = y
+        share = photo / total
+        same = ramp(math.sqrt(ex * ex + ey * ey), far, near) * share * s[m.LAST_SHARE + k]
+        clear = ONE - s[m.O_A + k]
+        apart, last_whole = clear * alpha, s[m.LAST_WHOLE + k]
+        split = s[m.LAST_THROUGH + k] * (ONE - last_whole) * alpha
+        through = min(apart + same * (split - apart), clear)
+        s[m.LAST_THROUGH + k] = clear + same * (s[m.LAST_THROUGH + k] - clear)
+        s[m.LAST_WHOLE + k] = ONE - (ONE - same * last_whole) * (ONE - whole)
+        s[m.LAST_X + k], s[m.LAST_Y + k], s[m.LAST_SHARE + k] = x, y, share
         shown = photo * matte
         scale = through / max(shown + body, TINY)
         if alpha > visible and s[m.O_DEPTH + k] == INFINITE:

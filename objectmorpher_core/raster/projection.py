@@ -53,7 +53,7 @@ MAGNIFIED = 21  # photo px per view px, the larger
 PHOTO, BODY = 22, 23  # shares of alpha that show the photo, and its own colour
 SEEN, MATTED, SOLID = 24, 25, 26
 FRONT = 27  # q up to which it can be a layer's front
-SPAN = 28
+SPAN = 32  # numbers of a row: two lines of the processor's cache, a plain Gaussian reads one
 
 OUT = skinning.ROWS  # first row of the results in the kernel's working memory
 VOLUME = SPAN  # further rows of the results: |det F|,
@@ -294,7 +294,7 @@ def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
         if not (weight * (photo + body) > 0.0 and ends < 1.0):
             continue
         i = start + k
-        for c in range(SPAN):
+        for c in range(FRONT):
             out[i, c] = s[o + c * LANES]
         cut = -2.0 * math.log(ends)
         out[i, CUT], out[i, WEIGHT] = cut, weight

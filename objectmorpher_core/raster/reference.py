@@ -20,9 +20,9 @@
 6. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
    towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
    by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets).
-7. Layers are composited front to back, premultiplied. Where two successive layers show the same
-   point of the photo they are one surface that was split, and their coverage adds up under one
-   matte.
+7. Layers are composited front to back, premultiplied. As far as two successive layers show the
+   same point of the photo they are one surface that was split, and their coverage adds up under
+   one matte.
 """
 
 from __future__ import annotations
@@ -338,7 +338,8 @@ class _Composite:
         self.depth = np.full(shape, np.inf)
         self.from_photo = np.zeros(shape)
         self.shift = np.zeros((*shape, 2))
-        self.last_shift = np.full((*shape, 2), np.inf)  # of the previous layer
+        self.last_shift = np.zeros((*shape, 2))  # of the previous layer
+        self.last_share = np.zeros(shape)  # of it, that shows the photo
         self.last_through = np.ones(shape)  # transmittance before it
         self.last_whole = np.zeros(shape)  # its coverage
 
@@ -371,15 +372,17 @@ class _Composite:
         size = np.array([self.photo_camera.width, self.photo_camera.height])
         within = ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
         seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
-        with np.errstate(invalid="ignore"):
-            same = np.linalg.norm(shift - self.last_shift[at], axis=1) < RULES.same_point
-        same &= is_photo
+        distance = np.linalg.norm(shift - self.last_shift[at], axis=1)
+        same = _ramp(distance, RULES.apart, RULES.same_point)
+        share = np.where(is_photo, photo / total, 0.0)
+        same = same * share * self.last_share[at]
         clear = 1 - self.alpha[at]
-        before = np.where(same, self.last_through[at], clear)
-        through = before * np.where(same, 1 - self.last_whole[at], 1) * alpha
-        self.last_through[at] = before
-        self.last_whole[at] = np.where(same, 1 - (1 - self.last_whole[at]) * (1 - whole), whole)
-        self.last_shift[at] = np.where(is_photo[:, None], shift, np.inf)
+        apart, split = clear * alpha, self.last_through[at] * (1 - self.last_whole[at]) * alpha
+        through = np.minimum(apart + same * (split - apart), clear)
+        self.last_through[at] = clear + same * (self.last_through[at] - clear)
+        covered = same * self.last_whole[at]
+        self.last_whole[at] = 1 - (1 - covered) * (1 - whole)
+        self.last_shift[at], self.last_share[at] = shift, share
         first = np.isinf(self.depth[at]) & (alpha > RULES.visible)
         self.depth[at] = np.where(first, layer.depth[at] / total, self.depth[at])
         self.shift[at] = np.where((first & is_photo)[:, None], shift, self.shift[at])

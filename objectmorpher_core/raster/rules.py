@@ -84,7 +84,9 @@ class Rules(NamedTuple):
     # cannot be seen, and halved copies would blur all that turns a little.
     sharp: float = 1.19
 
-    same_point: float = 1.0  # px of the photo: layers that look so close together are one surface
+    # Px of the photo: layers that look so close together are one surface, beyond apart they are not.
+    same_point: float = 1.0
+    apart: float = 1.5
     visible: float = 1 / 255  # alpha of the layer whose depth and shift a pixel has
     opaque: float = 0.999  # alpha from which what lies behind is not looked at
 

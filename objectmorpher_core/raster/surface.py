@@ -22,7 +22,6 @@ from .rules import LAYERS
 from .sampling import HALF, ONE, THREE, TWO, ZERO
 
 FAR = np.float32(3e38)  # a depth that nothing has
-NOWHERE = np.float32(1e18)  # a place in the photo at which nothing looks
 INFINITE = np.float32(np.inf)
 MIDDLE = np.float32(TILE / 2)
 
@@ -38,10 +37,7 @@ def draw_layers(
     width, height of the view and of the photo, px.
     """
     s = np.zeros(m.ROWS * m.PIXELS, np.float32)
-    for k in range(m.ALL):
-        i = int(k)
-        s[m.STEP_X + k] = np.float32(i // (m.STRIP * TILE) * m.STRIP + i % m.STRIP)
-        s[m.STEP_Y + k] = np.float32(i // m.STRIP % TILE)
+    m.number_pixels(s, m.STEP_X, m.STEP_Y)
     gaps = ONE / np.float32(gap * gap), ONE / np.float32(texture_gap * texture_gap)
     for tile in range(first, last):
         begin, end = starts[tile], starts[tile + 1]
@@ -55,11 +51,11 @@ def draw_layers(
             continue
         _clear(s, m.O_R, m.OPEN, ZERO)
         _clear(s, m.O_DEPTH, m.O_DEPTH + m.ALL, INFINITE)
-        _clear(s, m.LAST_X, m.LAST_X + m.ALL, NOWHERE)
         _clear(s, m.LAST_THROUGH, m.LAST_THROUGH + m.ALL, ONE)
         _clear(s, m.OPEN, m.OPEN + m.ALL, ONE)
         x0, y0 = np.float32(left + column), np.float32(top + row)
-        is_one = _is_one_layer(projected, members[begin:end], x0, y0, gaps)
+        # Of other assets even what is no front counts, where there is a front.
+        is_one = kind.is_surface and _is_one_layer(projected, members[begin:end], x0, y0, gaps)
         for layer in range(LAYERS):
             _clear(s, m.TOTAL, m.CLEAR, ZERO)
             _clear(s, m.CLEAR, m.BODY_CLEAR + m.ALL, ONE)
@@ -177,7 +173,10 @@ def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_fr
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _first_front(s, at, count, g, dx0, dy0):
-    """The nearest sample of each pixel so far."""
+    """The nearest sample of each pixel so far.
+
+    What is chosen is added, not stored: stores that depend on a condition are slow.
+    """
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy, limit = g[p.QXX], g[p.TILT], g[p.RYY], g[p.FRONT]
@@ -188,13 +187,13 @@ def _first_front(s, at, count, g, dx0, dy0):
         depth = z + zx * dx + zy * dy
         before = s[m.F_DEPTH + at + k]
         nearer = (qxx * e * e + ryy * dy * dy <= limit) & (depth < before)
-        front_x, front_y = s[m.F_X + at + k], s[m.F_Y + at + k]
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        shows = s[m.F_PHOTO + at + k]
-        s[m.F_DEPTH + at + k] = depth if nearer else before
-        s[m.F_X + at + k] = x if nearer else front_x
-        s[m.F_Y + at + k] = y if nearer else front_y
-        s[m.F_PHOTO + at + k] = is_photo if nearer else shows
+        x = sx + axx * dx + axy * dy - s[m.F_X + at + k]
+        y = sy + ayx * dx + ayy * dy - s[m.F_Y + at + k]
+        shows = is_photo - s[m.F_PHOTO + at + k]
+        s[m.F_DEPTH + at + k] = min(before, depth if nearer else FAR)
+        s[m.F_X + at + k] += x if nearer else ZERO
+        s[m.F_Y + at + k] += y if nearer else ZERO
+        s[m.F_PHOTO + at + k] += shows if nearer else ZERO
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -215,13 +214,13 @@ def _next_front(s, at, count, g, dx0, dy0, rules, kind):
         before = s[m.F_DEPTH + at + k]
         is_enough = (alpha >= least) & (s[m.SHARE + at + k] * alpha * both >= least_front)
         nearer = is_enough & (depth < before)
-        front_x, front_y = s[m.F_X + at + k], s[m.F_Y + at + k]
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        shows = s[m.F_PHOTO + at + k]
-        s[m.F_DEPTH + at + k] = depth if nearer else before
-        s[m.F_X + at + k] = x if nearer else front_x
-        s[m.F_Y + at + k] = y if nearer else front_y
-        s[m.F_PHOTO + at + k] = is_photo if nearer else shows
+        x = sx + axx * dx + axy * dy - s[m.F_X + at + k]
+        y = sy + ayx * dx + ayy * dy - s[m.F_Y + at + k]
+        shows = is_photo - s[m.F_PHOTO + at + k]
+        s[m.F_DEPTH + at + k] = min(before, depth if nearer else FAR)
+        s[m.F_X + at + k] += x if nearer else ZERO
+        s[m.F_Y + at + k] += y if nearer else ZERO
+        s[m.F_PHOTO + at + k] += shows if nearer else ZERO
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

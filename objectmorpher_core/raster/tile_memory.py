@@ -40,10 +40,10 @@ RESULTS = SUMS + 19
 # What has been composited, and what the next layer has to know of it.
 (
     O_R, O_G, O_B, O_A, O_DEPTH, O_PHOTO, O_X, O_Y, LAST_X, LAST_Y, LAST_THROUGH, LAST_WHOLE,
-    OPEN,  # 1 where it is not opaque yet
-) = _rows(RESULTS, 13)  # fmt: skip
+    LAST_SHARE, OPEN,  # 1 where it is not opaque yet
+) = _rows(RESULTS, 14)  # fmt: skip
 OUTPUTS = 8  # the first of them: colour, alpha, depth, from_photo, shift
-ROOM = RESULTS + 13
+ROOM = RESULTS + 14
 
 # Room to work in: what the photo shows; whether it does, and whether within the photo; what no
 # layer before has taken of a sample; its alpha and gradient; the pixel's column and row.
@@ -57,3 +57,12 @@ ROWS = ROOM + 12
 def pixel_index(x, y):
     """Where the pixel in column x and row y of the tile lies in a row of the memory."""
     return np.uint64(x // STRIP * (STRIP * TILE) + y * STRIP + x % STRIP)
+
+
+@numba.njit(cache=True, nogil=True)
+def number_pixels(s, step_x, step_y):
+    """Writes the column and the row of each pixel of the tile to two rows of the memory."""
+    for k in range(ALL):
+        i = int(k)
+        s[step_x + k] = np.float32(i // (STRIP * TILE) * STRIP + i % STRIP)
+        s[step_y + k] = np.float32(i // STRIP % TILE)

@@ -118,9 +118,16 @@ def test_tiles_equal_the_reference_on_a_bent_object(window):
     assert mean <= MEAN
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_tiles_equal_the_reference_on_random_clouds(seed):
-    splats, texture = _random_scene(seed)
+KINDS = [
+    ("surface", True), ("mip", True), ("classic", True), ("mip", False), ("classic", False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize(("splatting", "is_textured"), KINDS)
+def test_tiles_equal_the_reference_on_gaussians_of_every_kind(splatting, is_textured, seed):
+    """Measured 2026-11: 2.3e-3 at most (what lies behind an alpha of 0.999), mean 1.4e-7."""
+    splats, texture = shapes.random_splats(seed, splatting, is_textured)
     camera = shapes.camera()
     largest, mean = _difference(
         tiles.render(splats, texture, camera, camera),
