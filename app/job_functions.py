@@ -125,9 +125,7 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
 
 def render_exact(request: Request, progress: Progress) -> np.ndarray:
     """A layer of the view: (h, w, 4) u8, premultiplied."""
-    picture = render(request)
-    rgba = np.dstack([picture.color, picture.alpha])
-    return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)
+    return render(request)
 
 
 def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -> Plate:

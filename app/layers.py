@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import cv2
@@ -142,18 +142,18 @@ class Layers:
         coarse = 1 if excess <= 1 else min(max(math.ceil(math.sqrt(excess)), 2), COARSEST)
         start = time.perf_counter()
         if coarse == 1:
-            picture = tiles.draw(drawable, request.texture, box)
-        else:
-            picture = render(replace(request, window=_coarser(request.window, coarse)))
+            rgba = tiles.draw_rgba(drawable, request.texture, box)
+            self._learn(time.perf_counter() - start, pixels)
+            x0, y0, x1, y1 = box
+            return Layer((float(x0), float(y0), float(x1), float(y1)), rgba)
+        window = _coarser(request.window, coarse)
+        picture = tiles.render(request.splats, request.texture, window, request.camera)
         self._learn(time.perf_counter() - start, pixels / coarse**2)
-        rgba = np.dstack([picture.color, picture.alpha])
         height, width = picture.alpha.shape
         covered = (box[0], box[1], box[0] + width * coarse, box[1] + height * coarse)
-        if coarse == 1:
-            return Layer(covered, rgba)
         texture = request.texture
         draft = Draft(_looks(picture), texture.levels[0], texture.left, texture.top)
-        return Layer(covered, rgba, draft)
+        return Layer(covered, np.dstack([picture.color, picture.alpha]), draft)
 
     def _want_exact(self, work: _Work) -> None:
         """Asks for the exact picture of what has not changed for a moment."""
@@ -174,11 +174,12 @@ class Layers:
         self._rate = float(np.clip(0.7 * self._rate + 0.3 * rate, 1e-9, 1e-5))
 
 
-def render(request: Request) -> Picture3D:
-    """The exact picture."""
+def render(request: Request) -> np.ndarray:
+    """The exact picture, (h, w, 4) u8 premultiplied."""
     from objectmorpher_core.raster import tiles
 
-    return tiles.render(request.splats, request.texture, request.window, request.camera)
+    drawable = tiles.prepare(request.splats, request.window, request.camera)
+    return tiles.draw_rgba(drawable, request.texture)
 
 
 def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:

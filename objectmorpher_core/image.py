@@ -184,7 +184,7 @@ def encode_picture(picture: Picture, ending: str, quality: int = 95) -> bytes:
         if ending == ".webp":
             return _encode_webp(picture)
         codec = png if ending == ".png" else tiff
-        samples = _samples(picture)
+        samples = _Channels(picture)
         return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
     except ImageError:
         raise
@@ -192,12 +192,26 @@ def encode_picture(picture: Picture, ending: str, quality: int = 95) -> bytes:
         raise ImageError(f"the picture cannot be written as {ending}: {error}") from error
 
 
-def _samples(picture: Picture) -> np.ndarray:
-    """The channels that a file stores (H, W, 1..4): grey or RGB, then alpha."""
-    colours = _grey(picture.pixels)[..., None] if picture.is_grey else picture.pixels
-    if picture.alpha is None:
-        return colours
-    return np.concatenate([colours, picture.alpha[..., None]], axis=2)
+class _Channels:
+    """The channels that a file stores (H, W, 1..4): grey or RGB, then alpha.
+
+    They are put together for the rows that are asked for: a second picture may not fit.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self._picture = picture
+        self.dtype = picture.pixels.dtype
+        channels = (1 if picture.is_grey else 3) + (picture.alpha is not None)
+        self.shape = (*picture.pixels.shape[:2], channels)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        picture = self._picture
+        colours = picture.pixels[rows]
+        if picture.is_grey:
+            colours = _grey(colours)[..., None]
+        if picture.alpha is None:
+            return colours
+        return np.concatenate([colours, picture.alpha[rows][..., None]], axis=2)
 
 
 def _grey(pixels: Pixels) -> np.ndarray:

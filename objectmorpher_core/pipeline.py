@@ -112,9 +112,13 @@ def make_plate(
     return build_plate(pixels, covered, compose.load(backend), progress, seed)
 
 
-def export(document: Document, puppets: dict[int, Puppet] | None = None) -> Picture:
+def export(
+    document: Document,
+    puppets: dict[int, Puppet] | None = None,
+    progress: Progress = silent,
+) -> Picture:
     """The edited photo, with everything of the file that the edit does not concern."""
-    return _picture(document, composite(document, puppets))
+    return _picture(document, composite(document, puppets, progress))
 
 
 def _picture(document: Document, result: Composite) -> Picture:

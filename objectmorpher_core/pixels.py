@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from .arrays import F32, Pixels
+
+
+class Samples(Protocol):
+    """What a picture file stores (H, W, 1..4): an array, or what gives its rows like one."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    @property
+    def dtype(self) -> np.dtype: ...
+
+    def __getitem__(self, rows: slice, /) -> np.ndarray: ...
 
 
 def unit_pixels(pixels: Pixels) -> F32:

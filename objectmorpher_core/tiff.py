@@ -12,6 +12,8 @@ import numpy as np
 from PIL import Image, TiffImagePlugin
 from PIL.TiffTags import LONG, SHORT, UNDEFINED
 
+from .pixels import Samples
+
 MARKS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # classic and BigTIFF
 ASSOCIATED_ALPHA = 1
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB = 0, 1, 2
@@ -88,12 +90,13 @@ def _unpremultiplied(samples: np.ndarray) -> np.ndarray:
     return np.concatenate([colours.astype(np.uint16), samples[..., -1:]], axis=2)
 
 
-def encode(samples: np.ndarray, icc: bytes | None, exif: bytes | None) -> bytes:
+def encode(samples: Samples, icc: bytes | None, exif: bytes | None) -> bytes:
     """Little-endian, deflated TIFF file of samples (H, W, 1..4) u8 or u16."""
     height, width, channels = samples.shape
-    rows = max(1, STRIP_BYTES // (width * channels * samples.itemsize))
+    rows = max(1, STRIP_BYTES // (width * channels * samples.dtype.itemsize))
     with ThreadPoolExecutor() as pool:  # zlib lets go of the interpreter lock
-        strips = list(pool.map(_deflated, (samples[t : t + rows] for t in range(0, height, rows))))
+        tops = range(0, height, rows)
+        strips = list(pool.map(lambda top: _deflated(samples[top : top + rows]), tops))
     lengths = [len(strip) for strip in strips]
     starts = tuple(accumulate(lengths[:-1], initial=0))  # Pillow adds the directory's own length
     fields = TiffImagePlugin.ImageFileDirectory_v2(b"II*\0\0\0\0\0")
@@ -104,7 +107,7 @@ def encode(samples: np.ndarray, icc: bytes | None, exif: bytes | None) -> bytes:
     values: dict[int, tuple[int, object]] = {
         256: (LONG, width),
         257: (LONG, height),
-        258: (SHORT, (8 * samples.itemsize,) * channels),
+        258: (SHORT, (8 * samples.dtype.itemsize,) * channels),
         259: (SHORT, DEFLATE),
         262: (SHORT, RGB if channels > 2 else BLACK_IS_ZERO),
         273: (LONG, starts),

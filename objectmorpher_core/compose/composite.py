@@ -2,13 +2,15 @@
 
 Everything is computed at the photo's own resolution on a crop around the edit, and blended into
 the photo inside the footprint only. A pixel of the object that did not move is the photo's own.
+The crop is worked off in strips of rows, whatever the size of the photo.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from functools import partial
 
-import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
@@ -17,15 +19,18 @@ from ..document import Document, EditObject, Matte
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
+from ..raster import tiles
+from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
 from ..raster.texture import TextureLevels, build_levels
+from .blend import FEATHER_START as FEATHER_START  # the view looks here for these two
+from .blend import NEAR, Blend, Box, Rows, differ, displacement, map_in_threads
+from .blend import STILL as STILL
 from .plate import hole_margin, plate_crop
 
-STILL = 0.05  # px: a surface that moved less is where it was
-STILL_ALPHA = 1.5 / 255  # likewise for its alpha
-NEAR = 7  # px, window in which a left pixel looks for the object's new edge
-FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
+STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
+PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +44,20 @@ class Shares:
 
 
 @dataclass(frozen=True, eq=False)
+class Moved:
+    """A moved object, and where its Gaussians are now."""
+
+    item: EditObject
+    splats: PosedSplats
+
+    @property
+    def matte(self) -> Matte:
+        """Where it was, and what it looked like."""
+        assert self.item.matte is not None, "a lifted object has a matte"
+        return self.item.matte
+
+
+@dataclass(frozen=True, eq=False)
 class Composite:
     """The edited photo and how it came about."""
 
@@ -47,7 +66,8 @@ class Composite:
     changed: int  # px
     outside_footprint_changed: int  # px, 0 by construction; counted, not assumed
     shares: Shares
-    layers: tuple[tuple[int, int, Picture3D], ...]  # x0, y0, each moved object's picture
+    camera: Camera  # the photo's
+    moved: tuple[Moved, ...]  # far ones first
 
 
 def object_texture(matte: Matte) -> TextureLevels:
@@ -59,183 +79,180 @@ def composite(
     document: Document,
     puppets: dict[int, Puppet] | None = None,
     progress: Progress = silent,
+    rows: int | None = None,
 ) -> Composite:
-    """The edited photo. `puppets` by object index save making them again."""
-    photo = document.photo.pixels
-    height, width = photo.shape[:2]
-    moved = [k for k, item in enumerate(document.objects) if item.is_moved]
+    """The edited photo. `puppets` by object index save making them again.
+
+    At least `rows` are blended at a time, by default a few times as many as they look around
+    them. It changes no pixel how many that are.
+    """
+    photo, camera = document.photo.pixels, document.photo.camera
+    moved = _moved(document, puppets or {})
     if not moved:
-        nothing = np.zeros((height, width), bool)
-        return Composite(photo, nothing, 0, 0, Shares(), ())
-    puppets = puppets or {}
-    camera = document.photo.camera
-    scenes = []
-    for k in moved:
-        item = document.objects[k]
-        puppet = puppets.get(k) or puppet_of(item, camera)
-        scenes.append((item, puppet.posed(item.pose, item.placement)))
-    scenes.sort(key=lambda scene: -float(np.median(scene[1].means[:, 2])))  # far ones first
-    box = _region([s for item, s in scenes if item.is_visible], moved, document)
-    blend = _Blend(document, box)
-    for n, (item, splats) in enumerate(scenes):
-        progress(n / len(scenes), "Drawing the object")
-        blend.add(item, splats, camera)
-    progress(0.9, "Blending into the photo")
-    return blend.finish()
+        nothing = np.zeros(photo.shape[:2], bool)
+        return Composite(photo, nothing, 0, 0, Shares(), camera, ())
+    drawing = _Drawing(moved, camera)
+    _, y0, _, y1 = drawing.box
+    blend = Blend(photo, hole_margin(camera.width, camera.height), drawing.box, rows)
+    for top, bottom in drawing.strips():
+        progress((top - y0) / (y1 - y0), "Drawing the object")
+        for drawn in drawing.over_plate(document, top, bottom):
+            blend.add(drawn)
+    pixels, footprint = blend.pixels, blend.footprint
+    changed, outside = _count_changes(photo, pixels, footprint)
+    shares = Shares(*blend.shares())
+    return Composite(pixels, footprint, changed, outside, shares, camera, moved)
 
 
-def _region(
-    drawn: list[PosedSplats], moved: list[int], document: Document
-) -> tuple[int, int, int, int]:
-    """x0, y0, x1, y1 px: everything the edit can touch."""
-    camera = document.photo.camera
-    margin = int(np.ceil(hole_margin(camera.width, camera.height))) + 2
-    corners = []
-    for k in moved:
-        matte = document.objects[k].matte
-        assert matte is not None, "a lifted object has a matte"
-        x0, y0, x1, y1 = matte.box
-        corners += [(x0, y0), (x1, y1)]
-    for splats in drawn:
-        seen = splats.means[splats.means[:, 2] > splats.gap]
-        if len(seen):
-            xy = camera.project(seen)
-            reach = splats.gap * camera.focal / float(np.median(seen[:, 2]))
-            corners += [tuple(xy.min(0) - reach), tuple(xy.max(0) + reach)]
-    low, high = np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin
-    size = np.array([camera.width, camera.height])
-    low, high = np.clip(np.floor(low), 0, size - 1), np.clip(np.ceil(high), 1, size)
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+def _moved(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
+    """The objects that are not as in the photo, also the hidden ones; far ones first."""
+    moved = []
+    for k, item in enumerate(document.objects):
+        if item.is_moved:
+            puppet = puppets.get(k) or puppet_of(item, document.photo.camera)
+            moved.append(Moved(item, puppet.posed(item.pose, item.placement)))
+    return tuple(sorted(moved, key=lambda thing: -thing.splats.middle_depth))
 
 
-class _Blend:
-    """The crop on which the edit is put together."""
+class _Drawing:
+    """The moved objects as the photo's camera sees them."""
 
-    def __init__(self, document: Document, box: tuple[int, int, int, int]) -> None:
-        self.document, self.box = document, box
-        x0, y0, x1, y1 = box
-        photo = document.photo.pixels
-        self.photo = unit_pixels(photo[y0:y1, x0:x1])
-        self.invented = np.zeros((y1 - y0, x1 - x0), np.float32)
-        self.colour = self.photo.copy()
-        if document.plate is not None:
-            self.invented = crop(document.plate.hole, document.plate.box, box).astype(np.float32)
-            self.colour = unit_pixels(plate_crop(photo, document.plate, box))
-        self.from_photo = 1 - self.invented
-        self.from_lifter = np.zeros_like(self.invented)
-        self.moved = np.zeros(self.invented.shape, np.float32)  # px, see `displacement`
-        self.covered = np.zeros(self.invented.shape, bool)
-        self.layers: list[tuple[int, int, Picture3D]] = []
+    def __init__(self, moved: tuple[Moved, ...], camera: Camera) -> None:
+        self._moved = moved
+        shown = [k for k, thing in enumerate(moved) if thing.item.is_visible]
+        self._drawables = {k: tiles.prepare(moved[k].splats, camera, camera) for k in shown}
+        self._textures = {k: object_texture(moved[k].matte) for k in shown}
+        self.box = self._region(camera)
 
-    def add(self, item: EditObject, splats: PosedSplats, camera: Camera) -> None:
-        """Draws one moved object over what is there."""
-        assert item.matte is not None
+    def _region(self, camera: Camera) -> Box:
+        """Everything the edit can touch."""
+        margin = int(np.ceil(hole_margin(camera.width, camera.height))) + 2
+        boxes = [thing.matte.box for thing in self._moved]
+        boxes += [box for shown in self._drawables.values() if (box := shown.box()) is not None]
+        x0, y0 = (int(low) - margin for low in np.min(boxes, axis=0)[:2])
+        x1, y1 = (int(high) + margin for high in np.max(boxes, axis=0)[2:])
+        return max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
+
+    def strips(self) -> Iterator[tuple[int, int]]:
+        """First and last row of the strips that are drawn at a time, whole tiles high."""
         x0, y0, x1, y1 = self.box
-        rest = crop(item.matte.alpha, item.matte.box, self.box)
-        self.covered |= rest > 0
-        if not item.is_visible:
-            self.moved[rest > 0] = np.inf
-            return
-        texture = object_texture(item.matte)
-        window = camera.windowed(x0, y0, x1 - x0, y1 - y0)
-        picture = _drawn(splats, texture, window, camera)
-        self.moved = np.maximum(self.moved, displacement(picture, rest))
-        self.covered |= picture.alpha > 0
-        through = 1 - picture.alpha
-        self.colour = picture.color + through[..., None] * self.colour
-        self.from_photo = picture.from_photo + through * self.from_photo
-        self.from_lifter = picture.alpha - picture.from_photo + through * self.from_lifter
-        self.invented = through * self.invented
-        self.layers.append((x0, y0, picture))
+        rows = max(STRIP // (x1 - x0) // PIECE, 1) * PIECE
+        for top in range(y0, y1, rows):
+            yield top, min(top + rows, y1)
 
-    def finish(self) -> Composite:
-        """Blends the crop into the photo around what was disturbed."""
-        photo = self.document.photo.pixels
-        height, width = photo.shape[:2]
+    def over_plate(self, document: Document, top: int, bottom: int) -> list[Rows]:
+        """The edit on the rows `top`..`bottom` of the box, a piece for each thread."""
         x0, y0, x1, y1 = self.box
-        margin = hole_margin(width, height)
-        blend = _blend_weights(self.moved, margin)
-        mixed = self.photo + blend[..., None] * (self.colour - self.photo)
-        crop = photo[y0:y1, x0:x1]
-        # Where the blend is nothing, or changes nothing, the photo's own integers stay.
-        new = np.where((blend > 0)[..., None], pixels_from_unit(mixed, photo.dtype), crop)
-        pixels = photo.copy()
-        pixels[y0:y1, x0:x1] = new
-        changed = (new != crop).any(-1)
-        footprint = np.zeros((height, width), bool)
-        reach = cv2.distanceTransform((~self.covered).astype(np.uint8), cv2.DIST_L2, 5)
-        footprint[y0:y1, x0:x1] = reach <= margin + 1
-        outside = int(((pixels != photo).any(-1) & ~footprint).sum())
-        shares = self._shares(changed, blend)
-        return Composite(pixels, footprint, int(changed.sum()), outside, shares, tuple(self.layers))
+        pieces = [(x0, a, x1, b) for a, b in _pieces(top, bottom)]
+        rows = map_in_threads(partial(_plate_rows, document), pieces)
+        # `displacement` looks around each pixel; and with a whole row of tiles more above, the
+        # rasteriser has the same tiles, and rounds alike, however the box is cut into strips.
+        above, below = max(top - TILE, y0), min(bottom + NEAR // 2, y1)
+        for k, thing in enumerate(self._moved):
+            picture = self._draw(k, above, below)
+            if picture is None:
+                rows = map_in_threads(partial(_without, thing.matte), rows)
+            else:
+                rows = map_in_threads(partial(_with, thing.matte, picture, above), rows)
+        return rows
 
-    def _shares(self, changed: Mask, blend: F32) -> Shares:
-        count = int(changed.sum())
-        if count == 0:
-            return Shares()
-        f = blend[changed]
-        photo = float((1 - f + f * self.from_photo[changed]).sum())
-        lifter = float((f * self.from_lifter[changed]).sum())
-        inpainter = float((f * self.invented[changed]).sum())
-        total = photo + lifter + inpainter
-        return Shares(photo / total, lifter / total, inpainter / total, 0.0)
+    def alone(self, top: int, bottom: int) -> F32:
+        """The objects on nothing (bottom - top, w, 4), premultiplied."""
+        x0, _, x1, _ = self.box
+        result = np.zeros((bottom - top, x1 - x0, 4), np.float32)
+        for k in range(len(self._moved)):
+            if (drawn := self._draw(k, top, bottom)) is not None:
+                picture = _part(drawn, 0, bottom - top)
+                result *= 1 - picture.alpha[..., None]
+                result[..., :3] += picture.color
+                result[..., 3] += picture.alpha
+        return result
 
-
-def displacement(picture: Picture3D, rest_alpha: F32) -> F32:
-    """(h, w) px by which what stands at a pixel is not where it was; 0 where nothing changed.
-
-    A pixel that the object has left counts as far as its neighbours moved, or as infinitely far
-    where none of the object is left near it.
-    """
-    stands = picture.alpha > 0
-    shift = np.where(stands, np.sqrt((picture.shift**2).sum(-1)), 0).astype(np.float32)
-    near = cv2.dilate(shift, np.ones((NEAR, NEAR), np.uint8))
-    shift = np.where(stands, shift, np.where(near > 0, near, np.inf))
-    is_invented = picture.from_photo < picture.alpha - STILL_ALPHA
-    is_other = np.abs(picture.alpha - rest_alpha) > STILL_ALPHA
-    shift[is_invented] = np.inf
-    shift[is_other] = np.maximum(shift[is_other], STILL)
-    is_still = (shift < STILL) | (~stands & ~is_other)
-    return np.where(is_still, 0, shift).astype(np.float32)
+    def _draw(self, k: int, top: int, bottom: int) -> Picture3D | None:
+        """The rows `top`..`bottom` of an object's picture; None where it is hidden."""
+        if k not in self._drawables:
+            return None
+        part = (self.box[0], top, self.box[2], bottom)
+        return tiles.draw(self._drawables[k], self._textures[k], part)
 
 
-def _blend_weights(moved: F32, margin: float) -> F32:
-    """(h, w) in [0, 1]: how much of the edit to show.
+def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:
+    return [(first, min(first + PIECE, bottom)) for first in range(top, bottom, PIECE)]
 
-    1 where something moved, and falling to 0 around it over a distance that grows with the
-    move: the plate's invented ring is not shown around what has hardly moved.
-    """
-    blend = np.zeros(moved.shape, np.float32)
-    for least, reach in ((STILL, 1.5), (0.5, 3.0), (2.0, 6.0), (6.0, margin)):
-        there = moved >= least
-        if there.any():
-            distance = cv2.distanceTransform((~there).astype(np.uint8), cv2.DIST_L2, 5)
-            reach = min(reach, margin)
-            ramp = (reach - distance) / ((1 - FEATHER_START) * reach)
-            blend = np.maximum(blend, np.clip(ramp, 0, 1))
-    return blend
+
+def _part(picture: Picture3D, first: int, last: int) -> Picture3D:
+    """Its rows first..last; none of them is more than opaque."""
+    part = Picture3D(*(getattr(picture, field.name)[first:last] for field in fields(picture)))
+    return replace(part, alpha=np.minimum(part.alpha, 1.0))
+
+
+def _plate_rows(document: Document, box: Box) -> Rows:
+    """What is seen in `box` without the objects that were moved."""
+    x0, y0, x1, y1 = box
+    photo, plate = document.photo.pixels, document.plate
+    nothing = np.zeros((y1 - y0, x1 - x0), np.float32)
+    if plate is None:
+        colour, invented = unit_pixels(photo[y0:y1, x0:x1]), nothing
+    else:
+        colour = unit_pixels(plate_crop(photo, plate, box))
+        invented = crop(plate.hole, plate.box, box).astype(np.float32)
+    return Rows(x0, y0, colour, 1 - invented, nothing, invented, nothing, nothing > 0)
+
+
+def _without(matte: Matte, rows: Rows) -> Rows:
+    """`rows` from which an object was taken."""
+    was_there = crop(matte.alpha, matte.box, rows.box) > 0
+    moved = np.where(was_there, np.float32(np.inf), rows.moved)
+    return replace(rows, moved=moved, is_covered=rows.is_covered | was_there)
+
+
+def _with(matte: Matte, drawn: Picture3D, above: int, rows: Rows) -> Rows:
+    """`rows` with an object over them whose picture `drawn` begins at row `above`."""
+    x0, y0, x1, y1 = rows.box
+    top, bottom = max(y0 - NEAR // 2, above), min(y1 + NEAR // 2, above + len(drawn.alpha))
+    around = _part(drawn, top - above, bottom - above)
+    rest = crop(matte.alpha, matte.box, (x0, top, x1, bottom))
+    inner = slice(y0 - top, y1 - top)
+    moved = displacement(around, rest)[inner]
+    picture = _part(around, inner.start, inner.stop)
+    through = 1 - picture.alpha
+    return replace(
+        rows,
+        colour=picture.color + through[..., None] * rows.colour,
+        from_photo=picture.from_photo + through * rows.from_photo,
+        from_lifter=picture.alpha - picture.from_photo + through * rows.from_lifter,
+        from_inpainter=through * rows.from_inpainter,
+        moved=np.maximum(rows.moved, moved),
+        is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
+    )
+
+
+def _count_changes(photo: Pixels, pixels: Pixels, footprint: Mask) -> tuple[int, int]:
+    """How many pixels differ, in all and outside the footprint."""
+
+    def count(rows: tuple[int, int]) -> tuple[int, int]:
+        part = slice(*rows)
+        is_changed = differ(pixels[part], photo[part])
+        return int(is_changed.sum()), int((is_changed & ~footprint[part]).sum())
+
+    counts = map_in_threads(count, _pieces(0, len(photo)))
+    return sum(changed for changed, _ in counts), sum(outside for _, outside in counts)
 
 
 def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -> np.ndarray:
-    """The moved objects alone, (H, W, 4) straight alpha, on nothing; `size` is (width, height)."""
+    """The moved objects alone, (H, W, 4) straight alpha, on nothing; `size` is (width, height).
+
+    They are drawn again, strip by strip: a composite does not keep what it has drawn.
+    """
     width, height = size
-    colour = np.zeros((height, width, 3), np.float32)
-    alpha = np.zeros((height, width), np.float32)
-    for x0, y0, picture in result.layers:
-        h, w = picture.alpha.shape
-        window = (slice(y0, y0 + h), slice(x0, x0 + w))
-        through = 1 - picture.alpha
-        colour[window] = picture.color + through[..., None] * colour[window]
-        alpha[window] = picture.alpha + through * alpha[window]
-    straight = colour / np.maximum(alpha, 1e-6)[..., None]
-    straight[alpha <= 0] = 0
-    return pixels_from_unit(np.dstack([straight, alpha]), dtype)
-
-
-def _drawn(
-    splats: PosedSplats, texture: TextureLevels, window: Camera, camera: Camera
-) -> Picture3D:
-    from ..raster import tiles
-
-    picture = tiles.render(splats, texture, window, camera)
-    return replace(picture, alpha=np.minimum(picture.alpha, 1.0))
+    cutout = np.zeros((height, width, 4), dtype)
+    if not result.moved:
+        return cutout
+    drawing = _Drawing(result.moved, result.camera)
+    x0, _, x1, _ = drawing.box
+    for top, bottom in drawing.strips():
+        drawn = drawing.alone(top, bottom)
+        drawn[..., :3] /= np.maximum(drawn[..., 3:], 1e-6)
+        drawn[drawn[..., 3] <= 0] = 0
+        cutout[top:bottom, x0:x1] = pixels_from_unit(drawn, dtype)
+    return cutout

@@ -79,11 +79,11 @@ class Skin:
 
     def run(self) -> Skinned:
         """The points after the motion, and its Jacobian."""
-        inputs = self.inputs()
-        x = inputs[0]
-        moved, linear = np.empty(x.shape), np.empty((len(x), 3, 3))
+        count = len(np.atleast_2d(self.points))
+        moved, linear = np.empty((count, 3)), np.empty((count, 3, 3))
+        inputs = (*self.inputs(), moved, linear)
         in_threads(
-            lambda first, last: _skin(first, last, *inputs, moved, linear),
+            lambda first, last: _skin(first, last, *inputs),
             len(self.binding.shares), least=LEAST_ROWS // LANES,
         )  # fmt: skip
         return Skinned(moved, linear)

@@ -16,8 +16,10 @@ from .bell import BATCH, batch_rows, bell
 from .binning import TILE
 from .sampling import HALF, ONE, ZERO
 
-CLEAR, R, G, B, MEAN, MEDIAN, STEP_X, STEP_Y = (np.uint64(row * m.PIXELS) for row in range(8))
-ROWS = 8
+CLEAR, R, G, B, ALPHA, MEAN, MEDIAN, STEP_X, STEP_Y = (
+    np.uint64(row * m.PIXELS) for row in range(9)
+)
+ROWS = 9
 INFINITE = np.float32(np.inf)
 PLAIN = 15  # columns of a projected Gaussian that are needed, the first
 START, END = (np.uint64((PLAIN + row) * 64) for row in (0, m.STRIPS))  # of a strip's rows
@@ -32,9 +34,10 @@ CX, CY, QXX, TILT, RYY, Z, ZX, ZY, WEIGHT, RED, GREEN, BLUE = (
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def draw_one_by_one(
-    first, last, projected, starts, members, across, left, top, width, height, rules, kind, out
-):
-    """Draws the tiles first..last of `out` (height, width, 8); see `surface.draw_layers`."""
+    first, last, projected, starts, members, across, left, top, width, height, rules, kind, out,
+    rgba,
+):  # fmt: skip
+    """Draws the tiles first..last of `out` or `rgba`; see `surface.draw_layers`."""
     s = np.zeros(ROWS * m.PIXELS, np.float32)
     batch = np.ones(BATCH_ROWS * int(BATCH), np.float32)
     m.number_pixels(s, STEP_X, STEP_Y)
@@ -42,6 +45,9 @@ def draw_one_by_one(
     for tile in range(first, last):
         column, row = (tile % across) * TILE, (tile // across) * TILE
         rows, columns = min(TILE, height - row), min(TILE, width - column)
+        if starts[tile] == starts[tile + 1]:
+            m.clear_tile(out, rgba, column, row, columns, rows)
+            continue
         x0, y0 = np.float32(left + column) + HALF, np.float32(top + row) + HALF
         for k in range(m.ALL):
             s[CLEAR + k] = ONE
@@ -55,6 +61,11 @@ def draw_one_by_one(
             batch_rows(batch, x0, y0, np.float32(rows), START, END)
             if not _draw(s, batch, count, x0, y0, through, kind):
                 break
+        if len(rgba) > 0:
+            for k in range(m.ALL):
+                s[ALPHA + k] = ONE - s[CLEAR + k]
+            m.write_rgba(s, R, rgba, column, row, columns, rows)
+            continue
         for y in range(rows):
             for x in range(columns):
                 _put(out[row + y, column + x], s, m.pixel_index(x, y))

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..threads import FAST
 from . import tile_memory as m
+from .look_up import look_up
 from .rules import ramp
-from .sampling import HALF, ONE, TWO, ZERO, sample, sample_inside
+from .sampling import HALF, ONE, ZERO
 
 TINY = np.float32(1e-30)
 LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows no photo
@@ -22,7 +23,10 @@ def composite_layer(
     s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
     rules, kind,
 ):  # fmt: skip
-    """Puts the layer behind what is there already; whether more may follow."""
+    """Puts the layer behind what is there already.
+
+    Returns the first row, and the last + 1, in which a further layer may be seen.
+    """
     for k in range(m.ALL):
         total = s[m.TOTAL + k]
         shown = max(total - s[m.BODIED + k], ZERO)
@@ -36,7 +40,7 @@ def composite_layer(
         s[m.MATTES + k] = max(ONE - s[m.MATTES + k] * inverse, ZERO)  # not below 0 by rounding
         s[m.SOLIDS + k] *= inverse
         s[m.SEES + k] = max(ONE - s[m.SEES + k] * inverse, ZERO)
-    _look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top)
+    look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top)
     if kind.is_surface:
         _cover(s, m.TOTAL, m.GX, m.GY, m.CLEAR, rules)
         _cover(s, m.BODIED, m.BGX, m.BGY, m.BODY_CLEAR, rules)
@@ -45,37 +49,17 @@ def composite_layer(
         _put_first(s, visible, opaque)
     else:
         _put_behind(s, rules)
-    least, more = np.float32(rules.least_front), ZERO
-    for k in range(m.ALL):
-        more += ONE if s[m.OPEN + k] * s[m.LEFT + k] >= least else ZERO
-    return more > ZERO
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top):
-    """What the photo shows where the layer looks."""
-    room = np.empty(16, np.float32)
-    ratio = photo[0] / view[0]
-    height, width = shapes[0, 0], shapes[0, 1]
-    u0 = (left + 0.5 - view[1]) * ratio + photo[1]
+    least = np.float32(rules.least_front)
+    begin, end = rows, 0
     for y in range(rows):
-        v0 = (top + y + 0.5 - view[2]) * ratio + photo[2]
-        for x in range(columns):
-            k = m.pixel_index(x, y)
-            if s[m.IS_PHOTO + k] == ZERO:
-                s[m.T_R + k] = s[m.T_G + k] = s[m.T_B + k] = s[m.T_A + k] = ZERO
-                continue
-            u = u0 + x * ratio + s[m.SHX + k]
-            v = v0 + s[m.SHY + k]
-            is_within = (u > 0.0) & (v > 0.0) & (u < photo[3]) & (v < photo[4])
-            s[m.WITHIN + k] = ONE if is_within else ZERO  # elsewhere the photo is made up
-            i, j = u - crop_left - 0.5, v - crop_top - 0.5
-            is_inside = (i >= 1.0) & (j >= 1.0) & (i < width - 2.0) & (j < height - 2.0)
-            if is_inside and s[m.MAG + k] < TWO:  # most often so, and one call less
-                texel = sample_inside(texels, shapes, i, j, s[m.MAG + k], room)
-            else:
-                texel = sample(texels, shapes, u - crop_left, v - crop_top, s[m.MAG + k], room)
-            s[m.T_R + k], s[m.T_G + k], s[m.T_B + k], s[m.T_A + k] = texel
+        more = ZERO
+        for strip in range(m.STRIPS):
+            at = m.pixel_index(strip * m.STRIP, y)
+            for k in range(at, at + np.uint64(m.STRIP)):
+                more += ONE if s[m.OPEN + k] * s[m.LEFT + k] >= least else ZERO
+        if more > ZERO:
+            begin, end = min(begin, y), y + 1
+    return begin, end
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

@@ -87,11 +87,11 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     inverse = np.linalg.inv(screen + ridge[:, None, None] * np.eye(2))
     a = rest.pictures[index] @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
     filtered = screen + kind.filter * np.eye(2)
-    conic = np.linalg.inv(filtered)
+    conic = np.linalg.inv(filtered).astype(np.float64)
     # Where the filter spreads a small Gaussian over more pixels, it must not gain weight by that.
     larger = np.sqrt(np.linalg.det(screen).clip(0) / np.linalg.det(filtered))
     compensation = larger if kind.is_compensated else np.ones(len(index))
-    singular = np.linalg.svd(a, compute_uv=False)
+    singular = np.linalg.svd(a, compute_uv=False).astype(np.float64)
     volume = np.cbrt(np.abs(np.linalg.det(motion)))
     zoom = camera.focal / means[:, 2] / rest.zoom[index]
     stretch = singular[:, 1] * zoom * volume

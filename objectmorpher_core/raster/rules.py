@@ -84,7 +84,7 @@ class Rules(NamedTuple):
     # cannot be seen, and halved copies would blur all that turns a little.
     sharp: float = 1.19
 
-    # Px of the photo: layers that look so close together are one surface, beyond apart they are not.
+    # Px of the photo: layers that look so close together are one surface; `apart`, they are two.
     same_point: float = 1.0
     apart: float = 1.5
     visible: float = 1 / 255  # alpha of the layer whose depth and shift a pixel has

@@ -45,15 +45,11 @@ def sample(texels, shapes, u, v, magnified, room):
 
 
 @numba.njit(inline="always", error_model="numpy", fastmath=FAST)
-def sample_inside(texels, shapes, x, y, magnified, room):
-    """The same at the pixel index (x, y), two pixels inside the crop, and `magnified` < 2."""
-    width = shapes[0, 1]
-    column, row = int(x), int(y)
-    wx, wy = _cubic_weights(np.float32(x - column)), _cubic_weights(np.float32(y - row))
-    first = np.uint64(4 * ((row - 1) * width + column - 1))
-    r = _cubic_inside(texels, first, width, wx, wy, room)
-    if magnified <= ONE:
-        return r
+def add_halved(r, texels, shapes, x, y, magnified):
+    """The full-size value `r` mixed with the halved level for 1 < `magnified` < 2.
+
+    At the pixel index (x, y), at least one pixel inside the crop.
+    """
     t = magnified - ONE
     mix = t * (L0 + t * (L1 + t * (L2 + t * (L3 + t * L4))))
     width = shapes[1, 1]
@@ -86,7 +82,7 @@ def _cubic(texels, shapes, u, v, room):
     column, row = int(j), int(i)
     if 1 <= column < width - 2 and 1 <= row < height - 2:
         first = np.uint64(4 * ((row - 1) * width + column - 1))
-        return _cubic_inside(texels, first, width, wx, wy, room)
+        return cubic_inside(texels, first, width, wx, wy, room)
     r = (ZERO, ZERO, ZERO, ZERO)
     for a in range(4):
         y = row + a - 1
@@ -96,7 +92,7 @@ def _cubic(texels, shapes, u, v, room):
 
 
 @numba.njit(inline="always", error_model="numpy", fastmath=FAST)
-def _cubic_inside(texels, first, width, wx, wy, room):
+def cubic_inside(texels, first, width, wx, wy, room):
     """Where all sixteen texels are inside. Four of a row are sixteen numbers side by side: the
     columns' sums are vector code."""
     w0, w1, w2, w3 = wy

@@ -20,6 +20,7 @@ from .binning import TILE
 from .compositing import composite_layer
 from .rules import LAYERS
 from .sampling import HALF, ONE, THREE, TWO, ZERO
+from .smooth import draw_smooth, is_plain, new_nodes
 
 FAR = np.float32(3e38)  # a depth that nothing has
 INFINITE = np.float32(np.inf)
@@ -29,58 +30,89 @@ MIDDLE = np.float32(TILE / 2)
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def draw_layers(
     first, last, projected, starts, members, across, left, top, width, height, view, photo,
-    gap, texture_gap, texels, shapes, crop_left, crop_top, rules, kind, out,
+    gap, texture_gap, texels, shapes, crop_left, crop_top, rules, kind, out, rgba,
 ):  # fmt: skip
-    """Draws the tiles first..last of `out` (height, width, 8).
+    """Draws the tiles first..last of `out` (height, width, 8) f32 or of `rgba` (.., 4) u8.
+
+    The one that is not wanted is empty.
 
     `left`, `top`: the pixel of the view at which `out` begins. `view`, `photo`: focal, cx, cy,
     width, height of the view and of the photo, px.
     """
     s = np.zeros(m.ROWS * m.PIXELS, np.float32)
     m.number_pixels(s, m.STEP_X, m.STEP_Y)
+    nodes = new_nodes()
     gaps = ONE / np.float32(gap * gap), ONE / np.float32(texture_gap * texture_gap)
     for tile in range(first, last):
         begin, end = starts[tile], starts[tile + 1]
         column, row = (tile % across) * TILE, (tile // across) * TILE
         rows, columns = min(TILE, height - row), min(TILE, width - column)
         if begin == end:
-            for y in range(row, row + rows):
-                for x in range(column, column + columns):
-                    for c in range(m.OUTPUTS):
-                        out[y, x, c] = INFINITE if c == 4 else ZERO
+            m.clear_tile(out, rgba, column, row, columns, rows)
             continue
-        _clear(s, m.O_R, m.OPEN, ZERO)
-        _clear(s, m.O_DEPTH, m.O_DEPTH + m.ALL, INFINITE)
-        _clear(s, m.LAST_THROUGH, m.LAST_THROUGH + m.ALL, ONE)
-        _clear(s, m.OPEN, m.OPEN + m.ALL, ONE)
+        own = members[begin:end]
         x0, y0 = np.float32(left + column), np.float32(top + row)
         # Of other assets even what is no front counts, where there is a front.
-        is_one = kind.is_surface and _is_one_layer(projected, members[begin:end], x0, y0, gaps)
-        for layer in range(LAYERS):
-            _clear(s, m.TOTAL, m.CLEAR, ZERO)
-            _clear(s, m.CLEAR, m.BODY_CLEAR + m.ALL, ONE)
-            if not is_one:
-                _clear(s, m.F_DEPTH, m.F_DEPTH + m.ALL, FAR)
-                for slot in range(begin, end):
-                    g = projected[members[slot]]
-                    _draw(s, g, x0, y0, rows, layer, False, gaps, rules, kind, True)
-            for slot in range(begin, end):
-                g = projected[members[slot]]
-                _draw(s, g, x0, y0, rows, layer, is_one, gaps, rules, kind, False)
-            is_more = composite_layer(
-                s, layer, left + column, top + row, columns, rows, view, photo,
-                texels, shapes, crop_left, crop_top, rules, kind,
+        is_one = kind.is_surface and _is_one_layer(projected, own, x0, y0, gaps)
+        is_done = False
+        if is_one and _are_plain(projected, own, rules):
+            is_done = draw_smooth(
+                s, nodes, projected, own, left + column, top + row, columns, rows, view, photo,
+                texels, shapes, crop_left, crop_top, kind,
             )  # fmt: skip
-            if is_one or not is_more:
-                break
-            if layer < LAYERS - 1:
-                for k in range(m.FRONT):
-                    s[np.uint64(layer + 1) * m.FRONT + k] = s[k]
-        for y in range(rows):
-            for x in range(columns):
-                for c in range(m.OUTPUTS):
-                    k = np.uint64((m.RESULTS + c) * m.PIXELS) + m.pixel_index(x, y)
-                    out[row + y, column + x, c] = s[k]
+        if not is_done:
+            _draw_tile(
+                s, projected, own, is_one, left + column, top + row, columns, rows, gaps, view,
+                photo, texels, shapes, crop_left, crop_top, rules, kind,
+            )  # fmt: skip
+        if len(rgba) > 0:
+            m.write_rgba(s, m.O_R, rgba, column, row, columns, rows)
+        else:
+            for y in range(rows):
+                for x in range(columns):
+                    for c in range(m.OUTPUTS):
+                        k = np.uint64((m.RESULTS + c) * m.PIXELS) + m.pixel_index(x, y)
+                        out[row + y, column + x, c] = s[k]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _draw_tile(
+    s, projected, members, is_one, left, top, columns, rows, gaps, view, photo, texels, shapes,
+    crop_left, crop_top, rules, kind,
+):  # fmt: skip
+    """Layer by layer, until nothing is left that could be seen."""
+    _clear(s, m.O_R, m.OPEN, ZERO)
+    _clear(s, m.O_DEPTH, m.O_DEPTH + m.ALL, INFINITE)
+    _clear(s, m.LAST_THROUGH, m.LAST_THROUGH + m.ALL, ONE)
+    _clear(s, m.OPEN, m.OPEN + m.ALL, ONE)
+    x0, y0 = np.float32(left), np.float32(top)
+    first, last = 0, rows  # that are not finished
+    for layer in range(LAYERS):
+        _clear(s, m.TOTAL, m.CLEAR, ZERO)
+        _clear(s, m.CLEAR, m.BODY_CLEAR + m.ALL, ONE)
+        if not is_one:
+            _clear(s, m.F_DEPTH, m.F_DEPTH + m.ALL, FAR)
+            for i in members:
+                _draw(s, projected[i], x0, y0, first, last, layer, False, gaps, rules, kind, True)
+        for i in members:
+            _draw(s, projected[i], x0, y0, first, last, layer, is_one, gaps, rules, kind, False)
+        first, last = composite_layer(
+            s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
+            rules, kind,
+        )  # fmt: skip
+        if is_one or first >= last:
+            return
+        if layer < LAYERS - 1:
+            for k in range(m.FRONT):
+                s[np.uint64(layer + 1) * m.FRONT + k] = s[k]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _are_plain(projected, members, rules):
+    for i in members:  # noqa: SIM110 (a loop is what numba compiles)
+        if not is_plain(projected[i], rules):
+            return False
+    return True
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -127,14 +159,18 @@ def _is_one_layer(projected, members, x0, y0, gaps):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _draw(s, g, x0, y0, rows, layer, is_one, gaps, rules, kind, is_front):
-    """One Gaussian onto the tile at x0, y0: as a layer's front, or into the layer's sums."""
+def _draw(s, g, x0, y0, first, last, layer, is_one, gaps, rules, kind, is_front):
+    """One Gaussian onto the tile at x0, y0: as a layer's front, or into the layer's sums.
+
+    On the rows first..last of the tile.
+    """
     cut = g[p.FRONT] if is_front and layer == 0 else g[p.CUT]
     if cut <= ZERO:
         return
     dx, dy = x0 + HALF - g[p.CX], y0 + HALF - g[p.CY]  # of the tile's first pixel
     for strip in range(m.STRIPS):
-        start, end = strip_rows(g, cut, dx, dy, strip, rows)
+        start, end = strip_rows(g, cut, dx, dy, strip, last)
+        start = max(start, first)
         if start >= end:
             continue
         at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)

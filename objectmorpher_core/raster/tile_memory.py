@@ -46,11 +46,13 @@ OUTPUTS = 8  # the first of them: colour, alpha, depth, from_photo, shift
 ROOM = RESULTS + 14
 
 # Room to work in: what the photo shows; whether it does, and whether within the photo; what no
-# layer before has taken of a sample; its alpha and gradient; the pixel's column and row.
+# layer before has taken of a sample; its alpha and gradient; the pixel's column and row; where it
+# looks in the photo, and the weights of the texels there.
 T_R, T_G, T_B, T_A, IS_PHOTO, WITHIN, SHARE, ALPHA, SLOPE_X, SLOPE_Y, STEP_X, STEP_Y = _rows(
     ROOM, 12
 )
-ROWS = ROOM + 12
+COLUMN, LINE, TX, TY, WX0, WX1, WX2, WX3, WY0, WY1, WY2, WY3 = _rows(ROOM + 12, 12)
+ROWS = ROOM + 24
 
 
 @numba.njit(cache=True, nogil=True)
@@ -66,3 +68,29 @@ def number_pixels(s, step_x, step_y):
         i = int(k)
         s[step_x + k] = np.float32(i // (STRIP * TILE) * STRIP + i % STRIP)
         s[step_y + k] = np.float32(i // STRIP % TILE)
+
+
+@numba.njit(cache=True, nogil=True)
+def clear_tile(out, rgba, column, row, columns, rows):
+    """Nothing is seen on the tile at (column, row) of a picture: in `out` or in `rgba`."""
+    for y in range(row, row + rows):
+        for x in range(column, column + columns):
+            if len(rgba) > 0:
+                for c in range(4):
+                    rgba[y, x, c] = 0
+            else:
+                for c in range(OUTPUTS):
+                    out[y, x, c] = np.inf if c == 4 else 0.0  # the depth
+
+
+@numba.njit(cache=True, nogil=True)
+def write_rgba(s, first, rgba, column, row, columns, rows):
+    """Premultiplied colour and alpha, four rows from `first` on, in 8 bits each."""
+    full, half, zero = np.float32(255), np.float32(0.5), np.float32(0)
+    for y in range(rows):
+        for x in range(columns):
+            k = first + pixel_index(x, y)
+            for c in range(4):
+                value = min(max(s[k] * full + half, zero), full)
+                rgba[row + y, column + x, c] = np.uint8(np.int32(value))
+                k += ALL

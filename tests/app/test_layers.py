@@ -42,7 +42,8 @@ def test_a_draft_is_replaced_by_the_exact_picture(editor: Editor, moved: Documen
     layers.draw(lift_free(moved), editor.view)
     (exact,) = layers.draw(moved, editor.view)
     assert exact.box == shown.box
-    np.testing.assert_allclose(shown.rgba, exact.rgba * 255, atol=0.51)
+    # its window begins elsewhere: interpolation between pixels differs by a rounding
+    np.testing.assert_allclose(shown.rgba.astype(int), exact.rgba, atol=1)
     layers.frame_time, layers.ask = 0.028, editor.tasks.render_exact
 
 
@@ -62,7 +63,7 @@ def test_a_draft_covers_what_the_exact_picture_covers(editor: Editor, moved: Doc
     exact, draft = pictures
     coarse = round((draft.box[2] - draft.box[0]) / draft.rgba.shape[1])
     assert coarse > 1
-    sampled = exact.rgba[coarse // 2 :: coarse, coarse // 2 :: coarse, 3]
+    sampled = exact.rgba[coarse // 2 :: coarse, coarse // 2 :: coarse, 3] / 255
     height, width = (min(a, b) for a, b in zip(sampled.shape, draft.rgba.shape, strict=False))
     difference = np.abs(sampled[:height, :width] - draft.rgba[:height, :width, 3])
     assert difference.mean() < 0.02  # they differ along the edge only

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 
 import numpy as np
 import pytest
 import tifffile
 from PIL import Image, ImageCms, ImageOps
 
+from objectmorpher_core import png
 from objectmorpher_core.image import (
     ImageError,
     Picture,
@@ -103,11 +105,44 @@ def test_other_programs_read_our_tiff(kind, is_deep, chelsea):
     np.testing.assert_array_equal(stored, np.concatenate(channels, axis=2).squeeze())
 
 
-def test_other_programs_read_our_grey_alpha_png(chelsea):
-    picture = pictures(chelsea)["grey alpha"]
+@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+def test_other_programs_read_our_png(kind, chelsea):
+    picture = pictures(np.tile(chelsea, (3, 2, 1)))[kind]  # several strips
     image = Image.open(io.BytesIO(encode_picture(picture, "png")))
-    assert image.mode == "LA"
-    np.testing.assert_array_equal(np.asarray(image)[..., 1], picture.alpha)
+    assert image.mode == {"rgb": "RGB", "rgba": "RGBA", "grey": "L", "grey alpha": "LA"}[kind]
+    stored = np.asarray(image).reshape(*picture.pixels.shape[:2], -1)
+    colours = 1 if picture.is_grey else 3
+    np.testing.assert_array_equal(stored[..., :colours], picture.pixels[..., :colours])
+    if picture.alpha is not None:
+        np.testing.assert_array_equal(stored[..., -1], picture.alpha)
+
+
+@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (5, 3), (700, 411)])
+@pytest.mark.parametrize("is_deep", [False, True])
+def test_a_png_is_a_whole_stream_of_filtered_rows(kind, shape, is_deep):
+    pixels = np.random.default_rng(0).integers(0, 256, (*shape, 3), np.uint8)
+    picture = pictures(deep(pixels) if is_deep else pixels)[kind]
+    data = encode_picture(picture, "png")
+    assert_same(read_picture(data), picture)
+    packed, at = b"", len(png.SIGNATURE)
+    while at < len(data):
+        size, name = struct.unpack_from(">I4s", data, at)
+        packed += data[at + 8 : at + 8 + size] if name == b"IDAT" else b""
+        at += 12 + size
+    stored = zlib.decompress(packed)  # raises where its checksum is wrong
+    channels = (1 if picture.is_grey else 3) + (picture.alpha is not None)
+    assert len(stored) == shape[0] * (1 + shape[1] * channels * (1 + is_deep))
+
+
+def test_a_png_is_about_as_small_as_others_make_it(chelsea):
+    ours, others = (
+        len(encode_picture(Picture(chelsea), "png")),
+        pil_bytes(Image.fromarray(chelsea), "PNG"),
+    )
+    assert ours < 1.15 * len(others)
+    flat = Picture(np.full((1000, 1000, 3), 77, np.uint8))
+    assert len(encode_picture(flat, "png")) < 20_000
 
 
 @pytest.mark.parametrize("ending", [".png", ".tif", ".webp", ".jpg"])

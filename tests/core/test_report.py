@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import time
 
+import numpy as np
 import pytest
 
 from objectmorpher_core.pipeline import Edited, run_script
@@ -106,6 +109,13 @@ def test_a_stopwatch_adds_up_by_stage_even_when_a_stage_fails():
     assert tuple(seconds) == STAGES
     assert seconds["lift"] >= 0.02
     assert seconds["total"] >= seconds["lift"]
+
+
+def test_the_memory_of_who_started_the_process_does_not_count():
+    told = "from objectmorpher_core.report import peak_memory_mb; print(peak_memory_mb())"
+    held = np.ones(100_000_000)  # 800 MB
+    ran = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert 20 < float(ran.stdout) < held.nbytes / 1e6 - 200
 
 
 def test_memory_is_told_in_megabytes():

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from objectmorpher_core import edits
-from objectmorpher_core.compose.composite import composite, straight_cutout
+from objectmorpher_core.compose import composite as composite_module
+from objectmorpher_core.compose.composite import Composite, composite, straight_cutout
 from objectmorpher_core.compose.plate import hole_margin
 from objectmorpher_core.document import Document, Placement, Pose
+from objectmorpher_core.progress import Cancelled
 from tests import shapes
 
 MOVES = {
@@ -23,7 +30,9 @@ MOVES = {
     "half out of the photo": Placement(move=(70.0, 40.0)),
     "large": Placement(scale=6.0),
     "a hair": Placement(move=(0.4, 0.0)),
+    "a little": Placement(move=(1.5, 2.5)),
 }
+ROOT = Path(__file__).parents[3]
 masks = pytest.mark.parametrize("name", ["ellipse", "thin", "frame", "parts", "ring"])
 moves = pytest.mark.parametrize("move", MOVES)
 
@@ -204,3 +213,122 @@ def test_an_object_behind_the_frame_or_nowhere_changes_only_its_hole():
     result = composite(_placed(scene.document(), MOVES["out of the photo"]), {0: scene.puppet})
     assert result.shares.from_inpainter > 0.5
     assert (result.pixels[scene.mask] == 128).mean() > 0.99
+
+
+# ---- strip by strip -------------------------------------------------------------------------
+
+
+@cache
+def _wide(name: str = "star") -> shapes.Scene:
+    """A scene that is many strips high where strips are made narrow."""
+    inside = shapes.mask(name, 640, 480)
+    return shapes.lifted_scene(shapes.picture(inside), inside, 2000)
+
+
+def _bent(scene: shapes.Scene) -> Document:
+    """One end of the object is lifted, the other stays in place."""
+    deformer = scene.puppet.deformer
+    points = deformer.points.copy()
+    points[:, 1] -= 0.6 * np.maximum(points[:, 0], 0) ** 2
+    return edits.set_pose(scene.document(), 0, Pose(points, deformer.rest().rotations))
+
+
+def _edited(edit: str) -> Document:
+    scene = _wide()
+    if edit == "bent":
+        return _bent(scene)
+    if edit == "hidden":
+        return edits.set_visible(scene.document(), 0, False)
+    if edit == "16 bits":
+        document = _placed(scene.document(), MOVES["turned"])
+        picture = replace(document.photo.picture, pixels=scene.pixels.astype(np.uint16) * 257)
+        plate = replace(document.plate, pixels=document.plate.pixels.astype(np.uint16) * 257)
+        return replace(document, photo=replace(document.photo, picture=picture), plate=plate)
+    return _placed(scene.document(), MOVES[edit])
+
+
+EDITS = (
+    "moved",
+    "turned",
+    "a hair",
+    "a little",
+    "half out of the photo",
+    "bent",
+    "hidden",
+    "16 bits",
+)
+
+
+@cache
+def _whole(edit: str) -> Composite:
+    return composite(_edited(edit), {0: _wide().puppet}, rows=10**6)
+
+
+def _assert_same(result: Composite, whole: Composite) -> None:
+    assert result.changed == whole.changed > 0
+    assert result.outside_footprint_changed == 0
+    assert np.array_equal(result.pixels, whole.pixels)
+    assert np.array_equal(result.footprint, whole.footprint)
+    for name, share in vars(whole.shares).items():
+        assert getattr(result.shares, name) == pytest.approx(share, abs=1e-6)
+
+
+@pytest.mark.parametrize("rows", [1, 64, 257, None])
+@pytest.mark.parametrize("edit", EDITS)
+def test_the_picture_is_the_same_however_many_rows_are_blended_at_a_time(edit, rows, monkeypatch):
+    whole = _whole(edit)
+    if rows == 1:
+        monkeypatch.setattr(composite_module, "PIECE", 3)  # fewer rows than a pixel looks around
+    result = composite(_edited(edit), {0: _wide().puppet}, rows=rows)
+    _assert_same(result, whole)
+
+
+@pytest.mark.parametrize("height", [1, 64, 257])
+@pytest.mark.parametrize("edit", EDITS)
+def test_the_picture_is_the_same_however_many_rows_are_drawn_at_a_time(edit, height, monkeypatch):
+    whole = _whole(edit)
+    kind = np.dtype(np.uint16), (640, 480)
+    cutout = straight_cutout(whole, *kind)
+    monkeypatch.setattr(composite_module, "STRIP", 640 * height)
+    _assert_same(composite(_edited(edit), {0: _wide().puppet}), whole)
+    assert np.array_equal(straight_cutout(whole, *kind), cutout)
+
+
+def test_every_strip_tells_how_far_it_is(monkeypatch):
+    monkeypatch.setattr(composite_module, "STRIP", 640 * 32)
+    told: list[float] = []
+    composite(_edited("moved"), {0: _wide().puppet}, lambda share, note: told.append(share))
+    assert len(told) > 5
+    assert told == sorted(told)
+    assert told[0] >= 0 and told[-1] <= 1
+
+
+def test_between_strips_it_can_be_cancelled(monkeypatch):
+    monkeypatch.setattr(composite_module, "STRIP", 640 * 32)
+
+    def stop(share: float, note: str) -> None:
+        if share > 0.4:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        composite(_edited("moved"), {0: _wide().puppet}, stop)
+
+
+def _cost_of_export(width: int, height: int, factor: int) -> dict[str, float]:
+    """See `tests.large`, in a process of its own."""
+    command = [sys.executable, "-m", "tests.large", str(width), str(height), str(factor)]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(ran.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "most_mb"), [((600, 400, 10), 2000), ((600, 417, 20), 6000)])
+def test_a_large_photo_is_exported_in_bounded_memory(size, most_mb):
+    """24 and 100 megapixels. An object on a quarter of the photo takes 16 bytes a pixel of its
+    box in the document, and as the texture that is drawn once or twice as much again."""
+    cost = _cost_of_export(*size)
+    assert cost["peak_mb"] < most_mb
+    assert cost["changed"] > 0.2 * cost["footprint"]
+    assert cost["outside"] == 0
+    assert cost["misread"] == 0

@@ -185,6 +185,31 @@ def test_a_window_is_a_crop_of_the_whole_picture():
     assert np.abs(whole.alpha[21:91, 37:127] - crop.alpha).max() < rounding
 
 
+@pytest.mark.parametrize(("splatting", "is_textured"), KINDS)
+def test_a_part_of_a_view_and_its_bytes_are_the_same_picture(splatting, is_textured):
+    splats, texture = shapes.random_splats(3, splatting, is_textured)
+    drawable = tiles.prepare(splats, shapes.camera(), shapes.camera())
+    whole = tiles.draw(drawable, texture)
+    part = tiles.draw(drawable, texture, (37, 21, 127, 91))
+    rounding = 1e-4  # sums are the same, but for the order of their roundings
+    assert np.abs(whole.color[21:91, 37:127] - part.color).max() < rounding
+    assert np.abs(whole.alpha[21:91, 37:127] - part.alpha).max() < rounding
+    rgba = np.dstack([part.color, part.alpha]) * 255
+    assert np.abs(tiles.draw_rgba(drawable, texture, (37, 21, 127, 91)) - rgba).max() < 0.51
+
+
+def test_the_box_of_a_view_holds_all_that_is_seen():
+    splats, texture = shapes.random_splats(3, "classic", False)
+    camera = shapes.camera().windowed(50.0, 35.0, 100, 80, 0.8)
+    drawable = tiles.prepare(splats, camera, shapes.camera())
+    x0, y0, x1, y1 = drawable.box()
+    alpha = tiles.draw(drawable, texture).alpha
+    alpha[y0:y1, x0:x1] = 0
+    assert not alpha.any()
+    away = tiles.prepare(splats, camera.windowed(5000.0, 0.0, 40, 30), shapes.camera())
+    assert away.box() is None
+
+
 def test_the_order_of_the_gaussians_does_not_matter():
     splats, texture = _random_scene(1)
     camera = shapes.camera()
