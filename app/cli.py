@@ -168,7 +168,7 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("deform",))
+    parser.add_argument("what", choices=("deform", "render"))
     parser.add_argument("--json", type=Path, metavar="FILE", help="write there, not to stdout")
     parser.add_argument("--quick", action="store_true", help="few repetitions, one size")
     parser.set_defaults(run=_lazily("bench"))

@@ -1,95 +1,95 @@
 #version 330
-// Third pass: a layer's sums become colour and alpha, the photo is looked up once per pixel
-// (raster/reference.py, step 4; raster/tiles.py: _close).
+// A layer's sums become colour and alpha, the photo is looked up once per pixel, and the layer
+// is put behind those that are there (reference.py: _Composite; raster/compositing.py).
 
-uniform sampler2D sum_shift;
+#include "splat_photo.glsl"
+
+uniform sampler2D sum_cover;  // see splat_sum.frag
+uniform sampler2D sum_place;
+uniform sampler2D sum_photo;
 uniform sampler2D sum_color;
-uniform sampler2D sum_slope;
-uniform sampler2D sum_edge;
-uniform sampler2D look_before;   // what the layer before wrote to `look`
-uniform sampler2D result_before;
-uniform bool peels;              // whether there is a layer before
-uniform float same_point;        // photo px within which two layers show one surface
-uniform sampler2D photo;         // straight colour and alpha on the object's crop, with mipmaps
+uniform sampler2D sum_left;
+#if LAYER > 0
+uniform sampler2D look_before;   // what the layer before has written
+uniform sampler2D cover_before;
+#endif
 
-uniform vec3 view;               // focal, cx, cy of the window, px
-uniform vec3 photo_camera;       // the same of the photo
-uniform vec2 corner;             // px, of the crop in the photo
-uniform float level;             // kernel sum at which the surface ends
-uniform float edge_width;        // px
+uniform vec3 unmoved;            // crop px = x * (gl_FragCoord - its first) + yz
+uniform vec4 photo_box;          // crop px, the photo: elsewhere it is made up
+uniform float surface_level;     // rules.Rules
+uniform float edge_width;
+uniform float same_point;
+uniform float apart;
+uniform float visible;
+uniform float opaque;
+uniform float least_front;
 
-layout(location = 0) out vec4 result;  // premultiplied
-layout(location = 1) out vec4 look;    // shift (2), coverage, 1 where the photo is shown
+layout(location = 0) out vec4 color;   // added up: premultiplied
+layout(location = 1) out vec4 detail;  // added up: depth and shift of the first visible layer
+layout(location = 2) out vec4 look;    // of this layer: shift, share of the photo, coverage
+layout(location = 3) out vec4 cover;   // clear before, alpha, has_depth, whether more may follow
+
+float ramp(float value, float zero, float one) {
+    float t = clamp((value - zero) / (one - zero), 0.0, 1.0);
+    return t * t * (3.0 - 2.0 * t);
+}
 
 float coverage(float total, vec2 slope) {
-    return clamp(0.5 + (total - level) / (edge_width * length(slope) + 1e-6), 0.0, 1.0);
-}
-
-// Catmull-Rom: gives a pixel's own value at its centre.
-vec4 cubic_weights(float t) {
-    return vec4(
-        ((-0.5 * t + 1.0) * t - 0.5) * t,
-        (1.5 * t - 2.5) * t * t + 1.0,
-        ((-1.5 * t + 2.0) * t + 0.5) * t,
-        (0.5 * t - 0.5) * t * t
-    );
-}
-
-vec4 texel(ivec2 at, ivec2 size) {
-    vec4 value = texelFetch(photo, clamp(at, ivec2(0), size - 1), 0);
-    bool inside = all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size));
-    return inside ? value : vec4(value.rgb, 0.0);
-}
-
-vec4 cubic(vec2 at) {
-    ivec2 size = textureSize(photo, 0);
-    ivec2 base = ivec2(floor(at - 0.5));
-    vec2 t = at - 0.5 - vec2(base);
-    vec4 wx = cubic_weights(t.x), wy = cubic_weights(t.y);
-    vec4 value = vec4(0.0);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j)
-            value += wy[i] * wx[j] * texel(base + ivec2(j - 1, i - 1), size);
-    return clamp(value, 0.0, 1.0);
-}
-
-vec4 sample_photo(vec2 at, float lod) {
-    vec4 fine = lod < 1.0 ? cubic(at) : vec4(0.0);
-    if (lod <= 0.0) return fine;
-    vec2 size = vec2(textureSize(photo, 0));
-    bool inside = all(greaterThan(at, vec2(0.0))) && all(lessThan(at, size));
-    vec4 coarse = textureLod(photo, at / size, max(lod, 1.0));
-    if (!inside) coarse.a = 0.0;
-    return mix(fine, coarse, min(lod, 1.0));
+    return clamp(0.5 + (total - surface_level) / (edge_width * length(slope) + 1e-6), 0.0, 1.0);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 shifts = texelFetch(sum_shift, pixel, 0);
-    float seen = shifts.z, body = shifts.w, total = seen + body;
+    vec4 covers = texelFetch(sum_cover, pixel, 0);
+    float total = covers.x, body = covers.y, left = texelFetch(sum_left, pixel, 0).r;
     if (total <= 0.0) discard;
+#ifdef IS_LAST
+    if (left == 0.0) discard;  // tails only
+#endif
+    vec4 places = texelFetch(sum_place, pixel, 0), photos = texelFetch(sum_photo, pixel, 0);
     vec4 colors = texelFetch(sum_color, pixel, 0);
-    vec4 slopes = texelFetch(sum_slope, pixel, 0);
-    vec4 edges = texelFetch(sum_edge, pixel, 0);
-    float matte = 0.0;
+
+    // what the photo shows
+    float shown = max(total - body, 0.0);
+    bool is_photo = shown > 1e-6 * total;
+    shown = is_photo ? shown : 0.0;
+    float inverse = is_photo ? 1.0 / shown : 0.0;
+    vec2 shift = vec2(places.w, photos.x) * inverse;
+    vec2 at = unmoved.x * gl_FragCoord.xy + unmoved.yz + shift;
     vec4 texel = vec4(0.0);
-    if (seen > 1e-6 * total) {
-        vec2 at = (gl_FragCoord.xy - view.yz) * (photo_camera.x / view.x) + photo_camera.yz;
-        texel = sample_photo(at + shifts.xy / seen - corner, edges.z / seen);
-        matte = (texel.a * edges.x + edges.y) / seen;
-    }
-    float whole = coverage(total, slopes.xy), solid = coverage(body, slopes.zw);
-    float alpha = matte * whole + (1.0 - matte) * solid;
-    vec2 shift = seen > 1e-6 * total ? shifts.xy / seen : vec2(0.0);
-    look = vec4(shift, whole, seen > 1e-6 * total ? 1.0 : 0.0);
-    if (peels && look.w > 0.5) {
-        // One surface that was split in two: its coverage adds up under one matte.
-        vec4 first = texelFetch(look_before, pixel, 0);
-        float above = texelFetch(result_before, pixel, 0).a;
-        if (first.w > 0.5 && distance(first.xy, shift) < same_point)
-            alpha *= (1.0 - first.z) / max(1.0 - above, 1e-4);
-    }
-    float shown = seen * matte;
-    vec3 mixed = (shown * texel.rgb + colors.rgb) / max(shown + body, 1e-30);
-    result = vec4(mixed, 1.0) * alpha;
+    if (is_photo) texel = sample_photo(at, 1.0 + photos.y * inverse);
+    float seen = max(1.0 - photos.z * inverse, 0.0);
+    seen *= all(greaterThan(at, photo_box.xy)) && all(lessThan(at, photo_box.zw)) ? 1.0 : 0.0;
+    float matte = texel.a * max(1.0 - photos.w * inverse, 0.0) + colors.a * inverse;
+    matte = is_photo ? matte : 0.0;
+
+    // the layer's alpha and colour
+#ifdef IS_SURFACE
+    float whole = coverage(total, covers.zw), solid = coverage(body, places.xy);
+#else
+    float whole = 1.0 - exp(covers.z), solid = 1.0 - exp(covers.w);
+#endif
+    float alpha = mix(solid, whole, matte);
+    float share = shown / total;
+    shown *= matte;
+    float weight = 1.0 / max(shown + body, 1e-30);
+    vec3 mixed = (shown * texel.rgb + colors.rgb) * weight;
+
+    // behind the layers before
+#if LAYER > 0
+    vec4 before = texelFetch(look_before, pixel, 0), covered = texelFetch(cover_before, pixel, 0);
+#else
+    vec4 before = vec4(0.0), covered = vec4(0.0);
+#endif
+    float clear = 1.0 - covered.y;
+    float same = ramp(distance(shift, before.xy), apart, same_point) * share * before.z;
+    float through = min(mix(clear * alpha, covered.x * (1.0 - before.w) * alpha, same), clear);
+    bool is_first = covered.z == 0.0 && alpha > visible;
+    float sum = covered.y + through;
+    color = vec4(mixed, 1.0) * through;
+    detail = vec4(0.0, through * seen * shown * weight, 0.0, 0.0);
+    if (is_first) detail += vec4(places.z / total, 0.0, shift);
+    look = vec4(shift, share, 1.0 - (1.0 - same * before.w) * (1.0 - whole));
+    cover = vec4(mix(clear, covered.x, same), sum, is_first ? 1.0 : covered.z, 0.0);
+    cover.w = sum <= opaque && left >= 0.99 * least_front ? 1.0 : 0.0;
 }

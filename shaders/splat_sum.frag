@@ -1,45 +1,53 @@
 #version 330
-// Second pass: the sums of one surface layer, added up in any order (raster/reference.py, step 3).
+// The sums of a layer, added up in any order (reference.py: _Sums).
 
-flat in vec3 v_conic;
-flat in vec3 v_plane;
-flat in vec2 v_shift;
-flat in vec4 v_shift_slope;
-flat in vec4 v_weights;
-flat in vec3 v_color;
-flat in vec2 v_edge;
-in vec2 v_offset;
+#include "splat_kernel.glsl"
+#include "splat_layer.glsl"
 
-uniform float cutoff;
-uniform float tail;
-uniform float gap;
-uniform bool peels;
-uniform sampler2D front;     // depth of this layer's front
-uniform sampler2D before;    // depth of the layer before, where there is one
+flat in vec4 v_color;  // RED, GREEN, BLUE, how much is not SEEN
+flat in vec2 v_edge;   // how much is not MATTED, SOLID of that
 
-layout(location = 0) out vec4 sum_shift;   // shift x photo (2), photo, body
-layout(location = 1) out vec4 sum_color;   // color x body (3), seen x photo
-layout(location = 2) out vec4 sum_slope;   // gradients of photo + body, and of body
-layout(location = 3) out vec4 sum_edge;    // matted, solid, lod (x photo), depth x (photo + body)
+#ifndef IS_LAST
+uniform sampler2D front;  // of this layer
+#endif
+
+layout(location = 0) out vec4 sum_cover;  // total, body; gradient of total or logs of what is clear
+layout(location = 1) out vec4 sum_place;  // gradient of body, depth, shift x
+layout(location = 2) out vec4 sum_photo;  // shift y; excess of MAGNIFIED, not SEEN, not MATTED
+layout(location = 3) out vec4 sum_color;  // of the body; SOLID of what is not MATTED
+layout(location = 4) out float sum_left;  // for later layers; of the last one: its fronts
 
 void main() {
-    vec2 d = v_offset;
-    vec2 g = vec2(v_conic.x * d.x + v_conic.y * d.y, v_conic.y * d.x + v_conic.z * d.y);
-    float q = dot(g, d);
-    if (q >= cutoff) discard;
-    float depth = v_plane.x + dot(v_plane.yz, d);
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    if (depth > texelFetch(front, pixel, 0).r + gap) discard;
-    if (peels && depth <= texelFetch(before, pixel, 0).r + gap) discard;
-    float bell = exp(-0.5 * q);
-    float photo = (bell - tail) * v_weights.y;
-    float body = (bell - tail) * v_weights.z;
-    vec2 shift = v_shift + vec2(dot(v_shift_slope.xy, d), dot(v_shift_slope.zw, d));
-    sum_shift = vec4(photo * shift, photo, body);
-    sum_color = vec4(body * v_color, photo * v_weights.w);
-    sum_slope = -bell * vec4(g * (v_weights.y + v_weights.z), g * v_weights.z);
-    sum_edge = vec4(
-        photo * v_edge.x, photo * (1.0 - v_edge.x) * v_edge.y, photo * v_weights.x,
-        (photo + body) * depth
-    );
+    vec2 d = offset();
+    float q = distance_at(d);
+    if (q > v_kernel.z || is_over()) discard;
+    float bell = exp(-0.5 * q), alpha = alpha_of(bell);
+    float depth = depth_at(d);
+    vec2 shift = shift_at(d);
+    float share = alpha > 0.0 ? remaining(depth, shift) : 0.0;
+    float photo = v_shift.z, body = v_shift.w, both = photo + body;
+#ifdef IS_LAST
+    float member = share;
+    sum_left = share * alpha * both >= least_front ? 1.0 : 0.0;
+#else
+    vec4 begin = texelFetch(front, ivec2(gl_FragCoord.xy), 0);
+    if (begin.x > 1e29) discard;  // there is no such layer
+    float member = share * membership(depth, shift, begin);
+    sum_left = (share - member) * alpha * both;
+#endif
+    alpha *= member;
+    photo *= alpha;
+    body *= alpha;
+    float steep = member * v_kernel.y * bell, across = v_centre.z * (d.x + v_centre.w * d.y);
+    vec2 gradient = -steep * vec2(across, v_centre.w * across + v_kernel.x * d.y);
+    gradient = alpha > 0.0 ? gradient : vec2(0.0);
+#ifdef IS_SURFACE
+    sum_cover = vec4(photo + body, body, gradient * both);
+#else
+    vec2 clear = max(1.0 - vec2(alpha * both, body), 1e-30);
+    sum_cover = vec4(photo + body, body, log(clear));
+#endif
+    sum_place = vec4(gradient * v_shift.w, (photo + body) * depth, photo * shift.x);
+    sum_photo = photo * vec4(shift.y, v_depth.w, v_color.w, v_edge.x);
+    sum_color = vec4(body * v_color.rgb, photo * v_edge.x * v_edge.y);
 }

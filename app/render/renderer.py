@@ -12,11 +12,11 @@ from ..view import View
 from .blend_texture import BlendTexture
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
-from .scene import Scene
+from .scene import Scene, SplatObject
 from .textures import PictureTexture
 
 if TYPE_CHECKING:
-    from .splat_pass import SplatPass
+    from .splat_pass import SplatPass, SplatPicture
 
 log = logging.getLogger(__name__)
 
@@ -51,13 +51,26 @@ class Renderer:
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
-            splat_pass = self._splats()
+            picture = self._render(item, view)
+            if picture is not None:
+                self._begin(viewport)
+                self._blend.use(scene)
+                self._layer_pass.draw_texture(picture.color, scene, view)
+        if self._splat_pass is not None:
+            self._splat_pass.sweep()
+
+    def _render(self, item: SplatObject, view: View) -> SplatPicture | None:
+        """The object's picture on the GPU; from the first failure on the processor makes them."""
+        if self.kind != "gl":
+            return None
+        try:
             camera = view.camera(item.camera)
-            front, behind = splat_pass.draw(item.splats, item.texture, camera, item.camera)
-            self._begin(viewport)
-            self._blend.use(scene)
-            for texture in (behind, front):
-                self._layer_pass.draw_texture(texture, scene, view)
+            return self._splats().draw(item.splats, item.texture, camera, item.camera)
+        except moderngl.Error as error:
+            self.kind = "tiles"
+            reason = str(error).strip().partition("\n")[0]
+            log.error("OpenGL cannot draw the object: %s; the processor does from now on", reason)
+            return None
 
     def picture(self, pixels: np.ndarray) -> PictureTexture:
         """A picture for the interface, on the GPU; see `PictureTexture.upload`."""

@@ -81,7 +81,7 @@ class Skin:
         """The points after the motion, and its Jacobian."""
         count = len(np.atleast_2d(self.points))
         moved, linear = np.empty((count, 3)), np.empty((count, 3, 3))
-        inputs = (*self.inputs(), moved, linear)
+        inputs: tuple[Any, ...] = (*self.inputs(), moved, linear)
         in_threads(
             lambda first, last: _skin(first, last, *inputs),
             len(self.binding.shares), least=LEAST_ROWS // LANES,
