@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     from objectmorpher_core.puppet import Puppet, SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.texture import TextureLevels
+    from objectmorpher_core.raster.tiles import Drawable
 
 T = TypeVar("T")
 
 KEPT = 6  # results remembered of each kind
+PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
 
@@ -88,6 +90,7 @@ class Derived:
         self._shapes, self._posed = Memo(), Memo()
         self.layers = Layers(self)
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
+        self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
 
     def share(self, mask: Mask) -> float:
@@ -120,6 +123,18 @@ class Derived:
         return self._posed(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
+
+    def drawable(self, document: Document, k: int, view: View) -> Drawable:
+        """Object `k`'s Gaussians on the canvas."""
+        from objectmorpher_core.raster import tiles
+
+        splats, camera = self.posed(document, k), document.photo.camera
+        key = (view.left, view.top, view.zoom, view.width, view.height)
+        kept = self._drawables.get(k)
+        if kept is None or kept[0] is not splats or kept[1] != key:
+            kept = (splats, key, tiles.prepare(splats, view.camera(camera), camera))
+            self._drawables[k] = kept
+        return kept[2]
 
     def blend(self, document: Document, view: View) -> F32:
         """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
@@ -216,12 +231,17 @@ class Derived:
 
     # The picture
 
-    def surface_at(self, document: Document, k: int, xy: np.ndarray) -> SurfacePoint | None:
-        """The surface of object `k` at image px `xy`, or None beside it."""
+    def surface_at(
+        self, document: Document, k: int, view: View, xy: np.ndarray
+    ) -> SurfacePoint | None:
+        """The surface of object `k` at canvas px `xy` or close beside it; None where it is not."""
         thing = document.objects[k]
         shape = self.shape(document.photo, thing)
-        at = (float(xy[0]), float(xy[1]))
-        return shape.puppet.pick(at, thing.pose, thing.placement, shape.texture)
+        at, reach = (float(xy[0]), float(xy[1])), PICK_REACH * view.scale
+        drawable = self.drawable(document, k, view)
+        return shape.puppet.pick_in(
+            drawable, shape.texture, at, thing.pose, thing.placement, reach
+        )  # fmt: skip
 
 
 def _build_shape(photo: Photo, thing: EditObject) -> Shape:

@@ -274,8 +274,7 @@ class Editor:
         """The point of the object's surface that is seen at canvas px."""
         if self.document is None or not self.is_lifted:
             return None
-        xy = self.view.image_from_canvas(canvas_xy)
-        return self.derived.surface_at(self.document, self.current, xy)
+        return self.derived.surface_at(self.document, self.current, self.view, canvas_xy)
 
     def handle_positions(self) -> F64:
         """Where the handles' targets are seen: (H, 2) image px."""

@@ -120,7 +120,7 @@ class Layers:
         if work is not None and work.splats is splats and work.view == key:
             self._want_exact(work)
             return work.shown
-        drawable = _prepare(splats, view.camera(camera), camera)
+        drawable = self._derived.drawable(document, k, view)
         box = drawable.box()
         if box is None:
             self._works.pop(k, None)
@@ -180,12 +180,6 @@ def render(request: Request) -> np.ndarray:
 
     drawable = tiles.prepare(request.splats, request.window, request.camera)
     return tiles.draw_rgba(drawable, request.texture)
-
-
-def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
-    from objectmorpher_core.raster import tiles
-
-    return tiles.prepare(splats, camera, photo_camera)
 
 
 def _coarser(window: Camera, coarse: int) -> Camera:

@@ -6,22 +6,22 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from .arrays import F64
+from .arrays import F64, I32
 from .camera import Camera
 from .deform.deformer import Deformer
 from .deform.splitting import Split, split_stretched
 from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose, Rig
 from .gaussians import Gaussians
 from .raster import tiles
+from .raster.picking import pick
 from .raster.posed import PosedSplats, RestSplats
 from .raster.reference import Picture3D
 from .raster.texture import TextureLevels
+from .raster.tiles import Drawable
 
-PICK_NEIGHBOURS = 12  # Gaussians near the picked point of which the best fitting is inverted
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
-LEAST_ALPHA = 0.1  # of a pixel that can be picked: less is background
+EXACT, CLOSE = 1e-9, 1e-6  # object units by which it may miss: at once, and after all steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,45 +121,53 @@ class Puppet:
         placement: Placement,
         texture: TextureLevels,
     ) -> SurfacePoint | None:
-        """The surface point seen at photo px `xy`, on the deformed object; None beside it.
-
-        The pixel is rendered alone; its depth gives the world point. Back in the rest frame, the
-        skinning is inverted by Newton's method from the nearest Gaussian's own motion.
-        """
-        window = self.camera.windowed(xy[0] - 0.5, xy[1] - 0.5, 1, 1)
+        """The surface point seen at photo px `xy`, on the deformed object; None beside it."""
         splats = self._posed_whole(pose, placement)
-        picture = tiles.render(splats, texture, window, self.camera)
-        depth = float(picture.depth[0, 0])
-        if picture.alpha[0, 0] < LEAST_ALPHA or not np.isfinite(depth):
-            return None
-        world = self.camera.unproject(np.array(xy), depth)
-        if pose is None:
-            return SurfacePoint(self.unplaced(world, placement), world, depth)
-        rest = self._unskinned(self.unplaced(world, placement), world, splats, pose)
-        return SurfacePoint(rest, world, depth)
+        drawable = tiles.prepare(splats, self.camera, self.camera)
+        return self.pick_in(drawable, texture, xy, pose, placement)
 
-    def _unskinned(self, target: F64, world: F64, splats: PosedSplats, pose: Pose) -> F64:
+    def pick_in(
+        self,
+        drawable: Drawable,
+        texture: TextureLevels,
+        xy: tuple[float, float],
+        pose: Pose | None,
+        placement: Placement,
+        reach: float = 0.0,
+    ) -> SurfacePoint | None:
+        """The same in a view of the object, which is projected already.
+
+        `xy` in px of the view; within `reach` px beside the object its nearest point counts. The
+        depth there gives the world point; the motion is inverted by Newton's method from the
+        Gaussians that are seen.
+        """
+        hit = pick(drawable, texture, xy, reach)
+        if hit is None:
+            return None
+        world = drawable.camera.unproject(hit.xy, hit.depth)
+        target = self.unplaced(world, placement)
+        if pose is None:
+            return SurfacePoint(target, world, hit.depth)
+        return SurfacePoint(self._unskinned(target, hit.gaussians, pose), world, hit.depth)
+
+    def _unskinned(self, target: F64, seen: I32, pose: Pose) -> F64:
         """Rest point (3,) that the pose moves to `target` (3,), both in the object frame."""
-        means = self.lifted.gaussians.means.astype(np.float64)
-        facing = np.flatnonzero(splats.means[:, 2] > 0)
-        _, near = KDTree(splats.means[facing]).query(world, k=min(PICK_NEIGHBOURS, len(facing)))
-        best, best_gap = None, np.inf
-        for start in facing[np.atleast_1d(near)]:
-            point = means[start]
+        best, best_gap = target, np.inf
+        for start in self.lifted.gaussians.means[seen].astype(np.float64):
+            point = start
             for _ in range(PICK_STEPS):
                 skinned = self.deformer.skin_points(point, pose)
                 miss = skinned.points[0] - target
-                if np.linalg.norm(miss) < 1e-9:
-                    break
+                gap = float(np.linalg.norm(miss))
+                if gap < best_gap:
+                    best, best_gap = point, gap
+                if gap < EXACT:
+                    return point
                 step = np.linalg.lstsq(skinned.linear[0], miss, rcond=1e-6)[0]
                 reach = 2.0 * self.lifted.spacing / max(float(np.linalg.norm(step)), 1e-12)
                 point = point - step * min(1.0, reach)
-            gap = float(np.linalg.norm(self.deformer.skin_points(point, pose).points[0] - target))
-            if gap < best_gap:
-                best, best_gap = point, gap
-            if best_gap < 1e-6:
+            if best_gap < CLOSE:
                 break
-        assert best is not None
         return best
 
 

@@ -374,3 +374,19 @@ def random_splats(
     noise[..., 3] = np.clip((noise[..., 3] - 0.4) * 5, 0, 1)
     splats = PosedSplats(RestSplats(lifted, camera()), Skinned(means, linear), np.eye(4))
     return splats, build_levels(noise[..., :3], noise[..., 3], 0, 0)
+
+
+def two_discs(front_opacity: float) -> tuple[PosedSplats, TextureLevels, tuple[float, float]]:
+    """A cloud of two wide discs on the ray through (80, 60), and their depths."""
+    lifted = lifted_cloud(np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]), ball(10))
+    gaussians = replace(
+        lifted.gaussians,
+        quats=np.tile(np.float32([0, 1, 0, 0]), (2, 1)),  # facing the camera
+        scales=np.tile(np.float32([0.2, 0.2, 0.02]), (2, 1)),
+        opacities=np.float32([front_opacity, 1.0]),
+    )
+    texture = replace(lifted.texture, visibility=np.zeros(2))
+    lifted = replace(lifted, gaussians=gaussians, texture=texture, splatting="mip")
+    splats = PosedSplats(RestSplats(lifted, camera()), None, np.eye(4))
+    nothing = np.zeros((4, 4), np.float32)
+    return splats, build_levels(np.dstack([nothing] * 3), nothing, 0, 0), (2.5, 3.5)

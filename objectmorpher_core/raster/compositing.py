@@ -130,7 +130,9 @@ def _put_behind(s, rules):
         s[m.LAST_X + k], s[m.LAST_Y + k], s[m.LAST_SHARE + k] = x, y, share
         shown = photo * matte
         scale = through / max(shown + body, TINY)
-        if alpha > visible and s[m.O_DEPTH + k] == INFINITE:
+        before = s[m.O_A + k]
+        is_first = alpha > visible and s[m.O_DEPTH + k] == INFINITE
+        if is_first or (before < HALF and before + through >= HALF):
             s[m.O_DEPTH + k] = s[m.DEPTH + k] / total
             s[m.O_X + k], s[m.O_Y + k] = x, y
         s[m.O_R + k] += scale * (shown * s[m.T_R + k] + s[m.R + k])

@@ -37,7 +37,7 @@ from .posed import PosedSplats, projection_jacobians, view_limits
 from .rules import LAYERS, RULES, Splatting
 from .texture import TextureLevels, sample_texture
 
-MEDIAN = 0.5  # of alpha: where a cloud without surface is
+MEDIAN = 0.5  # of alpha: where the object is
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,9 @@ class Picture3D:
 
     color: F32  # (h, w, 3) sRGB in [0, 1], premultiplied
     alpha: F32  # (h, w)
-    depth: F32  # (h, w) world units, of the first visible layer; inf where there is none
+    # (h, w) world units: of the layer with which alpha, from the front, reaches a half; else of the
+    # first that is visible; inf where there is none
+    depth: F32
     from_photo: F32  # (h, w) share of the pixel that shows the photo at its own pixels' detail
     shift: F32  # (h, w, 2) photo px from where the pixel is to where it looks, the same layer
 
@@ -384,6 +386,7 @@ class _Composite:
         self.last_whole[at] = 1 - (1 - covered) * (1 - whole)
         self.last_shift[at], self.last_share[at] = shift, share
         first = np.isinf(self.depth[at]) & (alpha > RULES.visible)
+        first |= (self.alpha[at] < MEDIAN) & (self.alpha[at] + through >= MEDIAN)
         self.depth[at] = np.where(first, layer.depth[at] / total, self.depth[at])
         self.shift[at] = np.where((first & is_photo)[:, None], shift, self.shift[at])
         self.color[at] += through[:, None] * mixed

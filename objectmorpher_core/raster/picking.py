@@ -1,0 +1,103 @@
+"""Which point of a drawn object is seen at a place of the view.
+
+The few Gaussians there are drawn once more, on one pixel around that very place, by the renderer's
+own rules: a silhouette is where the picture ends, and what shows through a soft edge is picked
+where it is the greater part. Beside the object, the nearest pixel of it within reach counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import F64, I32
+from .projection import CUT, CX, CY, EX, EY, QXX, RYY, TILT, WEIGHT, ZX, ZY, Z
+from .texture import TextureLevels
+from .tiles import Drawable, draw
+
+LEAST_ALPHA = 0.1  # of what can be picked: less is background
+NEAR = 16  # Gaussians that are named, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """A place of the surface."""
+
+    xy: F64  # (2,) view px: the place asked for, or the nearest on the object
+    depth: float  # world units, along z
+    gaussians: I32  # (n,) those that make up the surface there, the weightiest first
+
+
+def pick(
+    drawable: Drawable, texture: TextureLevels, xy: tuple[float, float], reach: float = 0.0
+) -> Hit | None:
+    """What is seen at `xy`, view px, or within `reach` px of it; None where that is nothing.
+
+    The depth is that of the layer with which alpha, front to back, reaches a half.
+    """
+    at = np.asarray(xy, dtype=np.float64)
+    near = _touching(drawable, at, reach + 2)
+    if not len(near):
+        return None
+    hit = _probe(drawable, texture, at, near)
+    if hit is not None or reach <= 0:
+        return hit
+    for beside in _nearest_pixels(drawable, texture, at, near, reach):
+        hit = _probe(drawable, texture, beside, near)
+        if hit is not None:
+            return hit
+    return None
+
+
+def _touching(drawable: Drawable, at: F64, reach: float) -> I32:
+    """Rows whose box comes within `reach` px of a place, in the order of drawing."""
+    rows = drawable.projected
+    is_near = (np.abs(rows[:, CX] - at[0]) <= rows[:, EX] + reach) & (
+        np.abs(rows[:, CY] - at[1]) <= rows[:, EY] + reach
+    )
+    is_near &= rows[:, WEIGHT] > 0
+    if drawable.order is None:
+        return np.flatnonzero(is_near).astype(np.int32)
+    return drawable.order[is_near[drawable.order]].astype(np.int32)
+
+
+def _around(drawable: Drawable, near: I32, corner: F64, size: int) -> Drawable:
+    """The Gaussians `near` on a view of `size` px squared whose corner is at `corner`."""
+    rows = drawable.projected[near]
+    rows[:, CX] -= corner[0]
+    rows[:, CY] -= corner[1]
+    camera = drawable.camera.windowed(float(corner[0]), float(corner[1]), size, size)
+    order = None if drawable.order is None else np.arange(len(near), dtype=np.uint32)
+    return replace(drawable, projected=rows, order=order, camera=camera)
+
+
+def _probe(drawable: Drawable, texture: TextureLevels, at: F64, near: I32) -> Hit | None:
+    """The surface at exactly this place."""
+    picture = draw(_around(drawable, near, at - 0.5, 1), texture)
+    depth = float(picture.depth[0, 0])
+    if picture.alpha[0, 0] < LEAST_ALPHA or not np.isfinite(depth):
+        return None
+    rows = drawable.projected[near].astype(np.float64)
+    dx, dy = at[0] - rows[:, CX], at[1] - rows[:, CY]
+    q = rows[:, QXX] * (dx + rows[:, TILT] * dy) ** 2 + rows[:, RYY] * dy**2
+    apart = np.abs(rows[:, Z] + rows[:, ZX] * dx + rows[:, ZY] * dy - depth)
+    weights = rows[:, WEIGHT] * np.exp(-0.5 * q)
+    weights *= (q < rows[:, CUT]) & (apart <= drawable.splats.gap)
+    best = np.argsort(-weights, kind="stable")[:NEAR]
+    return Hit(at, depth, near[best[weights[best] > 0]])
+
+
+def _nearest_pixels(
+    drawable: Drawable, texture: TextureLevels, at: F64, near: I32, reach: float
+) -> F64:
+    """(n, 2) view px: centres of the object's pixels within `reach`, the nearest first."""
+    radius = int(np.ceil(reach))
+    corner = np.floor(at) - radius
+    side = 2 * radius + 1
+    picture = draw(_around(drawable, near, corner, side), texture)
+    rows, columns = np.nonzero((picture.alpha >= LEAST_ALPHA) & np.isfinite(picture.depth))
+    centres = corner + np.column_stack([columns, rows]) + 0.5
+    away = np.linalg.norm(centres - at, axis=1)
+    order = np.argsort(away, kind="stable")
+    return centres[order[away[order] <= reach]].astype(np.float64)
