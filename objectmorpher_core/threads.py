@@ -13,6 +13,9 @@ from functools import cache
 from itertools import pairwise
 
 FAST = {"reassoc", "contract", "nsz"}  # of kernels: sums in any order, a * b + c at once
+# Of kernels whose results are bytes of a picture. The process that compiles a kernel may run
+# another copy of what it calls than one that loads it from the disk: both must round alike.
+EXACT = {"nsz"}
 LEAST_ROWS = 2048  # of a light kernel, for which a second thread is woken
 
 

@@ -134,7 +134,11 @@ class _Drawing:
         return max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
 
     def strips(self) -> Iterator[tuple[int, int]]:
-        """First and last row of the strips that are drawn at a time, whole tiles high."""
+        """First and last row of the strips that are drawn at a time.
+
+        They follow from the box alone, and so does the picture: a last bit may depend on which
+        part of the view the rasteriser is asked for.
+        """
         x0, y0, x1, y1 = self.box
         rows = max(STRIP // (x1 - x0) // PIECE, 1) * PIECE
         for top in range(y0, y1, rows):
@@ -145,8 +149,8 @@ class _Drawing:
         x0, y0, x1, y1 = self.box
         pieces = [(x0, a, x1, b) for a, b in _pieces(top, bottom)]
         rows = map_in_threads(partial(_plate_rows, document), pieces)
-        # `displacement` looks around each pixel; and with a whole row of tiles more above, the
-        # rasteriser has the same tiles, and rounds alike, however the box is cut into strips.
+        # `displacement` looks around each pixel. A whole row of tiles more above, and the tiles
+        # stay where they are: what the rasteriser rounds, it rounds tile by tile.
         above, below = max(top - TILE, y0), min(bottom + NEAR // 2, y1)
         for k, thing in enumerate(self._moved):
             picture = self._draw(k, above, below)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from ..arrays import F64, Sparse
 from ..document import Pose
+from ..threads import FAST
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +33,10 @@ def measure_strain(points: F64, weights: Sparse, pose: Pose) -> Strain:
     least-squares fit to its links. Its links lie along a surface, so F_i is taken in the plane
     of their two widest directions, and its singular values are the stretches.
     """
-    count = len(points)
-    i = np.repeat(np.arange(count), np.diff(weights.indptr))
-    j, w = weights.indices, weights.data
-    rest, moved = points[j] - points[i], pose.points[j] - pose.points[i]
-    gaps = moved - (pose.rotations[i] @ rest[..., None])[..., 0]
-    squares = np.bincount(i, w * (rest**2).sum(1), minlength=count)
-    energy = np.bincount(i, w * (gaps**2).sum(1), minlength=count)
-    before = _summed(i, w[:, None, None] * rest[:, :, None] * rest[:, None, :], count)
-    after = _summed(i, w[:, None, None] * moved[:, :, None] * rest[:, None, :], count)
+    links = weights.indptr, weights.indices, weights.data
+    rest = np.asarray(points, np.float64)
+    before, after, energy = _sums(*links, rest, pose.points, pose.rotations)
+    squares = np.trace(before, axis1=1, axis2=2)
     spread, axes = np.linalg.eigh(before)  # rising
     widest = np.maximum(spread[:, 2], 1e-300)
     is_line = spread[:, 1] < 1e-9 * widest  # of links all in one line: no second direction
@@ -52,11 +49,26 @@ def measure_strain(points: F64, weights: Sparse, pose: Pose) -> Strain:
     return Strain(energy / np.maximum(squares, 1e-300), most, least)
 
 
-def _summed(rows: np.ndarray, terms: F64, count: int) -> F64:
-    """Sums (count, 3, 3) of the terms (E, 3, 3) of each row; rows ascend."""
-    sums = np.zeros((count, 3, 3))
-    starts = np.searchsorted(rows, np.arange(count))
-    filled = np.flatnonzero(np.bincount(rows, minlength=count))
-    if len(filled):
-        sums[filled] = np.add.reduceat(terms, starts[filled], axis=0)
-    return sums
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _sums(starts, others, weights, points, moved, rotations):
+    """Over the links of each control point: w e e^T and w e' e^T (M, 3, 3), w |e' - R e|^2 (M,)."""
+    count = len(points)
+    before, after = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
+    energy = np.zeros(count)
+    for i in range(count):
+        for k in range(starts[i], starts[i + 1]):
+            j, w = others[k], weights[k]
+            x, y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+            z = points[j, 2] - points[i, 2]
+            for a in range(3):
+                old = points[j, a] - points[i, a]
+                new = moved[j, a] - moved[i, a]
+                turned = rotations[i, a, 0] * x + rotations[i, a, 1] * y + rotations[i, a, 2] * z
+                energy[i] += w * (new - turned) ** 2
+                before[i, a, 0] += w * old * x
+                before[i, a, 1] += w * old * y
+                before[i, a, 2] += w * old * z
+                after[i, a, 0] += w * new * x
+                after[i, a, 1] += w * new * y
+                after[i, a, 2] += w * new * z
+    return before, after, energy

@@ -17,6 +17,7 @@ from ..threads import FAST, core_count, in_threads
 from .projection import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
 
 TILE = 16  # px
+SMALL = np.float32(TILE * TILE / 4)  # px^2, extents of a Gaussian that touches about four tiles
 LEAST_SHARE = 4096  # Gaussians, for which a second thread counts
 
 
@@ -113,9 +114,9 @@ def _fill(first, last, projected, order, boxes, across, left, top, width, height
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _columns(g, box, row, cx, cy):
     """First and last of the box's tiles in a row that the ellipse touches."""
-    if (box[2] - box[0]) * (box[3] - box[1]) <= 1:  # little to gain
-        return box[0], box[2]
     ex, ey, tilt = g[EX], g[EY], g[TILT]
+    if ex * ey <= SMALL:  # little to gain; decided alike for all parts of a view
+        return box[0], box[2]
     low = max(np.float32(row * TILE) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
     high = min(np.float32(row * TILE) + np.float32(TILE - 0.5) - cy, ey)
     lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -18,21 +19,18 @@ MOST_LEVELS = 8
 class TextureLevels:
     """The object's straight colours and alpha, with halved copies for minification."""
 
-    levels: tuple[F32, ...]  # each (h, w, 4), level l halved l times
+    texels: F32  # (4 T,) all levels, one after the other, rows of pixels as they come
+    shapes: np.ndarray  # (levels, 3) height, width and first texel of each
     left: float  # px in the photo, corner of the crop
     top: float
 
     @cached_property
-    def texels(self) -> F32:
-        """(4 T,) all levels, one after the other, rows of pixels as they come."""
-        return frozen(np.concatenate([v.reshape(-1) for v in self.levels]))
-
-    @cached_property
-    def shapes(self) -> np.ndarray:
-        """(levels, 3) height, width and first texel of each level."""
-        sizes = np.array([level.shape[:2] for level in self.levels], np.int64)
-        starts = np.concatenate([[0], np.cumsum(sizes.prod(1))[:-1]])
-        return frozen(np.column_stack([sizes, starts]))
+    def levels(self) -> tuple[F32, ...]:
+        """Each (h, w, 4), level l halved l times: views."""
+        return tuple(
+            self.texels[4 * first : 4 * (first + height * width)].reshape(height, width, 4)
+            for height, width, first in self.shapes.tolist()
+        )
 
 
 def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> TextureLevels:
@@ -40,15 +38,23 @@ def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> Textur
 
     `left`, `top`: px in the photo of the crop's corner, which may lie outside it.
     """
-    level = np.dstack([foreground, alpha]).astype(np.float32)
-    levels = [level]
-    while min(level.shape[:2]) >= LEAST_LEVEL and len(levels) < MOST_LEVELS:
-        height, width = level.shape[:2]
-        padded = cv2.copyMakeBorder(level, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
-        size = (padded.shape[1] // 2, padded.shape[0] // 2)
-        level = cv2.resize(padded, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-        levels.append(level)
-    return TextureLevels(tuple(frozen(v) for v in levels), left, top)
+    height, width = alpha.shape
+    sizes = [(height, width)]
+    while min(sizes[-1]) >= LEAST_LEVEL and len(sizes) < MOST_LEVELS:
+        sizes.append((-(-sizes[-1][0] // 2), -(-sizes[-1][1] // 2)))
+    starts = np.concatenate([[0], np.cumsum([h * w for h, w in sizes])])
+    shapes = np.column_stack([np.array(sizes, np.int64), starts[:-1]])
+    texels = np.empty(4 * int(starts[-1]), np.float32)  # a photo's worth: nothing is kept twice
+    levels = TextureLevels(texels, shapes, left, top).levels
+    colours = np.ascontiguousarray(foreground, np.float32), np.ascontiguousarray(alpha, np.float32)
+    cv2.mixChannels(list(colours), [levels[0]], [0, 0, 1, 1, 2, 2, 3, 3])
+    for fine, coarse in pairwise(levels):
+        odd = fine.shape[0] % 2, fine.shape[1] % 2
+        if any(odd):
+            fine = cv2.copyMakeBorder(fine, 0, odd[0], 0, odd[1], cv2.BORDER_REPLICATE)
+        size = (coarse.shape[1], coarse.shape[0])
+        cv2.resize(fine, size, dst=coarse, interpolation=cv2.INTER_AREA)
+    return TextureLevels(frozen(texels), frozen(shapes), left, top)
 
 
 def sample_texture(texture: TextureLevels, look: np.ndarray, lod: np.ndarray) -> np.ndarray:
