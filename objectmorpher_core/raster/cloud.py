@@ -16,11 +16,12 @@ from .bell import BATCH, batch_rows, bell
 from .binning import TILE
 from .sampling import HALF, ONE, ZERO
 
-CLEAR, R, G, B, ALPHA, MEAN, MEDIAN, STEP_X, STEP_Y = (
-    np.uint64(row * m.PIXELS) for row in range(9)
+CLEAR, R, G, B, ALPHA, SHOWN, MEAN, MEDIAN, STEP_X, STEP_Y = (
+    np.uint64(row * m.PIXELS) for row in range(10)
 )
-ROWS = 9
+ROWS = 10
 INFINITE = np.float32(np.inf)
+NOTHING = np.float32(1e-12)  # what shines through at least: ever smaller numbers are slow
 PLAIN = 15  # columns of a projected Gaussian that are needed, the first
 START, END = (np.uint64((PLAIN + row) * 64) for row in (0, m.STRIPS))  # of a strip's rows
 BATCH_ROWS = PLAIN + 2 * m.STRIPS
@@ -59,7 +60,7 @@ def draw_one_by_one(
                 for c in range(PLAIN):
                     batch[np.uint64(c) * BATCH + j] = g[c]
             batch_rows(batch, x0, y0, np.float32(rows), START, END)
-            if not _draw(s, batch, count, x0, y0, through, kind):
+            if not _draw(s, batch, count, x0, y0, through, len(rgba) == 0, kind):
                 break
         if len(rgba) > 0:
             for k in range(m.ALL):
@@ -72,43 +73,50 @@ def draw_one_by_one(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _draw(s, batch, count, x0, y0, through, kind):
+def _draw(s, batch, count, x0, y0, through, has_depth, kind):
     """A batch of Gaussians behind those that are there; whether one still sees through."""
-    tail, most, least = np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least)
+    most, least = np.float32(kind.most), np.float32(kind.least)
     for j in range(np.uint64(count)):
         dx0, dy0 = x0 - batch[CX + j], y0 - batch[CY + j]
-        z, zx, zy = batch[Z + j], batch[ZX + j], batch[ZY + j]
-        qxx, tilt = batch[QXX + j], batch[TILT + j]
-        ryy, weight = batch[RYY + j], batch[WEIGHT + j]
-        red, green = batch[RED + j], batch[GREEN + j]
-        blue = batch[BLUE + j]
+        qxx, tilt, ryy, weight = batch[QXX + j], batch[TILT + j], batch[RYY + j], batch[WEIGHT + j]
+        red, green, blue = batch[RED + j], batch[GREEN + j], batch[BLUE + j]
         for strip in range(m.STRIPS):
             start = int(batch[START + np.uint64(strip) * BATCH + j])
             end = int(batch[END + np.uint64(strip) * BATCH + j])
             if start >= end:
                 continue
             at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)
-            for k in range(np.uint64((end - start) * m.STRIP)):
+            lanes = np.uint64((end - start) * m.STRIP)
+            for k in range(lanes):
                 dx, dy = dx0 + s[STEP_X + at + k], dy0 + s[STEP_Y + at + k]
                 e = dx + tilt * dy
-                alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
+                alpha = min(weight * bell(qxx * e * e + ryy * dy * dy), most)
                 clear = s[CLEAR + at + k]
-                is_seen = (alpha >= least) & (clear > through)
                 shown = clear * alpha
-                shown = shown if is_seen else ZERO
-                behind = clear - shown
-                depth = z + zx * dx + zy * dy
-                is_half = (clear > HALF) & (behind <= HALF)  # of one Gaussian only
-                s[MEDIAN + at + k] += depth if is_half else ZERO
-                s[CLEAR + at + k] = behind
-                s[MEAN + at + k] += shown * depth
+                shown = shown if alpha >= least else ZERO
+                s[SHOWN + at + k] = shown
+                s[CLEAR + at + k] = max(clear - shown, NOTHING)
                 s[R + at + k] += shown * red
                 s[G + at + k] += shown * green
                 s[B + at + k] += shown * blue
+            if has_depth:
+                z = batch[Z + j] + batch[ZX + j] * dx0 + batch[ZY + j] * dy0
+                _measure(s, at, lanes, z, batch[ZX + j], batch[ZY + j])
     clear = ZERO  # a sum, of which vector code can be made, unlike of a maximum
     for k in range(m.ALL):
         clear += ONE if s[CLEAR + k] > through else ZERO
     return clear > ZERO
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _measure(s, at, count, z, zx, zy):
+    """Adds the depth of the Gaussian that was just drawn: z at the tile's first pixel, its slope."""
+    for k in range(count):
+        depth = z + zx * s[STEP_X + at + k] + zy * s[STEP_Y + at + k]
+        shown, behind = s[SHOWN + at + k], s[CLEAR + at + k]
+        is_half = (behind + shown > HALF) & (behind <= HALF)  # of one Gaussian only
+        s[MEDIAN + at + k] += depth if is_half else ZERO
+        s[MEAN + at + k] += shown * depth
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

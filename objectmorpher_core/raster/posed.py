@@ -131,6 +131,11 @@ class PosedSplats:
         return replace(self, rest=self.rest.painted(colors))
 
     @property
+    def is_layered(self) -> bool:
+        """Whether the picture is made of layers, and not of Gaussians one by one."""
+        return self.rest.splatting.is_surface or self.rest.is_textured
+
+    @property
     def scale(self) -> float:
         """How much the placement enlarges."""
         return float(np.cbrt(np.linalg.det(self.placement[:3, :3])))

@@ -72,7 +72,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F32:
             linear.ravel(), offset, [splats.scale, RULES.near * splats.gap],
             [camera.focal, camera.cx, camera.cy],
             [photo_camera.focal, photo_camera.cx, photo_camera.cy],
-            posed.view_limits(photo_camera),
+            posed.view_limits(photo_camera), [splats.is_layered],
         ]
     )  # fmt: skip
     inputs: tuple[Any, ...] = (
@@ -268,7 +268,8 @@ def _project_block(s, rest, base, frame, drift, rules, kind):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
     """The rules that decide weights and shares, and the rows of `out`, start and following."""
-    scale = frame[12]
+    scale, is_plain = frame[12], frame[22] == 0.0
+    whole = -2.0 * math.log(kind.tail) if kind.tail > 0.0 else 0.0
     for k in range(count):
         o, r = OUT * LANES + k, base + k
         z, weight = s[o + Z * LANES], s[o + WEIGHT * LANES]
@@ -294,12 +295,16 @@ def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
         if not (weight * (photo + body) > 0.0 and ends < 1.0):
             continue
         i = start + k
-        for c in range(FRONT):
+        for c in range(SX if is_plain else FRONT):
             out[i, c] = s[o + c * LANES]
-        cut = -2.0 * math.log(ends)
+        cut = -2.0 * math.log(ends) if kind.least > 0.0 else whole
         out[i, CUT], out[i, WEIGHT] = cut, weight
         out[i, EX] = math.sqrt(cut * s[o + EX * LANES])
         out[i, EY] = math.sqrt(cut * s[o + EY * LANES])
+        for c in range(3):
+            out[i, RED + c] = rest[r + (COLOUR + c) * LANES]
+        if is_plain:
+            continue
         out[i, PHOTO], out[i, BODY], out[i, SEEN], out[i, SOLID] = photo, body, seen, solidity
         turned = cosine - rest[r + COSINE * LANES]
         out[i, MATTED] = ramp(stretch, rules.matte_end, rules.matte_start) * ramp(
@@ -307,5 +312,3 @@ def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
         )
         least = max(rules.least_front / (weight * (photo + body)), kind.least / weight)
         out[i, FRONT] = -2.0 * math.log(kind.tail + least) if kind.tail + least < 1.0 else -1.0
-        for c in range(3):
-            out[i, RED + c] = rest[r + (COLOUR + c) * LANES]

@@ -201,7 +201,7 @@ def render(
     p = project(splats, camera, photo_camera)
     samples = [_sampled(p, i, splats, camera) for i in range(len(p.depth))]
     there = [(i, s) for i, s in enumerate(samples) if s is not None]
-    if not splats.rest.splatting.is_surface and not splats.rest.is_textured:
+    if not splats.is_layered:
         return _composite_one_by_one(p, there, camera)
     out = _Composite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
     fronts: list[_Front] = []

@@ -56,15 +56,10 @@ def prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawab
     """Projects the Gaussians, and sorts them where their order matters."""
     projected = frozen(project(splats, camera, photo_camera))
     order = None
-    if not is_layered(splats):
+    if not splats.is_layered:
         there = np.flatnonzero(projected[:, WEIGHT] > 0).astype(np.uint32)
         order = there[depth_order(projected[there, Z])]
     return Drawable(splats, projected, order, camera, photo_camera)
-
-
-def is_layered(splats: PosedSplats) -> bool:
-    """Whether the picture is made of layers, and not of Gaussians one by one."""
-    return splats.rest.splatting.is_surface or splats.rest.is_textured
 
 
 def draw(
@@ -102,7 +97,7 @@ def _draw(
         drawable.projected, frozen(bins.starts), frozen(bins.members), bins.across,
         *corner, width, height,
     )  # fmt: skip
-    if is_layered(splats):
+    if splats.is_layered:
         inputs = (
             *where, _intrinsics(drawable.camera), _intrinsics(drawable.photo_camera),
             float(splats.gap), float(splats.texture_gap), texture.texels, texture.shapes,
