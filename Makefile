@@ -43,7 +43,7 @@ test: .make/test
 	    ! $(PYTHON) -c 'import ctypes; ctypes.CDLL("libGL.so.1"); ctypes.CDLL("libEGL.so.1")' 2>/dev/null; then
 	    apt_install libgl1 libegl1 || echo "The editor's window needs libGL and libEGL: install the packages libgl1 and libegl1."
 	fi
-	echo "Compiling the kernels (half a minute, once)"
+	echo "Compiling the kernels (a minute, once)"
 	$(PYTHON) -m objectmorpher_core.warm_up
 	touch $@
 
@@ -101,3 +101,8 @@ gallery: .make/run
 .PHONY: ablations
 ablations: .make/test
 	@$(PYTHON) docs/deformation/make_ablations.py
+
+# Makes docs/rendering and docs/performance.md anew; PAGES=performance makes one of them.
+.PHONY: rendering
+rendering: .make/test
+	@$(PYTHON) docs/rendering/make_rendering.py $(PAGES)

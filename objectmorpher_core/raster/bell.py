@@ -26,7 +26,7 @@ CX, CY, TILT, EX, EY = (
 )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def bell(q):
     """exp(-q / 2) for 0 <= q <= 11.2, and beyond as there."""
     t = min(q, LIMIT) * SIXTEENTH
@@ -36,7 +36,7 @@ def bell(q):
     return e * e
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def strip_rows(g, cut, dx, dy, strip, rows):
     """First and last + 1 of the `rows` that the ellipse q <= cut touches in a strip of a tile.
 
@@ -62,7 +62,7 @@ def strip_rows(g, cut, dx, dy, strip, rows):
     return start, int(min(max(high - dy + ONE, ZERO), np.float32(rows)))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def batch_rows(batch, x0, y0, rows, first, last):
     """`strip_rows` of 64 projected Gaussians, whose columns are the rows of `batch`.
 

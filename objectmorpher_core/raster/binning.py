@@ -111,7 +111,7 @@ def _fill(first, last, projected, order, boxes, across, left, top, width, height
                 at[tile] += 1
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _columns(g, box, row, cx, cy):
     """First and last of the box's tiles in a row that the ellipse touches."""
     ex, ey, tilt = g[EX], g[EY], g[TILT]
@@ -128,7 +128,7 @@ def _columns(g, box, row, cx, cy):
     return first, min(np.int32(max(end + slack, np.float32(0)) * scale), box[2])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _edge(dy, tilt, ey, reach, side):
     """dx of the ellipse's left (side -1) or right (1) edge at dy."""
     y = dy / ey

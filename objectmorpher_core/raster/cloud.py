@@ -72,7 +72,7 @@ def draw_one_by_one(
                 _put(out[row + y, column + x], s, m.pixel_index(x, y))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw(s, batch, count, x0, y0, through, has_depth, kind):
     """A batch of Gaussians behind those that are there; whether one still sees through."""
     most, least = np.float32(kind.most), np.float32(kind.least)
@@ -108,9 +108,9 @@ def _draw(s, batch, count, x0, y0, through, has_depth, kind):
     return clear > ZERO
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _measure(s, at, count, z, zx, zy):
-    """Adds the depth of the Gaussian that was just drawn: z at the tile's first pixel, its slope."""
+    """Adds the depth of what was just drawn: z at the tile's first pixel, and its slope."""
     for k in range(count):
         depth = z + zx * s[STEP_X + at + k] + zy * s[STEP_Y + at + k]
         shown, behind = s[SHOWN + at + k], s[CLEAR + at + k]
@@ -119,7 +119,7 @@ def _measure(s, at, count, z, zx, zy):
         s[MEAN + at + k] += shown * depth
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _put(o, s, k):
     """A pixel's results, see `reference.Picture3D`."""
     alpha, depth = ONE - s[CLEAR + k], s[MEDIAN + k]

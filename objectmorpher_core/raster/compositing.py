@@ -18,7 +18,7 @@ LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows
 INFINITE = np.float32(np.inf)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def composite_layer(
     s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
     rules, kind,
@@ -62,7 +62,7 @@ def composite_layer(
     return begin, end
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _cover(s, total, across, down, clear, rules):
     """1 - coverage, see `rules.coverage`, into the row `clear`."""
     level, width = np.float32(rules.surface_level), np.float32(rules.edge_width)
@@ -73,7 +73,7 @@ def _cover(s, total, across, down, clear, rules):
         s[clear + k] = ONE - min(max(edge, ZERO), ONE)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _put_first(s, visible, opaque):
     """The first layer: nothing is in front of it."""
     for k in range(m.ALL):
@@ -102,7 +102,7 @@ def _put_first(s, visible, opaque):
         s[m.OPEN + k] = ZERO if alpha > opaque else ONE
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _put_behind(s, rules):
     """A later layer."""
     near, far = np.float32(rules.same_point), np.float32(rules.apart)

@@ -49,7 +49,7 @@ def _sort(keys, pairs, spare, order):
         order[i] = np.uint32(pairs[i] & np.uint64(0xFFFFFFFF))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
+@numba.njit(nogil=True, fastmath=FAST)
 def _scatter(source, target, starts, shift):
     """Puts the pairs in the order of the digit at `shift`, those of one digit as they come."""
     last = np.uint64((1 << BITS) - 1)

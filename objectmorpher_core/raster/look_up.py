@@ -24,7 +24,7 @@ from .sampling import (
 HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top):
     """Fills the rows T_R to T_A and WITHIN where IS_PHOTO is 1; 0 elsewhere.
 
@@ -64,7 +64,7 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
             s[m.T_R + k], s[m.T_G + k], s[m.T_B + k], s[m.T_A + k] = texel
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _prepare(s, x0, y0, ratio, photo_x, photo_y, width, height):
     """Pixel index, place within the pixel and weights of the four texels on either axis.
 

@@ -134,7 +134,7 @@ def _project(
         _finish_block(s, rest, base, start, count, frame, rules, kind, out)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _project_block(s, rest, base, frame, drift, rules, kind):
     """The geometry of 64 Gaussians; the loop is straight, so that it becomes vector code."""
     w00, w01, w02, w10, w11, w12, w20, w21, w22 = (
@@ -265,7 +265,7 @@ def _project_block(s, rest, base, frame, drift, rules, kind):
         s[o + SMALLEST * LANES] = area / largest * j / rest[r + ZOOM * LANES]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
     """The rules that decide weights and shares, and the rows of `out`, start and following."""
     scale, is_plain = frame[12], frame[22] == 0.0

@@ -94,14 +94,14 @@ class Rules(NamedTuple):
 RULES = Rules()
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def ramp(value, zero, one):
     """0 at `zero`, 1 at `one`, smooth between and constant beyond (either may be larger)."""
     t = min(max((value - zero) / (one - zero), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def facing_weight(cosine, is_seen, solidity, rules):
     """Weight of a surface's Gaussian whose normal makes this cosine with the way to the camera."""
     width = rules.facing_ramp
@@ -110,7 +110,7 @@ def facing_weight(cosine, is_seen, solidity, rules):
     return solidity * front + (1.0 - solidity) * brim
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def coverage(total, slope, rules):
     """Share of a pixel that is inside the surface whose kernel sum is `total`.
 

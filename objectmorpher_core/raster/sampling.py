@@ -20,7 +20,7 @@ L0, L1, L2, L3, L4 = (
 )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def sample(texels, shapes, u, v, magnified, room):
     """Straight colour and alpha (4 x f32) at crop px (u, v), for so many px per view px.
 
@@ -73,7 +73,7 @@ def add_halved(r, texels, shapes, x, y, magnified):
     )  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _cubic(texels, shapes, u, v, room):
     """The full-size level, Catmull-Rom: gives a pixel's own value at its centre."""
     height, width = shapes[0, 0], shapes[0, 1]
@@ -110,7 +110,7 @@ def cubic_inside(texels, first, width, wx, wy, room):
     ))  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _clipped(r):
     return (
         min(max(r[0], ZERO), ONE), min(max(r[1], ZERO), ONE),
@@ -118,7 +118,7 @@ def _clipped(r):
     )  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _add(r, texels, first, height, width, y, x, w):
     """r + w times a texel of a level; outside it that at the border, without alpha."""
     at = 4 * (first + min(max(y, 0), height - 1) * width + min(max(x, 0), width - 1))
@@ -129,7 +129,7 @@ def _add(r, texels, first, height, width, y, x, w):
     )  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _linear(texels, shapes, level, u, v):
     """A halved level, bilinear."""
     height, width, first = shapes[level, 0], shapes[level, 1], shapes[level, 2]
@@ -147,7 +147,7 @@ def _linear(texels, shapes, level, u, v):
     return r
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+@numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
 def _cubic_weights(t):
     return (
         ((-HALF * t + ONE) * t - HALF) * t,

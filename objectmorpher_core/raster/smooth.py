@@ -29,7 +29,7 @@ STEEPEST = np.float32(0.5)  # of the kernel sum, per px: so is what is no steepe
 QUARTER, THREE_QUARTERS = np.float32(0.25), np.float32(0.75)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def new_nodes():
     """The grid's memory: the rows above."""
     s = np.zeros(NODE_ROWS * int(NODES), np.float32)
@@ -39,7 +39,7 @@ def new_nodes():
     return s
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def is_plain(g, rules):
     """Whether a projected Gaussian is wide, shows the photo only, and carries it as it was."""
     narrow = g[p.QXX] * (ONE + g[p.TILT] * g[p.TILT]) + g[p.RYY]  # >= 1 / its least variance
@@ -48,7 +48,7 @@ def is_plain(g, rules):
     return is_photo & is_sharp & (narrow * NARROWEST * NARROWEST <= ONE)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def draw_smooth(
     s, nodes, projected, members, left, top, columns, rows, view, photo, texels, shapes,
     crop_left, crop_top, kind,
@@ -80,7 +80,7 @@ def draw_smooth(
     return True
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add(nodes, g, left, top, tail):
     """A Gaussian's share of the sums; the first node is half a pixel beside the first pixel."""
     dx0, dy0 = left - g[p.CX], top - g[p.CY]
@@ -97,7 +97,7 @@ def _add(nodes, g, left, top, tail):
         nodes[Y + k] += alpha * (sy + ayx * dx + ayy * dy)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _is_whole(nodes):
     """Whether coverage is 1 at all nodes, and so between them."""
     bad = ZERO
@@ -114,7 +114,7 @@ def _is_whole(nodes):
     return bad == ZERO
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _spread(nodes, source, s, target):
     """A row of the grid's memory, interpolated to a row of the tile's."""
     upper, lower = np.empty(16, np.float32), np.empty(16, np.float32)

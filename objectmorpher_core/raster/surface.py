@@ -75,7 +75,7 @@ def draw_layers(
                         out[row + y, column + x, c] = s[k]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw_tile(
     s, projected, members, is_one, left, top, columns, rows, gaps, view, photo, texels, shapes,
     crop_left, crop_top, rules, kind,
@@ -107,7 +107,7 @@ def _draw_tile(
                 s[np.uint64(layer + 1) * m.FRONT + k] = s[k]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _are_plain(projected, members, rules):
     for i in members:  # noqa: SIM110 (a loop is what numba compiles)
         if not is_plain(projected[i], rules):
@@ -115,13 +115,13 @@ def _are_plain(projected, members, rules):
     return True
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _clear(s, first, last, value):
     for k in range(first, last):
         s[k] = value
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _is_one_layer(projected, members, x0, y0, gaps):
     """Whether any two samples on the tile at x0, y0 agree in depth and in where they look.
 
@@ -158,7 +158,7 @@ def _is_one_layer(projected, members, x0, y0, gaps):
     return True
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw(s, g, x0, y0, first, last, layer, is_one, gaps, rules, kind, is_front):
     """One Gaussian onto the tile at x0, y0: as a layer's front, or into the layer's sums.
 
@@ -178,7 +178,7 @@ def _draw(s, g, x0, y0, first, last, layer, is_one, gaps, rules, kind, is_front)
         _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_front)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_front):
     """The same on `count` pixels from `at` on: some rows of a strip."""
     if is_one:
@@ -207,7 +207,7 @@ def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_fr
         _multiply(s, at, count, g)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _first_front(s, at, count, g, dx0, dy0):
     """The nearest sample of each pixel so far.
 
@@ -232,7 +232,7 @@ def _first_front(s, at, count, g, dx0, dy0):
         s[m.F_PHOTO + at + k] += shows if nearer else ZERO
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _next_front(s, at, count, g, dx0, dy0, rules, kind):
     """The same among what the layers before have left, m.SHARE."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
@@ -259,7 +259,7 @@ def _next_front(s, at, count, g, dx0, dy0, rules, kind):
         s[m.F_PHOTO + at + k] += shows if nearer else ZERO
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _member(depth, x, y, is_alike, gaps, end):
     """How much a sample belongs to the layer of a front, from which it is so far: see `rules`."""
     looks = is_alike * (x * x + y * y) * gaps[1]
@@ -268,7 +268,7 @@ def _member(depth, x, y, is_alike, gaps, end):
     return t * t * (THREE - TWO * t)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _take(s, at, count, g, dx0, dy0, before, gaps, rules):
     """Takes from m.SHARE what belongs to the layer `before`."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
@@ -285,7 +285,7 @@ def _take(s, at, count, g, dx0, dy0, before, gaps, rules):
         s[m.SHARE + at + k] = s[m.SHARE + at + k] * (ONE - member)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add(s, at, count, g, dx0, dy0, layer, gaps, rules, kind):
     """Adds a Gaussian to the sums of the layer, as far as it belongs there."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
@@ -330,7 +330,7 @@ def _add(s, at, count, g, dx0, dy0, layer, gaps, rules, kind):
         s[m.SHY + at + k] += alpha * photo * y
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add_all(s, at, count, g, dx0, dy0, kind):
     """The same where all belongs to one layer."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
@@ -359,7 +359,7 @@ def _add_all(s, at, count, g, dx0, dy0, kind):
         s[m.SHY + at + k] += alpha * photo * (sy + ayx * dx + ayy * dy)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add_more(s, at, count, g, rules):
     """What is 0 for a part of the photo that is carried along as it was."""
     photo, unseen = g[p.PHOTO], (ONE - g[p.SEEN]) * g[p.PHOTO]
@@ -373,7 +373,7 @@ def _add_more(s, at, count, g, rules):
         s[m.SEES + at + k] += alpha * unseen
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add_body(s, at, count, g):
     """What shows its own colour."""
     body = g[p.BODY]
@@ -388,7 +388,7 @@ def _add_body(s, at, count, g):
         s[m.B + at + k] += alpha * blue
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _multiply(s, at, count, g):
     """What shines through, for assets whose coverage is 1 - prod(1 - alpha)."""
     body, both = g[p.BODY], g[p.PHOTO] + g[p.BODY]

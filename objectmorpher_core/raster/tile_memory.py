@@ -55,13 +55,13 @@ COLUMN, LINE, TX, TY, WX0, WX1, WX2, WX3, WY0, WY1, WY2, WY3 = _rows(ROOM + 12, 
 ROWS = ROOM + 24
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def pixel_index(x, y):
     """Where the pixel in column x and row y of the tile lies in a row of the memory."""
     return np.uint64(x // STRIP * (STRIP * TILE) + y * STRIP + x % STRIP)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def number_pixels(s, step_x, step_y):
     """Writes the column and the row of each pixel of the tile to two rows of the memory."""
     for k in range(ALL):
@@ -70,7 +70,7 @@ def number_pixels(s, step_x, step_y):
         s[step_y + k] = np.float32(i // STRIP % TILE)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def clear_tile(out, rgba, column, row, columns, rows):
     """Nothing is seen on the tile at (column, row) of a picture: in `out` or in `rgba`."""
     for y in range(row, row + rows):
@@ -83,7 +83,7 @@ def clear_tile(out, rgba, column, row, columns, rows):
                     out[y, x, c] = np.inf if c == 4 else 0.0  # the depth
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(nogil=True)
 def write_rgba(s, first, rgba, column, row, columns, rows):
     """Premultiplied colour and alpha, four rows from `first` on, in 8 bits each."""
     full, half, zero = np.float32(255), np.float32(0.5), np.float32(0)
