@@ -12,7 +12,7 @@ from .editor import SELECT, Editor
 from .filing import Dialog
 from .tasks import LIFT
 from .tools import navigate
-from .view import ToolName
+from .view import Shown, ToolName
 
 
 def _always(editor: Editor) -> str | None:
@@ -31,6 +31,12 @@ def no_selection(editor: Editor) -> str | None:
 
 def no_lift(editor: Editor) -> str | None:
     return None if editor.is_lifted else "Lift an object first"
+
+
+def nothing_lifted(editor: Editor) -> str | None:
+    document = editor.document
+    is_there = document is not None and any(o.lifted for o in document.objects)
+    return None if is_there else no_photo(editor) or "Lift an object first"
 
 
 def no_handle(editor: Editor) -> str | None:
@@ -78,6 +84,13 @@ def _tool(tool: ToolName) -> Callable[[Editor], None]:
     return lambda editor: editor.choose_tool(tool)
 
 
+def _show(shown: Shown) -> Callable[[Editor], None]:
+    def run(editor: Editor) -> None:
+        editor.view.shown = shown
+
+    return run
+
+
 def _fit(editor: Editor) -> None:
     if editor.photo_size is not None:
         editor.view.fit(editor.photo_size)
@@ -114,7 +127,13 @@ COMMANDS: dict[str, Command] = {
     "zoom_in": Command("Zoom in", "Ctrl+=", lambda e: navigate.zoom_step(e, 1)),
     "zoom_out": Command("Zoom out", "Ctrl+-", lambda e: navigate.zoom_step(e, -1)),
     "split": Command("Split before/after", "\\", _split),
-    "points": Command("Control points", "Ctrl+Shift+P", _points, no_lift),
+    "points": Command("Control graph", "Ctrl+Shift+P", _points, no_lift),
+    **{
+        f"show_{shown.name.lower()}": Command(
+            shown.value, f"Alt+{number}", _show(shown), nothing_lifted if number > 1 else no_photo
+        )
+        for number, shown in enumerate(Shown, start=1)
+    },
     "cancel": Command("Cancel the running job", "", lambda e: e.jobs.cancel(), _always),
 }
 

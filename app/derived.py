@@ -5,21 +5,21 @@ The heavy modules of the core are imported when the first object is lifted, or b
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from objectmorpher_core import edits
-from objectmorpher_core.arrays import F32, F64, Mask, Sparse
+from objectmorpher_core.arrays import F32, F64, I32, Mask, Sparse
 from objectmorpher_core.document import Document, EditObject, Photo, Pose
 
 from .blend import build_blend
 from .layers import Layers
+from .memo import Memo
+from .painter import Painter
 from .view import View
 
 if TYPE_CHECKING:
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 
-T = TypeVar("T")
-
-KEPT = 6  # results remembered of each kind
 PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
@@ -66,32 +63,17 @@ class Shape:
     texture: TextureLevels
 
 
-class Memo:
-    """The last few results of one function, by the identity of what they came from."""
-
-    def __init__(self) -> None:
-        self._results: OrderedDict[tuple[int, ...], tuple[tuple[Any, ...], Any]] = OrderedDict()
-
-    def __call__(self, build: Callable[[], T], *sources: Any) -> T:
-        key = tuple(id(s) for s in sources)
-        if key not in self._results:
-            # The sources are held, so that no other object can get their ids.
-            self._results[key] = (sources, build())
-            while len(self._results) > KEPT:
-                self._results.popitem(last=False)
-        self._results.move_to_end(key)
-        return self._results[key][1]
-
-
 class Derived:
     """Solver, posed Gaussians and rendered layers of the document's objects."""
 
     def __init__(self) -> None:
         self._shapes, self._posed = Memo(), Memo()
         self.layers = Layers(self)
+        self.painter = Painter(self)
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
+        self._links = Memo()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -172,18 +154,12 @@ class Derived:
         points = thing.pose.points if thing.pose else thing.lifted.control_points
         return self.project(document, k, points)
 
-    def links(self, document: Document, k: int, count: int) -> list[tuple[F64, F64]]:
-        """The strongest links of each control point: pairs of image px (2,)."""
+    def links(self, document: Document, k: int, count: int) -> F64:
+        """The strongest links of each control point: (L, 2, 2) image px of their ends."""
         thing = document.objects[k]
         graph = self.shape(document.photo, thing).puppet.deformer.graph
-        xy = self.control_points(document, k)
-        pairs = set()
-        weights: Sparse = graph.weights
-        for i, (first, last) in enumerate(pairwise(weights.indptr)):
-            strongest = np.argsort(-weights.data[first:last], kind="stable")[:count]
-            ends = weights.indices[first + strongest]
-            pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
-        return [(xy[i], xy[j]) for i, j in sorted(pairs)]
+        pairs = self._links(lambda: _strongest(graph.weights, count), graph)
+        return self.control_points(document, k)[pairs]
 
     # Between the object's frame and the picture
 
@@ -242,6 +218,16 @@ class Derived:
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip
+
+
+def _strongest(weights: Sparse, count: int) -> I32:
+    """(L, 2) the ends of each control point's strongest links, each link once."""
+    pairs = set()
+    for i, (first, last) in enumerate(pairwise(weights.indptr)):
+        strongest = np.argsort(-weights.data[first:last], kind="stable")[:count]
+        ends = weights.indices[first + strongest]
+        pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
+    return np.array(sorted(pairs), np.int32).reshape(-1, 2)
 
 
 def _build_shape(photo: Photo, thing: EditObject) -> Shape:

@@ -27,7 +27,7 @@ from .jobs import JobError, Jobs
 from .settings import Settings
 from .tasks import Tasks
 from .tools.pointer import Hand
-from .view import ToolName, View
+from .view import Shown, ToolName, View
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import SurfacePoint
@@ -133,7 +133,7 @@ class Editor:
         self.history = History(document)
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
-        self.view.split = None
+        self.view.split, self.view.shown = None, Shown.COMPOSITE
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()

@@ -24,7 +24,7 @@ from objectmorpher_core.document import (
 )
 from objectmorpher_core.progress import Progress, part
 
-from .layers import Request, render
+from .layers import Rendered, Request, render
 
 if TYPE_CHECKING:
     from objectmorpher_core.pipeline import Reading
@@ -123,8 +123,8 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
     puppet.pick((float(x), float(y)), None, Placement(), texture)
 
 
-def render_exact(request: Request, progress: Progress) -> np.ndarray:
-    """A layer of the view: (h, w, 4) u8, premultiplied."""
+def render_exact(request: Request, progress: Progress) -> Rendered:
+    """A layer of the view."""
     return render(request)
 
 

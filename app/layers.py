@@ -21,7 +21,8 @@ from objectmorpher_core.arrays import F32
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Document
 
-from .view import View
+from .painter import PAINTED
+from .view import Shown, View
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
@@ -53,7 +54,18 @@ class Layer:
 
     box: tuple[float, float, float, float]  # x0, y0, x1, y1 canvas px
     rgba: np.ndarray  # (h, w, 4) premultiplied sRGB, f32 in [0, 1] or u8
-    draft: Draft | None = None  # None: `rgba` is exact, px for px
+    invented: np.ndarray | None = None  # (h, w) u8, what of alpha is not the photo's: hatched
+    draft: Draft | None = None  # makes a coarse layer of the photo sharp
+    is_coarse: bool = False  # else it is exact, px for px
+    is_tint: bool = False  # lies over everything, translucent
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """An exact picture."""
+
+    rgba: np.ndarray  # (h, w, 4) u8, premultiplied
+    invented: np.ndarray | None = None  # (h, w) u8, see `Layer`
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +76,31 @@ class Request:
     texture: TextureLevels
     window: Camera
     camera: Camera  # the photo's
+    part: Part
+
+
+@dataclass(frozen=True)
+class Part:
+    """An object, and how it is shown: as it is, with what of it is invented, or painted."""
+
+    k: int
+    look: Shown
+
+    @property
+    def is_painted(self) -> bool:
+        return self.look in PAINTED
+
+    @property
+    def is_marked(self) -> bool:
+        return self.look is Shown.PROVENANCE
 
 
 @dataclass(eq=False)
 class _Work:
-    """An object's picture."""
+    """The picture of a part."""
 
-    splats: PosedSplats
+    source: PosedSplats  # the object as it is
+    splats: PosedSplats  # what is drawn of it
     view: tuple[float, ...]
     request: Request  # for the exact one
     box: tuple[int, int, int, int]  # canvas px
@@ -79,107 +109,194 @@ class _Work:
     is_asked: bool = False
 
 
-Ask = Callable[[Request, Callable[[np.ndarray], None]], None]
+Ask = Callable[[Request, Callable[[Rendered], None]], None]
 
 
 class Layers:
-    """Renders objects, remembers the pictures, and keeps within the frame's time."""
+    """Renders objects, remembers the pictures of each view, and keeps within the frame's time."""
 
     def __init__(self, derived: Derived) -> None:
         self._derived = derived
-        self._works: dict[int, _Work] = {}  # object index -> its last picture
-        self._rate = FIRST_RATE  # s per px, measured
+        self._works: dict[Part, _Work] = {}  # its last picture
+        self._drawn: list[_Work] = []  # in the last frame
+        self._rates: dict[Shown, float] = {}  # s per px, measured
         self.frame_time = FRAME  # s; infinite where only the last frame counts
         self.ask: Ask | None = None  # renders elsewhere and calls back
 
     @property
     def is_waiting(self) -> bool:
         """Whether an exact picture is still to be asked for."""
-        return any(w.shown.draft is not None and not w.is_asked for w in self._works.values())
+        return any(w.shown.is_coarse and not w.is_asked for w in self._drawn)
 
-    def draw(self, document: Document, view: View) -> tuple[Layer, ...]:
-        """The moved objects' pictures, back to front."""
-        order = self.order(document)
-        self._works = {k: w for k, w in self._works.items() if k in order}
-        layers = [self._layer(document, k, splats, view) for k, splats in order.items()]
-        return tuple(layer for layer in layers if layer is not None)
+    def draw(
+        self, document: Document, view: View, shown: Shown = Shown.COMPOSITE
+    ) -> tuple[Layer, ...]:
+        """The pictures of the objects that a view shows, back to front."""
+        self._forget(document)
+        parts = self.parts(document, shown)
+        missing = [part for part in parts if not self._is_there(document, part, view)]
+        for part in missing:
+            self._render(document, part, view, self.frame_time / len(missing))
+        self._drawn = [self._works[part] for part in parts if part in self._works]
+        for work in self._drawn:
+            self._want_exact(work)
+        return tuple(work.shown for work in self._drawn)
 
-    def order(self, document: Document) -> dict[int, PosedSplats]:
-        """The moved objects that are visible, back to front."""
-        moved = {
+    def parts(self, document: Document, shown: Shown) -> list[Part]:
+        """What a view is put together from, back to front."""
+        order = self.order(document, shown)
+        if shown is Shown.OBJECT:
+            return [Part(k, Shown.COMPOSITE) for k in order]
+        if shown is not Shown.STRAIN:
+            return [Part(k, shown) for k in order]
+        parts = []
+        for k in order:  # the tint right over its object, so that nearer ones cover both
+            if document.objects[k].is_moved:
+                parts.append(Part(k, Shown.COMPOSITE))
+            parts.append(Part(k, Shown.STRAIN))
+        return parts
+
+    def order(self, document: Document, shown: Shown = Shown.COMPOSITE) -> dict[int, PosedSplats]:
+        """The visible objects back to front; where the photo is shown, too, only moved ones."""
+        is_over_photo = shown in (Shown.COMPOSITE, Shown.PROVENANCE)
+        there = {
             k: self._derived.posed(document, k)
             for k, o in enumerate(document.objects)
-            if o.lifted and o.is_moved and o.is_visible
+            if o.lifted and o.is_visible and (o.is_moved or not is_over_photo)
         }
-        return dict(sorted(moved.items(), key=lambda kv: -kv[1].middle_depth))
+        return dict(sorted(there.items(), key=lambda kv: -kv[1].middle_depth))
 
-    def _layer(self, document: Document, k: int, splats: PosedSplats, view: View) -> Layer | None:
-        key = (view.left, view.top, view.zoom, view.width, view.height)
-        thing, camera = document.objects[k], document.photo.camera
-        work = self._works.get(k)
-        if work is not None and work.splats is splats and work.view == key:
-            self._want_exact(work)
-            return work.shown
-        drawable = self._derived.drawable(document, k, view)
+    def _forget(self, document: Document) -> None:
+        """Drops the pictures of objects that are not as they were."""
+        lifted = {k for k, o in enumerate(document.objects) if o.lifted}
+        self._works = {
+            part: work
+            for part, work in self._works.items()
+            if part.k in lifted and self._derived.posed(document, part.k) is work.source
+        }
+        self._derived.painter.forget(len(document.objects))
+
+    def _is_there(self, document: Document, part: Part, view: View) -> bool:
+        work = self._works.get(part)
+        splats = self._derived.painter.painted(document, part.k, part.look)
+        return work is not None and work.splats is splats and work.view == _key(view)
+
+    def _render(self, document: Document, part: Part, view: View, seconds: float) -> None:
+        """A new picture of the part, in about so many seconds."""
+        k, camera, derived = part.k, document.photo.camera, self._derived
+        splats = derived.painter.painted(document, k, part.look)
+        drawable = derived.drawable(document, k, view)
+        if part.is_painted:
+            drawable = _prepare(splats, view.camera(camera), camera)
         box = drawable.box()
         if box is None:
-            self._works.pop(k, None)
-            return None
-        texture = self._derived.shape(document.photo, thing).texture
-        request = Request(splats, texture, view.camera(camera, box), camera)
-        shown = self._first(request, box, drawable)
-        self._works[k] = _Work(splats, key, request, box, shown, time.monotonic())
-        return shown
+            self._works.pop(part, None)
+            return
+        texture = derived.shape(document.photo, document.objects[k]).texture
+        request = Request(splats, texture, view.camera(camera, box), camera, part)
+        shown = self._first(request, box, drawable, seconds)
+        source, now = derived.posed(document, k), time.monotonic()
+        self._works[part] = _Work(source, splats, _key(view), request, box, shown, now)
 
     def _first(
-        self, request: Request, box: tuple[int, int, int, int], drawable: Drawable
+        self,
+        request: Request,
+        box: tuple[int, int, int, int],
+        drawable: Drawable,
+        seconds: float,
     ) -> Layer:
-        """Exact where the time allows, else a draft."""
-        from objectmorpher_core.raster import tiles
-
-        pixels = (box[2] - box[0]) * (box[3] - box[1])
-        excess = pixels * self._rate / self.frame_time
+        """Exact where the time allows, else coarse."""
+        pixels, look = (box[2] - box[0]) * (box[3] - box[1]), request.part.look
+        excess = pixels * self._rates.get(look, FIRST_RATE) / seconds
         coarse = 1 if excess <= 1 else min(max(math.ceil(math.sqrt(excess)), 2), COARSEST)
         start = time.perf_counter()
         if coarse == 1:
-            rgba = tiles.draw_rgba(drawable, request.texture, box)
-            self._learn(time.perf_counter() - start, pixels)
-            x0, y0, x1, y1 = box
-            return Layer((float(x0), float(y0), float(x1), float(y1)), rgba)
-        window = _coarser(request.window, coarse)
-        picture = tiles.render(request.splats, request.texture, window, request.camera)
-        self._learn(time.perf_counter() - start, pixels / coarse**2)
-        height, width = picture.alpha.shape
-        covered = (box[0], box[1], box[0] + width * coarse, box[1] + height * coarse)
-        texture = request.texture
-        draft = Draft(_looks(picture), texture.levels[0], texture.left, texture.top)
-        return Layer(covered, np.dstack([picture.color, picture.alpha]), draft)
+            layer = _layer(box, _rendered(drawable, request, box), request.part)
+        else:
+            layer = _coarse_layer(request, box, coarse)
+        self._learn(look, time.perf_counter() - start, pixels / coarse**2)
+        return layer
 
     def _want_exact(self, work: _Work) -> None:
         """Asks for the exact picture of what has not changed for a moment."""
-        if self.ask is None or work.shown.draft is None or work.is_asked:
+        if self.ask is None or not work.shown.is_coarse or work.is_asked:
             return
         if time.monotonic() - work.since < STILL:
             return
         work.is_asked = True
 
-        def accept(rgba: np.ndarray) -> None:
-            work.shown = Layer(work.box, rgba)
+        def accept(rendered: Rendered) -> None:
+            work.shown = _layer(work.box, rendered, work.request.part)
 
         self.ask(work.request, accept)
 
-    def _learn(self, seconds: float, pixels: float) -> None:
+    def _learn(self, look: Shown, seconds: float, pixels: float) -> None:
         """A moving average, so that one disturbed frame decides little."""
         rate = seconds / max(pixels, 1.0)
-        self._rate = float(np.clip(0.7 * self._rate + 0.3 * rate, 1e-9, 1e-5))
+        mean = 0.7 * self._rates.get(look, FIRST_RATE) + 0.3 * rate
+        self._rates[look] = float(np.clip(mean, 1e-9, 1e-5))
 
 
-def render(request: Request) -> np.ndarray:
-    """The exact picture, (h, w, 4) u8 premultiplied."""
+def render(request: Request) -> Rendered:
+    """The exact picture."""
+    drawable = _prepare(request.splats, request.window, request.camera)
+    return _rendered(drawable, request)
+
+
+def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
     from objectmorpher_core.raster import tiles
 
-    drawable = tiles.prepare(request.splats, request.window, request.camera)
-    return tiles.draw_rgba(drawable, request.texture)
+    return tiles.prepare(splats, camera, photo_camera)
+
+
+def _rendered(
+    drawable: Drawable, request: Request, box: tuple[int, int, int, int] | None = None
+) -> Rendered:
+    """All of the view or the part `box` of it."""
+    from objectmorpher_core.raster import tiles
+
+    if not request.part.is_marked:
+        return Rendered(tiles.draw_rgba(drawable, request.texture, box))
+    picture = tiles.draw(drawable, request.texture, box)
+    rgba = np.dstack([picture.color, picture.alpha])
+    return Rendered(_as_u8(rgba), _invented(picture))
+
+
+def _layer(box: tuple[int, int, int, int], rendered: Rendered, part: Part) -> Layer:
+    x0, y0, x1, y1 = box
+    own = (float(x0), float(y0), float(x1), float(y1))
+    return Layer(own, rendered.rgba, rendered.invented, is_tint=part.look is Shown.STRAIN)
+
+
+def _coarse_layer(request: Request, box: tuple[int, int, int, int], coarse: int) -> Layer:
+    """With `coarse` times fewer px across and down."""
+    from objectmorpher_core.raster import tiles
+
+    window, part = _coarser(request.window, coarse), request.part
+    covered = (box[0], box[1], box[0] + window.width * coarse, box[1] + window.height * coarse)
+    drawable = _prepare(request.splats, window, request.camera)
+    if part.is_painted:  # smooth already
+        rgba = tiles.draw_rgba(drawable, request.texture)
+        return Layer(covered, rgba, is_coarse=True, is_tint=part.look is Shown.STRAIN)
+    picture, texture = tiles.draw(drawable, request.texture), request.texture
+    draft = Draft(_looks(picture), texture.levels[0], texture.left, texture.top)
+    invented = _invented(picture) if part.is_marked else None
+    rgba = np.dstack([picture.color, picture.alpha])
+    return Layer(covered, rgba, invented, draft, is_coarse=True)
+
+
+def _invented(picture: Picture3D) -> np.ndarray:
+    """(h, w) u8 share of the pixel that shows the object, but nothing of the photo."""
+    return _as_u8(picture.alpha - picture.from_photo)
+
+
+def _as_u8(values: np.ndarray) -> np.ndarray:
+    return (values * 255 + 0.5).clip(0, 255).astype(np.uint8)
+
+
+def _key(view: View) -> tuple[float, ...]:
+    """What a picture on the canvas depends on."""
+    return (view.left, view.top, view.zoom, view.width, view.height)
 
 
 def _coarser(window: Camera, coarse: int) -> Camera:

@@ -10,8 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Prompt
@@ -19,7 +17,7 @@ from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Pr
 from . import job_functions
 from .job_functions import Choice, Cut
 from .jobs import JobError
-from .layers import Request
+from .layers import Rendered, Request
 from .view import ToolName
 
 if TYPE_CHECKING:
@@ -166,12 +164,11 @@ class Tasks:
         if editor.preview is not None:
             editor.preview = edits.set_plate(editor.preview, plate)
 
-    def render_exact(self, request: Request, accept: Callable[[np.ndarray], None]) -> None:
+    def render_exact(self, request: Request, accept: Callable[[Rendered], None]) -> None:
         """Asks for an exact picture of the view, which shows a draft meanwhile."""
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,
-            done=accept, failed=lambda error: None, kind=f"draw {id(request.texture)}",
-            is_quiet=True,
+            done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
         )  # fmt: skip
 
     def export(self, path: Path) -> None:

@@ -26,6 +26,17 @@ class ToolName(Enum):
     PLACE = "Place"
 
 
+class Shown(Enum):
+    """What the canvas shows of the edit, in the order of the View menu."""
+
+    COMPOSITE = "Composite"
+    OBJECT = "Object only"
+    DEPTH = "Depth"
+    NORMALS = "Normals"
+    PROVENANCE = "Provenance"
+    STRAIN = "Strain"
+
+
 @dataclass(eq=False)
 class View:
     """Mutable: the tools and panels write it, the window reads it each frame."""
@@ -41,6 +52,7 @@ class View:
     is_before: bool = False  # X is held: the photo as it was
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
+    shown: Shown = Shown.COMPOSITE
 
     def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:
         """Canvas px (..., 2) of image px (..., 2)."""

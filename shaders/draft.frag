@@ -13,9 +13,13 @@ uniform vec2 corner;      // image px at the canvas's left top
 uniform float zoom;       // canvas px per image px
 uniform vec4 photo_box;   // x0, y0, x1, y1 canvas px; nothing is drawn outside
 uniform float split;      // canvas px, left of which the photo is shown as it was
+uniform sampler2D marks;  // share that shows the object but nothing of the photo
+uniform float marked;     // 1: hatches that
 
 in vec2 xy;
 out vec4 color;
+
+#include "hatch.glsl"
 
 void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
@@ -26,5 +30,8 @@ void main() {
     vec4 texel = texture(crop, (point - crop_box.xy) / (crop_box.zw - crop_box.xy));
     float covered = clamp(2.0 * coarse.a, 0.0, 1.0);
     vec4 sharp = vec4(texel.rgb * texel.a, texel.a) * covered;
-    color = mix(coarse, sharp, look.z) * texture(blend, xy / cells).r;
+    color = mix(coarse, sharp, look.z);
+    float share = clamp(texture(marks, at).r / max(coarse.a, 1e-3), 0, 1);
+    color.rgb = hatched(color.rgb, color.a, marked * share, xy);
+    color *= texture(blend, xy / cells).r;
 }

@@ -13,11 +13,15 @@ uniform vec4 plate_box;   // x0, y0, x1, y1 image px; empty where there is no pl
 uniform float split;      // canvas px, left of which the photo is shown as it was
 uniform vec3 surround;    // sRGB
 uniform float veil;       // share of black over what is outside the mask
-uniform float hatch;      // share of the hatching over the mask, where the plate is missing
-uniform float unit;       // canvas px per point
+uniform float hatch;      // share of the hatching over the mask
+uniform float bare;       // 1: paper instead of the photo
+uniform vec3 paper;       // sRGB
+uniform vec3 checked;     // sRGB, of every other square
 
 in vec2 xy;
 out vec4 color;
+
+#include "hatch.glsl"
 
 // 1 inside a box, 0 outside, a ramp of one canvas px along its border.
 float inside(vec2 point, vec4 bounds) {
@@ -25,10 +29,10 @@ float inside(vec2 point, vec4 bounds) {
     return clamp(min(depth.x, depth.y) + 0.5, 0.0, 1.0);
 }
 
-// Diagonal stripes, 8 points apart: pixels that are not there yet.
-float stripes() {
-    float phase = fract((xy.x + xy.y) / (8.0 * unit * 1.41421356));
-    return smoothstep(0.30, 0.38, phase) - smoothstep(0.62, 0.70, phase);
+// Squares of 8 points, which move with the photo.
+vec3 checker(vec2 point) {
+    vec2 square = floor(point * zoom / (8.0 * unit));
+    return mod(square.x + square.y, 2.0) < 1.0 ? paper : checked;
 }
 
 void main() {
@@ -42,8 +46,8 @@ void main() {
         }
         float meant = texture(mask, point / photo_size).r;
         picture = mix(picture, vec3(0), veil * (1.0 - meant));
-        vec3 striped = mix(picture * 0.25, vec3(0.5), 0.35 * stripes());
-        picture = mix(picture, striped, hatch * meant * edited);
+        picture = hatched(picture, 1.0, hatch * meant * edited, xy);
+        picture = mix(picture, checker(point), bare);
     }
     color = vec4(mix(surround, picture, inside(point, vec4(0, 0, photo_size))), 1);
 }

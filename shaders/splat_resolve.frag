@@ -14,7 +14,7 @@ uniform sampler2D look_before;   // what the layer before has written
 uniform sampler2D cover_before;
 #endif
 
-uniform vec3 unmoved;            // crop px = x * (gl_FragCoord - its first) + yz
+uniform vec3 unmoved;            // crop px = x * gl_FragCoord + yz, of what has not moved
 uniform vec4 photo_box;          // crop px, the photo: elsewhere it is made up
 uniform float surface_level;     // rules.Rules
 uniform float edge_width;
@@ -25,9 +25,12 @@ uniform float opaque;
 uniform float least_front;
 
 layout(location = 0) out vec4 color;   // added up: premultiplied
-layout(location = 1) out vec4 detail;  // added up: depth and shift of the first visible layer
-layout(location = 2) out vec4 look;    // of this layer: shift, share of the photo, coverage
-layout(location = 3) out vec4 cover;   // clear before, alpha, has_depth, whether more may follow
+layout(location = 1) out vec4 detail;  // added up: the first visible layer's depth, shift (zw)
+layout(location = 2) out vec4 median;  // added up: with which alpha reaches a half: the same
+layout(location = 3) out vec4 look;    // of this layer: shift, share of the photo, coverage
+layout(location = 4) out vec4 cover;   // clear before, alpha, has_depth, whether more may follow
+
+const float HALF = 0.5;  // reference.py: MEDIAN
 
 float ramp(float value, float zero, float one) {
     float t = clamp((value - zero) / (one - zero), 0.0, 1.0);
@@ -87,8 +90,10 @@ void main() {
     bool is_first = covered.z == 0.0 && alpha > visible;
     float sum = covered.y + through;
     color = vec4(mixed, 1.0) * through;
-    detail = vec4(0.0, through * seen * shown * weight, 0.0, 0.0);
+    detail = vec4(0.0, through * seen * shown * weight, 0.0, 0.0);  // y: from_photo
     if (is_first) detail += vec4(places.z / total, 0.0, shift);
+    bool is_half = covered.y < HALF && sum >= HALF;
+    median = is_half ? vec4(places.z / total, is_photo ? 1.0 : 0.0, shift) : vec4(0.0);
     look = vec4(shift, share, 1.0 - (1.0 - same * before.w) * (1.0 - whole));
     cover = vec4(mix(clear, covered.x, same), sum, is_first ? 1.0 : covered.z, 0.0);
     cover.w = sum <= opaque && left >= 0.99 * least_front ? 1.0 : 0.0;

@@ -8,6 +8,8 @@ from imgui_bundle import ImVec2, imgui
 
 from ..commands import COMMANDS, run
 from ..editor import Editor
+from ..painter import shown_now
+from ..view import Shown
 from .layout import Rect
 from .theme import Icon, theme
 from .widgets import icon_button, tooltip
@@ -16,8 +18,11 @@ MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
     "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
-    "View": ("zoom_in", "zoom_out", "fit", "actual", "-", "split", "points", "-", "theme"),
-}
+    "View": (
+        "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
+        "-", "split", "points", "-", "theme",
+    ),
+}  # fmt: skip
 
 
 def draw_menu(editor: Editor, rect: Rect) -> None:
@@ -63,11 +68,19 @@ def _draw_command(editor: Editor, name: str) -> None:
         label = f"Undo: {editor.history.undo_label}"
     if name == "redo" and editor.history and editor.history.redo_label:
         label = f"Redo: {editor.history.redo_label}"
-    is_on = {"split": editor.view.split is not None, "points": editor.view.has_points}
-    if imgui.menu_item(f"{label}##{name}", command.keys, is_on.get(name, False), reason is None)[0]:
+    is_on = name in _switched_on(editor)
+    if imgui.menu_item(f"{label}##{name}", command.keys, is_on, reason is None)[0]:
         run(editor, name)
     if reason is not None:
         tooltip(reason)
+
+
+def _switched_on(editor: Editor) -> set[str]:
+    """The toggles that are on, and the view that is chosen."""
+    view = editor.view
+    names = {f"show_{shown_now(editor.document, view).name.lower()}"}
+    names |= {"split"} if view.split is not None else set()
+    return names | ({"points"} if view.has_points else set())
 
 
 def _draw_recent(editor: Editor) -> None:

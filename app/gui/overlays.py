@@ -15,6 +15,7 @@ from ..editor import Editor
 from ..tools.place_tool import gizmo
 from ..view import ToolName
 from .layout import Rect
+from .legend import Legend
 from .theme import theme
 
 DARK = "#0B0C0E"
@@ -36,15 +37,15 @@ class Overlays:
         end = ImVec2(self._rect.x + self._rect.width, self._rect.y + self._rect.height)
         self._draw.push_clip_rect(corner, end, True)
         if not view.is_before:
+            if view.has_points and editor.is_lifted:
+                self._draw_control_points()
             if view.tool is ToolName.SELECT:
                 self._draw_selection()
+            elif editor.is_lifted and view.tool is ToolName.POSE:
+                self._draw_pose()
             elif editor.is_lifted:
-                if view.has_points:
-                    self._draw_control_points()
-                if view.tool is ToolName.POSE:
-                    self._draw_pose()
-                else:
-                    self._draw_frame()
+                self._draw_frame()
+            Legend(editor, self._rect).draw()
         if view.is_before or view.split is not None:
             self._draw_comparison()
         self._draw.pop_clip_rect()
@@ -193,11 +194,16 @@ class Overlays:
     def _draw_control_points(self) -> None:
         editor = self._editor
         assert editor.document is not None
-        for a, b in editor.derived.links(editor.document, editor.current, MAX_LINKED):
-            start, end = self._at(np.stack([a, b]))
-            self._draw.add_line(start, end, theme.u32(WHITE, 0.3), 1.0)
+        links = editor.derived.links(editor.document, editor.current, MAX_LINKED)
+        is_there = ((links >= 0) & (links <= editor.document.photo.size)).all((1, 2))
+        ends = self._at(links[is_there].reshape(-1, 2))
+        dark, white = theme.u32(DARK, 0.25), theme.u32(WHITE, 0.4)
+        for start, end in zip(ends[::2], ends[1::2], strict=True):
+            self._draw.add_line(start, end, dark, 2.5)
+            self._draw.add_line(start, end, white, 1.0)
         for at in self._on_photo(editor.derived.control_points(editor.document, editor.current)):
-            self._draw.add_circle_filled(at, theme.pt(2), theme.u32(WHITE, 0.5), 8)
+            self._draw.add_circle_filled(at, theme.scale * 2.6, theme.u32(DARK, 0.4), 8)
+            self._draw.add_circle_filled(at, theme.scale * 1.8, theme.u32(WHITE, 0.8), 8)
 
     # Place
 

@@ -27,7 +27,7 @@ def draw_pose(editor: Editor) -> None:
         tooltip("With one handle, the part farthest from it is anchored by itself")
         if is_on != thing.has_auto_anchors:
             editor.set_auto_anchors(is_on)
-    editor.view.has_points = checkbox("Show control points", editor.view.has_points)
+    editor.view.has_points = checkbox("Show control graph", editor.view.has_points)
     gap(12)
     reason = COMMANDS["reset_pose"].why_not(editor)
     if reason is None and thing is not None and not thing.handles:

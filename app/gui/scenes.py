@@ -5,12 +5,16 @@ from __future__ import annotations
 from objectmorpher_core.document import Document
 
 from ..editor import Editor
-from ..render.scene import Scene, SplatObject
-from ..view import ToolName
+from ..painter import shown_now
+from ..render.scene import Hatch, Scene, SplatObject
+from ..view import Shown, ToolName
 from .theme import theme
 
 VEIL = 0.45  # share of black outside the selection, while selecting
-HATCH = 1.0
+MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
+LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
+INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
+BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
 def build_scene(editor: Editor, renderer: str) -> Scene | None:
@@ -19,29 +23,47 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if document is None:
         return None
     photo, surround = document.photo.pixels, theme.rgb("surround")
-    if view.tool is ToolName.SELECT:  # the selection is about the photo as it was
+    shown = shown_now(document, view)
+    if shown is Shown.COMPOSITE and view.tool is ToolName.SELECT:  # is about the photo as it was
         is_veiled = editor.mask is not None and not view.is_before
         return Scene(photo, surround, mask=editor.mask, veil=VEIL if is_veiled else 0.0)
     is_edited = any(o.is_moved for o in document.objects)
-    if view.is_before or not is_edited:
+    if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
         return Scene(photo, surround)
-    hole = None if document.plate else editor.derived.moved_mask(document)
+    if shown is Shown.DEPTH and editor.preview is None:
+        editor.derived.painter.measure(document)
+    layers = editor.derived.layers.draw(document, view, shown) if renderer == "tiles" else ()
+    objects = _objects(editor, document, shown) if renderer == "gl" else ()
+    split = view.split or 0.0
+    if shown in BARE:
+        paper = _paper(shown)
+        return Scene(photo, surround, layers=layers, objects=objects, paper=paper, split=split)
+    mask, hatch = None, None
+    if document.plate is None and is_edited:
+        mask, hatch = editor.derived.moved_mask(document), MISSING
+    elif shown is Shown.PROVENANCE:
+        mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
     return Scene(
-        photo,
-        surround,
-        plate=document.plate,
-        layers=editor.derived.layers.draw(document, view) if renderer == "tiles" else (),
-        objects=_objects(editor, document) if renderer == "gl" else (),
-        mask=hole,
-        hatch=HATCH if hole is not None else 0.0,
-        blend=editor.derived.blend(document, view),
-        split=view.split or 0.0,
-    )
+        photo, surround, document.plate if is_edited else None, layers, objects, mask,
+        hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
+    )  # fmt: skip
 
 
-def _objects(editor: Editor, document: Document) -> tuple[SplatObject, ...]:
-    camera, photo = document.photo.camera, document.photo
+def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """A checker says that nothing is there; under colours that mean something it would disturb."""
+    panel = theme.rgb("panel")
+    return panel, theme.rgb("raised") if shown is Shown.OBJECT else panel
+
+
+def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject, ...]:
+    camera, photo, derived = document.photo.camera, document.photo, editor.derived
     return tuple(
-        SplatObject(splats, editor.derived.shape(photo, document.objects[k]).texture, camera)
-        for k, splats in editor.derived.layers.order(document).items()
+        SplatObject(
+            derived.painter.painted(document, part.k, part.look),
+            derived.shape(photo, document.objects[part.k]).texture,
+            camera,
+            is_marked=part.is_marked,
+            is_tint=part.look is Shown.STRAIN,
+        )
+        for part in derived.layers.parts(document, shown)
     )

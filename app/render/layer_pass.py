@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import moderngl
 import numpy as np
 
 from ..layers import Draft, Layer
 from ..view import View
 from .blend_texture import BLEND, blend_cells
-from .scene import Scene
+from .photo_pass import hatch_uniforms
+from .scene import Scene, SplatObject
 from .shaders import build_program, set_uniforms
 from .textures import PictureTexture
 
-LAYER, LOOKS, CROP = range(3)  # texture units
+if TYPE_CHECKING:
+    from .splat_pass import SplatPicture
+
+LAYER, LOOKS, CROP, MARKS = range(4)  # texture units
 KEPT_CROPS = 4
+TINT = 0.6  # opacity
 
 
 class LayerPass:
@@ -21,52 +28,60 @@ class LayerPass:
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
-        self._exact = build_program(context, "quad.vert", "layer.frag")
-        self._draft = build_program(context, "quad.vert", "draft.frag")
-        self._exact_quad = context.vertex_array(self._exact, [])
-        self._draft_quad = context.vertex_array(self._draft, [])
-        self._uploaded: dict[int, tuple[Layer, list[moderngl.Texture]]] = {}
+        self._exact, self._exact_quad = self._build("layer.frag")
+        self._drawn, self._drawn_quad = self._build("layer.frag", "DETAIL")  # by the GPU
+        self._draft, self._draft_quad = self._build("draft.frag")
+        self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
         self._crops: dict[int, tuple[np.ndarray, PictureTexture]] = {}
-        set_uniforms(self._exact, layer=LAYER, blend=BLEND)
-        set_uniforms(self._draft, layer=LAYER, looks=LOOKS, crop=CROP, blend=BLEND)
+        self._nothing = context.texture((1, 1), 4, bytes(4))
+
+    def _build(self, fragment: str, *defines: str) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        program = build_program(self._context, "quad.vert", fragment, *defines)
+        set_uniforms(program, layer=LAYER, looks=LOOKS, crop=CROP, marks=MARKS, blend=BLEND)
+        return program, self._context.vertex_array(program, [])
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
         self._forget(scene.layers)
-        self._context.enable(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         for layer in scene.layers:
-            for unit, texture in enumerate(self._textures(layer)):
+            self._nothing.use(MARKS)
+            for unit, texture in self._textures(layer).items():
                 texture.use(unit)
-            program = self._exact if layer.draft is None else self._draft
-            set_uniforms(
-                program,
-                canvas=(view.width, view.height),
-                box=layer.box,
-                photo_box=_photo_box(scene, view),
-                cells=blend_cells(scene),
-                split=scene.split * view.width,
+            is_exact = layer.draft is None
+            program, quad = (
+                (self._exact, self._exact_quad) if is_exact else (self._draft, self._draft_quad)
             )
             if layer.draft is not None:
                 self._use_draft(layer.draft, view)
-            quad = self._exact_quad if layer.draft is None else self._draft_quad
-            quad.render(moderngl.TRIANGLE_STRIP, 4)
-        self._context.disable(moderngl.BLEND)
+            set_uniforms(program, box=layer.box, **_appearance(layer.is_tint))
+            set_uniforms(program, marked=0.0 if layer.invented is None else 1.0)
+            self._render(program, quad, scene, view)
 
-    def draw_texture(self, texture: moderngl.Texture, scene: Scene, view: View) -> None:
+    def draw_picture(
+        self, picture: SplatPicture, item: SplatObject, scene: Scene, view: View
+    ) -> None:
         """A picture of the whole canvas that is on the GPU already."""
-        self._context.enable(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        texture.use(LAYER)
+        picture.color.use(LAYER)
+        (picture.detail or self._nothing).use(MARKS)
+        box = (0, 0, view.width, view.height)
+        set_uniforms(self._drawn, box=box, **_appearance(item.is_tint))
+        set_uniforms(self._drawn, marked=1.0 if item.is_marked else 0.0)
+        self._render(self._drawn, self._drawn_quad, scene, view)
+
+    def _render(
+        self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: View
+    ) -> None:
         set_uniforms(
-            self._exact,
+            program,
             canvas=(view.width, view.height),
-            box=(0, 0, view.width, view.height),
             photo_box=_photo_box(scene, view),
             cells=blend_cells(scene),
             split=scene.split * view.width,
+            **hatch_uniforms(scene.marks, view),
         )
-        self._exact_quad.render(moderngl.TRIANGLE_STRIP, 4)
+        self._context.enable(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        quad.render(moderngl.TRIANGLE_STRIP, 4)
         self._context.disable(moderngl.BLEND)
 
     def _use_draft(self, draft: Draft, view: View) -> None:
@@ -85,23 +100,32 @@ class LayerPass:
         """Releases what is not shown any more."""
         kept = {id(layer) for layer in layers}
         for key in [key for key in self._uploaded if key not in kept]:
-            for texture in self._uploaded.pop(key)[1]:
+            for texture in self._uploaded.pop(key)[1].values():
                 texture.release()
 
-    def _textures(self, layer: Layer) -> list[moderngl.Texture]:
+    def _textures(self, layer: Layer) -> dict[int, moderngl.Texture]:
+        """The layer's textures by their unit."""
         if id(layer) not in self._uploaded:
-            height, width = layer.rgba.shape[:2]
-            size = (width, height)
-            textures = [self._context.texture(size, 4, _as_u8(layer.rgba), alignment=1)]
+            textures = {LAYER: self._upload(_as_u8(layer.rgba))}
+            if layer.invented is not None:
+                textures[MARKS] = self._upload(layer.invented[..., None])
             if layer.draft is not None:
-                looks = np.ascontiguousarray(layer.draft.looks)
-                textures.append(self._context.texture(size, 4, looks, dtype="f4"))
-            near = moderngl.NEAREST if layer.draft is None else moderngl.LINEAR
-            for texture in textures:
+                textures[LOOKS] = self._upload(layer.draft.looks)
+            near = moderngl.LINEAR if layer.is_coarse else moderngl.NEAREST
+            for texture in textures.values():
                 texture.filter = near, near
                 texture.repeat_x = texture.repeat_y = False
             self._uploaded[id(layer)] = (layer, textures)
         return self._uploaded[id(layer)][1]
+
+    def _upload(self, pixels: np.ndarray) -> moderngl.Texture:
+        height, width, channels = pixels.shape
+        kind, data = "f1" if pixels.dtype == np.uint8 else "f4", np.ascontiguousarray(pixels)
+        return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
+
+
+def _appearance(is_tint: bool) -> dict[str, float]:
+    return {"opacity": TINT if is_tint else 1.0, "blended": 0.0 if is_tint else 1.0}
 
 
 def _photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
 
 from ..view import View
 from .blend_texture import BLEND, blend_cells
-from .scene import Scene
+from .scene import Hatch, Scene
 from .shaders import build_program, set_uniforms
 from .textures import PictureTexture
 
@@ -45,8 +47,25 @@ class PhotoPass:
             split=scene.split * view.width,
             surround=scene.surround,
             veil=scene.veil,
-            hatch=scene.hatch,
-            unit=view.scale,
+            hatch=0.0 if scene.hatch is None else 1.0,
+            **hatch_uniforms(scene.hatch, view),
+            **_paper_uniforms(scene),
             cells=blend_cells(scene),
         )
         self._quad.render(moderngl.TRIANGLE_STRIP, 4)
+
+
+def hatch_uniforms(hatch: Hatch | None, view: View) -> dict[str, Any]:
+    """What shaders/hatch.glsl asks for."""
+    if hatch is None:
+        return {"unit": view.scale}
+    return {
+        "unit": view.scale, "ink": hatch.ink, "strength": hatch.strength,
+        "brightness": hatch.brightness, "slant": hatch.slant,
+    }  # fmt: skip
+
+
+def _paper_uniforms(scene: Scene) -> dict[str, Any]:
+    if scene.paper is None:
+        return {"bare": 0.0}
+    return {"bare": 1.0, "paper": scene.paper[0], "checked": scene.paper[1]}

@@ -55,7 +55,7 @@ class Renderer:
             if picture is not None:
                 self._begin(viewport)
                 self._blend.use(scene)
-                self._layer_pass.draw_texture(picture.color, scene, view)
+                self._layer_pass.draw_picture(picture, item, scene, view)
         if self._splat_pass is not None:
             self._splat_pass.sweep()
 

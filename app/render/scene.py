@@ -19,12 +19,24 @@ Colour = tuple[float, float, float]  # sRGB in [0, 1]
 
 
 @dataclass(frozen=True, eq=False)
+class Hatch:
+    """Stripes over what is not the photo's."""
+
+    ink: Colour
+    strength: float = 0.9  # share of the ink in a stripe
+    brightness: float = 0.75  # share of the picture that is left under it
+    slant: float = 1.0  # 1: rising to the right, -1: falling
+
+
+@dataclass(frozen=True, eq=False)
 class SplatObject:
-    """A moved object for the GPU to draw."""
+    """An object for the GPU to draw."""
 
     splats: PosedSplats
     texture: TextureLevels
     camera: Camera  # the photo's
+    is_marked: bool = False  # hatched where it shows nothing of the photo
+    is_tint: bool = False  # lies over everything, translucent
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +46,12 @@ class Scene:
     photo: Pixels
     surround: Colour
     plate: Plate | None = None  # shown where there is one
-    layers: tuple[Layer, ...] = ()  # moved objects that are rendered already, back to front
-    objects: tuple[SplatObject, ...] = ()  # moved objects to render, back to front
+    layers: tuple[Layer, ...] = ()  # objects that are rendered already, back to front
+    objects: tuple[SplatObject, ...] = ()  # objects to render, back to front
     mask: Mask | None = None  # what `veil` and `hatch` refer to
     veil: float = 0.0  # share of black outside the mask
-    hatch: float = 0.0  # share of the hatching inside the mask
+    hatch: Hatch | None = None  # inside the mask
+    marks: Hatch | None = None  # on what an object invents, where its layer says so
+    paper: tuple[Colour, Colour] | None = None  # squares of these instead of the photo
     blend: F32 | None = None  # (h, w) over the canvas: 0 shows the photo over the edit
     split: float = 0.0  # share of the canvas, from the left, that shows the photo as it was

@@ -16,10 +16,11 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels
 
-from .cloud_pass import CloudPass, near_to_far
+from .cloud_pass import CloudPass
 from .gpu_memory import Uploads
 from .layered_pass import LayeredPass
 from .project_pass import ProjectPass
+from .view_depths import near_to_far
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +36,13 @@ class SplatPicture:
 class SplatPass:
     """Draws one object after the other."""
 
-    def __init__(self, context: moderngl.Context) -> None:
+    def __init__(self, context: moderngl.Context, most_texture: int | None = None) -> None:
+        """`most_texture`: px, the longest side of a texture, if not the driver's limit."""
+        limit = most_texture or int(context.info["GL_MAX_TEXTURE_SIZE"])
         self._context = context
-        self._uploads = Uploads()
-        self._project = ProjectPass(context, self._uploads)
-        self._layered = LayeredPass(context, self._uploads)
+        self.uploads = Uploads()
+        self._project = ProjectPass(context, self.uploads)
+        self._layered = LayeredPass(context, self.uploads, limit)
         self._cloud = CloudPass(context)
         self._pictures: dict[bool, _Target] = {}
         # Without a window, transform feedback needs some framebuffer; and none that is bound may
@@ -57,7 +60,7 @@ class SplatPass:
             return None
         self._idle.use()
         _ = self._context.error  # whatever somebody else has left
-        is_layered = splats.rest.splatting.is_surface or splats.rest.is_textured
+        is_layered = splats.is_layered
         target = self._sized(is_layered, (camera.width, camera.height))
         order = None if is_layered else near_to_far(splats)
         instances = self._project.draw(splats, camera, photo_camera, order)
@@ -73,7 +76,7 @@ class SplatPass:
 
     def sweep(self) -> None:
         """Releases the objects that have not been drawn since the last time."""
-        self._uploads.sweep()
+        self.uploads.sweep()
 
     def _sized(self, is_layered: bool, size: tuple[int, int]) -> _Target:
         """The picture to draw into; made anew when the canvas has changed."""
@@ -88,9 +91,7 @@ class SplatPass:
 class _Target:
     """A picture's textures. Sums of thousands of Gaussians need 32 bits, finished ones 16."""
 
-    def __init__(
-        self, context: moderngl.Context, size: tuple[int, int], is_layered: bool
-    ) -> None:
+    def __init__(self, context: moderngl.Context, size: tuple[int, int], is_layered: bool) -> None:
         self.size = size
         types = ("f2", "f4") if is_layered else ("f4",)
         self.textures = [context.texture(size, 4, dtype=bits) for bits in types]

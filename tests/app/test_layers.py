@@ -6,10 +6,11 @@ import time
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs
+from conftest import PATIENCE, wait_for_jobs
 
 from app.blend import CELL
 from app.editor import Editor
+from app.view import Shown
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
 
@@ -30,7 +31,7 @@ def test_a_draft_is_replaced_by_the_exact_picture(editor: Editor, moved: Documen
     (draft,) = layers.draw(moved, editor.view)
     assert draft.draft is not None
     assert layers.is_waiting
-    end = time.monotonic() + 30
+    end = time.monotonic() + PATIENCE
     while (shown := layers.draw(moved, editor.view)[0]).draft is not None:
         assert time.monotonic() < end
         editor.poll()
@@ -78,3 +79,47 @@ def test_the_photo_stays_where_nothing_moved(editor: Editor, moved: Document) ->
     assert blend[int(corner[1]), int(corner[0])] == 0
     hidden = edits.set_visible(lift_free(moved), 0, False)
     assert editor.derived.blend(hidden, editor.view)[int(centre[1]), int(centre[0])] == 1
+
+
+@pytest.mark.parametrize("shown", list(Shown))
+def test_every_view_draws_the_object(editor: Editor, moved: Document, shown: Shown) -> None:
+    layers = editor.derived.layers
+    layers.frame_time = np.inf
+    drawn = layers.draw(moved, editor.view, shown)
+    assert len(drawn) == (2 if shown is Shown.STRAIN else 1)
+    assert (drawn[-1].invented is not None) == (shown is Shown.PROVENANCE)
+    assert drawn[-1].is_tint == (shown is Shown.STRAIN)
+    is_over_photo = shown in (Shown.COMPOSITE, Shown.PROVENANCE)
+    resting = layers.draw(lift_free(moved), editor.view, shown)
+    assert len(resting) == (0 if is_over_photo else 1)
+    layers.frame_time = 0.028
+
+
+def test_each_view_remembers_its_pictures(editor: Editor, moved: Document) -> None:
+    layers = editor.derived.layers
+    layers.frame_time = np.inf
+    before = [layers.draw(moved, editor.view, shown) for shown in Shown]
+    after = [layers.draw(moved, editor.view, shown) for shown in Shown]
+    for first, second in zip(before, after, strict=True):
+        assert all(a is b for a, b in zip(first, second, strict=True))
+    layers.frame_time = 0.028
+
+
+@pytest.mark.parametrize("shown", [Shown.DEPTH, Shown.STRAIN, Shown.PROVENANCE])
+def test_coarse_pictures_of_a_view_become_exact(
+    editor: Editor, moved: Document, shown: Shown
+) -> None:
+    layers = editor.derived.layers
+    layers.draw(lift_free(moved), editor.view)
+    layers.frame_time = 1e-4
+    assert all(layer.is_coarse for layer in layers.draw(moved, editor.view, shown))
+    assert layers.is_waiting
+    end = time.monotonic() + PATIENCE
+    while any(layer.is_coarse for layer in layers.draw(moved, editor.view, shown)):
+        assert time.monotonic() < end
+        editor.poll()
+        time.sleep(0.01)
+    assert not layers.is_waiting
+    last = layers.draw(moved, editor.view, shown)[-1]
+    assert (last.invented is not None) == (shown is Shown.PROVENANCE)
+    layers.frame_time = 0.028

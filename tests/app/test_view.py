@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.view import MARGIN, View
+from app.commands import COMMANDS, run
+from app.editor import Editor
+from app.view import MARGIN, Shown, View
 from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Document
 
 PHOTO = (600, 400)
 
@@ -70,3 +73,27 @@ def test_a_zoomed_photo_keeps_its_zoom_when_the_window_grows(view: View) -> None
     view.resize((1400, 900), 1.0, PHOTO)
     assert view.zoom == 5.0
     np.testing.assert_allclose(view.image_from_canvas((700, 450)), middle)
+
+
+def test_views_have_keys_of_their_own_and_are_in_the_menu() -> None:
+
+    from app.gui.menu import MENUS
+
+    keys = [command.keys for command in COMMANDS.values() if command.keys]
+    assert len(keys) == len(set(keys))
+    for shown in Shown:
+        name = f"show_{shown.name.lower()}"
+        assert COMMANDS[name].label == shown.value
+        assert name in MENUS["View"]
+
+
+def test_choosing_a_view_is_no_step(editor: Editor, ball: Document) -> None:
+    run(editor, "show_depth")
+    assert editor.view.shown is Shown.COMPOSITE  # nothing is lifted yet, and that is said
+    assert editor.message is not None
+    editor.start(ball)
+    run(editor, "show_depth")
+    assert editor.view.shown is Shown.DEPTH
+    assert editor.document is ball and editor.is_saved
+    editor.start(ball)  # another document begins with the photo
+    assert editor.view.shown is Shown.COMPOSITE

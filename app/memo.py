@@ -1,0 +1,28 @@
+"""Results remembered by the identity of what they came from (ARCHITECTURE 1)."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+KEPT = 6  # results remembered of each kind
+
+
+class Memo:
+    """The last few results of one function, by the identity of what they came from."""
+
+    def __init__(self) -> None:
+        self._results: OrderedDict[tuple[int, ...], tuple[tuple[Any, ...], Any]] = OrderedDict()
+
+    def __call__(self, build: Callable[[], T], *sources: Any) -> T:
+        key = tuple(id(s) for s in sources)
+        if key not in self._results:
+            # The sources are held, so that no other object can get their ids.
+            self._results[key] = (sources, build())
+            while len(self._results) > KEPT:
+                self._results.popitem(last=False)
+        self._results.move_to_end(key)
+        return self._results[key][1]

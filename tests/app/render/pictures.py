@@ -1,0 +1,57 @@
+"""The GPU's picture as arrays, the specification's, and what is between them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from objectmorpher_core.arrays import F32
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Handle, Pose
+from objectmorpher_core.raster import reference
+from objectmorpher_core.raster.posed import PosedSplats
+from objectmorpher_core.raster.texture import TextureLevels
+from tests import shapes
+
+View = tuple[
+    PosedSplats, TextureLevels, Camera, Camera
+]  # an object, the view's camera, the photo's
+
+
+def rendered(splat_pass: Any, *view: Any) -> F32:
+    """(h, w, 4) premultiplied, by the GPU."""
+    return pixels_of(splat_pass.draw(*view).color)
+
+
+def specified(*view: Any) -> F32:
+    """The same by `raster/reference.py`."""
+    picture = reference.render(*view)
+    return np.dstack([picture.color, picture.alpha])
+
+
+def pixels_of(texture: Any) -> F32:
+    """(h, w, 4) of a texture of 16 or 32 bits."""
+    bits = np.float16 if texture.dtype == "f2" else np.float32
+    pixels = np.frombuffer(texture.read(), bits).reshape(texture.height, texture.width, 4)
+    return pixels.astype(np.float32)
+
+
+@cache
+def bent(name: str, count: int, largeness: float) -> tuple[shapes.Scene, Pose]:
+    """A scene with one end of its object dragged and another pressed, the rest of it held."""
+    scene = shapes.scene(name, count)
+    points = scene.lifted.control_points.astype(np.float64)
+    left, right, top = points[:, 0].argmin(), points[:, 0].argmax(), points[:, 1].argmin()
+    middle = np.abs(points - points.mean(0)).sum(1).argmin()
+    moves = {
+        int(left): np.array([0.1, -0.3, 0.1]) * largeness,
+        int(top): np.array([0.05, 0.15, -0.1]) * largeness,
+        int(right): np.zeros(3),
+        int(middle): np.zeros(3),
+    }
+    handles: tuple[Handle, ...] = tuple(
+        shapes.handle(scene.lifted, k, move) for k, move in moves.items()
+    )
+    return scene, scene.puppet.deformer.solve(handles).pose

@@ -1,0 +1,110 @@
+"""The renderer: moved objects by the GPU, and what happens where it cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.render.scene import Scene, SplatObject
+from app.view import View
+from objectmorpher_core.document import Placement
+from tests import shapes
+from tests.app.render.pictures import specified
+
+pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
+
+moderngl = pytest.importorskip("moderngl")
+
+PIXEL = 3 / 255  # see test_splat_pass; and the window's 8 bits
+SIZE = (shapes.WIDTH, shapes.HEIGHT)
+
+
+@pytest.fixture
+def renderer(context, monkeypatch):
+    """A renderer whose window is a framebuffer."""
+    from app.render.renderer import Renderer
+
+    window = context.framebuffer([context.texture(SIZE, 4)])
+    monkeypatch.setattr(moderngl, "create_context", lambda **_: context)
+    monkeypatch.setattr(context, "_screen", window)
+    yield Renderer("gl")
+    context.finish()
+
+
+def _view() -> View:
+    view = View()
+    view.resize(SIZE, 1.0, SIZE)
+    return view
+
+
+def _scene(*objects: SplatObject) -> Scene:
+    return Scene(np.zeros((SIZE[1], SIZE[0], 3), np.uint8), (0.0, 0.0, 0.0), objects=objects)
+
+
+def _object(turn: tuple[float, float, float]) -> SplatObject:
+    scene = shapes.scene("ellipse", 800)
+    splats = scene.puppet.posed(None, Placement(turn=turn))
+    return SplatObject(splats, scene.texture, scene.camera)
+
+
+def _window_picture(renderer, scene: Scene, view: View) -> np.ndarray:
+    renderer.clear((0.0, 0.0, 0.0), SIZE)
+    renderer.draw(scene, view, (0, 0, *SIZE))
+    return renderer.read(SIZE).astype(np.float32) / 255
+
+
+def test_the_window_shows_the_object_over_the_photo(renderer):
+    view, item = _view(), _object((10.0, 20.0, 0.0))
+    shown = _window_picture(renderer, _scene(item), view)
+    camera = view.camera(item.camera)
+    expected = specified(item.splats, item.texture, camera, item.camera)[..., :3]
+    x0, y0, x1, y1 = _photo_box(view)
+    inside = (slice(y0, y1), slice(x0, x1))
+    assert expected[inside].any()
+    assert np.abs(shown - expected)[inside].max() <= PIXEL
+
+
+def _photo_box(view: View) -> tuple[int, int, int, int]:
+    """Canvas px that are wholly within the photo; nothing is drawn beyond it."""
+    low, high = view.canvas_from_image(np.array([[0, 0], SIZE]))
+    return int(low[0]) + 1, int(low[1]) + 1, int(high[0]), int(high[1])
+
+
+def test_of_an_object_that_is_gone_nothing_stays_on_the_gpu(renderer):
+    view = _view()
+    _window_picture(renderer, _scene(_object((10.0, 20.0, 0.0))), view)
+    assert len(renderer._splats().uploads) > 0
+    _window_picture(renderer, _scene(), view)
+    assert len(renderer._splats().uploads) == 0
+
+
+def test_where_the_driver_cannot_the_processor_draws(renderer, monkeypatch, caplog):
+    from app.render import layered_pass
+
+    def refuse(*_):
+        raise moderngl.Error("the framebuffer is not complete\nand much else")
+
+    view, scene = _view(), _scene(_object((10.0, 20.0, 0.0)))
+    monkeypatch.setattr(layered_pass, "LayerTargets", refuse)
+    assert renderer.kind == "gl"
+    assert not _window_picture(renderer, scene, view).any()  # the photo alone, and no exception
+    assert renderer.kind == "tiles"
+    assert caplog.messages[-1].startswith("OpenGL cannot draw the object: the framebuffer is not")
+    assert "\n" not in caplog.messages[-1]
+    _window_picture(renderer, scene, view)  # nor is it tried again
+    assert len(caplog.messages) == len(set(caplog.messages))
+
+
+def test_an_error_of_the_driver_is_said(renderer, monkeypatch, caplog):
+    """Such as one that is out of memory, or has lost its context."""
+    monkeypatch.setattr(type(renderer._context), "error", property(lambda _: "GL_OUT_OF_MEMORY"))
+    _window_picture(renderer, _scene(_object((0.0, 0.0, 0.0))), _view())
+    assert renderer.kind == "tiles"
+    assert "GL_OUT_OF_MEMORY" in caplog.text
+
+
+def test_a_canvas_without_pixels_is_no_error(renderer):
+    view = _view()
+    view.width = 0
+    renderer.draw(_scene(_object((10.0, 20.0, 0.0))), view, (0, 0, 0, SIZE[1]))
+    assert renderer.kind == "gl"

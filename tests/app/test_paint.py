@@ -1,0 +1,137 @@
+"""What views paint: colours that rise where their amount does, and shares that the export has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app import paint
+from app.derived import Derived
+from app.editor import Editor
+from app.painter import PAINTED, shown_now
+from app.view import Shown, View
+from objectmorpher_core import edits
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.rotations import matrix_from_vector
+
+COUNTED = 0.06  # of all changed pixels: the view counts on a small picture, its blend is coarser
+F32 = 1e-6
+RED, YELLOW, BLUE = paint.STRAIN_STOPS[::-1]
+
+
+@pytest.fixture
+def turned(ball: Document) -> Document:
+    """The ball, turned so far that its back comes into sight."""
+    return edits.set_placement(ball, 0, Placement(turn=(70.0, 0.0, 0.0)))
+
+
+@pytest.fixture
+def bent(editor: Editor, ball: Document) -> Document:
+    """The ball, its top pulled to the right."""
+    point = ball.objects[0].lifted.control_points[0].astype(float)  # type: ignore[union-attr]
+    diameter = ball.objects[0].lifted.diameter  # type: ignore[union-attr]
+    moved = edits.add_handle(ball, 0, point, point + (0.3 * diameter, 0, 0))
+    return editor.derived.solved(moved, 0, None)
+
+
+def test_what_is_farther_is_darker() -> None:
+    spread = paint.DepthRange(2.0, 5.0, 3.0)
+    colors = paint.depth_colors(np.linspace(2, 5, 200), spread).astype(float)
+    lightness = colors @ (0.2126, 0.7152, 0.0722)
+    assert (np.diff(lightness) < 0).all()
+    outside = paint.depth_colors(np.array([1.0, 9.0, np.nan]), spread)
+    expected = paint.DEPTH_STOPS[:1] + paint.DEPTH_STOPS[-1:] * 2
+    np.testing.assert_allclose(outside, expected, atol=F32)
+
+
+def test_the_range_of_depths_holds_all_and_a_little_more() -> None:
+    spread = paint.depth_range(np.array([2.0, 3.0, 2.5]), 2.0)
+    assert (spread.near, spread.far) == pytest.approx((1.9, 3.1), abs=1e-5)
+    assert spread.half == pytest.approx(0.3, abs=1e-5)
+    flat = paint.depth_range(np.array([2.0, 2.0]), 2.0)
+    assert flat.far > flat.near
+
+
+def test_normals_of_a_sphere_point_outward() -> None:
+    normals = _sphere(400)
+    still = np.broadcast_to(np.eye(3), (400, 3, 3))
+    colors = paint.normal_colors(normals, still)
+    right, up, near = (normals * (1, -1, -1)).T
+    np.testing.assert_allclose(colors, 0.5 + 0.5 * np.stack([right, up, near], 1), atol=F32)
+
+
+def test_normals_turn_with_the_object_and_stand_on_what_is_squeezed() -> None:
+    normals = _sphere(200)
+    turn = matrix_from_vector(np.array([0.3, -0.8, 0.2]))
+    np.testing.assert_allclose(
+        paint.moved_normals(normals, np.broadcast_to(turn, (200, 3, 3))), normals @ turn.T, atol=F32
+    )
+    squeeze = np.diag([1.0, 0.25, 1.0])  # a sphere becomes an ellipsoid: gradient of its equation
+    squeezed = paint.moved_normals(normals, np.broadcast_to(squeeze, (200, 3, 3)))
+    expected = normals / (1.0, 0.25, 1.0)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(squeezed, expected, atol=F32)
+    mirrored = paint.moved_normals(normals, np.broadcast_to(np.diag([-1.0, 1, 1]), (200, 3, 3)))
+    np.testing.assert_allclose(mirrored, normals * (-1, 1, 1), atol=F32)
+
+
+def test_strain_goes_from_blue_by_yellow_to_red() -> None:
+    nodes, weights = np.array([[0], [1], [2], [3]], np.int32), np.ones((4, 1))
+    full = paint.FULL_STRAIN
+    most, least = np.array([1.0, 1 + full / 2, 1 + full, 1.0]), np.array([1.0, 1.0, 1.0, 0.1])
+    colors = paint.strain_colors(paint.stretch(most, least), nodes, weights)
+    np.testing.assert_allclose(colors, [BLUE, YELLOW, RED, RED], atol=F32)
+
+
+@pytest.mark.parametrize("shown", PAINTED)
+def test_an_unchanged_object_is_painted_once(editor: Editor, ball: Document, shown: Shown) -> None:
+    painter = editor.derived.painter
+    first = painter.painted(ball, 0, shown)
+    painter.painted(ball, 0, Shown.NORMALS)
+    assert painter.painted(ball, 0, shown) is first
+    assert not first.rest.is_textured
+
+
+def test_an_object_at_rest_or_moved_as_a_whole_has_no_strain(
+    editor: Editor, ball: Document, turned: Document, bent: Document
+) -> None:
+    for document in (ball, turned):
+        colors = editor.derived.painter.painted(
+            document, 0, Shown.STRAIN
+        ).rest.lifted.gaussians.colors
+        np.testing.assert_allclose(colors, np.broadcast_to(BLUE, colors.shape), atol=F32)
+    colors = editor.derived.painter.painted(bent, 0, Shown.STRAIN).rest.lifted.gaussians.colors
+    assert (colors[:, 0] > BLUE[0] + 0.1).any()
+
+
+def test_depths_keep_their_colours_until_they_are_measured_again(
+    ball: Document, turned: Document
+) -> None:
+    painter = Derived().painter
+    rest = painter.measure(ball)
+    painter.painted(turned, 0, Shown.DEPTH)
+    assert painter.spread(turned) is rest
+    assert painter.measure(turned).half > rest.half
+    assert painter.measure(ball) is rest
+
+
+@pytest.mark.parametrize("turn", [20.0, 70.0])
+def test_shares_are_about_those_of_the_export(editor: Editor, ball: Document, turn: float) -> None:
+    document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0), turn=(turn, 0.0, 0.0)))
+    shares, exact = editor.derived.painter.shares(document), composite(document).shares
+    for name in ("from_photo", "from_lifter", "from_inpainter"):
+        assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
+    assert editor.derived.painter.shares(ball).from_photo == 0  # nothing is changed
+
+
+def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:
+    view = View(shown=Shown.STRAIN)
+    assert shown_now(None, view) is Shown.COMPOSITE
+    assert shown_now(editor.document, view) is Shown.COMPOSITE
+    assert shown_now(ball, view) is Shown.STRAIN
+
+
+def _sphere(count: int) -> np.ndarray:
+    points = np.random.default_rng(3).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
