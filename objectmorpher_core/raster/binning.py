@@ -45,7 +45,7 @@ def bin_tiles(
     parts = min(core_count(), max(len(order) // LEAST_SHARE, 1))
     bounds = np.linspace(0, len(order), parts + 1).astype(np.int64)
     counts = np.zeros((parts, across * down), np.int64)
-    boxes = np.empty((len(order), 4), np.int32)
+    boxes = np.empty((len(order), 5), np.int32)
     inputs = (frozen(projected), frozen(order), boxes, across, left, top, width, height)
 
     def count(first: int, last: int) -> None:
@@ -69,7 +69,10 @@ def bin_tiles(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _count(first, last, projected, order, boxes, across, left, top, width, height, counts):
-    """Tiles of the box around each Gaussian, `boxes` (M, 4): x0, y0, x1, y1; and their members."""
+    """Tiles of the box around each Gaussian and their members.
+
+    `boxes` (M, 5): x0, y0, x1, y1, and whether the ellipse leaves out some of them.
+    """
     scale = np.float32(1 / TILE)
     zero, half = np.float32(0), np.float32(0.5)
     right, bottom = np.float32(width) - half, np.float32(height) - half
@@ -87,10 +90,12 @@ def _count(first, last, projected, order, boxes, across, left, top, width, heigh
             continue
         box[0], box[1] = np.int32((x0 + half) * scale), np.int32((y0 + half) * scale)
         box[2], box[3] = np.int32((x1 - half) * scale), np.int32((y1 - half) * scale)
+        # Where there is little to gain the box will do; decided alike for all parts of a view.
+        box[4] = ex * ey > SMALL
         for row in range(box[1], box[3] + 1):
-            start, end = _columns(g, box, row, cx, cy)
+            start, end = _columns(g, box, row, cx, cy) if box[4] else (box[0], box[2])
             for column in range(start, end + 1):
-                counts[row * across + column] += 1
+                counts[np.uint64(row * across + column)] += 1
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -101,13 +106,15 @@ def _fill(first, last, projected, order, boxes, across, left, top, width, height
         if box[2] < box[0]:
             continue
         i = order[n]
-        g = projected[i]
-        cx, cy = g[CX] - np.float32(left), g[CY] - np.float32(top)
         for row in range(box[1], box[3] + 1):
-            start, end = _columns(g, box, row, cx, cy)
+            start, end = box[0], box[2]
+            if box[4]:
+                g = projected[i]
+                cx, cy = g[CX] - np.float32(left), g[CY] - np.float32(top)
+                start, end = _columns(g, box, row, cx, cy)
             for column in range(start, end + 1):
-                tile = row * across + column
-                members[at[tile]] = i
+                tile = np.uint64(row * across + column)
+                members[np.uint64(at[tile])] = i
                 at[tile] += 1
 
 
@@ -115,8 +122,6 @@ def _fill(first, last, projected, order, boxes, across, left, top, width, height
 def _columns(g, box, row, cx, cy):
     """First and last of the box's tiles in a row that the ellipse touches."""
     ex, ey, tilt = g[EX], g[EY], g[TILT]
-    if ex * ey <= SMALL:  # little to gain; decided alike for all parts of a view
-        return box[0], box[2]
     low = max(np.float32(row * TILE) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
     high = min(np.float32(row * TILE) + np.float32(TILE - 0.5) - cy, ey)
     lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left
