@@ -42,44 +42,38 @@ def bin_tiles(
     across, down = -(-width // TILE), -(-height // TILE)
     if order is None:
         order = np.arange(len(projected), dtype=np.uint32)
-    parts = min(core_count(), max(len(order) // LEAST_SHARE, 1))
-    bounds = np.linspace(0, len(order), parts + 1).astype(np.int64)
+    boxes = np.empty((len(projected), 5), np.int32)
+    parts = min(core_count(), max(len(projected) // LEAST_SHARE, 1))
     counts = np.zeros((parts, across * down), np.int64)
-    boxes = np.empty((len(order), 5), np.int32)
-    inputs = (frozen(projected), frozen(order), boxes, across, left, top, width, height)
+    rows = frozen(projected)
 
     def count(first: int, last: int) -> None:
         for part in range(first, last):
-            _count(int(bounds[part]), int(bounds[part + 1]), *inputs, counts[part])
+            begin, end = (len(projected) * (part + k) // parts for k in (0, 1))
+            _count(begin, end, rows, boxes, across, left, top, width, height, counts[part])
 
     in_threads(count, parts)
-    sizes = counts.sum(0)
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    # where each part puts its first member of each tile
-    counts[:] = starts[:-1] + np.cumsum(np.vstack([np.zeros_like(sizes), counts[:-1]]), axis=0)
+    starts = np.concatenate([[0], np.cumsum(counts.sum(0))])
     members = np.empty(int(starts[-1]), np.uint32)
-
-    def fill(first: int, last: int) -> None:
-        for part in range(first, last):
-            _fill(int(bounds[part]), int(bounds[part + 1]), *inputs, counts[part], members)
-
-    in_threads(fill, parts)
+    at = starts[:-1].copy()
+    inputs = (rows, frozen(order), frozen(boxes), across, left, top, at, members)
+    # Each thread fills some rows of tiles: their members come in order by themselves.
+    in_threads(lambda first, last: _fill(first, last, *inputs), down, least=-(-down // parts))
     return Bins(starts, members, across, down)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _count(first, last, projected, order, boxes, across, left, top, width, height, counts):
-    """Tiles of the box around each Gaussian and their members.
+def _count(first, last, projected, boxes, across, left, top, width, height, counts):
+    """Tiles of the box around the Gaussians first..last, and how many each tile has of them.
 
-    `boxes` (M, 5): x0, y0, x1, y1, and whether the ellipse leaves out some of them.
+    `boxes` (N, 5): x0, y0, x1, y1, and whether the ellipse leaves out some of them.
     """
     scale = np.float32(1 / TILE)
     zero, half = np.float32(0), np.float32(0.5)
     right, bottom = np.float32(width) - half, np.float32(height) - half
     left, top = np.float32(left), np.float32(top)
     for n in range(np.uint64(first), np.uint64(last)):
-        g = projected[order[n]]
-        box = boxes[n]
+        g, box = projected[n], boxes[n]
         cx, cy, ex, ey = g[CX] - left, g[CY] - top, g[EX], g[EY]
         # the first and last pixel whose centre is inside
         x0, x1 = max(cx - ex, half), min(cx + ex, right)
@@ -99,14 +93,13 @@ def _count(first, last, projected, order, boxes, across, left, top, width, heigh
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fill(first, last, projected, order, boxes, across, left, top, width, height, at, members):
-    """Puts the Gaussians where `at` says that their tiles' next members belong."""
-    for n in range(np.uint64(first), np.uint64(last)):
-        box = boxes[n]
-        if box[2] < box[0]:
-            continue
+def _fill(first, last, projected, order, boxes, across, left, top, at, members):
+    """Puts the Gaussians where `at` says that the next members belong, of the tiles' rows
+    first..last."""
+    for n in range(np.uint64(len(order))):
         i = order[n]
-        for row in range(box[1], box[3] + 1):
+        box = boxes[i]
+        for row in range(max(box[1], first), min(box[3], last - 1) + 1):
             start, end = box[0], box[2]
             if box[4]:
                 g = projected[i]
