@@ -140,9 +140,9 @@ def write_picture(document: Document, path: Path, quality: int, progress: Progre
     from objectmorpher_core.files import write_all
     from objectmorpher_core.image import encode_picture
     from objectmorpher_core.pipeline import export
+    from objectmorpher_core.progress import part
 
-    progress(0.1, "rendering")
-    picture = export(document)
+    picture = export(document, progress=part(progress, 0.05, 0.7))
     progress(0.7, "encoding")
     data = encode_picture(picture, path.suffix, quality)
     progress(0.95, "writing")
