@@ -55,7 +55,7 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
                 wx = s[m.WX0 + k], s[m.WX1 + k], s[m.WX2 + k], s[m.WX3 + k]
                 wy = s[m.WY0 + k], s[m.WY1 + k], s[m.WY2 + k], s[m.WY3 + k]
                 texel = cubic_inside(texels, at, width, wx, wy, room)
-                if s[m.MAG + k] > ONE:
+                if s[m.MAG + k] > ONE and len(shapes) > 1:
                     i, j = column + s[m.TX + k], row + s[m.TY + k]
                     texel = add_halved(texel, texels, shapes, i, j, s[m.MAG + k])
             else:

@@ -64,7 +64,7 @@ def test_the_report_has_the_keys_that_the_design_names(tmp_path: Path) -> None:
     assert sorts["cloud"] > 0 and sorts["lift"] == 0
 
 
-def test_a_size_that_is_not_known_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bench_that_is_not_known_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         cli.main(["bench", "pipelines"])
     assert "render" in capsys.readouterr().err
