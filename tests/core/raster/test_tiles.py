@@ -265,6 +265,20 @@ def test_gaussians_beside_the_picture_change_nothing():
     )
 
 
+def test_a_texture_without_halved_copies_is_sampled_as_it_is():
+    scene = shapes.scene("ellipse", 800)
+    whole = scene.texture
+    height, width, _ = whole.shapes[0]
+    single = replace(whole, texels=whole.texels[: 4 * height * width], shapes=whole.shapes[:1])
+    view = scene.camera.windowed(0.0, 0.0, 106, 80, 0.66)
+    splats = scene.puppet.posed(None, Placement(turn=(30.0, 0.0, 0.0)))
+    largest, _ = _difference(
+        tiles.render(splats, single, view, scene.camera),
+        reference.render(splats, single, view, scene.camera),
+    )
+    assert largest <= PIXEL
+
+
 def test_no_gaussian_in_sight_is_an_empty_picture():
     scene = shapes.scene("star", 250)
     view = scene.camera.windowed(-5000, 0, 40, 30)
