@@ -111,16 +111,20 @@ class Derived:
         from objectmorpher_core.raster import tiles
 
         splats, camera = self.posed(document, k), document.photo.camera
-        key = (view.left, view.top, view.zoom, view.width, view.height)
+        key = view.place
         kept = self._drawables.get(k)
         if kept is None or kept[0] is not splats or kept[1] != key:
             kept = (splats, key, tiles.prepare(splats, view.camera(camera), camera))
             self._drawables[k] = kept
         return kept[2]
 
+    def forget(self, lifted: set[int]) -> None:
+        """Drops what was projected of objects other than these."""
+        self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
+
     def blend(self, document: Document, view: View) -> F32:
         """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
-        key = (view.left, view.top, view.zoom, view.width, view.height)
+        key = view.place
         if self._blend is None or self._blend[0] is not document or self._blend[1] != key:
             self._blend = (document, key, build_blend(self, document, view))
         return self._blend[2]

@@ -174,20 +174,22 @@ class Layers:
             for part, work in self._works.items()
             if part.k in lifted and self._derived.posed(document, part.k) is work.source
         }
+        self._derived.forget(lifted)
         self._derived.painter.forget(len(document.objects))
 
     def _is_there(self, document: Document, part: Part, view: View) -> bool:
         work = self._works.get(part)
         splats = self._derived.painter.painted(document, part.k, part.look)
-        return work is not None and work.splats is splats and work.view == _key(view)
+        return work is not None and work.splats is splats and work.view == view.place
 
     def _render(self, document: Document, part: Part, view: View, seconds: float) -> None:
         """A new picture of the part, in about so many seconds."""
         k, camera, derived = part.k, document.photo.camera, self._derived
         splats = derived.painter.painted(document, k, part.look)
-        drawable = derived.drawable(document, k, view)
         if part.is_painted:
             drawable = _prepare(splats, view.camera(camera), camera)
+        else:
+            drawable = derived.drawable(document, k, view)
         box = drawable.box()
         if box is None:
             self._works.pop(part, None)
@@ -196,7 +198,7 @@ class Layers:
         request = Request(splats, texture, view.camera(camera, box), camera, part)
         shown = self._first(request, box, drawable, seconds)
         source, now = derived.posed(document, k), time.monotonic()
-        self._works[part] = _Work(source, splats, _key(view), request, box, shown, now)
+        self._works[part] = _Work(source, splats, view.place, request, box, shown, now)
 
     def _first(
         self,
@@ -292,11 +294,6 @@ def _invented(picture: Picture3D) -> np.ndarray:
 
 def _as_u8(values: np.ndarray) -> np.ndarray:
     return (values * 255 + 0.5).clip(0, 255).astype(np.uint8)
-
-
-def _key(view: View) -> tuple[float, ...]:
-    """What a picture on the canvas depends on."""
-    return (view.left, view.top, view.zoom, view.width, view.height)
 
 
 def _coarser(window: Camera, coarse: int) -> Camera:

@@ -54,6 +54,11 @@ class View:
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
 
+    @property
+    def place(self) -> tuple[float, ...]:
+        """What a picture on the canvas depends on: it is the same where this is."""
+        return (self.left, self.top, self.zoom, self.width, self.height)
+
     def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:
         """Canvas px (..., 2) of image px (..., 2)."""
         return (np.asarray(xy, dtype=np.float64) - (self.left, self.top)) * self.zoom

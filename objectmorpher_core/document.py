@@ -100,6 +100,9 @@ class PhotoTexture:
             object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
 
 
+SPLATTINGS = ("surface", "mip", "classic")  # see raster/rules.py
+
+
 @dataclass(frozen=True, eq=False)
 class LiftedObject:
     """An object lifted to 3D, registered to the photo."""
@@ -115,6 +118,8 @@ class LiftedObject:
     def __post_init__(self) -> None:
         object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
         object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+        if self.splatting not in SPLATTINGS:
+            raise ValueError(f"splatting is {self.splatting!r}, not one of {', '.join(SPLATTINGS)}")
 
     @cached_property
     def diameter(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from ..threads import FAST
 from . import tile_memory as m
 from .look_up import look_up
-from .rules import ramp
+from .rules import coverage, ramp
 from .sampling import HALF, ONE, ZERO
 
 TINY = np.float32(1e-30)
@@ -65,12 +65,9 @@ def composite_layer(
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _cover(s, total, across, down, clear, rules):
     """1 - coverage, see `rules.coverage`, into the row `clear`."""
-    level, width = np.float32(rules.surface_level), np.float32(rules.edge_width)
     for k in range(m.ALL):
         gx, gy = s[across + k], s[down + k]
-        slope = width * math.sqrt(gx * gx + gy * gy) + np.float32(1e-6)
-        edge = HALF + (s[total + k] - level) / slope
-        s[clear + k] = ONE - min(max(edge, ZERO), ONE)
+        s[clear + k] = ONE - coverage(s[total + k], math.sqrt(gx * gx + gy * gy), rules)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -34,7 +34,7 @@ from .posed import (
     ZOOM,
     PosedSplats,
 )
-from .rules import RULES, ramp
+from .rules import RULES, facing_weight, ramp
 
 # Columns of a projected Gaussian: its place and shape, ...
 CX, CY = 0, 1  # view px
@@ -278,10 +278,7 @@ def _finish_block(s, rest, base, start, count, frame, rules, kind, out):
         seen, solidity = rest[r + VISIBILITY * LANES], rest[r + SOLIDITY * LANES]
         cosine, volume = s[o + FACING * LANES], s[o + VOLUME * LANES]
         if kind.is_surface:
-            front = (cosine - rules.facing_ramp * (1.0 - seen)) / rules.facing_ramp + 1.0
-            front = min(max(front, 0.0), 1.0)
-            brim = ramp(abs(cosine), rules.brim_end, rules.brim_start) if solidity < 1.0 else 0.0
-            weight *= solidity * front + (1.0 - solidity) * brim
+            weight *= facing_weight(cosine, seen, solidity, rules)
         if abs(volume - 1.0) > 1e-9:
             volume = volume ** (1.0 / 3.0)
         stretch = s[o + SMALLEST * LANES] * volume * scale

@@ -12,6 +12,7 @@ import math
 from typing import NamedTuple
 
 import numba
+import numpy as np
 
 CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian of a surface is 0
 LAYERS = 4  # of a pixel; all that is left belongs to the last one
@@ -110,12 +111,14 @@ def facing_weight(cosine, is_seen, solidity, rules):
     return solidity * front + (1.0 - solidity) * brim
 
 
-@numba.njit(nogil=True)
+@numba.njit(nogil=True, error_model="numpy")
 def coverage(total, slope, rules):
-    """Share of a pixel that is inside the surface whose kernel sum is `total`.
+    """Share of a pixel that is inside the surface whose kernel sum is `total`; of 32 bits.
 
     The surface ends where the sum falls to the surface level; the sum's gradient `slope` (per
     px) says how far that is, so the edge is one pixel wide at any scale.
     """
-    edge = (total - rules.surface_level) / (rules.edge_width * slope + 1e-6)
-    return min(max(0.5 + edge, 0.0), 1.0)
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    width = np.float32(rules.edge_width) * np.float32(slope) + np.float32(1e-6)
+    edge = (np.float32(total) - np.float32(rules.surface_level)) / width
+    return min(max(half + edge, zero), one)
