@@ -37,6 +37,19 @@ from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from objectmorpher_core.rotations import matrices_from_quats, quats_along
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
+PLACEMENTS = {  # of an object that is drawn
+    "at rest": Placement(),
+    "turned": Placement(turn=(35.0, -20.0, 15.0)),
+    "turned away": Placement(turn=(180.0, 0.0, 0.0)),
+    "edge-on": Placement(turn=(90.0, 0.0, 0.0)),
+    "far": Placement(depth=30.0, move=(10.0, 3.0)),
+    "near": Placement(depth=-0.6),
+    "large": Placement(scale=3.0, move=(40.0, -30.0)),
+    "small": Placement(scale=0.05, turn=(50.0, 0.0, 0.0)),
+}
+KINDS = [  # of splatting, and whether the photo is shown
+    ("surface", True), ("mip", True), ("classic", True), ("mip", False), ("classic", False),
+]  # fmt: skip
 MASKS = ("disc", "ellipse", "thin", "frame", "parts", "ring", "star")
 
 

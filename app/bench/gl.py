@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any
 
 from objectmorpher_core.raster.depth_order import depth_order
@@ -72,8 +71,9 @@ class Drawer:
 def drawing() -> Iterator[Drawer]:
     """A drawer, with OpenGL where it can be had without a window."""
     try:
-        # by name: only app/render imports it, and what is measured here need not be there
-        context = import_module("moderngl").create_standalone_context(backend="egl")
+        from ..render.headless import create_context  # what is measured need not be there
+
+        context = create_context()
     except Exception as error:  # what the loader raises differs from system to system
         log.warning("OpenGL cannot be had without a window here, its rows are left out: %s", error)
         context = None

@@ -30,18 +30,8 @@ ZOOMS = {
     "2x": (50.3, 40.7, 200, 150, 2.0),
     "0.5x": (-40, -30, 90, 70, 0.5),
 }
-PLACEMENTS = {
-    "turned": Placement(turn=(35.0, -20.0, 15.0)),
-    "turned away": Placement(turn=(180.0, 0.0, 0.0)),
-    "edge-on": Placement(turn=(90.0, 0.0, 0.0)),
-    "far": Placement(depth=30.0, move=(10.0, 3.0)),
-    "near": Placement(depth=-0.6),
-    "large": Placement(scale=3.0, move=(40.0, -30.0)),
-    "small": Placement(scale=0.05, turn=(50.0, 0.0, 0.0)),
-}
-KINDS = [
-    ("surface", True), ("mip", True), ("classic", True), ("mip", False), ("classic", False),
-]  # fmt: skip
+PLACEMENTS = {name: p for name, p in shapes.PLACEMENTS.items() if name != "at rest"}
+KINDS = shapes.KINDS
 
 
 def difference(splat_pass, *view) -> float:

@@ -22,16 +22,7 @@ from tests import shapes
 PIXEL = 2 / 255  # where a sample falls on the other side of a layer's limit by rounding
 MEAN = 1e-4
 
-PLACEMENTS = {
-    "at rest": Placement(),
-    "turned": Placement(turn=(35.0, -20.0, 15.0)),
-    "turned away": Placement(turn=(180.0, 0.0, 0.0)),
-    "edge-on": Placement(turn=(90.0, 0.0, 0.0)),
-    "far": Placement(depth=30.0, move=(10.0, 3.0)),
-    "near": Placement(depth=-0.6),
-    "large": Placement(scale=3.0, move=(40.0, -30.0)),
-    "small": Placement(scale=0.05, turn=(50.0, 0.0, 0.0)),
-}
+PLACEMENTS = shapes.PLACEMENTS
 WINDOWS = {
     "whole": (0.0, 0.0, 160, 120, 1.0),
     "zoomed": (50.3, 40.7, 130, 100, 3.7),
@@ -119,9 +110,7 @@ def test_tiles_equal_the_reference_on_a_bent_object(window):
     assert mean <= MEAN
 
 
-KINDS = [
-    ("surface", True), ("mip", True), ("classic", True), ("mip", False), ("classic", False),
-]  # fmt: skip
+KINDS = shapes.KINDS
 
 
 @pytest.mark.parametrize("seed", range(20))
