@@ -209,10 +209,7 @@ def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_fr
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _first_front(s, at, count, g, dx0, dy0):
-    """The nearest sample of each pixel so far.
-
-    What is chosen is added, not stored: stores that depend on a condition are slow.
-    """
+    """The nearest sample of each pixel so far."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy, limit = g[p.QXX], g[p.TILT], g[p.RYY], g[p.FRONT]
@@ -221,15 +218,10 @@ def _first_front(s, at, count, g, dx0, dy0):
         dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
         e = dx + tilt * dy
         depth = z + zx * dx + zy * dy
-        before = s[m.F_DEPTH + at + k]
-        nearer = (qxx * e * e + ryy * dy * dy <= limit) & (depth < before)
-        x = sx + axx * dx + axy * dy - s[m.F_X + at + k]
-        y = sy + ayx * dx + ayy * dy - s[m.F_Y + at + k]
-        shows = is_photo - s[m.F_PHOTO + at + k]
-        s[m.F_DEPTH + at + k] = min(before, depth if nearer else FAR)
-        s[m.F_X + at + k] += x if nearer else ZERO
-        s[m.F_Y + at + k] += y if nearer else ZERO
-        s[m.F_PHOTO + at + k] += shows if nearer else ZERO
+        is_front = qxx * e * e + ryy * dy * dy <= limit
+        nearer = is_front & (depth < s[m.F_DEPTH + at + k])
+        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+        _choose_front(s, at + k, nearer, depth, x, y, is_photo)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -247,16 +239,22 @@ def _next_front(s, at, count, g, dx0, dy0, rules, kind):
         e = dx + tilt * dy
         depth = z + zx * dx + zy * dy
         alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
-        before = s[m.F_DEPTH + at + k]
         is_enough = (alpha >= least) & (s[m.SHARE + at + k] * alpha * both >= least_front)
-        nearer = is_enough & (depth < before)
-        x = sx + axx * dx + axy * dy - s[m.F_X + at + k]
-        y = sy + ayx * dx + ayy * dy - s[m.F_Y + at + k]
-        shows = is_photo - s[m.F_PHOTO + at + k]
-        s[m.F_DEPTH + at + k] = min(before, depth if nearer else FAR)
-        s[m.F_X + at + k] += x if nearer else ZERO
-        s[m.F_Y + at + k] += y if nearer else ZERO
-        s[m.F_PHOTO + at + k] += shows if nearer else ZERO
+        nearer = is_enough & (depth < s[m.F_DEPTH + at + k])
+        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+        _choose_front(s, at + k, nearer, depth, x, y, is_photo)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _choose_front(s, k, nearer, depth, x, y, is_photo):
+    """Makes a sample the front of pixel k, where it is nearer.
+
+    What is chosen is added, not stored: stores that depend on a condition are slow.
+    """
+    s[m.F_DEPTH + k] = min(s[m.F_DEPTH + k], depth if nearer else FAR)
+    s[m.F_X + k] += x - s[m.F_X + k] if nearer else ZERO
+    s[m.F_Y + k] += y - s[m.F_Y + k] if nearer else ZERO
+    s[m.F_PHOTO + k] += is_photo - s[m.F_PHOTO + k] if nearer else ZERO
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
