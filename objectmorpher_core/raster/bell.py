@@ -10,27 +10,29 @@ import numpy as np
 from ..threads import FAST
 from . import projection as p
 from .sampling import ONE, ZERO
-from .tile_memory import STRIP, STRIPS
+from .tile_memory import STRIP
 
 STRIP_END = np.float32(STRIP - 1)
-# exp(-t), 0 <= t <= 0.7: interpolated at Chebyshev points, right to 1e-7
-E0, E1, E2, E3, E4, E5 = (
-    np.float32(v)
-    for v in (0.99999994, -0.99999389, 0.49989734, -0.16603126, 0.03986404, -0.00589814)
+# exp(-t), 0 <= t <= 0.7: interpolated at Chebyshev points, right to 3e-6
+E0, E1, E2, E3, E4 = (
+    np.float32(v) for v in (0.99999797, -0.99985296, 0.49829826, -0.15966694, 0.029512201)
 )
-SIXTEENTH = np.float32(1 / 16)
-LIMIT = np.float32(11.2)
-BATCH = np.uint64(64)  # Gaussians whose rows are found together
-CX, CY, TILT, EX, EY = (
-    np.uint64(column * 64) for column in (p.CX, p.CY, p.TILT, p.EX, p.EY)
-)
+BELL = np.float32(1 / 16)  # x q: what `bell_of` is a function of
+LIMIT = np.float32(0.7)
+BATCH = np.uint64(64)  # Gaussians that are prepared together
+ALMOST = np.float32(0.999)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def bell(q):
     """exp(-q / 2) for 0 <= q <= 11.2, and beyond as there."""
-    t = min(q, LIMIT) * SIXTEENTH
-    e = E0 + t * (E1 + t * (E2 + t * (E3 + t * (E4 + t * E5))))
+    return bell_of(min(q * BELL, LIMIT))
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def bell_of(t):
+    """exp(-8 t) for 0 <= t <= 0.7, right to 2e-5; beyond it is any number."""
+    e = E0 + t * (E1 + t * (E2 + t * (E3 + t * E4)))
     e = e * e
     e = e * e
     return e * e
@@ -45,49 +47,28 @@ def strip_rows(g, cut, dx, dy, strip, rows):
     ex, ey = g[p.EX], math.sqrt(cut / g[p.RYY])
     if cut < g[p.CUT]:
         ex *= math.sqrt(cut / g[p.CUT])
-    left = max(dx + np.float32(strip * STRIP), -ex)
-    right = min(dx + np.float32(strip * STRIP) + STRIP_END, ex)
-    if left > right:
+    dx += np.float32(strip * STRIP)
+    if max(dx, -ex) > min(dx + STRIP_END, ex):
         return 0, 0
-    # at dx its rows are lean dx +- reach sqrt(1 - (dx / ex)^2)
-    turned = ey / ex
-    lean = -g[p.TILT] * turned * turned
-    reach = math.sqrt(max(ey * ey - lean * lean * ex * ex, ZERO))
-    lowest = lean * ex / turned
-    x = min(max(-lowest, left), right) / ex
-    low = lean * ex * x - reach * math.sqrt(max(ONE - x * x, ZERO))
-    x = min(max(lowest, left), right) / ex
-    high = lean * ex * x + reach * math.sqrt(max(ONE - x * x, ZERO))
-    start = int(max(low - dy, ZERO))
-    return start, int(min(max(high - dy + ONE, ZERO), np.float32(rows)))
+    start, end = rows_of(g[p.TILT], ex, ey, dx, dy, np.float32(rows))
+    return int(start), int(end)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def batch_rows(batch, x0, y0, rows, first, last):
-    """`strip_rows` of 64 projected Gaussians, whose columns are the rows of `batch`.
+def rows_of(tilt, ex, ey, dx, dy, rows):
+    """The same of any strip, to be cut off to integers; start >= end where it is not touched.
 
-    `x0`, `y0`: centre of the tile's first pixel. From the rows `first` and `last` of `batch` on:
-    first and last + 1 of the rows of each strip; to be cut off to integers.
+    `ex`, `ey`: half the size of the ellipse's box; `dx`, `dy`: way to the strip's first pixel.
     """
-    for strip in range(STRIPS):
-        begin, end = first + np.uint64(strip) * BATCH, last + np.uint64(strip) * BATCH
-        offset = x0 + np.float32(strip * STRIP)
-        for j in range(BATCH):
-            tilt = batch[TILT + j]
-            ex = batch[EX + j]
-            ey = batch[EY + j]
-            dx = offset - batch[CX + j]
-            dy = y0 - batch[CY + j]
-            left, right = max(dx, -ex), min(dx + STRIP_END, ex)
-            turned = ey / ex
-            lean = -tilt * turned * turned * ex
-            reach = math.sqrt(max(ey * ey - lean * lean, ZERO))
-            lowest = lean / turned
-            x = min(max(-lowest, left), right) / ex
-            low = lean * x - reach * math.sqrt(max(ONE - x * x, ZERO))
-            x = min(max(lowest, left), right) / ex
-            high = lean * x + reach * math.sqrt(max(ONE - x * x, ZERO))
-            start = max(low - dy, ZERO)
-            stop = min(max(high - dy + ONE, ZERO), rows)
-            batch[begin + j] = start
-            batch[end + j] = stop if left <= right else ZERO
+    left, right = max(dx, -ex), min(dx + STRIP_END, ex)
+    # at dx its rows are lean dx / ex +- reach sqrt(1 - (dx / ex)^2)
+    turned = ey / ex
+    lean = -tilt * turned * ey
+    reach = math.sqrt(max(ey * ey - lean * lean, ZERO))
+    lowest = lean / turned
+    x = min(max(-lowest, left), right) / ex
+    low = lean * x - reach * math.sqrt(max(ONE - x * x, ZERO))
+    x = min(max(lowest, left), right) / ex
+    high = lean * x + reach * math.sqrt(max(ONE - x * x, ZERO))
+    start = max(low - dy + ALMOST, ZERO)
+    return start, min(max(high - dy + ONE, ZERO), rows) if left <= right else ZERO

@@ -16,8 +16,8 @@ from ..arrays import F32, frozen
 from ..threads import FAST, core_count, in_threads
 from .projection import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
 
-TILE = 16  # px
-SMALL = np.float32(TILE * TILE / 4)  # px^2, extents of a Gaussian that touches about four tiles
+TILE = 16  # px, of a surface's tiles
+SMALL = np.float32(1 / 4)  # of a tile, extents of a Gaussian that touches about four
 LEAST_SHARE = 4096  # Gaussians, for which a second thread counts
 
 
@@ -32,14 +32,17 @@ class Bins:
 
 
 def bin_tiles(
-    projected: F32, window: tuple[int, int, int, int], order: np.ndarray | None = None
-) -> Bins:
+    projected: F32, window: tuple[int, int, int, int], tile: tuple[int, int],
+    order: np.ndarray | None = None,
+) -> Bins:  # fmt: skip
     """Bins the Gaussians of `projected` (N, SPAN), or those of `order` (M,) u32 in that order.
 
-    `window`: left, top, width, height px of the part of the view that is cut into tiles.
+    `window`: left, top, width, height px of the part of the view that is cut into tiles; `tile`:
+    width and height px of each.
     """
     left, top, width, height = window
-    across, down = -(-width // TILE), -(-height // TILE)
+    wide, tall = tile
+    across, down = -(-width // wide), -(-height // tall)
     if order is None:
         order = np.arange(len(projected), dtype=np.uint32)
     boxes = np.empty((len(projected), 5), np.int32)
@@ -50,25 +53,28 @@ def bin_tiles(
     def count(first: int, last: int) -> None:
         for part in range(first, last):
             begin, end = (len(projected) * (part + k) // parts for k in (0, 1))
-            _count(begin, end, rows, boxes, across, left, top, width, height, counts[part])
+            _count(begin, end, rows, boxes, across, *window, wide, tall, counts[part])
 
     in_threads(count, parts)
     starts = np.concatenate([[0], np.cumsum(counts.sum(0))])
     members = np.empty(int(starts[-1]), np.uint32)
     at = starts[:-1].copy()
-    inputs = (rows, frozen(order), frozen(boxes), across, left, top, at, members)
+    inputs = (rows, frozen(order), frozen(boxes), across, left, top, wide, tall, at, members)
     # Each thread fills some rows of tiles: their members come in order by themselves.
     in_threads(lambda first, last: _fill(first, last, *inputs), down, least=-(-down // parts))
     return Bins(starts, members, across, down)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _count(first, last, projected, boxes, across, left, top, width, height, counts):
+def _count(
+    first, last, projected, boxes, across, left, top, width, height, wide, tall, counts
+):  # fmt: skip
     """Tiles of the box around the Gaussians first..last, and how many each tile has of them.
 
     `boxes` (N, 5): x0, y0, x1, y1, and whether the ellipse leaves out some of them.
     """
-    scale = np.float32(1 / TILE)
+    scale_x, scale_y = np.float32(1 / wide), np.float32(1 / tall)
+    small = SMALL * np.float32(wide * tall)
     zero, half = np.float32(0), np.float32(0.5)
     right, bottom = np.float32(width) - half, np.float32(height) - half
     left, top = np.float32(left), np.float32(top)
@@ -82,18 +88,18 @@ def _count(first, last, projected, boxes, across, left, top, width, height, coun
             box[2] = box[3] = -1
             box[0] = box[1] = 0
             continue
-        box[0], box[1] = np.int32((x0 + half) * scale), np.int32((y0 + half) * scale)
-        box[2], box[3] = np.int32((x1 - half) * scale), np.int32((y1 - half) * scale)
+        box[0], box[1] = np.int32((x0 + half) * scale_x), np.int32((y0 + half) * scale_y)
+        box[2], box[3] = np.int32((x1 - half) * scale_x), np.int32((y1 - half) * scale_y)
         # Where there is little to gain the box will do; decided alike for all parts of a view.
-        box[4] = ex * ey > SMALL
+        box[4] = ex * ey > small
         for row in range(box[1], box[3] + 1):
-            start, end = _columns(g, box, row, cx, cy) if box[4] else (box[0], box[2])
+            start, end = _columns(g, box, row, cx, cy, wide, tall) if box[4] else (box[0], box[2])
             for column in range(start, end + 1):
                 counts[np.uint64(row * across + column)] += 1
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _fill(first, last, projected, order, boxes, across, left, top, at, members):
+def _fill(first, last, projected, order, boxes, across, left, top, wide, tall, at, members):
     """Puts the Gaussians where `at` says that the next members belong, of the tiles' rows
     first..last."""
     for n in range(np.uint64(len(order))):
@@ -104,7 +110,7 @@ def _fill(first, last, projected, order, boxes, across, left, top, at, members):
             if box[4]:
                 g = projected[i]
                 cx, cy = g[CX] - np.float32(left), g[CY] - np.float32(top)
-                start, end = _columns(g, box, row, cx, cy)
+                start, end = _columns(g, box, row, cx, cy, wide, tall)
             for column in range(start, end + 1):
                 tile = np.uint64(row * across + column)
                 members[np.uint64(at[tile])] = i
@@ -112,16 +118,16 @@ def _fill(first, last, projected, order, boxes, across, left, top, at, members):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _columns(g, box, row, cx, cy):
+def _columns(g, box, row, cx, cy, wide, tall):
     """First and last of the box's tiles in a row that the ellipse touches."""
     ex, ey, tilt = g[EX], g[EY], g[TILT]
-    low = max(np.float32(row * TILE) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
-    high = min(np.float32(row * TILE) + np.float32(TILE - 0.5) - cy, ey)
+    low = max(np.float32(row * tall) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
+    high = min(np.float32(row * tall) + np.float32(tall - 0.5) - cy, ey)
     lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left
     reach = math.sqrt(g[CUT] / g[QXX])  # half its row at dy = 0
     start = cx + _edge(min(max(lean, low), high), tilt, ey, reach, np.float32(-1))
     end = cx + _edge(min(max(-lean, low), high), tilt, ey, reach, np.float32(1))
-    scale, slack = np.float32(1 / TILE), np.float32(0.51)
+    scale, slack = np.float32(1 / wide), np.float32(0.51)
     first = max(np.int32(max(start - slack, np.float32(0)) * scale), box[0])
     return first, min(np.int32(max(end + slack, np.float32(0)) * scale), box[2])
 

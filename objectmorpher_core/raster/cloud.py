@@ -1,36 +1,43 @@
 """Plainly coloured Gaussians, one by one: step 3 of `reference`, compiled.
 
-The tile's pixels lie as in `surface`. Members come in the order of their depth, 64 at a time: their
-numbers are laid side by side first, and the rows that they touch computed for all of them.
+A tile is one strip, 8 px wide and 64 tall: what a Gaussian touches of it are whole rows of eight
+pixels that lie side by side in the memory, so that one loop without a branch draws it. Members come
+in the order of their depth, 64 at a time: their numbers are laid side by side first, and what is
+needed of all of them computed for all of them.
 """
 
 from __future__ import annotations
+
+import math
 
 import numba
 import numpy as np
 
 from ..threads import FAST
 from . import projection as p
-from . import tile_memory as m
-from .bell import BATCH, batch_rows, bell
-from .binning import TILE
+from .bell import BATCH, BELL, bell_of, rows_of
 from .sampling import HALF, ONE, ZERO
+from .tile_memory import clear_tile, number_pixels, write_rgba
 
+WIDE, TALL = 8, 64  # px, of a tile
+PIXELS = WIDE * TALL
+ALL, ROW = np.uint64(PIXELS), np.uint64(WIDE)
 CLEAR, R, G, B, ALPHA, SHOWN, MEAN, MEDIAN, STEP_X, STEP_Y = (
-    np.uint64(row * m.PIXELS) for row in range(10)
+    np.uint64(row * PIXELS) for row in range(10)
 )
 ROWS = 10
 INFINITE = np.float32(np.inf)
 NOTHING = np.float32(1e-12)  # what shines through at least: ever smaller numbers are slow
-PLAIN = 15  # columns of a projected Gaussian that are needed, the first
-START, END = (np.uint64((PLAIN + row) * 64) for row in (0, m.STRIPS))  # of a strip's rows
-BATCH_ROWS = PLAIN + 2 * m.STRIPS
-CX, CY, QXX, TILT, RYY, Z, ZX, ZY, WEIGHT, RED, GREEN, BLUE = (
-    np.uint64(column * 64)
-    for column in (
-        p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.Z, p.ZX, p.ZY, p.WEIGHT, p.RED, p.GREEN, p.BLUE,
+CX, CY, QXX, TILT, RYY, CUT, EX, EY, Z, ZX, ZY, WEIGHT, RED, GREEN, BLUE = (
+    np.uint64(column * 64) for column in (
+        p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.CUT, p.EX, p.EY, p.Z, p.ZX, p.ZY, p.WEIGHT,
+        p.RED, p.GREEN, p.BLUE,
     )
 )  # fmt: skip
+# Of a batch, further: t = (UX x + UY y + U)^2 + (VY y + V)^2 is what the bell is a function of, at
+# the pixel in column x and row y of the tile; LIMIT is t where alpha ends.
+UX, UY, U, VY, V, LIMIT, START, END = (np.uint64((p.PLAIN_SPAN + row) * 64) for row in range(8))
+BATCH_ROWS = p.PLAIN_SPAN + 8
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -39,84 +46,109 @@ def draw_one_by_one(
     rgba,
 ):  # fmt: skip
     """Draws the tiles first..last of `out` or `rgba`; see `surface.draw_layers`."""
-    s = np.zeros(ROWS * m.PIXELS, np.float32)
+    s = np.zeros(ROWS * PIXELS, np.float32)
     batch = np.ones(BATCH_ROWS * int(BATCH), np.float32)
-    m.number_pixels(s, STEP_X, STEP_Y)
+    packed = np.empty(PIXELS if len(rgba) > 0 else 0, np.uint32)
+    number_pixels(s, STEP_X, STEP_Y, PIXELS, TALL)
     through = ONE - np.float32(rules.opaque)
     for tile in range(first, last):
-        column, row = (tile % across) * TILE, (tile // across) * TILE
-        rows, columns = min(TILE, height - row), min(TILE, width - column)
+        column, row = (tile % across) * WIDE, (tile // across) * TALL
+        rows, columns = min(TALL, height - row), min(WIDE, width - column)
         if starts[tile] == starts[tile + 1]:
-            m.clear_tile(out, rgba, column, row, columns, rows)
+            clear_tile(out, rgba, column, row, columns, rows)
             continue
         x0, y0 = np.float32(left + column) + HALF, np.float32(top + row) + HALF
-        for k in range(m.ALL):
+        for k in range(ALL):
             s[CLEAR + k] = ONE
             s[R + k] = s[G + k] = s[B + k] = s[MEAN + k] = s[MEDIAN + k] = ZERO
         for start in range(starts[tile], starts[tile + 1], int(BATCH)):
             count = min(starts[tile + 1] - start, int(BATCH))
             for j in range(np.uint64(count)):
                 g = projected[members[np.uint64(start) + j]]
-                for c in range(PLAIN):
+                for c in range(p.PLAIN_SPAN):
                     batch[np.uint64(c) * BATCH + j] = g[c]
-            batch_rows(batch, x0, y0, np.float32(rows), START, END)
-            if not _draw(s, batch, count, x0, y0, through, len(rgba) == 0, kind):
+            _prepare(batch, x0, y0, np.float32(rows))
+            _draw(s, batch, count, len(rgba) == 0, kind)
+            clear = ZERO  # a sum, of which vector code can be made, unlike of a maximum
+            for k in range(ALL):
+                clear += ONE if s[CLEAR + k] > through else ZERO
+            if clear == ZERO:
                 break
         if len(rgba) > 0:
-            for k in range(m.ALL):
+            for k in range(ALL):
                 s[ALPHA + k] = ONE - s[CLEAR + k]
-            m.write_rgba(s, R, rgba, column, row, columns, rows)
+            write_rgba(s, R, packed, rgba, column, row, columns, rows, TALL)
             continue
         for y in range(rows):
             for x in range(columns):
-                _put(out[row + y, column + x], s, m.pixel_index(x, y))
+                _put(out[row + y, column + x], s, np.uint64(y * WIDE + x))
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _draw(s, batch, count, x0, y0, through, has_depth, kind):
-    """A batch of Gaussians behind those that are there; whether one still sees through."""
-    most, least = np.float32(kind.most), np.float32(kind.least)
+def _prepare(batch, x0, y0, rows):
+    """Everything about the batch's Gaussians on the tile whose first pixel's centre is x0, y0."""
+    for j in range(BATCH):
+        cx, cy, tilt, cut = batch[CX + j], batch[CY + j], batch[TILT + j], batch[CUT + j]
+        dx, dy = x0 - cx, y0 - cy
+        start, end = rows_of(tilt, batch[EX + j], batch[EY + j], dx, dy, rows)
+        batch[START + j], batch[END + j] = start, end
+        across, down = math.sqrt(BELL * batch[QXX + j]), math.sqrt(BELL * batch[RYY + j])
+        batch[UX + j] = across
+        batch[UY + j] = across * tilt
+        batch[U + j] = across * (dx + tilt * dy)
+        batch[VY + j] = down
+        batch[V + j] = down * dy
+        batch[LIMIT + j] = BELL * cut
+        batch[Z + j] += batch[ZX + j] * dx + batch[ZY + j] * dy
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _draw(s, batch, count, has_depth, kind):
+    """A batch of Gaussians behind those that are there."""
+    most = np.float32(kind.most)
     for j in range(np.uint64(count)):
-        dx0, dy0 = x0 - batch[CX + j], y0 - batch[CY + j]
-        qxx, tilt, ryy, weight = batch[QXX + j], batch[TILT + j], batch[RYY + j], batch[WEIGHT + j]
-        red, green, blue = batch[RED + j], batch[GREEN + j], batch[BLUE + j]
-        for strip in range(m.STRIPS):
-            start = int(batch[START + np.uint64(strip) * BATCH + j])
-            end = int(batch[END + np.uint64(strip) * BATCH + j])
-            if start >= end:
-                continue
-            at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)
-            lanes = np.uint64((end - start) * m.STRIP)
-            for k in range(lanes):
-                dx, dy = dx0 + s[STEP_X + at + k], dy0 + s[STEP_Y + at + k]
-                e = dx + tilt * dy
-                alpha = min(weight * bell(qxx * e * e + ryy * dy * dy), most)
-                clear = s[CLEAR + at + k]
-                shown = clear * alpha
-                shown = shown if alpha >= least else ZERO
-                s[SHOWN + at + k] = shown
-                s[CLEAR + at + k] = max(clear - shown, NOTHING)
-                s[R + at + k] += shown * red
-                s[G + at + k] += shown * green
-                s[B + at + k] += shown * blue
-            if has_depth:
-                z = batch[Z + j] + batch[ZX + j] * dx0 + batch[ZY + j] * dy0
-                _measure(s, at, lanes, z, batch[ZX + j], batch[ZY + j])
-    clear = ZERO  # a sum, of which vector code can be made, unlike of a maximum
-    for k in range(m.ALL):
-        clear += ONE if s[CLEAR + k] > through else ZERO
-    return clear > ZERO
+        begin = np.uint64(int(batch[START + j])) * ROW
+        lanes = np.uint64(max(int(batch[END + j]) - int(batch[START + j]), 0)) * ROW
+        ux, uy, u = batch[UX + j], batch[UY + j], batch[U + j]
+        vy, v, limit = batch[VY + j], batch[V + j], batch[LIMIT + j]
+        color = batch[RED + j], batch[GREEN + j], batch[BLUE + j]
+        weight = batch[WEIGHT + j]
+        if has_depth:
+            for i in range(lanes):
+                k = begin + i
+                s[SHOWN + k] = _add(s, k, ux, uy, u, vy, v, limit, weight, most, color)
+            _measure(s, begin, lanes, batch[Z + j], batch[ZX + j], batch[ZY + j])
+        else:
+            for i in range(lanes):
+                _add(s, begin + i, ux, uy, u, vy, v, limit, weight, most, color)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _measure(s, at, count, z, zx, zy):
+def _add(s, k, ux, uy, u, vy, v, limit, weight, most, color):
+    """A Gaussian behind what is there of pixel k; the share of the pixel that it gets."""
+    a = u + ux * s[STEP_X + k] + uy * s[STEP_Y + k]
+    b = v + vy * s[STEP_Y + k]
+    t = a * a + b * b
+    clear = s[CLEAR + k]
+    shown = clear * min(weight * bell_of(t), most)
+    shown = shown if t <= limit else ZERO
+    s[CLEAR + k] = max(clear - shown, NOTHING)
+    s[R + k] += shown * color[0]
+    s[G + k] += shown * color[1]
+    s[B + k] += shown * color[2]
+    return shown
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _measure(s, begin, count, z, zx, zy):
     """Adds the depth of what was just drawn: z at the tile's first pixel, and its slope."""
-    for k in range(count):
-        depth = z + zx * s[STEP_X + at + k] + zy * s[STEP_Y + at + k]
-        shown, behind = s[SHOWN + at + k], s[CLEAR + at + k]
+    for i in range(count):
+        k = begin + i
+        depth = z + zx * s[STEP_X + k] + zy * s[STEP_Y + k]
+        shown, behind = s[SHOWN + k], s[CLEAR + k]
         is_half = (behind + shown > HALF) & (behind <= HALF)  # of one Gaussian only
-        s[MEDIAN + at + k] += depth if is_half else ZERO
-        s[MEAN + at + k] += shown * depth
+        s[MEDIAN + k] += depth if is_half else ZERO
+        s[MEAN + k] += shown * depth
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -53,7 +53,8 @@ MAGNIFIED = 21  # photo px per view px, the larger
 PHOTO, BODY = 22, 23  # shares of alpha that show the photo, and its own colour
 SEEN, MATTED, SOLID = 24, 25, 26
 FRONT = 27  # q up to which it can be a layer's front
-SPAN = 32  # numbers of a row: two lines of the processor's cache, a plain Gaussian reads one
+SPAN = 32  # numbers of a row: two lines of the processor's cache
+PLAIN_SPAN = 16  # of one that has no photo: one line
 
 OUT = skinning.ROWS  # first row of the results in the kernel's working memory
 VOLUME = SPAN  # further rows of the results: |det F|,
@@ -63,9 +64,12 @@ ROWS = OUT + SPAN + 3
 
 
 def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F32:
-    """Gaussians on the screen (N, SPAN), columns as named above; unseen ones are all 0."""
+    """Gaussians on the screen (N, SPAN), columns as named above; unseen ones are all 0.
+
+    (N, PLAIN_SPAN) where nothing of the photo is shown.
+    """
     rest = splats.rest
-    out = np.zeros((len(rest), SPAN), np.float32)
+    out = np.zeros((len(rest), SPAN if splats.is_layered else PLAIN_SPAN), np.float32)
     linear, offset = splats.world_from_object[:3, :3], splats.world_from_object[:3, 3]
     frame = np.concatenate(
         [

@@ -32,15 +32,16 @@ def draw_layers(
     first, last, projected, starts, members, across, left, top, width, height, view, photo,
     gap, texture_gap, texels, shapes, crop_left, crop_top, rules, kind, out, rgba,
 ):  # fmt: skip
-    """Draws the tiles first..last of `out` (height, width, 8) f32 or of `rgba` (.., 4) u8.
+    """Draws the tiles first..last of `out` (height, width, 8) f32 or of `rgba` (..) u32.
 
-    The one that is not wanted is empty.
+    The one that is not wanted is empty. A number of `rgba` is four bytes, the first the lowest.
 
     `left`, `top`: the pixel of the view at which `out` begins. `view`, `photo`: focal, cx, cy,
     width, height of the view and of the photo, px.
     """
     s = np.zeros(m.ROWS * m.PIXELS, np.float32)
-    m.number_pixels(s, m.STEP_X, m.STEP_Y)
+    m.number_pixels(s, m.STEP_X, m.STEP_Y, m.PIXELS)
+    packed = np.empty(m.PIXELS if len(rgba) > 0 else 0, np.uint32)
     nodes = new_nodes()
     gaps = ONE / np.float32(gap * gap), ONE / np.float32(texture_gap * texture_gap)
     for tile in range(first, last):
@@ -66,7 +67,7 @@ def draw_layers(
                 photo, texels, shapes, crop_left, crop_top, rules, kind,
             )  # fmt: skip
         if len(rgba) > 0:
-            m.write_rgba(s, m.O_R, rgba, column, row, columns, rows)
+            m.write_rgba(s, m.O_R, packed, rgba, column, row, columns, rows)
         else:
             for y in range(rows):
                 for x in range(columns):

@@ -9,14 +9,18 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ..threads import EXACT
 from .binning import TILE
 from .rules import LAYERS
+from .sampling import HALF, ZERO
 
 PIXELS = TILE * TILE
 STRIP = 8  # px, columns that lie side by side
 STRIPS = TILE // STRIP
 # Indices are unsigned: a signed one is looked at for its sign, and the loop is no vector code.
 ALL = np.uint64(PIXELS)
+FULL = np.float32(255)
+BITS = np.uint32(8), np.uint32(16), np.uint32(24)  # where the bytes of a number begin
 
 
 def _rows(first: int, count: int) -> tuple[np.uint64, ...]:
@@ -56,18 +60,18 @@ ROWS = ROOM + 24
 
 
 @numba.njit(nogil=True)
-def pixel_index(x, y):
-    """Where the pixel in column x and row y of the tile lies in a row of the memory."""
-    return np.uint64(x // STRIP * (STRIP * TILE) + y * STRIP + x % STRIP)
+def pixel_index(x, y, tall=TILE):
+    """Where the pixel in column x and row y of a tile so tall lies in a row of the memory."""
+    return np.uint64(x // STRIP * (STRIP * tall) + y * STRIP + x % STRIP)
 
 
 @numba.njit(nogil=True)
-def number_pixels(s, step_x, step_y):
+def number_pixels(s, step_x, step_y, pixels, tall=TILE):
     """Writes the column and the row of each pixel of the tile to two rows of the memory."""
-    for k in range(ALL):
+    for k in range(np.uint64(pixels)):
         i = int(k)
-        s[step_x + k] = np.float32(i // (STRIP * TILE) * STRIP + i % STRIP)
-        s[step_y + k] = np.float32(i // STRIP % TILE)
+        s[step_x + k] = np.float32(i // (STRIP * tall) * STRIP + i % STRIP)
+        s[step_y + k] = np.float32(i // STRIP % tall)
 
 
 @numba.njit(nogil=True)
@@ -76,21 +80,31 @@ def clear_tile(out, rgba, column, row, columns, rows):
     for y in range(row, row + rows):
         for x in range(column, column + columns):
             if len(rgba) > 0:
-                for c in range(4):
-                    rgba[y, x, c] = 0
+                rgba[y, x] = np.uint32(0)
             else:
                 for c in range(OUTPUTS):
                     out[y, x, c] = np.inf if c == 4 else 0.0  # the depth
 
 
-@numba.njit(nogil=True)
-def write_rgba(s, first, rgba, column, row, columns, rows):
-    """Premultiplied colour and alpha, four rows from `first` on, in 8 bits each."""
-    full, half, zero = np.float32(255), np.float32(0.5), np.float32(0)
+@numba.njit(nogil=True, fastmath=EXACT)
+def write_rgba(s, first, packed, rgba, column, row, columns, rows, tall=TILE):
+    """Premultiplied colour and alpha: four rows from `first` on, as numbers of four bytes.
+
+    `packed` (pixels of a tile,) u32 is room to work in.
+    """
+    pixels = np.uint64(len(packed))
+    for k in range(pixels):
+        at = first + k
+        red, green, blue = s[at], s[at + pixels], s[at + pixels + pixels]
+        packed[k] = (
+            _byte(red) | _byte(green) << BITS[0] | _byte(blue) << BITS[1]
+            | _byte(s[at + pixels + pixels + pixels]) << BITS[2]
+        )  # fmt: skip
     for y in range(rows):
         for x in range(columns):
-            k = first + pixel_index(x, y)
-            for c in range(4):
-                value = min(max(s[k] * full + half, zero), full)
-                rgba[row + y, column + x, c] = np.uint8(np.int32(value))
-                k += ALL
+            rgba[row + y, column + x] = packed[pixel_index(x, y, tall)]
+
+
+@numba.njit(nogil=True, fastmath=EXACT)
+def _byte(share):
+    return np.uint32(np.int32(min(max(share * FULL + HALF, ZERO), FULL)))

@@ -15,8 +15,8 @@ import numpy as np
 from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..threads import in_threads
-from .binning import bin_tiles
-from .cloud import draw_one_by_one
+from .binning import TILE, bin_tiles
+from .cloud import TALL, WIDE, draw_one_by_one
 from .depth_order import depth_order
 from .posed import PosedSplats
 from .projection import CX, CY, EX, EY, WEIGHT, Z, project
@@ -77,12 +77,12 @@ def draw_rgba(
 ) -> np.ndarray:
     """The same as (h, w, 4) u8, premultiplied: what a window shows, an eighth of the memory."""
     left, top, right, bottom = box or (0, 0, drawable.camera.width, drawable.camera.height)
-    rgba = np.empty((bottom - top, right - left, 4), np.uint8)
+    rgba = np.empty((bottom - top, right - left), "<u4")
     _draw(drawable, texture, (left, top), _NO_OUT, rgba)
-    return rgba
+    return rgba.view(np.uint8).reshape(*rgba.shape, 4)
 
 
-_NO_OUT, _NO_RGBA = np.empty((0, 0, 8), np.float32), np.empty((0, 0, 4), np.uint8)
+_NO_OUT, _NO_RGBA = np.empty((0, 0, 8), np.float32), np.empty((0, 0), "<u4")
 
 
 def _draw(
@@ -92,7 +92,8 @@ def _draw(
     """Draws the part of the view that begins at `corner` into the array that is not empty."""
     splats, kind = drawable.splats, drawable.splats.rest.splatting
     height, width = max(out.shape[0], rgba.shape[0]), max(out.shape[1], rgba.shape[1])
-    bins = bin_tiles(drawable.projected, (*corner, width, height), drawable.order)
+    tile = (TILE, TILE) if splats.is_layered else (WIDE, TALL)
+    bins = bin_tiles(drawable.projected, (*corner, width, height), tile, drawable.order)
     where: tuple[Any, ...] = (
         drawable.projected, frozen(bins.starts), frozen(bins.members), bins.across,
         *corner, width, height,
