@@ -13,8 +13,9 @@ import numpy as np
 
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.binning import bin_tiles
+from objectmorpher_core.raster.columns import Z
 from objectmorpher_core.raster.depth_order import depth_order
-from objectmorpher_core.raster.projection import WEIGHT, Z, project
+from objectmorpher_core.raster.projection import project
 
 from . import gl, gsplat_torch
 from .scenes import VIEW, Row, Scene, cloud_scene, lift_scene
@@ -74,6 +75,7 @@ def tiles_row(scene: Scene, effort: Effort) -> Row:
     """
     camera, photo = scene.camera, scene.puppet.camera
     window = (0, 0, camera.width, camera.height)
+    tile = tiles.tile_size(scene.splats(0))
 
     def timed(run: Callable[[int], object]) -> Timing:
         return measure(run, effort)
@@ -82,12 +84,11 @@ def tiles_row(scene: Scene, effort: Effort) -> Row:
     drawable = tiles.prepare(scene.splats(0), camera, photo)
 
     def sort(_: int) -> object:
-        there = np.flatnonzero(drawable.projected[:, WEIGHT] > 0).astype(np.uint32)
-        return there[depth_order(drawable.projected[there, Z])]
+        return depth_order(drawable.projected[:, Z])
 
     sorting = None if drawable.order is None else timed(sort)
     projecting = timed(lambda k: project(scene.splats(k), camera, photo))
-    binning = timed(lambda _: bin_tiles(drawable.projected, window, drawable.order))
+    binning = timed(lambda _: bin_tiles(drawable.projected, window, tile, drawable.order))
     drawing = timed(lambda _: tiles.draw_rgba(drawable, scene.texture)).less(binning)
     return scene.row(
         "tiles", frame, sorting, project_ms=projecting, bin_ms=binning, draw_ms=drawing

@@ -7,4 +7,4 @@ import moderngl
 
 def create_context() -> moderngl.Context:
     """A context of its own, through EGL. Raises whatever the system's loader does."""
-    return moderngl.create_standalone_context(backend="egl")
+    return moderngl.create_context(standalone=True, backend="egl")

@@ -8,31 +8,26 @@ import numba
 import numpy as np
 
 from ..threads import FAST
-from . import projection as p
+from . import columns as p
 from .sampling import ONE, ZERO
 from .tile_memory import STRIP
 
 STRIP_END = np.float32(STRIP - 1)
-# exp(-t), 0 <= t <= 0.7: interpolated at Chebyshev points, right to 3e-6
-E0, E1, E2, E3, E4 = (
-    np.float32(v) for v in (0.99999797, -0.99985296, 0.49829826, -0.15966694, 0.029512201)
+# exp(-t), 0 <= t <= 0.7: interpolated at Chebyshev points, right to 1e-7
+E0, E1, E2, E3, E4, E5 = (
+    np.float32(v)
+    for v in (0.99999994, -0.99999389, 0.49989734, -0.16603126, 0.03986404, -0.00589814)
 )
-BELL = np.float32(1 / 16)  # x q: what `bell_of` is a function of
+SIXTEENTH = np.float32(1 / 16)
 LIMIT = np.float32(0.7)
-BATCH = np.uint64(64)  # Gaussians that are prepared together
 ALMOST = np.float32(0.999)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def bell(q):
     """exp(-q / 2) for 0 <= q <= 11.2, and beyond as there."""
-    return bell_of(min(q * BELL, LIMIT))
-
-
-@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def bell_of(t):
-    """exp(-8 t) for 0 <= t <= 0.7, right to 2e-5; beyond it is any number."""
-    e = E0 + t * (E1 + t * (E2 + t * (E3 + t * E4)))
+    t = min(q * SIXTEENTH, LIMIT)
+    e = E0 + t * (E1 + t * (E2 + t * (E3 + t * (E4 + t * E5))))
     e = e * e
     e = e * e
     return e * e

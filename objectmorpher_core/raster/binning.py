@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import F32, frozen
 from ..threads import FAST, core_count, in_threads
-from .projection import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
+from .columns import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
 
 TILE = 16  # px, of a surface's tiles
 SMALL = np.float32(1 / 4)  # of a tile, extents of a Gaussian that touches about four
@@ -43,23 +43,25 @@ def bin_tiles(
     left, top, width, height = window
     wide, tall = tile
     across, down = -(-width // wide), -(-height // tall)
-    if order is None:
-        order = np.arange(len(projected), dtype=np.uint32)
-    boxes = np.empty((len(projected), 5), np.int32)
+    boxes = np.empty(len(projected), np.uint64)  # one number each: quickly put in another order
     parts = min(core_count(), max(len(projected) // LEAST_SHARE, 1))
     counts = np.zeros((parts, across * down), np.int64)
-    rows = frozen(projected)
+    rows, corners = frozen(projected), boxes.view(np.int16).reshape(-1, 4)
 
     def count(first: int, last: int) -> None:
         for part in range(first, last):
             begin, end = (len(projected) * (part + k) // parts for k in (0, 1))
-            _count(begin, end, rows, boxes, across, *window, wide, tall, counts[part])
+            _count(begin, end, rows, corners, across, *window, wide, tall, counts[part])
 
     in_threads(count, parts)
     starts = np.concatenate([[0], np.cumsum(counts.sum(0))])
     members = np.empty(int(starts[-1]), np.uint32)
     at = starts[:-1].copy()
-    inputs = (rows, frozen(order), frozen(boxes), across, left, top, wide, tall, at, members)
+    if order is None:
+        order = np.arange(len(projected), dtype=np.uint32)
+    else:
+        corners = boxes[order].view(np.int16).reshape(-1, 4)
+    inputs = (rows, frozen(order), frozen(corners), across, left, top, wide, tall, at, members)
     # Each thread fills some rows of tiles: their members come in order by themselves.
     in_threads(lambda first, last: _fill(first, last, *inputs), down, least=-(-down // parts))
     return Bins(starts, members, across, down)
@@ -71,7 +73,7 @@ def _count(
 ):  # fmt: skip
     """Tiles of the box around the Gaussians first..last, and how many each tile has of them.
 
-    `boxes` (N, 5): x0, y0, x1, y1, and whether the ellipse leaves out some of them.
+    `boxes` (N, 4) i16: x0, y0, x1, y1. Where the ellipse leaves out some of them, x0 is -1 - x0.
     """
     scale_x, scale_y = np.float32(1 / wide), np.float32(1 / tall)
     small = SMALL * np.float32(wide * tall)
@@ -85,32 +87,35 @@ def _count(
         x0, x1 = max(cx - ex, half), min(cx + ex, right)
         y0, y1 = max(cy - ey, half), min(cy + ey, bottom)
         if not (g[WEIGHT] > zero and x0 <= x1 and y0 <= y1):
-            box[2] = box[3] = -1
             box[0] = box[1] = 0
+            box[2] = box[3] = -1
             continue
-        box[0], box[1] = np.int32((x0 + half) * scale_x), np.int32((y0 + half) * scale_y)
-        box[2], box[3] = np.int32((x1 - half) * scale_x), np.int32((y1 - half) * scale_y)
+        first_column, first_row = np.int32((x0 + half) * scale_x), np.int32((y0 + half) * scale_y)
+        last_column, last_row = np.int32((x1 - half) * scale_x), np.int32((y1 - half) * scale_y)
         # Where there is little to gain the box will do; decided alike for all parts of a view.
-        box[4] = ex * ey > small
-        for row in range(box[1], box[3] + 1):
-            start, end = _columns(g, box, row, cx, cy, wide, tall) if box[4] else (box[0], box[2])
+        is_large = ex * ey > small
+        box[0] = ~first_column if is_large else first_column
+        box[1], box[2], box[3] = first_row, last_column, last_row
+        for row in range(first_row, last_row + 1):
+            start, end = first_column, last_column
+            if is_large:
+                start, end = _columns(g, start, end, row, cx, cy, wide, tall)
             for column in range(start, end + 1):
                 counts[np.uint64(row * across + column)] += 1
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _fill(first, last, projected, order, boxes, across, left, top, wide, tall, at, members):
-    """Puts the Gaussians where `at` says that the next members belong, of the tiles' rows
-    first..last."""
+    """Puts the Gaussians `order`, whose boxes come in that order, where `at` says that the next
+    members belong, of the tiles' rows first..last."""
     for n in range(np.uint64(len(order))):
-        i = order[n]
-        box = boxes[i]
+        i, box = order[n], boxes[n]
         for row in range(max(box[1], first), min(box[3], last - 1) + 1):
-            start, end = box[0], box[2]
-            if box[4]:
+            start, end = np.int32(box[0]), np.int32(box[2])
+            if start < 0:
                 g = projected[i]
                 cx, cy = g[CX] - np.float32(left), g[CY] - np.float32(top)
-                start, end = _columns(g, box, row, cx, cy, wide, tall)
+                start, end = _columns(g, ~start, end, row, cx, cy, wide, tall)
             for column in range(start, end + 1):
                 tile = np.uint64(row * across + column)
                 members[np.uint64(at[tile])] = i
@@ -118,8 +123,8 @@ def _fill(first, last, projected, order, boxes, across, left, top, wide, tall, a
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _columns(g, box, row, cx, cy, wide, tall):
-    """First and last of the box's tiles in a row that the ellipse touches."""
+def _columns(g, first, last, row, cx, cy, wide, tall):
+    """Those of the tiles first..last of a row that the ellipse touches."""
     ex, ey, tilt = g[EX], g[EY], g[TILT]
     low = max(np.float32(row * tall) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
     high = min(np.float32(row * tall) + np.float32(tall - 0.5) - cy, ey)
@@ -128,8 +133,8 @@ def _columns(g, box, row, cx, cy, wide, tall):
     start = cx + _edge(min(max(lean, low), high), tilt, ey, reach, np.float32(-1))
     end = cx + _edge(min(max(-lean, low), high), tilt, ey, reach, np.float32(1))
     scale, slack = np.float32(1 / wide), np.float32(0.51)
-    first = max(np.int32(max(start - slack, np.float32(0)) * scale), box[0])
-    return first, min(np.int32(max(end + slack, np.float32(0)) * scale), box[2])
+    first = max(np.int32(max(start - slack, np.float32(0)) * scale), first)
+    return first, min(np.int32(max(end + slack, np.float32(0)) * scale), last)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

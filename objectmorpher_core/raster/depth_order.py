@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..arrays import frozen
 from ..threads import FAST
 
 BITS = 8  # of a digit: more of them would write to more places than a processor keeps in reach
@@ -13,29 +12,36 @@ PASSES = 4
 
 
 def depth_order(depths: np.ndarray) -> np.ndarray:
-    """Rows (N,) u32 of `depths` (N,), all > 0, ascending; equal float32 depths stay in order.
+    """Rows (M,) u32 of `depths` (N,) that are > 0, ascending; equal float32 depths stay in order.
 
     The bits of positive float32 numbers ascend as they do. A fraction of the time of
     `np.argsort(depths, kind="stable")`.
     """
-    keys = frozen(depths, np.float32).view(np.uint32)
+    keys = np.maximum(depths, 0, dtype=np.float32).view(np.uint32)
     pairs, spare = np.empty(len(keys), np.uint64), np.empty(len(keys), np.uint64)
     order = np.empty(len(keys), np.uint32)
-    _sort(keys, pairs, spare, order)
-    return order
+    return order[: _sort(keys, pairs, spare, order)]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _sort(keys, pairs, spare, order):
-    """Rows in the order of `keys` (N,) u32 into `order`. A pair: key and row in one number."""
+    """Rows of `keys` (N,) u32 other than 0 into `order`, ascending; how many they are.
+
+    A pair: key and row in one number.
+    """
     size = 1 << BITS
     last = np.uint64(size - 1)
     counts = np.zeros((PASSES, size), np.uint32)  # unsigned: no index is looked at for its sign
+    there = np.uint64(0)
     for i in range(len(keys)):
         key = np.uint64(keys[i])
-        pairs[i] = (key << np.uint64(32)) | np.uint64(i)
+        if key == np.uint64(0):
+            continue
+        pairs[there] = (key << np.uint64(32)) | np.uint64(i)
+        there += np.uint64(1)
         for p in range(PASSES):
             counts[p, (key >> np.uint64(p * BITS)) & last] += np.uint32(1)
+    pairs, spare = pairs[:there], spare[:there]
     for p in range(PASSES):
         start = np.uint32(0)
         for d in range(size):
@@ -45,8 +51,9 @@ def _sort(keys, pairs, spare, order):
     for p in range(0, PASSES, 2):
         _scatter(pairs, spare, counts[p], np.uint64(32 + p * BITS))
         _scatter(spare, pairs, counts[p + 1], np.uint64(32 + (p + 1) * BITS))
-    for i in range(len(order)):
+    for i in range(len(pairs)):
         order[i] = np.uint32(pairs[i] & np.uint64(0xFFFFFFFF))
+    return len(pairs)
 
 
 @numba.njit(nogil=True, fastmath=FAST)

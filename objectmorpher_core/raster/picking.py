@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import F64, I32
-from .projection import CUT, CX, CY, EX, EY, QXX, RYY, TILT, WEIGHT, ZX, ZY, Z
+from .columns import CUT, CX, CY, EX, EY, QXX, RYY, TILT, WEIGHT, ZX, ZY, Z
 from .texture import TextureLevels
 from .tiles import Drawable, draw
 

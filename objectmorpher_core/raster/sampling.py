@@ -15,8 +15,7 @@ C15, C25 = np.float32(1.5), np.float32(2.5)
 ONE_ON, TWO_ON, THREE_ON = np.uint64(1), np.uint64(2), np.uint64(3)
 # log2(1 + t) / t, 0 <= t <= 1: interpolated at Chebyshev points, right to 5e-5
 L0, L1, L2, L3, L4 = (
-    np.float32(v)
-    for v in (1.442603894, -0.716714663, 0.440599033, -0.225103025, 0.058664940)
+    np.float32(v) for v in (1.442603894, -0.716714663, 0.440599033, -0.225103025, 0.058664940)
 )
 
 

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from ..threads import FAST
-from . import projection as p
+from . import columns as p
 from . import tile_memory as m
 from .bell import bell, strip_rows
 from .binning import TILE

@@ -17,9 +17,10 @@ from ..camera import Camera
 from ..threads import in_threads
 from .binning import TILE, bin_tiles
 from .cloud import TALL, WIDE, draw_one_by_one
+from .columns import CX, CY, EX, EY, WEIGHT, Z
 from .depth_order import depth_order
 from .posed import PosedSplats
-from .projection import CX, CY, EX, EY, WEIGHT, Z, project
+from .projection import project
 from .reference import Picture3D
 from .rules import RULES
 from .surface import draw_layers
@@ -55,10 +56,7 @@ class Drawable:
 def prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
     """Projects the Gaussians, and sorts them where their order matters."""
     projected = frozen(project(splats, camera, photo_camera))
-    order = None
-    if not splats.is_layered:
-        there = np.flatnonzero(projected[:, WEIGHT] > 0).astype(np.uint32)
-        order = there[depth_order(projected[there, Z])]
+    order = None if splats.is_layered else depth_order(projected[:, Z])
     return Drawable(splats, projected, order, camera, photo_camera)
 
 
@@ -82,6 +80,11 @@ def draw_rgba(
     return rgba.view(np.uint8).reshape(*rgba.shape, 4)
 
 
+def tile_size(splats: PosedSplats) -> tuple[int, int]:
+    """Width and height px of the tiles that the picture is drawn in."""
+    return (TILE, TILE) if splats.is_layered else (WIDE, TALL)
+
+
 _NO_OUT, _NO_RGBA = np.empty((0, 0, 8), np.float32), np.empty((0, 0), "<u4")
 
 
@@ -92,8 +95,8 @@ def _draw(
     """Draws the part of the view that begins at `corner` into the array that is not empty."""
     splats, kind = drawable.splats, drawable.splats.rest.splatting
     height, width = max(out.shape[0], rgba.shape[0]), max(out.shape[1], rgba.shape[1])
-    tile = (TILE, TILE) if splats.is_layered else (WIDE, TALL)
-    bins = bin_tiles(drawable.projected, (*corner, width, height), tile, drawable.order)
+    window = (*corner, width, height)
+    bins = bin_tiles(drawable.projected, window, tile_size(splats), drawable.order)
     where: tuple[Any, ...] = (
         drawable.projected, frozen(bins.starts), frozen(bins.members), bins.across,
         *corner, width, height,

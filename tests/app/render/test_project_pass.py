@@ -8,16 +8,17 @@ import pytest
 from objectmorpher_core.arrays import F32
 from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
 from objectmorpher_core.document import Placement
-from objectmorpher_core.raster import projection as p
+from objectmorpher_core.raster import columns as p
 from objectmorpher_core.raster.depth_order import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
+from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import RULES
 from tests import shapes
 from tests.app.render.pictures import bent
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 
-# Names of `projection`'s columns in the order in which the GPU writes them; what it keeps as
+# The columns in the order in which the GPU writes them; what it keeps as
 # what is missing to 1, or goes beyond it, is converted by `by_processor`.
 COLUMNS = (
     p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.WEIGHT, p.CUT, p.FRONT, None, None, None, None,
@@ -45,7 +46,7 @@ def by_gpu(project_pass, splats: PosedSplats, camera, order=None) -> F32:
 
 
 def by_processor(splats: PosedSplats, camera) -> F32:
-    rows = p.project(splats, camera, shapes.camera())
+    rows = project(splats, camera, shapes.camera())
     for column in (p.SEEN, p.MATTED):
         rows[:, column] = 1 - rows[:, column]
     rows[:, p.MAGNIFIED] = np.maximum(rows[:, p.MAGNIFIED] / RULES.sharp - 1, 0)
