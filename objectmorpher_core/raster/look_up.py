@@ -9,6 +9,7 @@ import numpy as np
 
 from ..threads import EXACT
 from . import tile_memory as m
+from .bicubic import sixteen_texels
 from .sampling import (
     C15,
     C25,
@@ -17,7 +18,6 @@ from .sampling import (
     TWO,
     ZERO,
     add_halved,
-    cubic_inside,
     sample,
 )
 
@@ -41,7 +41,7 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
         np.float32(photo_x), np.float32(photo_y), np.float32(photo[3]), np.float32(photo[4]),
     )  # fmt: skip
     height, width = shapes[0, 0], shapes[0, 1]
-    room = np.empty(16, np.float32)
+    stride = np.uint64(4 * width)
     for y in range(rows):
         for x in range(columns):
             k = m.pixel_index(x, y)
@@ -54,13 +54,13 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
                 at = np.uint64(4 * ((row - 1) * width + column - 1))
                 wx = s[m.WX0 + k], s[m.WX1 + k], s[m.WX2 + k], s[m.WX3 + k]
                 wy = s[m.WY0 + k], s[m.WY1 + k], s[m.WY2 + k], s[m.WY3 + k]
-                texel = cubic_inside(texels, at, width, wx, wy, room)
+                texel = sixteen_texels(texels, at, stride, wx, wy)
                 if s[m.MAG + k] > ONE and len(shapes) > 1:
                     i, j = column + s[m.TX + k], row + s[m.TY + k]
                     texel = add_halved(texel, texels, shapes, i, j, s[m.MAG + k])
             else:
                 u, v = column + 0.5 + s[m.TX + k], row + 0.5 + s[m.TY + k]
-                texel = sample(texels, shapes, u, v, s[m.MAG + k], room)
+                texel = sample(texels, shapes, u, v, s[m.MAG + k])
             s[m.T_R + k], s[m.T_G + k], s[m.T_B + k], s[m.T_A + k] = texel
 
 

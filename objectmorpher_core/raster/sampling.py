@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from ..threads import EXACT
+from .bicubic import sixteen_texels
 
 HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1), np.float32(2), np.float32(3)
 ZERO = np.float32(0)
@@ -20,18 +21,18 @@ L0, L1, L2, L3, L4 = (
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def sample(texels, shapes, u, v, magnified, room):
+def sample(texels, shapes, u, v, magnified):
     """Straight colour and alpha (4 x f32) at crop px (u, v), for so many px per view px.
 
-    `texels` (4 T,) f32, `shapes` (levels, 3) see `TextureLevels`; `room` (16,) to work in.
+    `texels` (4 T,) f32, `shapes` (levels, 3) see `TextureLevels`.
     """
     if magnified <= ONE:
-        return _cubic(texels, shapes, u, v, room)
+        return _cubic(texels, shapes, u, v)
     last = len(shapes) - 1
     lod = min(math.log2(magnified), float(last))
     lower = int(lod)
     mix = np.float32(lod - lower)
-    a = _cubic(texels, shapes, u, v, room) if lower == 0 else _linear(texels, shapes, lower, u, v)
+    a = _cubic(texels, shapes, u, v) if lower == 0 else _linear(texels, shapes, lower, u, v)
     if mix == ZERO:
         return a
     b = _linear(texels, shapes, lower + 1, u, v)
@@ -73,7 +74,7 @@ def add_halved(r, texels, shapes, x, y, magnified):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def _cubic(texels, shapes, u, v, room):
+def _cubic(texels, shapes, u, v):
     """The full-size level, Catmull-Rom: gives a pixel's own value at its centre."""
     height, width = shapes[0, 0], shapes[0, 1]
     j, i = math.floor(u - 0.5), math.floor(v - 0.5)
@@ -81,32 +82,13 @@ def _cubic(texels, shapes, u, v, room):
     column, row = int(j), int(i)
     if 1 <= column < width - 2 and 1 <= row < height - 2:
         first = np.uint64(4 * ((row - 1) * width + column - 1))
-        return cubic_inside(texels, first, width, wx, wy, room)
+        return sixteen_texels(texels, first, np.uint64(4 * width), wx, wy)
     r = (ZERO, ZERO, ZERO, ZERO)
     for a in range(4):
         y = row + a - 1
         for b in range(4):
             r = _add(r, texels, 0, height, width, y, column + b - 1, wy[a] * wx[b])
     return _clipped(r)
-
-
-@numba.njit(inline="always", error_model="numpy", fastmath=EXACT)
-def cubic_inside(texels, first, width, wx, wy, room):
-    """Where all sixteen texels are inside. Four of a row are sixteen numbers side by side: the
-    columns' sums are vector code."""
-    w0, w1, w2, w3 = wy
-    b = first + np.uint64(4 * width)
-    c, d = b + np.uint64(4 * width), b + np.uint64(8 * width)
-    for m in range(np.uint64(len(room))):
-        rows = w0 * texels[first + m] + w1 * texels[b + m]
-        room[m] = rows + (w2 * texels[c + m] + w3 * texels[d + m])
-    x0, x1, x2, x3 = wx
-    return _clipped((
-        x0 * room[0] + x1 * room[4] + x2 * room[8] + x3 * room[12],
-        x0 * room[1] + x1 * room[5] + x2 * room[9] + x3 * room[13],
-        x0 * room[2] + x1 * room[6] + x2 * room[10] + x3 * room[14],
-        x0 * room[3] + x1 * room[7] + x2 * room[11] + x3 * room[15],
-    ))  # fmt: skip
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)

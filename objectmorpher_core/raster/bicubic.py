@@ -1,0 +1,106 @@
+"""The weighted sum of sixteen texels, written as vector instructions.
+
+A texel is four numbers and two that stand side by side fill a register, but the compiler does not
+see it: what it makes of loops takes three times as long.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import impl_ret_untracked
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+
+F32 = ir.FloatType()
+FOUR, EIGHT, LANE = ir.VectorType(F32, 4), ir.VectorType(F32, 8), ir.IntType(32)
+
+
+@intrinsic
+def sixteen_texels(typing_context, texels, first, stride, wx, wy):  # noqa: ANN001, ANN201
+    """sum_ab wy[a] wx[b] texel(a, b), each of the four numbers clipped to [0, 1]: a tuple.
+
+    `texels` (n,) f32; `first` u64: where the first texel begins; `stride` u64: numbers from a row
+    of texels to the next; `wx`, `wy` (4,) f32. All sixteen texels must lie within the array.
+    """
+    four = types.UniTuple(types.float32, 4)
+    signature = four(texels, types.uint64, types.uint64, four, four)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, first, stride, wx, wy = arguments
+        data = make_array(signature.args[0])(context, builder, array).data
+        across = [builder.extract_value(wx, k) for k in range(4)]
+        left = right = None
+        for row in range(4):
+            weight = _spread(builder, builder.extract_value(wy, row), EIGHT)
+            start = builder.gep(data, [first])
+            two = _load(builder, start), _load(builder, builder.gep(start, [LANE(8)]))
+            left, right = (_add(builder, weight, a, b) for a, b in zip(two, (left, right)))
+            first = builder.add(first, stride)
+        total = _add(builder, _pair(builder, *across[:2]), left, None)
+        total = _add(builder, _pair(builder, *across[2:]), right, total)
+        total = builder.fadd(_half(builder, total, 0), _half(builder, total, 4))
+        for limit, order in ((0.0, ">"), (1.0, "<")):
+            bound = ir.Constant(FOUR, [limit] * 4)
+            total = builder.select(builder.fcmp_ordered(order, total, bound), total, bound)
+        values = [builder.extract_element(total, LANE(k)) for k in range(4)]
+        return impl_ret_untracked(
+            context, builder, signature.return_type, cgutils.pack_array(builder, values)
+        )
+
+    return signature, generate
+
+
+@intrinsic
+def fetch(typing_context, texels, at):  # noqa: ANN001, ANN201
+    """Asks for the line of memory around `texels[at]`, without waiting for it."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, at = arguments
+        data = make_array(signature.args[0])(context, builder, array).data
+        byte = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, LANE, LANE, LANE])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch.p0", fnty=kind)
+        place = builder.bitcast(builder.gep(data, [at]), byte)
+        builder.call(prefetch, [place, LANE(0), LANE(3), LANE(1)])  # of data, to read, soon
+        return context.get_dummy_value()
+
+    return types.void(texels, types.uint64), generate
+
+
+def _load(builder: Any, start: Any) -> Any:
+    """Eight numbers, wherever they begin."""
+    return builder.load(builder.bitcast(start, EIGHT.as_pointer()), align=4, typ=EIGHT)
+
+
+def _add(builder: Any, a: Any, b: Any, c: Any) -> Any:
+    """a b + c, fused where the processor can; so it is alike wherever this is called from."""
+    if c is None:
+        return builder.fmul(a, b)
+    kind = ir.FunctionType(EIGHT, [EIGHT] * 3)
+    fused = builder.module.declare_intrinsic("llvm.fmuladd.v8f32", fnty=kind)
+    return builder.call(fused, [a, b, c])
+
+
+def _spread(builder: Any, value: Any, kind: ir.VectorType) -> Any:
+    """The value in every lane."""
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, LANE(0))
+    order = ir.Constant(ir.VectorType(LANE, kind.count), [0] * kind.count)
+    return builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), order)
+
+
+def _pair(builder: Any, left: Any, right: Any) -> Any:
+    """One value in the first four lanes, the other in the last four."""
+    order = ir.Constant(ir.VectorType(LANE, 8), list(range(8)))
+    return builder.shuffle_vector(
+        _spread(builder, left, FOUR), _spread(builder, right, FOUR), order
+    )
+
+
+def _half(builder: Any, value: Any, start: int) -> Any:
+    """Four of eight lanes."""
+    order = ir.Constant(ir.VectorType(LANE, 4), list(range(start, start + 4)))
+    return builder.shuffle_vector(value, ir.Constant(EIGHT, ir.Undefined), order)
