@@ -15,7 +15,9 @@ CORE, APP = ROOT / "objectmorpher_core", ROOT / "app"
 WINDOW = {"imgui_bundle", "imgui", "glfw", "OpenGL"}
 GL = {"moderngl", "glcontext"}
 HEAVY = {"torch", "onnxruntime", "patchmatch", "trimesh", "tifffile"}  # only inside functions
-CORE_AT_IMPORT = {"numpy", "scipy", "numba", "cv2", "PIL", "platformdirs", "objectmorpher_core"}
+CORE_AT_IMPORT = {
+    "numpy", "scipy", "numba", "llvmlite", "cv2", "PIL", "platformdirs", "objectmorpher_core",
+}  # fmt: skip
 
 
 def sources(folder: Path) -> list[Path]:

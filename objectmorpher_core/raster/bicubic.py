@@ -19,8 +19,7 @@ F32 = ir.FloatType()
 FOUR, EIGHT, LANE = ir.VectorType(F32, 4), ir.VectorType(F32, 8), ir.IntType(32)
 
 
-@intrinsic
-def sixteen_texels(typing_context, texels, first, stride, wx, wy):  # noqa: ANN001, ANN201
+def _sixteen_texels(typing_context, texels, first, stride, wx, wy):
     """sum_ab wy[a] wx[b] texel(a, b), each of the four numbers clipped to [0, 1]: a tuple.
 
     `texels` (n,) f32; `first` u64: where the first texel begins; `stride` u64: numbers from a row
@@ -38,7 +37,9 @@ def sixteen_texels(typing_context, texels, first, stride, wx, wy):  # noqa: ANN0
             weight = _spread(builder, builder.extract_value(wy, row), EIGHT)
             start = builder.gep(data, [first])
             two = _load(builder, start), _load(builder, builder.gep(start, [LANE(8)]))
-            left, right = (_add(builder, weight, a, b) for a, b in zip(two, (left, right)))
+            left, right = (
+                _add(builder, weight, a, b) for a, b in zip(two, (left, right), strict=True)
+            )
             first = builder.add(first, stride)
         total = _add(builder, _pair(builder, *across[:2]), left, None)
         total = _add(builder, _pair(builder, *across[2:]), right, total)
@@ -54,8 +55,7 @@ def sixteen_texels(typing_context, texels, first, stride, wx, wy):  # noqa: ANN0
     return signature, generate
 
 
-@intrinsic
-def fetch(typing_context, texels, at):  # noqa: ANN001, ANN201
+def _fetch(typing_context, texels, at):
     """Asks for the line of memory around `texels[at]`, without waiting for it."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -69,6 +69,10 @@ def fetch(typing_context, texels, at):  # noqa: ANN001, ANN201
         return context.get_dummy_value()
 
     return types.void(texels, types.uint64), generate
+
+
+sixteen_texels: Any = intrinsic(_sixteen_texels)  # called without the typing context
+fetch: Any = intrinsic(_fetch)
 
 
 def _load(builder: Any, start: Any) -> Any:

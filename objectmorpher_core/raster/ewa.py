@@ -222,15 +222,17 @@ def limit_front(s, rules, kind):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def write(s, rest, base, start, count, columns, out):
-    """So many columns of the rows start.. of `out`, of what is there of `count` Gaussians."""
+    """So many columns of the rows start.. of `out` for `count` Gaussians: 0 of what is not seen."""
     for lane in range(np.uint64(count)):
-        k = OUT * LANES + int(lane)
+        k, row = OUT * LANES + int(lane), out[np.uint64(start) + lane]
         if s[k + p.CUT * LANES] > 0.0:
-            row = out[np.uint64(start) + lane]
             for c in range(columns):
                 row[c] = s[k + c * LANES]
             for c in range(3):
                 row[p.RED + c] = rest[base + (COLOUR + c) * LANES + int(lane)]
+        else:
+            row[:columns] = 0.0
+        row[columns:] = 0.0
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import F64, frozen
+from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..deform.binding import LANES
 from ..deform.skinning import Skin, Skinned
@@ -95,10 +95,11 @@ class RestSplats:
         return frozen(-(self.normals * world).sum(1) / np.linalg.norm(world, axis=1))
 
     @cached_property
-    def blocks(self) -> F64:
+    def blocks(self) -> F32:
         """(blocks, REST_ROWS, LANES): 64 Gaussians side by side, in the object's frame.
 
-        As `projection` reads them, for vector instructions; the rest of the last block is 0.
+        As `projection` reads them, for vector instructions, in half the memory of what it computes
+        with; the rest of the last block is 0.
         """
         gaussians, texture = self.lifted.gaussians, self.lifted.texture
         covariances = gaussians.covariances()
@@ -110,7 +111,7 @@ class RestSplats:
             self.zoom[:, None], self.cosines[:, None], gaussians.colors,
         ]  # fmt: skip
         count = -(-len(self) // LANES)
-        table = np.zeros((count * LANES, REST_ROWS))
+        table = np.zeros((count * LANES, REST_ROWS), np.float32)
         table[: len(self)] = np.hstack(rows)
         return frozen(table.reshape(count, LANES, REST_ROWS).transpose(0, 2, 1))
 

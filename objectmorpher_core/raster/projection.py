@@ -23,12 +23,12 @@ from .rules import RULES
 
 
 def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F32:
-    """Gaussians on the screen (N, SPAN), columns as named above; unseen ones are all 0.
+    """Gaussians on the screen (N, SPAN), columns as in `columns`; unseen ones are all 0.
 
     (N, PLAIN_SPAN) where nothing of the photo is shown.
     """
     rest = splats.rest
-    out = np.zeros((len(rest), SPAN if splats.is_layered else PLAIN_SPAN), np.float32)
+    out = np.empty((len(rest), SPAN if splats.is_layered else PLAIN_SPAN), np.float32)
     linear, offset = splats.world_from_object[:3, :3], splats.world_from_object[:3, 3]
     frame = np.concatenate(
         [
