@@ -27,33 +27,44 @@ def depth_order(depths: np.ndarray) -> np.ndarray:
 def _sort(keys, pairs, spare, order):
     """Rows of `keys` (N,) u32 other than 0 into `order`, ascending; how many they are.
 
-    A pair: key and row in one number.
+    A pair: key and row in one number. Only the digits in which the keys differ are sorted by.
     """
     size = 1 << BITS
     last = np.uint64(size - 1)
+    low, high = np.uint32(0xFFFFFFFF), np.uint32(0)
+    for i in range(len(keys)):
+        if keys[i] > 0:
+            low, high = min(low, keys[i]), max(high, keys[i])
+    passes = 1
+    while passes < PASSES and (np.uint64(high) - np.uint64(low)) >> np.uint64(passes * BITS) > 0:
+        passes += 1
     counts = np.zeros((PASSES, size), np.uint32)  # unsigned: no index is looked at for its sign
     there = np.uint64(0)
     for i in range(len(keys)):
-        key = np.uint64(keys[i])
-        if key == np.uint64(0):
+        if keys[i] == 0:
             continue
+        key = np.uint64(keys[i] - low)
         pairs[there] = (key << np.uint64(32)) | np.uint64(i)
         there += np.uint64(1)
-        for p in range(PASSES):
+        for p in range(passes):
             counts[p, (key >> np.uint64(p * BITS)) & last] += np.uint32(1)
-    pairs, spare = pairs[:there], spare[:there]
-    for p in range(PASSES):
+    for p in range(passes):
         start = np.uint32(0)
         for d in range(size):
             own = counts[p, d]
             counts[p, d] = start
             start += own
-    for p in range(0, PASSES, 2):
-        _scatter(pairs, spare, counts[p], np.uint64(32 + p * BITS))
-        _scatter(spare, pairs, counts[p + 1], np.uint64(32 + (p + 1) * BITS))
-    for i in range(len(pairs)):
-        order[i] = np.uint32(pairs[i] & np.uint64(0xFFFFFFFF))
-    return len(pairs)
+    source, target = pairs[:there], spare[:there]
+    for p in range(passes - 1):
+        _scatter(source, target, counts[p], np.uint64(32 + p * BITS))
+        source, target = target, source
+    starts, shift = counts[passes - 1], np.uint64(32 + (passes - 1) * BITS)
+    for i in range(len(source)):
+        pair = source[i]
+        d = (pair >> shift) & last
+        order[starts[d]] = np.uint32(pair & np.uint64(0xFFFFFFFF))
+        starts[d] += np.uint32(1)
+    return len(source)
 
 
 @numba.njit(nogil=True, fastmath=FAST)
