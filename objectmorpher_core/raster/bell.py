@@ -9,7 +9,7 @@ import numpy as np
 
 from ..threads import FAST
 from . import columns as p
-from .sampling import ONE, ZERO
+from .singles import ONE, ZERO
 from .tile_memory import STRIP
 
 STRIP_END = np.float32(STRIP - 1)

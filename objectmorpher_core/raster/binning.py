@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import F32, frozen
 from ..threads import FAST, core_count, in_threads
 from .columns import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
+from .singles import HALF, ONE, ZERO
 
 TILE = 16  # px, of a surface's tiles
 SMALL = np.float32(1 / 4)  # of a tile, extents of a Gaussian that touches about four
@@ -77,21 +78,20 @@ def _count(
     """
     scale_x, scale_y = np.float32(1 / wide), np.float32(1 / tall)
     small = SMALL * np.float32(wide * tall)
-    zero, half = np.float32(0), np.float32(0.5)
-    right, bottom = np.float32(width) - half, np.float32(height) - half
+    right, bottom = np.float32(width) - HALF, np.float32(height) - HALF
     left, top = np.float32(left), np.float32(top)
     for n in range(np.uint64(first), np.uint64(last)):
         g, box = projected[n], boxes[n]
         cx, cy, ex, ey = g[CX] - left, g[CY] - top, g[EX], g[EY]
         # the first and last pixel whose centre is inside
-        x0, x1 = max(cx - ex, half), min(cx + ex, right)
-        y0, y1 = max(cy - ey, half), min(cy + ey, bottom)
-        if not (g[WEIGHT] > zero and x0 <= x1 and y0 <= y1):
+        x0, x1 = max(cx - ex, HALF), min(cx + ex, right)
+        y0, y1 = max(cy - ey, HALF), min(cy + ey, bottom)
+        if not (g[WEIGHT] > ZERO and x0 <= x1 and y0 <= y1):
             box[0] = box[1] = 0
             box[2] = box[3] = -1
             continue
-        first_column, first_row = np.int32((x0 + half) * scale_x), np.int32((y0 + half) * scale_y)
-        last_column, last_row = np.int32((x1 - half) * scale_x), np.int32((y1 - half) * scale_y)
+        first_column, first_row = np.int32((x0 + HALF) * scale_x), np.int32((y0 + HALF) * scale_y)
+        last_column, last_row = np.int32((x1 - HALF) * scale_x), np.int32((y1 - HALF) * scale_y)
         # Where there is little to gain the box will do; decided alike for all parts of a view.
         is_large = ex * ey > small
         box[0] = ~first_column if is_large else first_column
@@ -126,19 +126,19 @@ def _fill(first, last, projected, order, boxes, across, left, top, wide, tall, a
 def _columns(g, first, last, row, cx, cy, wide, tall):
     """Those of the tiles first..last of a row that the ellipse touches."""
     ex, ey, tilt = g[EX], g[EY], g[TILT]
-    low = max(np.float32(row * tall) + np.float32(0.5) - cy, -ey)  # dy of the tile's rows
+    low = max(np.float32(row * tall) + HALF - cy, -ey)  # dy of the tile's rows
     high = min(np.float32(row * tall) + np.float32(tall - 0.5) - cy, ey)
     lean = tilt * ey * ey / ex  # dy at which the ellipse is widest, to the left
     reach = math.sqrt(g[CUT] / g[QXX])  # half its row at dy = 0
     start = cx + _edge(min(max(lean, low), high), tilt, ey, reach, np.float32(-1))
-    end = cx + _edge(min(max(-lean, low), high), tilt, ey, reach, np.float32(1))
+    end = cx + _edge(min(max(-lean, low), high), tilt, ey, reach, ONE)
     scale, slack = np.float32(1 / wide), np.float32(0.51)
-    first = max(np.int32(max(start - slack, np.float32(0)) * scale), first)
-    return first, min(np.int32(max(end + slack, np.float32(0)) * scale), last)
+    first = max(np.int32(max(start - slack, ZERO) * scale), first)
+    return first, min(np.int32(max(end + slack, ZERO) * scale), last)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _edge(dy, tilt, ey, reach, side):
     """dx of the ellipse's left (side -1) or right (1) edge at dy."""
     y = dy / ey
-    return side * reach * math.sqrt(max(np.float32(1) - y * y, np.float32(0))) - tilt * dy
+    return side * reach * math.sqrt(max(ONE - y * y, ZERO)) - tilt * dy

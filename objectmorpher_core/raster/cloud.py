@@ -16,7 +16,7 @@ import numpy as np
 from ..threads import FAST
 from . import columns as p
 from .bell import SIXTEENTH, rows_of
-from .sampling import HALF, ONE, ZERO
+from .singles import HALF, INFINITE, ONE, ZERO
 from .tile_memory import clear_tile, number_pixels, write_rgba
 
 WIDE, TALL = 8, 64  # px, of a tile
@@ -26,7 +26,6 @@ CLEAR, R, G, B, ALPHA, SHOWN, MEAN, MEDIAN, STEP_X, STEP_Y = (
     np.uint64(row * PIXELS) for row in range(10)
 )
 ROWS = 10
-INFINITE = np.float32(np.inf)
 BATCH = np.uint64(64)  # Gaussians that are prepared together
 # exp(-t), 0 <= t <= 0.7, so that its 8th power is right to 4e-5 everywhere (minimax): of a colour
 # a hundredth of what 8 bits tell apart

@@ -11,11 +11,10 @@ from ..threads import FAST
 from . import tile_memory as m
 from .look_up import look_up
 from .rules import coverage, ramp
-from .sampling import HALF, ONE, ZERO
+from .singles import HALF, INFINITE, ONE, ZERO
 
 TINY = np.float32(1e-30)
 LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows no photo
-INFINITE = np.float32(np.inf)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

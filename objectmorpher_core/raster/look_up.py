@@ -13,13 +13,10 @@ from .bicubic import sixteen_texels
 from .sampling import (
     C15,
     C25,
-    HALF,
-    ONE,
-    TWO,
-    ZERO,
     add_halved,
     sample,
 )
+from .singles import HALF, ONE, TWO, ZERO
 
 HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing
 

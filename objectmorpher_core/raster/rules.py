@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from .singles import HALF, ONE, ZERO
+
 CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian of a surface is 0
 LAYERS = 4  # of a pixel; all that is left belongs to the last one
 
@@ -118,7 +120,6 @@ def coverage(total, slope, rules):
     The surface ends where the sum falls to the surface level; the sum's gradient `slope` (per
     px) says how far that is, so the edge is one pixel wide at any scale.
     """
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     width = np.float32(rules.edge_width) * np.float32(slope) + np.float32(1e-6)
     edge = (np.float32(total) - np.float32(rules.surface_level)) / width
-    return min(max(half + edge, zero), one)
+    return min(max(HALF + edge, ZERO), ONE)

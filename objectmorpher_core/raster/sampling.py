@@ -9,9 +9,8 @@ import numpy as np
 
 from ..threads import EXACT
 from .bicubic import sixteen_texels
+from .singles import HALF, ONE, TWO, ZERO
 
-HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1), np.float32(2), np.float32(3)
-ZERO = np.float32(0)
 C15, C25 = np.float32(1.5), np.float32(2.5)
 ONE_ON, TWO_ON, THREE_ON = np.uint64(1), np.uint64(2), np.uint64(3)
 # log2(1 + t) / t, 0 <= t <= 1: interpolated at Chebyshev points, right to 5e-5

@@ -17,7 +17,7 @@ from .bell import bell
 from .bicubic import fetch
 from .binning import TILE
 from .look_up import look_up
-from .sampling import HALF, ONE, ZERO
+from .singles import HALF, ONE, ZERO
 
 STEP = 2  # px between nodes
 SIDE = TILE // STEP + 1  # nodes

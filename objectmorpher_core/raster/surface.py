@@ -19,11 +19,10 @@ from .bell import bell, strip_rows
 from .binning import TILE
 from .compositing import composite_layer
 from .rules import LAYERS
-from .sampling import HALF, ONE, THREE, TWO, ZERO
+from .singles import HALF, INFINITE, ONE, THREE, TWO, ZERO
 from .smooth import draw_smooth, is_plain, new_nodes
 
 FAR = np.float32(3e38)  # a depth that nothing has
-INFINITE = np.float32(np.inf)
 MIDDLE = np.float32(TILE / 2)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..threads import EXACT
 from .binning import TILE
 from .rules import LAYERS
-from .sampling import HALF, ZERO
+from .singles import HALF, ZERO
 
 PIXELS = TILE * TILE
 STRIP = 8  # px, columns that lie side by side
