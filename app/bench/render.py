@@ -82,9 +82,10 @@ def tiles_row(scene: Scene, effort: Effort) -> Row:
 
     frame = timed(lambda k: tiles_frame(scene, k))
     drawable = tiles.prepare(scene.splats(0), camera, photo)
+    depths = drawable.projected[:, Z].copy()
 
     def sort(_: int) -> object:
-        return depth_order(drawable.projected[:, Z])
+        return depth_order(depths)
 
     sorting = None if drawable.order is None else timed(sort)
     projecting = timed(lambda k: project(scene.splats(k), camera, photo))

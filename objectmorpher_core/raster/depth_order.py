@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ..arrays import frozen
 from ..threads import FAST
 
 BITS = 8  # of a digit: more of them would write to more places than a processor keeps in reach
@@ -17,7 +18,7 @@ def depth_order(depths: np.ndarray) -> np.ndarray:
     The bits of positive float32 numbers ascend as they do. A fraction of the time of
     `np.argsort(depths, kind="stable")`.
     """
-    keys = np.maximum(depths, 0, dtype=np.float32).view(np.uint32)
+    keys = frozen(np.maximum(depths, 0), np.float32).view(np.uint32)
     pairs, spare = np.empty(len(keys), np.uint64), np.empty(len(keys), np.uint64)
     order = np.empty(len(keys), np.uint32)
     return order[: _sort(keys, pairs, spare, order)]

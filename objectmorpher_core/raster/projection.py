@@ -17,15 +17,18 @@ from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
 from ..threads import FAST, in_threads
 from . import ewa
-from .columns import FRONT, PLAIN_SPAN, SPAN, SX
+from .columns import FRONT, PLAIN_SPAN, SPAN, SX, Z
 from .posed import REST_ROWS, PosedSplats, view_limits
 from .rules import RULES
 
 
-def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F32:
+def project(
+    splats: PosedSplats, camera: Camera, photo_camera: Camera, depths: F32 | None = None
+) -> F32:
     """Gaussians on the screen (N, SPAN), columns as in `columns`; unseen ones are all 0.
 
-    (N, PLAIN_SPAN) where nothing of the photo is shown.
+    (N, PLAIN_SPAN) where nothing of the photo is shown. `depths` (N,) gets the column Z: to sort
+    them one has to read them only, and not a line of memory for each.
     """
     rest = splats.rest
     out = np.empty((len(rest), SPAN if splats.is_layered else PLAIN_SPAN), np.float32)
@@ -40,7 +43,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> F32:
     )  # fmt: skip
     inputs: tuple[Any, ...] = (
         *_motion(splats), rest.blocks.reshape(-1), frozen(frame), RULES, rest.splatting,
-        splats.is_layered, out,
+        splats.is_layered, out, _NO_DEPTHS if depths is None else depths,
     )  # fmt: skip
     in_threads(lambda first, last: _project(first, last, *inputs), len(rest.blocks), 2)
     return out
@@ -50,6 +53,7 @@ _NO_SKIN = (
     frozen(np.zeros((0, 3))), frozen(np.zeros((0, 4), np.uint32)), frozen(np.zeros((0, 0))),
     frozen(np.zeros((0, 8))), frozen(np.zeros((2, 3))),
 )  # fmt: skip
+_NO_DEPTHS = np.zeros(0, np.float32)
 _NO_POINTS = (frozen(np.zeros((0, 3))), frozen(np.zeros((0, 3, 3))))
 
 
@@ -67,7 +71,7 @@ def _motion(splats: PosedSplats) -> tuple[Any, ...]:
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _project(
     first, last, x, control_points, shares, nodes, centre, points, linear,
-    rest, frame, rules, kind, is_textured, out,
+    rest, frame, rules, kind, is_textured, out, depths,
 ):  # fmt: skip
     """Fills the rows of `out` that belong to the blocks first..last."""
     s = np.ones(ewa.ROWS * LANES)
@@ -105,3 +109,5 @@ def _project(
             ewa.project_plain(s, rest, base, screen, rules, kind)
             ewa.limit(s, kind)
             ewa.write(s, rest, base, start, count, SX, out)
+        for i in range(start, min(start + count, len(depths))):
+            depths[i] = out[i, Z]

@@ -17,7 +17,7 @@ from ..camera import Camera
 from ..threads import in_threads
 from .binning import TILE, bin_tiles
 from .cloud import TALL, WIDE, draw_one_by_one
-from .columns import CX, CY, EX, EY, WEIGHT, Z
+from .columns import CX, CY, EX, EY, WEIGHT
 from .depth_order import depth_order
 from .posed import PosedSplats
 from .projection import project
@@ -55,8 +55,9 @@ class Drawable:
 
 def prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
     """Projects the Gaussians, and sorts them where their order matters."""
-    projected = frozen(project(splats, camera, photo_camera))
-    order = None if splats.is_layered else depth_order(projected[:, Z])
+    depths = None if splats.is_layered else np.empty(len(splats), np.float32)
+    projected = frozen(project(splats, camera, photo_camera, depths))
+    order = None if depths is None else depth_order(depths)
     return Drawable(splats, projected, order, camera, photo_camera)
 
 
