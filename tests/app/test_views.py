@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import PATIENCE
+from hands import ROOT, Hands, opened
 from PIL import Image, ImageChops
 from shoot_views import NAMES, made_document
-from test_window import ROOT, Hands
 
 from objectmorpher_core.session_file import save_session
 
@@ -84,16 +84,10 @@ def test_the_golden_pictures_are_small() -> None:
 @pytest.fixture
 def posed(window_environment: dict[str, str], tmp_path: Path) -> Iterator[Hands]:
     """Hands on a window that shows the made document."""
-    if shutil.which("xdotool") is None:
-        pytest.skip("xdotool is not installed")
     session = tmp_path / "club.omorph"
     save_session(made_document(), session)
-    command = [sys.executable, "-m", "app", str(session)]
-    with subprocess.Popen(command, env=window_environment, cwd=ROOT) as window:
-        hands = Hands(window_environment)
-        hands.wait(lambda: session.name in hands.title(), "opening the session")
+    with opened(window_environment, session) as hands:
         yield hands
-        window.kill()
 
 
 def test_keys_switch_views(posed: Hands) -> None:

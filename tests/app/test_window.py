@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import CENTRE, HEIGHT, PATIENCE, WIDTH
-from PIL import Image, ImageGrab
+from hands import ROOT, Hands, opened
+from PIL import Image
 
 pytestmark = pytest.mark.window
 
-ROOT = Path(__file__).parents[2]
-ACCENT = (0x5A, 0xA9, 0xFF)
 CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
 PRIMARY = (1160, 839)  # in the primary button, left of its label
 POSE_TOOL = (10, 88)  # in the Pose tool's button, beside its icon
@@ -82,77 +80,18 @@ def screen_xy(x: float, y: float) -> tuple[float, float]:
     )
 
 
-class Hands:
-    """Mouse, keyboard and eyes on the display."""
-
-    def __init__(self, environment: dict[str, str]) -> None:
-        self._environment = environment
-        self._display = environment["DISPLAY"]
-
-    def xdotool(self, *arguments: object) -> str:
-        command = ["xdotool", *(str(a) for a in arguments)]
-        result = subprocess.run(command, env=self._environment, capture_output=True, text=True)
-        time.sleep(0.08)
-        return result.stdout
-
-    def click(self, x: float, y: float, button: int = 1) -> None:
-        self.xdotool("mousemove", round(x), round(y))
-        self.xdotool("click", button)
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        self.xdotool("mousemove", round(start[0]), round(start[1]))
-        self.xdotool("mousedown", 1)
-        for share in (0.25, 0.5, 0.75, 1.0, 1.0):
-            x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
-            self.xdotool("mousemove", round(x), round(y))
-        self.xdotool("mouseup", 1)
-
-    def press(self, keys: str) -> None:
-        self.xdotool("key", keys)
-
-    def fill_in(self, path: Path) -> None:
-        """Types a path into the open dialog, in place of what it suggests."""
-        time.sleep(0.5)
-        self.press("ctrl+a")
-        self.xdotool("type", "--delay", 5, path)
-        self.press("Return")
-
-    def picture(self) -> np.ndarray:
-        return np.asarray(ImageGrab.grab(xdisplay=self._display))
-
-    def is_accent(self, at: tuple[int, int]) -> bool:
-        return tuple(int(v) for v in self.picture()[at[1], at[0], :3]) == ACCENT
-
-    def is_red(self, x: float, y: float) -> bool:
-        """Whether the canvas shows the ball at image px."""
-        left, top = screen_xy(x, y)
-        red, green, _ = self.picture()[round(top), round(left), :3].astype(int)
-        return bool(red > green + 30)
-
-    def title(self) -> str:
-        names = self.xdotool("search", "--name", "ObjectMorpher", "getwindowname", "%@")
-        return names.strip()
-
-    def wait(self, is_reached: Callable[[], bool], what: str) -> None:
-        end = time.monotonic() + PATIENCE
-        while not is_reached():
-            if time.monotonic() > end:
-                Image.fromarray(self.picture()).save(f"window-test-{what.replace(' ', '-')}.png")
-                pytest.fail(f"{what} did not happen; a picture of the screen was saved")
-            time.sleep(0.1)
+def is_red(hands: Hands, x: float, y: float) -> bool:
+    """Whether the canvas shows the ball at image px."""
+    left, top = screen_xy(x, y)
+    red, green, _ = hands.picture()[round(top), round(left), :3].astype(int)
+    return bool(red > green + 30)
 
 
 @pytest.fixture
 def hands(window_environment: dict[str, str], photo_path: Path) -> Iterator[Hands]:
     """On a window that shows the made photo."""
-    if shutil.which("xdotool") is None:
-        pytest.skip("xdotool is not installed")
-    command = [sys.executable, "-m", "app", str(photo_path)]
-    with subprocess.Popen(command, env=window_environment, cwd=ROOT) as window:
-        hands = Hands(window_environment)
-        hands.wait(lambda: photo_path.name in hands.title(), "opening the photo")
+    with opened(window_environment, photo_path) as hands:
         yield hands
-        window.kill()
 
 
 def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -> None:
@@ -162,10 +101,10 @@ def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -
     hands.click(*PRIMARY)
     hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
     hands.wait(lambda: not hands.is_accent(PRIMARY), "asking for a drag")
-    assert not hands.is_red(x + 30, y - 34)  # the wall, right above the ball
+    assert not is_red(hands, x + 30, y - 34)  # the wall, right above the ball
     hands.drag(screen_xy(x, y - 30), screen_xy(x + 36, y - 40))
     hands.wait(lambda: hands.is_accent(PRIMARY), "dragging")
-    hands.wait(lambda: hands.is_red(x + 30, y - 34), "following")  # the ball, near the handle
+    hands.wait(lambda: is_red(hands, x + 30, y - 34), "following")  # the ball, near the handle
 
     exported, session = tmp_path / "edited.png", tmp_path / "ball.omorph"
     hands.press("ctrl+e")

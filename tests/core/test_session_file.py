@@ -55,7 +55,7 @@ def lifted_object(random: np.random.Generator) -> LiftedObject:
     )
     return LiftedObject(
         gaussians, texture, random.normal(size=(NODES, 3)), random.normal(size=(4, 4)),
-        float(np.float64(1) / 3), "relief",
+        float(np.float64(1) / 3), "relief", "mip",
     )  # fmt: skip
 
 
@@ -256,6 +256,12 @@ SPOILED = {
             d, lambda h: h["document"]["objects"][0]["handles"][0].update(control_point=NODES)
         ),
         "control point 16 of 16",
+    ),
+    "unknown splatting": (
+        lambda d: with_head(
+            d, lambda h: h["document"]["objects"][0]["lifted"].update(splatting="star")
+        ),
+        "splatting is 'star', not one of",
     ),
     "plate outside": (
         lambda d: with_head(d, lambda h: h["document"]["plate"].update(left=100)),
