@@ -95,15 +95,18 @@ def _budgets_of(frames: list[Row], solves: list[Row]) -> list[Budget]:
     ours = next(r for r in solves if (r["mode"], r["nodes"]) == ("default", 512))
     lift = _frame(frames, "lift", None)
     cloud = _frame(frames, "cloud", 100_000)
-    edit, large = _edit_report()["seconds"], _export_report()
-    export = large["seconds"]["render"] + large["seconds"]["save"]
-    memory = large["peak_memory_mb"]
+    many = _frame(frames, "cloud", 300_000)
+    edit, edit_of_large, large = _edit_report()["seconds"], _large_edit_report(), _export_report()
+    export, memory = large["composite_s"] + large["encode_s"], large["peak_mb"] / 1000
     gap, solve = max(100 * ours["energy_gap"], 0.0), ours["solve_ms"]
     return [
         Budget("ARAP frame, 512 nodes, paper graph, 3 iterations", "≤ 1.5 ms",
                f"{paper['solve_ms']:.1f} ms", paper["solve_ms"] <= 1.5),
         Budget("within 1 % of the energy minimum after a large cold drag", "≤ 10 ms",
                f"{gap:.1f} % after a frame of 10 ms; {solve:.1f} ms a frame of a drag", gap <= 1),
+        _framed(f"frame, an embedded lift ({lift['gaussians']:,} Gaussians)", lift, 33),
+        _framed("frame, 100k plainly coloured Gaussians", cloud, 35),
+        _framed("frame, 300k of them", many, 90),
         _dragged(f"drag to pixels, an embedded lift ({lift['gaussians']:,} Gaussians)", lift,
                  "≤ 33 ms, then 16 ms", 33),
         _dragged("drag to pixels, 100k plainly coloured Gaussians", cloud, "≤ 35 ms", 35),
@@ -112,8 +115,10 @@ def _budgets_of(frames: list[Row], solves: list[Row]) -> list[Budget]:
         _timed("lift, 1 MP photo", edit["lift"], 1.5),
         _timed("whole `edit`, 1 MP photo, GrabCut, relief, PatchMatch", edit["total"], 8),
         Budget("export of a 24 MP photo", "≤ 10 s, < 2 GB",
-               f"{export:.1f} s, {memory / 1000:.1f} GB for the whole edit",
-               export <= 10 and memory < 2000),
+               f"{export:.1f} s, {memory:.1f} GB", export <= 10 and memory < 2),
+        Budget("the whole edit of it, object on half of the photo", "–",
+               f"{edit_of_large['seconds']['total']:.0f} s, "
+               f"{edit_of_large['peak_memory_mb'] / 1000:.1f} GB (in matting)", None),
         Budget("start to a drawn window", "≤ 1.5 s", "needs a screen", None),
     ]  # fmt: skip
 
@@ -122,6 +127,13 @@ def _frame(rows: list[Row], scene: str, count: int | None) -> Row:
     """The tiles' row of the largest view."""
     own = [r for r in rows if (r["renderer"], r["scene"]) == ("tiles", scene)]
     return max((r for r in own if count in (None, r["gaussians"])), key=lambda r: r["width"])
+
+
+def _framed(what: str, frame: Row, limit: float) -> Budget:
+    taken, least = frame["frame_ms"], frame["frame_least_ms"]
+    return Budget(
+        f"{what}, 1024²", f"≤ {limit:g} ms", f"{taken:.0f} ms ({least:.0f})", taken <= limit
+    )
 
 
 def _dragged(what: str, frame: Row, asked: str, limit: float) -> Budget:
@@ -160,6 +172,12 @@ def _edit_report() -> Row:
 
 
 def _export_report() -> Row:
+    """What the export of a photo of 24 MP costs, whose edit is made up."""
+    command = [sys.executable, "-m", "tests.large", "600", "400", "10"]
+    return json.loads(subprocess.run(command, cwd=ROOT, check=True, capture_output=True).stdout)
+
+
+def _large_edit_report() -> Row:
     """The edit of a photo of 24 MP whose mask is given."""
     size, mask = LARGE, made_mask(PHOTO)
     pixels = cv2.resize(made_photo(PHOTO, mask), size, interpolation=cv2.INTER_CUBIC)
