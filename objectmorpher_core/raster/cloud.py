@@ -71,8 +71,11 @@ def draw_one_by_one(
             count = min(starts[tile + 1] - start, int(BATCH))
             for j in range(np.uint64(count)):
                 g = projected[members[np.uint64(start) + j]]
-                for c in range(p.PLAIN_SPAN):
+                for c in range(p.Z):
                     batch[np.uint64(c) * BATCH + j] = g[c]
+                if len(rgba) == 0:
+                    for c in range(p.Z, p.SX):
+                        batch[np.uint64(c) * BATCH + j] = g[c]
             _prepare(batch, x0, y0, np.float32(rows))
             _draw(s, batch, count, len(rgba) == 0, kind)
             clear = ZERO  # a sum, of which vector code can be made, unlike of a maximum

@@ -9,9 +9,9 @@ TILT = 3  # e = dx + TILT dy: so written, q keeps its digits however thin the Ga
 RYY = 4  # 1 / Cyy
 CUT = 5  # q beyond which alpha is 0
 EX, EY = 6, 7  # view px, half-size of the box that holds what is left
-Z, ZX, ZY = 8, 9, 10  # depth, and its slope per px
-WEIGHT = 11  # of alpha
-RED, GREEN, BLUE = 12, 13, 14
+WEIGHT = 8  # of alpha
+RED, GREEN, BLUE = 9, 10, 11
+Z, ZX, ZY = 12, 13, 14  # depth, and its slope per px
 # ... and what it shows of the photo.
 SX, SY = 15, 16  # photo px, from the pixel to where it looks
 AXX, AXY, AYX, AYY = 17, 18, 19, 20  # slope of that
