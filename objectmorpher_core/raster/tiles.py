@@ -1,6 +1,6 @@
 """The fast twin of `reference`: compiled, tile by tile, all cores.
 
-Gaussians are projected once, each tile of 16 x 16 pixels gets the list of those that touch it, and
+Gaussians are projected once, each tile of the picture gets the list of those that touch it, and
 is then drawn by itself with its sums in the processor's cache: in layers where the photo is shown
 (`surface`), one by one where there are plain colours only (`cloud`).
 """
