@@ -19,8 +19,7 @@ from objectmorpher_core.threads import FAST, LEAST_ROWS, in_threads
 def near_to_far(splats: PosedSplats) -> np.ndarray:
     """Rows (M,) u32 of the Gaussians before the camera, as the rasterisers sort them."""
     depths = view_depths(splats)
-    there = np.flatnonzero(depths > RULES.near * splats.gap).astype(np.uint32)
-    return there[depth_order(depths[there])]
+    return depth_order(np.where(depths > RULES.near * splats.gap, depths, 0))
 
 
 def view_depths(splats: PosedSplats) -> F32:

@@ -20,7 +20,7 @@ E0, E1, E2, E3, E4, E5 = (
 )
 SIXTEENTH = np.float32(1 / 16)
 LIMIT = np.float32(0.7)
-ALMOST = np.float32(0.999)
+ALMOST = np.float32(0.999)  # of a row: to begin with the next one, however it is rounded
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -17,33 +17,33 @@ from ..threads import FAST
 from . import columns as p
 from .bell import SIXTEENTH, rows_of
 from .singles import HALF, INFINITE, ONE, ZERO
-from .tile_memory import clear_tile, number_pixels, write_rgba
+from .tile_memory import STRIP, clear_tile, number_pixels, write_rgba
 
-WIDE, TALL = 8, 64  # px, of a tile
+WIDE, TALL = STRIP, 64  # px, of a tile
 PIXELS = WIDE * TALL
 ALL, ROW = np.uint64(PIXELS), np.uint64(WIDE)
 CLEAR, R, G, B, ALPHA, SHOWN, MEAN, MEDIAN, STEP_X, STEP_Y = (
     np.uint64(row * PIXELS) for row in range(10)
 )
 ROWS = 10
-BATCH = np.uint64(64)  # Gaussians that are prepared together
 # exp(-t), 0 <= t <= 0.7, so that its 8th power is right to 4e-5 everywhere (minimax): of a colour
 # a hundredth of what 8 bits tell apart
 E0, E1, E2, E3 = (np.float32(v) for v in (0.999994874, -0.999412537, 0.491425544, -0.132089347))
 NOTHING = np.float32(1e-12)  # what shines through at least: ever smaller numbers are slow
+BATCH = np.uint64(64)  # Gaussians that are prepared together, a row of it a number of each
 CX, CY, QXX, TILT, RYY, CUT, EX, EY, Z, ZX, ZY, WEIGHT, RED, GREEN, BLUE = (
-    np.uint64(column * 64) for column in (
+    np.uint64(column) * BATCH for column in (
         p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.CUT, p.EX, p.EY, p.Z, p.ZX, p.ZY, p.WEIGHT,
         p.RED, p.GREEN, p.BLUE,
     )
 )  # fmt: skip
 # Of a batch, further: t = (UX x + UY y + U)^2 + (VY y + V)^2 is what the bell is a function of, at
 # the pixel in column x and row y of the tile; LIMIT is t where alpha ends, BELL0 to BELL3 are the
-# coefficients of the bell with the weight in them.
-UX, UY, U, VY, V, LIMIT, BELL0, BELL1, BELL2, BELL3, START, END = (
-    np.uint64((p.PLAIN_SPAN + row) * 64) for row in range(12)
+# coefficients of the bell with the weight in them, DEPTH is the depth at the first pixel.
+UX, UY, U, VY, V, LIMIT, BELL0, BELL1, BELL2, BELL3, DEPTH, START, END = (
+    np.uint64(p.PLAIN_SPAN + row) * BATCH for row in range(13)
 )
-BATCH_ROWS = p.PLAIN_SPAN + 12
+BATCH_ROWS = p.PLAIN_SPAN + 13
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -111,7 +111,7 @@ def _prepare(batch, x0, y0, rows):
         root = math.sqrt(math.sqrt(math.sqrt(batch[WEIGHT + j])))
         batch[BELL0 + j], batch[BELL1 + j] = root * E0, root * E1
         batch[BELL2 + j], batch[BELL3 + j] = root * E2, root * E3
-        batch[Z + j] += batch[ZX + j] * dx + batch[ZY + j] * dy
+        batch[DEPTH + j] = batch[Z + j] + batch[ZX + j] * dx + batch[ZY + j] * dy
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -129,7 +129,7 @@ def _draw(s, batch, count, has_depth, kind):
             for i in range(lanes):
                 k = begin + i
                 s[SHOWN + k] = _add(s, k, ux, uy, u, vy, v, limit, bells, most, color)
-            _measure(s, begin, lanes, batch[Z + j], batch[ZX + j], batch[ZY + j])
+            _measure(s, begin, lanes, batch[DEPTH + j], batch[ZX + j], batch[ZY + j])
         else:
             for i in range(lanes):
                 _add(s, begin + i, ux, uy, u, vy, v, limit, bells, most, color)

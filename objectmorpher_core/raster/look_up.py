@@ -9,7 +9,7 @@ import numpy as np
 
 from ..threads import EXACT
 from . import tile_memory as m
-from .bicubic import sixteen_texels
+from .intrinsics import sixteen_texels
 from .sampling import (
     C15,
     C25,

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from ..threads import EXACT
-from .bicubic import sixteen_texels
+from .intrinsics import sixteen_texels
 from .singles import HALF, ONE, TWO, ZERO
 
 C15, C25 = np.float32(1.5), np.float32(2.5)

@@ -14,8 +14,8 @@ from ..threads import FAST
 from . import columns as p
 from . import tile_memory as m
 from .bell import bell
-from .bicubic import fetch
 from .binning import TILE
+from .intrinsics import fetch
 from .look_up import look_up
 from .singles import HALF, ONE, ZERO
 

@@ -1,7 +1,8 @@
 """A tile's working memory: where each quantity lies, shared by the kernels that draw in it.
 
-A row of 256 numbers per quantity, one for each pixel of the tile: first the left half of the tile,
-row by row, then the right half.
+A row of numbers per quantity, one for each pixel of the tile. Pixels lie strip by strip: eight
+columns of the tile, row by row. The rows named here are those of a surface's tiles, 16 x 16 px in
+two strips; the functions serve tiles of any height.
 """
 
 from __future__ import annotations

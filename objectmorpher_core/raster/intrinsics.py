@@ -1,7 +1,7 @@
-"""The weighted sum of sixteen texels, written as vector instructions.
+"""Kernels' instructions that numba has no words for, written as LLVM's: texels, and fetching ahead.
 
 A texel is four numbers and two that stand side by side fill a register, but the compiler does not
-see it: what it makes of loops takes three times as long.
+see it: what it makes of loops takes three times as long. LLVM has the same for every processor.
 """
 
 from __future__ import annotations
