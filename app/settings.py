@@ -16,6 +16,7 @@ log = logging.getLogger(__name__)
 
 RECENT = 6  # files remembered
 AUTO = "auto"
+TABLES = ("backends", "shortcuts")  # of the file; everything else is a line of it
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,9 @@ class Settings:
     quality: int = 95  # of JPEG and WebP exports
     gaussians: int = GAUSSIANS  # of a lifted object
     recent: tuple[str, ...] = ()  # paths, newest first
+    language: str = "en"
     backends: Backends = field(default_factory=Backends)
+    shortcuts: dict[str, str] = field(default_factory=dict)  # command -> keys of the user's own
 
     def with_recent(self, path: Path) -> Settings:
         """`path` is the file opened last."""
@@ -64,16 +67,23 @@ def read_settings(path: Path) -> Settings:
         log.warning("The settings %s cannot be read (%s); defaults are used", path.name, error)
         return Settings()
     backends = Backends(**_matching(Backends(), values.pop("backends", {})))
+    shortcuts = _words(values.pop("shortcuts", {}))
     if isinstance(values.get("recent"), list):
         values["recent"] = tuple(str(r) for r in values["recent"])
-    return replace(Settings(backends=backends), **_matching(Settings(), values))
+    return replace(
+        Settings(backends=backends, shortcuts=shortcuts), **_matching(Settings(), values)
+    )
 
 
 def write_settings(path: Path, settings: Settings) -> None:
     """Writes the file; a failure is logged, for no work depends on it."""
-    lines = [f"{f.name} = {_toml(getattr(settings, f.name))}" for f in fields(settings)[:-1]]
-    lines += ["", "[backends]"]
-    lines += [f"{k} = {_toml(v)}" for k, v in asdict(settings.backends).items()]
+    plain = [f.name for f in fields(settings) if f.name not in TABLES]
+    lines = [f"{name} = {_toml(getattr(settings, name))}" for name in plain]
+    for title, table in (
+        ("backends", asdict(settings.backends)),
+        ("shortcuts", settings.shortcuts),
+    ):
+        lines += ["", f"[{title}]", *(f"{k} = {_toml(v)}" for k, v in table.items())]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_suffix(f".{os.getpid()}.tmp")
@@ -81,6 +91,13 @@ def write_settings(path: Path, settings: Settings) -> None:
         temporary.replace(path)
     except OSError as error:
         log.warning("The settings cannot be written: %s", error)
+
+
+def _words(values: object) -> dict[str, str]:
+    """The entries of a table that are names with a text."""
+    if not isinstance(values, dict):
+        return {}
+    return {k: v for k, v in values.items() if k.isidentifier() and isinstance(v, str)}
 
 
 def _matching(defaults: object, values: object) -> dict:

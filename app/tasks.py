@@ -23,7 +23,7 @@ from .view import ToolName
 if TYPE_CHECKING:
     from .editor import Editor
 
-READ, LIFT, PLATE, WRITE = "read", "lift", "plate", "write"
+READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 
 
 class Tasks:
@@ -72,14 +72,14 @@ class Tasks:
             except ValueError as error:
                 editor.complain(str(error))
                 return
-            editor.handle = None
+            editor.posing.select(None)
             editor.view.tool = ToolName.SELECT
             editor.apply(label, changed)
 
         editor.jobs.start(
             "Selecting", job_functions.segment, photo.pixels, prompt,
             Choice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind="segment",
+            done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind=SELECT,
         )  # fmt: skip
 
     def _fail_segment(self, error: JobError) -> None:
@@ -104,7 +104,7 @@ class Tasks:
                 return
             matte, lifted = answer
             changed = edits.set_lifted(current, k, matte, lifted)
-            editor.handle = None
+            editor.posing.select(None)
             editor.apply("Lift object", changed)
             editor.derived.prepare(changed, k)
             editor.view.tool = ToolName.POSE

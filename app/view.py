@@ -22,8 +22,11 @@ class ToolName(Enum):
     """The tools, in the order of the tool strip."""
 
     SELECT = "Select"
+    MASK = "Refine mask"
     POSE = "Pose"
     PLACE = "Place"
+    LOOK = "Look"
+    COMPOSE = "Compose"
 
 
 class Shown(Enum):

@@ -8,24 +8,16 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ..commands import COMMANDS, run
+from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
 from ..feedback import Hover
 from ..tools import navigate
-from ..tools.place_tool import PlaceTool
 from ..tools.pointer import Button, Pointer, Shape, Tool
-from ..tools.pose_tool import PoseTool
-from ..tools.select_tool import SelectTool
-from ..view import ToolName
+from ..tools.registry import TOOLS
 from .layout import Rect
 
 log = logging.getLogger(__name__)
 
-TOOLS: dict[ToolName, Tool] = {
-    ToolName.SELECT: SelectTool(),
-    ToolName.POSE: PoseTool(),
-    ToolName.PLACE: PlaceTool(),
-}
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
 FAR = 10  # px that an arrow with Shift moves
 
@@ -35,8 +27,6 @@ class Input:
 
     def __init__(self) -> None:
         self.shape = Shape.ARROW
-        self._commands = {c.keys: name for name, c in COMMANDS.items() if c.keys}
-        self._commands |= {"Ctrl+Y": "redo", "Backspace": "remove_handle"}
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
@@ -103,9 +93,9 @@ class Input:
             editor.escape()
         elif direction is not None:
             step = FAR if far else 1
-            editor.nudge_handle(direction[0] * step, direction[1] * step)
-        elif keys in self._commands:
-            run(editor, self._commands[keys])
+            editor.posing.nudge(direction[0] * step, direction[1] * step)
+        elif (name := _command_of(editor, keys)) is not None:
+            run(editor, name)
 
     def _begin(self, editor: Editor, pointer: Pointer) -> None:
         """The pointer hovers, zooms, or starts a stroke."""
@@ -157,6 +147,14 @@ class Input:
             self._last = (pointer.x, pointer.y)
             editor.hand.move(pointer)  # before the release: both may come in one slow frame
         else:
-            editor.relax()
+            editor.posing.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))
+
+
+def _command_of(editor: Editor, keys: str) -> str | None:
+    """The command that a chord runs."""
+    for name, command in COMMANDS.items():
+        if keys == keys_of(editor, name) or keys in command.other_keys:
+            return name
+    return None

@@ -6,15 +6,19 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from ..commands import COMMANDS, next_step, no_photo, run
+from ..commands import next_step, run, why_not
 from ..editor import Editor
 from ..view import ToolName
 from .layout import Rect
-from .panel_place import draw_place
-from .panel_pose import draw_pose
+from .panels.compose import draw_compose
+from .panels.look import draw_look
+from .panels.mask import draw_mask
+from .panels.place import draw_place
+from .panels.pose import draw_pose
+from .panels.select import draw_select
 from .panes import edge, pane
 from .theme import PRIMARY, Icon, theme
-from .widgets import Kind, button, gap, heading, icon_button, note, rule
+from .widgets import Kind, button, heading, icon_button, note, rule
 
 ROW = 32.0  # points
 
@@ -43,7 +47,7 @@ def _draw_objects(editor: Editor) -> None:
     if editor.object is not None and editor.is_lifted:
         imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
         if button(f"{Icon.PLUS}  Another object", Kind.QUIET):
-            editor.start_object()
+            editor.objects.start_another()
         imgui.pop_style_color()
 
 
@@ -58,7 +62,7 @@ def _draw_object(editor: Editor, k: int) -> None:
     end = ImVec2(start.x + width, start.y + height)
     imgui.set_next_item_allow_overlap()
     if imgui.invisible_button(f"##object{k}", ImVec2(width, height)):
-        editor.choose_object(k)
+        editor.objects.choose(k)
     if is_current or imgui.is_item_hovered():
         role = "raised" if is_current else "hovered"
         draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
@@ -71,33 +75,9 @@ def _draw_object(editor: Editor, k: int) -> None:
         imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(30), start.y + theme.pt(2)))
         eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
         if icon_button(eye, f"eye{k}", "Hide or show the object"):
-            editor.toggle_visible(k)
+            editor.objects.toggle_visible(k)
     imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(4)))
     imgui.dummy(ImVec2(0, 0))
-
-
-def _draw_select(editor: Editor) -> None:
-    heading("Selection")
-    gap(4)
-    if button(f"{Icon.PERSON}  Select subject", why_not=no_photo(editor)):
-        run(editor, "subject")
-    if button(f"{Icon.ERASE}  Clear selection", why_not=COMMANDS["clear"].why_not(editor)):
-        run(editor, "clear")
-    gap(12)
-    prompt, mask = editor.prompt, editor.mask
-    if mask is not None and editor.document is not None:
-        share = editor.mask_share
-        note(f"{share:.1%} of the photo is selected.")
-    adds = sum(c.is_foreground for c in prompt.clicks)
-    removes = len(prompt.clicks) - adds
-    if adds or removes:
-        note(f"{adds} added, {removes} removed by click.")
-    if mask is None:
-        note("Left click adds what belongs to the object, right click removes what does not.")
-    elif not editor.is_lifted:
-        note("Right-click what does not belong to the object, then lift it.")
-    else:
-        note("The photo is shown as it was. A new click makes a new selection and a new lift.")
 
 
 def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
@@ -106,12 +86,15 @@ def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
     label, command = next_step(editor)
     if command is None:
         button(label, Kind.WAITING)
-    elif button(label, Kind.PRIMARY, why_not=COMMANDS[command].why_not(editor)):
+    elif button(label, Kind.PRIMARY, why_not=why_not(editor, command)):
         run(editor, command)
 
 
 _PANELS: dict[ToolName, Callable[[Editor], None]] = {
-    ToolName.SELECT: _draw_select,
+    ToolName.SELECT: draw_select,
+    ToolName.MASK: draw_mask,
     ToolName.POSE: draw_pose,
     ToolName.PLACE: draw_place,
+    ToolName.LOOK: draw_look,
+    ToolName.COMPOSE: draw_compose,
 }

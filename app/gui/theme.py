@@ -60,8 +60,10 @@ class Icon:
     """Glyphs of Font Awesome 6 Free Solid."""
 
     SELECT = "\uf245"
+    BRUSH = "\uf1fc"
     POSE = "\uf25a"
     PLACE = "\uf0b2"
+    LAYERS = "\uf5fd"
     UNDO = "\uf2ea"
     REDO = "\uf2f9"
     OPEN = "\uf07c"

@@ -16,8 +16,11 @@ SIDE = 36.0  # points
 ICON = 18.0
 TOOLS = (
     (ToolName.SELECT, Icon.SELECT, "select", "Click what you want to move"),
+    (ToolName.MASK, Icon.BRUSH, "mask", "Paint the selection exactly"),
     (ToolName.POSE, Icon.POSE, "pose", "Drag points of the object; it bends"),
     (ToolName.PLACE, Icon.PLACE, "place", "Move, turn and scale the whole object"),
+    (ToolName.LOOK, Icon.EYE, "look", "See the object from all sides, before and after"),
+    (ToolName.COMPOSE, Icon.LAYERS, "compose", "Repair the background, join the object to it"),
 )
 
 

@@ -30,7 +30,7 @@ from .input import Input
 from .inspector import draw_inspector
 from .layout import Rect, lay_out
 from .menu import draw_menu
-from .overlays import Overlays
+from .overlays import draw_overlays
 from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
@@ -115,7 +115,7 @@ class Window:
                 lively = self._wait()
             else:
                 glfw.poll_events()
-            has_news = self.editor.poll() or self.editor.is_restless
+            has_news = self.editor.poll() or self.editor.posing.is_restless
             lively = SETTLE if has_news else lively - 1
             self._frame()
             drawn += 1
@@ -176,7 +176,7 @@ class Window:
         else:
             draw_toolbar(self.editor, layout.strip)
             draw_inspector(self.editor, layout.inspector)
-            Overlays(self.editor, layout.canvas, ratio).draw()
+            draw_overlays(self.editor, layout.canvas, ratio)
         draw_status(self.editor, layout.status, self._input.hint(self.editor))
         self._dialogs.draw(self.editor)
         self._set_cursor()

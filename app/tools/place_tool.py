@@ -44,7 +44,7 @@ class Gizmo:
 
 def gizmo(editor: Editor) -> Gizmo | None:
     """The current object's, or None where nothing is lifted."""
-    frame, view = editor.object_frame(), editor.view
+    frame, view = editor.placing.frame(), editor.view
     if frame is None:
         return None
     size = np.array([view.width, view.height])
@@ -61,7 +61,7 @@ class PlaceTool:
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         part = self.part_at(editor, pointer)
-        start = editor.placement
+        start = editor.placing.placement
         if part is None or start is None or pointer.button is not Button.LEFT:
             return _ignore()
         return self._drag(editor, pointer, start, part)
@@ -73,7 +73,7 @@ class PlaceTool:
             depth -= pointer.wheel * DEPTH_STEP
             if is_moved:
                 changed = _CHANGES[part](editor, start, first, pointer)
-                editor.place(replace(changed, depth=changed.depth + depth))
+                editor.placing.move_to(replace(changed, depth=changed.depth + depth))
         editor.commit(f"{part.capitalize()} object" if is_moved else "")
 
     def part_at(self, editor: Editor, pointer: Pointer) -> str | None:
@@ -87,7 +87,7 @@ class PlaceTool:
         gap = float(np.linalg.norm(pointer.xy - shown.centre))
         if abs(gap - shown.radius) <= reach:
             return "roll"
-        return "move" if editor.surface_at(pointer.xy) is not None else "turn"
+        return "move" if editor.posing.surface_at(pointer.xy) is not None else "turn"
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         part = self.part_at(editor, pointer)

@@ -31,13 +31,13 @@ class PoseTool:
         while (yield).is_down:
             pass
         if handle is not None:
-            editor.remove_handle(handle)
+            editor.posing.remove(handle)
 
     def _add(self, editor: Editor, pointer: Pointer) -> Stroke:
         """A new handle at the surface point under the pointer."""
-        handle = editor.start_handle(pointer.xy, is_pin=pointer.alt)
+        handle = editor.posing.start_handle(pointer.xy, is_pin=pointer.alt)
         if handle is None:
-            editor.select_handle(None)
+            editor.posing.select(None)
             while (yield).is_down:
                 pass
             return
@@ -45,9 +45,9 @@ class PoseTool:
 
     def _drag(self, editor: Editor, pointer: Pointer, handle: int, is_new: bool) -> Stroke:
         """The handle follows the pointer at its own depth, which the wheel changes."""
-        editor.select_handle(handle)
+        editor.posing.select(handle)
         start, is_moved, depth = pointer, False, 0.0
-        held = editor.handle_position(handle)
+        held = editor.posing.spot(handle)
         while (pointer := (yield)).is_down:
             depth -= pointer.wheel * DEPTH_STEP
             is_moved = is_moved or has_moved(editor, start, pointer) or pointer.wheel != 0
@@ -55,14 +55,14 @@ class PoseTool:
                 delta = (pointer.xy - start.xy) / editor.view.zoom
                 if pointer.shift:  # along one axis of the picture
                     delta[np.abs(delta).argmin()] = 0.0
-                editor.drag_handle(handle, held.moved(delta, depth))
-        editor.settle()
+                editor.posing.drag(handle, held.moved(delta, depth))
+        editor.posing.settle()
         label = "Drag point" if is_moved else "Add pin" if start.alt else "Add handle"
         editor.commit(label if is_new or is_moved else "")
 
     def handle_at(self, editor: Editor, pointer: Pointer) -> int | None:
         """The handle a press would take."""
-        positions = editor.handle_positions()  # (H, 2) image px
+        positions = editor.posing.positions()  # (H, 2) image px
         if len(positions) == 0:
             return None
         gaps = np.linalg.norm(editor.view.canvas_from_image(positions) - pointer.xy, axis=1)
@@ -71,7 +71,7 @@ class PoseTool:
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         handle = self.handle_at(editor, pointer)
-        point = None if handle is not None else editor.surface_at(pointer.xy)
+        point = None if handle is not None else editor.posing.surface_at(pointer.xy)
         editor.hover = replace(editor.hover, handle=handle, surface=point, is_pin=pointer.alt)
         if handle is not None:
             return Shape.MOVE

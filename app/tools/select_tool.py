@@ -29,7 +29,7 @@ class SelectTool:
         else:
             x, y = editor.view.image_from_canvas(start.xy)
             is_foreground = start.button is Button.LEFT and not start.alt
-            editor.add_click(float(x), float(y), is_foreground)
+            editor.selection.add_click(float(x), float(y), is_foreground)
 
     def _choose_box(self, editor: Editor, start: Pointer, end: Pointer) -> None:
         assert editor.photo_size is not None
@@ -37,12 +37,12 @@ class SelectTool:
         low = np.clip(corners.min(0), 0, editor.photo_size)
         high = np.clip(corners.max(0), 0, editor.photo_size)
         if (high - low).min() >= MIN_BOX:
-            editor.set_box((float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+            editor.selection.set_box((float(low[0]), float(low[1]), float(high[0]), float(high[1])))
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
-        if editor.mask is None and editor.pending is None:
+        if editor.mask is None and editor.selection.pending is None:
             return "Click an object, or drag a box around it"
         return "Click adds to the selection · Right-click removes from it · Drag draws a new box"

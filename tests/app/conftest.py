@@ -98,7 +98,7 @@ def wait_for_jobs(editor: Editor) -> None:
 
 def lift_ball(editor: Editor) -> Document:
     """The ball, selected, lifted and with a background behind it."""
-    editor.add_click(*CENTRE, True)
+    editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
     assert editor.mask is not None, editor.message
     run(editor, "lift")

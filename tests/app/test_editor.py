@@ -56,7 +56,7 @@ def test_the_whole_job(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> No
     np.testing.assert_allclose(editor.view.canvas_from_image(xy), end, atol=PIXEL)
     assert next_step(editor) == ("Export photo…", "export")
 
-    editor.place(Placement(move=(12.0, -4.0), turn=(10.0, 0.0, 0.0)))
+    editor.placing.move_to(Placement(move=(12.0, -4.0), turn=(10.0, 0.0, 0.0)))
     editor.commit("Move object")
     posed = editor.document
 
@@ -92,33 +92,33 @@ def test_the_whole_job(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> No
 
 
 def test_a_second_click_refines_and_undo_takes_it_back(editor: Editor) -> None:
-    editor.add_click(*CENTRE, True)
-    assert editor.pending is not None  # shown at once
+    editor.selection.add_click(*CENTRE, True)
+    assert editor.selection.pending is not None  # shown at once
     wait_for_jobs(editor)
     first = editor.mask
-    editor.add_click(10, 10, False)
+    editor.selection.add_click(10, 10, False)
     wait_for_jobs(editor)
-    assert len(editor.prompt.clicks) == 2
+    assert len(editor.selection.prompt.clicks) == 2
     run(editor, "undo")
     assert editor.mask is first
     run(editor, "undo")
     assert editor.mask is None
-    assert len(editor.prompt.clicks) == 0
+    assert len(editor.selection.prompt.clicks) == 0
 
 
 def test_undo_while_selecting_takes_the_click_back(editor: Editor) -> None:
-    editor.add_click(*CENTRE, True)
+    editor.selection.add_click(*CENTRE, True)
     run(editor, "undo")
     wait_for_jobs(editor)
-    assert editor.pending is None
+    assert editor.selection.pending is None
     assert editor.mask is None
 
 
 def test_an_answer_to_an_old_question_is_dropped(editor: Editor) -> None:
-    editor.add_click(*CENTRE, True)
+    editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
     editor.tasks.lift()
-    editor.clear_selection()
+    editor.selection.clear()
     wait_for_jobs(editor)
     assert editor.mask is None
     assert not editor.is_lifted
@@ -146,14 +146,14 @@ def test_pins_hold_and_handles_can_be_removed(editor: Editor, ball: Document) ->
         editor.hand.move(Pointer(*at, is_down=False))
     assert editor.object is not None
     assert [h.is_pin for h in editor.object.handles] == [True, False]
-    held = editor.handle_positions()[0]
-    editor.select_handle(1)
-    editor.nudge_handle(10, 0)
-    np.testing.assert_allclose(editor.handle_positions()[0], held, atol=1e-6)
+    held = editor.posing.positions()[0]
+    editor.posing.select(1)
+    editor.posing.nudge(10, 0)
+    np.testing.assert_allclose(editor.posing.positions()[0], held, atol=1e-6)
     assert editor.history is not None
     assert editor.history.undo_label == "Nudge point"
-    editor.remove_handle(1)
-    editor.remove_handle(0)
+    editor.posing.remove(1)
+    editor.posing.remove(0)
     assert editor.object.handles == ()
     assert editor.object.pose is None
 
@@ -191,7 +191,7 @@ def test_an_export_that_cannot_be_written_says_so(editor: Editor, tmp_path: Path
 
 
 def test_unsaved_changes_are_asked_about(editor: Editor, photo_path: Path) -> None:
-    editor.add_click(*CENTRE, True)
+    editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
     document = editor.document
     editor.filing.open(photo_path)
@@ -234,16 +234,16 @@ def test_the_editor_needs_no_window_and_no_heavy_modules() -> None:
 def test_a_held_drag_comes_to_rest_and_is_then_left_alone(editor: Editor) -> None:
     lift_ball(editor)
     start = canvas_xy(editor, 90, 50)
-    handle = editor.start_handle(start, is_pin=False)
+    handle = editor.posing.start_handle(start, is_pin=False)
     assert handle is not None
-    spot = editor.handle_position(handle)
-    editor.drag_handle(handle, spot.moved(np.array([30.0, -20.0]), 0.0))
-    assert editor.is_restless
+    spot = editor.posing.spot(handle)
+    editor.posing.drag(handle, spot.moved(np.array([30.0, -20.0]), 0.0))
+    assert editor.posing.is_restless
     for _ in range(500):
-        editor.relax()
-    assert not editor.is_restless
+        editor.posing.relax()
+    assert not editor.posing.is_restless
     at_rest = editor.preview
-    editor.relax()
+    editor.posing.relax()
     assert editor.preview is at_rest
     editor.commit("")
 
@@ -254,10 +254,10 @@ def test_a_click_beside_a_handle_on_its_control_point_is_no_step(editor: Editor)
     drag(editor, start, canvas_xy(editor, 110, 40))
     document, thing = editor.document, editor.object
     assert thing is not None and thing.lifted is not None
-    target = editor.view.canvas_from_image(editor.handle_positions()[0])
+    target = editor.view.canvas_from_image(editor.posing.positions()[0])
     for angle in np.arange(0, 2 * np.pi, 0.1):  # just out of the handle's reach
         at = target + 13.0 * np.array([np.cos(angle), np.sin(angle)])
-        seen = editor.surface_at(at)
+        seen = editor.posing.surface_at(at)
         if PoseTool().handle_at(editor, Pointer(*at)) is None and seen is not None:
             node = edits.nearest_control_point(thing.lifted, seen.rest)
             if node == thing.handles[0].control_point:

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.window
 
 CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
 PRIMARY = (1160, 839)  # in the primary button, left of its label
-POSE_TOOL = (10, 88)  # in the Pose tool's button, beside its icon
+POSE_TOOL = (10, 132)  # in the Pose tool's button, beside its icon
 
 
 def run_app(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from objectmorpher_core.document import Placement
 
-from ..commands import COMMANDS, run
-from ..editor import Editor
-from .theme import Icon
-from .widgets import Number, button, gap, heading, note, number_field
+from ...commands import COMMANDS, run
+from ...editor import Editor
+from ..theme import Icon
+from ..widgets import Number, button, gap, heading, note, number_field
 
 FIELDS = (
     ("Position", (
@@ -27,7 +27,7 @@ FIELDS = (
 
 
 def draw_place(editor: Editor) -> None:
-    placement = editor.placement
+    placement = editor.placing.placement
     if placement is None:
         note("Lift an object first.")
         return
@@ -38,7 +38,7 @@ def draw_place(editor: Editor) -> None:
             change = number_field(number, values[number.name])
             values[number.name] = change.value
             if change.is_changed:
-                editor.place(_placement(placement, values))
+                editor.placing.move_to(_placement(placement, values))
             if change.is_done:
                 editor.commit(f"{number.name} of object")
         gap(12)

@@ -1,0 +1,57 @@
+"""Every command by name: menu, shortcuts, buttons and tests run the same entry."""
+
+from __future__ import annotations
+
+from ..editor import Editor
+from ..tasks import LIFT, SELECT
+from ..texts import t
+from ..view import ToolName
+from . import compose, edit, files, look, place, pose, select
+from .command import Command
+
+__all__ = ["COMMANDS", "Command", "keys_of", "next_step", "run", "why_not"]
+
+COMMANDS: dict[str, Command] = {
+    **files.COMMANDS, **edit.COMMANDS, **select.COMMANDS, **pose.COMMANDS, **place.COMMANDS,
+    **look.COMMANDS, **compose.COMMANDS,
+}  # fmt: skip
+
+
+def why_not(editor: Editor, name: str) -> str | None:
+    """Why a command cannot run now, or None."""
+    return COMMANDS[name].why_not(editor)
+
+
+def run(editor: Editor, name: str) -> None:
+    """Runs a command, or says why it cannot."""
+    command = COMMANDS[name]
+    reason = command.why_not(editor)
+    if reason is None:
+        command.run(editor)
+    else:
+        editor.say(reason)
+
+
+def keys_of(editor: Editor, name: str) -> str:
+    """The keys that run a command: the user's own, or the usual ones; "" for none."""
+    return editor.settings.shortcuts.get(name, COMMANDS[name].keys)
+
+
+def next_step(editor: Editor) -> tuple[str, str | None]:
+    """What the primary button says, and the command behind it (None: it only says it)."""
+    if editor.document is None:
+        return t("Open a photo…"), "open"
+    if editor.jobs.is_busy(LIFT):
+        return t("Lifting…"), None
+    if editor.mask is None:
+        is_busy = editor.jobs.is_busy(SELECT)
+        return (t("Selecting…") if is_busy else t("Click an object in the photo")), None
+    if not editor.is_lifted:
+        return t("Lift object"), "lift"
+    if editor.view.tool in (ToolName.SELECT, ToolName.MASK):
+        return t("Pose the object"), "pose"
+    thing = editor.object
+    if thing is not None and not thing.is_moved:
+        is_posing = editor.view.tool is ToolName.POSE
+        return (t("Drag a point on the object") if is_posing else t("Drag the object")), None
+    return t("Export photo…"), "export"

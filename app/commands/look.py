@@ -1,0 +1,54 @@
+"""What is shown, and from how near."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..editor import Editor
+from ..painter import shown_now
+from ..tools import navigate
+from ..view import Shown
+from .command import Command, no_lift, no_photo, nothing_lifted
+
+
+def _show(shown: Shown, number: int) -> Command:
+    def is_on(editor: Editor) -> bool:
+        return shown_now(editor.document, editor.view) is shown
+
+    why_not = nothing_lifted if number > 1 else no_photo
+    return Command(shown.value, f"Alt+{number}", _shower(shown), why_not, is_on)
+
+
+def _shower(shown: Shown) -> Callable[[Editor], None]:
+    def run(editor: Editor) -> None:
+        editor.view.shown = shown
+
+    return run
+
+
+def _fit(editor: Editor) -> None:
+    if editor.photo_size is not None:
+        editor.view.fit(editor.photo_size)
+
+
+def _split(editor: Editor) -> None:
+    editor.view.split = 0.5 if editor.view.split is None else None
+
+
+def _points(editor: Editor) -> None:
+    editor.view.has_points = not editor.view.has_points
+
+
+COMMANDS: dict[str, Command] = {
+    "fit": Command("Fit to window", "F", _fit),
+    "actual": Command("Actual size", "Ctrl+1", lambda e: navigate.zoom_to(e, 1.0)),
+    "zoom_in": Command("Zoom in", "Ctrl+=", lambda e: navigate.zoom_step(e, 1)),
+    "zoom_out": Command("Zoom out", "Ctrl+-", lambda e: navigate.zoom_step(e, -1)),
+    "split": Command(
+        "Split before/after", "\\", _split, is_on=lambda e: e.view.split is not None
+    ),
+    "points": Command(
+        "Control graph", "Ctrl+Shift+P", _points, no_lift, lambda e: e.view.has_points
+    ),
+    **{f"show_{s.name.lower()}": _show(s, n) for n, s in enumerate(Shown, start=1)},
+}  # fmt: skip

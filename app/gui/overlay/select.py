@@ -1,0 +1,49 @@
+"""The selection: its edge, the clicks and the box that made it."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import ImVec2
+
+from ..theme import theme
+from .canvas import ACCENT, DARK, WARM, Canvas
+
+
+def draw_selection(canvas: Canvas) -> None:
+    """For the Select tool."""
+    editor = canvas.editor
+    draw_edge(canvas)
+    prompt = editor.selection.prompt
+    if prompt.box is not None:
+        x0, y0, x1, y1 = prompt.box
+        canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
+    for click in prompt.clicks:
+        _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
+    if editor.rubber is not None:
+        draw_rubber(canvas)
+
+
+def draw_edge(canvas: Canvas) -> None:
+    """The outline of what is selected."""
+    editor = canvas.editor
+    if editor.mask is not None:
+        for outline in editor.derived.contours(editor.mask):
+            canvas.polyline(canvas.at(outline), ACCENT)
+
+
+def draw_rubber(canvas: Canvas) -> None:
+    """The box that is being drawn."""
+    assert canvas.editor.rubber is not None
+    x0, y0, x1, y1 = canvas.editor.rubber
+    low, high = canvas.on_canvas(np.array([[x0, y0], [x1, y1]]))
+    canvas.draw.add_rect_filled(low, high, theme.u32(ACCENT, 0.12))
+    canvas.draw.add_rect(low, high, theme.u32(ACCENT), 0.0, theme.pt(1.5))
+
+
+def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
+    """A disc with + or -: shape and colour both tell."""
+    canvas.disc(at, 6, ACCENT if is_foreground else WARM)
+    arm, dark, width = theme.pt(3), theme.u32(DARK), theme.pt(2)
+    canvas.draw.add_line(ImVec2(at.x - arm, at.y), ImVec2(at.x + arm, at.y), dark, width)
+    if is_foreground:
+        canvas.draw.add_line(ImVec2(at.x, at.y - arm), ImVec2(at.x, at.y + arm), dark, width)

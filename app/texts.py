@@ -1,0 +1,39 @@
+"""Every sentence the window says, in the user's language.
+
+The English text is its own key: `t("{count} handles", count=3)`. Translations are TOML tables in
+assets/languages, one file a language, `"English" = "translation"`; what one lacks stays English.
+`assets/languages/texts.txt` lists every text; a test keeps it complete.
+"""
+
+from __future__ import annotations
+
+import logging
+import tomllib
+
+from .resources import resource
+
+log = logging.getLogger(__name__)
+
+ENGLISH = "en"
+_texts: dict[str, str] = {}
+
+
+def use_language(code: str) -> None:
+    """Speaks `code` ("de") from now on; "en", or one that is not there, is English."""
+    global _texts
+    _texts = {}
+    if code == ENGLISH:
+        return
+    try:
+        path = resource(f"assets/languages/{code}.toml")
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        log.warning("There is no usable translation %r (%s); English is used", code, error)
+        return
+    _texts = {key: text for key, text in found.items() if isinstance(text, str) and text}
+
+
+def t(text: str, **values: object) -> str:
+    """`text` in the user's language, `{names}` in it replaced by `values`."""
+    found = _texts.get(text, text)
+    return found.format(**values) if values else found
