@@ -31,7 +31,7 @@ from .jobs import JobError, Jobs
 from .settings import Settings
 from .tasks import SELECT, Tasks
 from .texts import t
-from .tools.pointer import Hand
+from .tools.pointer import Hand, Pointer
 from .view import Shown, ToolName, View
 
 
@@ -57,6 +57,7 @@ class Editor:
         self.source: Path | None = None  # the photo's file
         self.current = 0  # index of the object that the tools change
         self.hover = Hover()
+        self.pointer: Pointer | None = None  # where it is now, on the canvas
         self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
         self.message: Message | None = None
         self.is_over = False  # the window closes

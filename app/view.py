@@ -11,6 +11,7 @@ from enum import Enum
 
 import numpy as np
 
+from objectmorpher_core.brush import Brush
 from objectmorpher_core.camera import Camera
 
 MARGIN = 24.0  # points between the fitted photo and the canvas's edge
@@ -56,6 +57,7 @@ class View:
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
+    brush: Brush = Brush()  # of every tool that paints
 
     @property
     def place(self) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..editor import Editor
+from ..tools import navigate
 from ..view import ToolName
 from .command import Command, Reason, never, no_lift, no_photo, no_redo, no_selection, no_undo
 
@@ -29,5 +30,9 @@ COMMANDS: dict[str, Command] = {
     "place": _tool(ToolName.PLACE, "4", no_lift),
     "look": _tool(ToolName.LOOK, "5", no_lift),
     "compose": _tool(ToolName.COMPOSE, "6", no_lift),
+    "smaller_brush": Command("Smaller brush", "[", lambda e: navigate.size_brush(e, -1)),
+    "larger_brush": Command("Larger brush", "]", lambda e: navigate.size_brush(e, 1)),
+    "softer_brush": Command("Softer brush", "Shift+[", lambda e: navigate.harden_brush(e, -1)),
+    "harder_brush": Command("Harder brush", "Shift+]", lambda e: navigate.harden_brush(e, 1)),
     "cancel": Command("Cancel the running job", "", lambda e: e.jobs.cancel(), never),
 }

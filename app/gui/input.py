@@ -57,6 +57,7 @@ class Input:
         """Hovering, beginning, going on: whichever it is."""
         io = imgui.get_io()
         is_over = rect.contains(io.mouse_pos.x, io.mouse_pos.y) and not io.want_capture_mouse
+        editor.pointer = pointer if is_over or editor.hand.is_busy else None
         if editor.hand.is_busy:
             self._go_on(editor, pointer)
         elif editor.document is not None and is_over:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,9 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 ZOOM_STEP = 1.2  # x per notch of the wheel
+BRUSH_STEP = 1.15  # x per press of a key
+HARDNESS_STEP = 0.1
+SMALLEST_BRUSH, LARGEST_BRUSH = 0.5, 2000.0  # px of the photo, radius
 SPLIT_REACH = 6.0  # points beside the before/after line where a press takes it
 
 
@@ -64,3 +68,17 @@ def drag_split(editor: Editor, pointer: Pointer) -> Stroke:
     """The before/after line follows the pointer."""
     while (pointer := (yield)).is_down:
         editor.view.split = float(np.clip(pointer.x / editor.view.width, 0.02, 0.98))
+
+
+def size_brush(editor: Editor, steps: float) -> None:
+    """Makes the brush larger, or smaller where `steps` is negative."""
+    brush = editor.view.brush
+    radius = float(np.clip(brush.radius * BRUSH_STEP**steps, SMALLEST_BRUSH, LARGEST_BRUSH))
+    editor.view.brush = replace(brush, radius=radius)
+
+
+def harden_brush(editor: Editor, steps: float) -> None:
+    """Makes the brush's edge harder, or softer where `steps` is negative."""
+    brush = editor.view.brush
+    hardness = float(np.clip(brush.hardness + HARDNESS_STEP * steps, 0, 1))
+    editor.view.brush = replace(brush, hardness=hardness)

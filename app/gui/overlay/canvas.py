@@ -111,6 +111,18 @@ class Canvas:
             low, high = ImVec2(at.x - reach, at.y - reach), ImVec2(at.x + reach, at.y + reach)
             self.draw.add_rect_filled(low, high, color, theme.pt(2))
 
+    def brush(self, color: str = WHITE) -> None:
+        """The brush's outline around the pointer: where it covers half."""
+        pointer, view = self.editor.pointer, self.editor.view
+        if pointer is None:
+            return
+        at, reach = self.on_canvas(pointer.xy)[0], view.zoom / self.ratio
+        half = view.brush.radius * (1 + view.brush.hardness) / 2
+        for radius, alpha in ((half, 1.0), (view.brush.radius, 0.45)):
+            r = max(radius * reach, 1.5)
+            self.draw.add_circle(at, r, theme.u32(DARK, 0.7 * alpha), 0, theme.pt(3))
+            self.draw.add_circle(at, r, theme.u32(color, alpha), 0, theme.pt(1.2))
+
     def label(self, text: str, x: float, y: float, side: float = 0.0) -> None:
         """White on dark, at a window position; `side`: 0 begins at x, 0.5 centred, 1 ends there."""
         size = imgui.calc_text_size(text)
