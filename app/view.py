@@ -6,7 +6,7 @@ in framebuffer px. Image px: the photo's own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -57,7 +57,7 @@ class View:
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
-    brush: Brush = Brush()  # of every tool that paints
+    brush: Brush = field(default_factory=Brush)  # of every tool that paints
 
     @property
     def place(self) -> tuple[float, ...]:
