@@ -6,11 +6,18 @@ import logging
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
+from .settings import settings_path
+
 log = logging.getLogger(__name__)
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 NAME = "objectmorpher.log"
 SIZE = 1_000_000  # bytes, after which a new file is begun; one old one is kept
+
+
+def log_path() -> Path:
+    """Where the log is."""
+    return settings_path().parent / NAME
 
 
 def start_log(folder: Path) -> None:

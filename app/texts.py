@@ -15,6 +15,7 @@ from .resources import resource
 log = logging.getLogger(__name__)
 
 ENGLISH = "en"
+NAME = "English"  # the text whose translation is the language's own name
 _texts: dict[str, str] = {}
 
 
@@ -31,6 +32,18 @@ def use_language(code: str) -> None:
         log.warning("There is no usable translation %r (%s); English is used", code, error)
         return
     _texts = {key: text for key, text in found.items() if isinstance(text, str) and text}
+
+
+def languages() -> dict[str, str]:
+    """Names of the languages there are, in themselves, by code."""
+    found = {ENGLISH: "English"}
+    for path in sorted(resource("assets/languages").glob("*.toml")):
+        try:
+            name = tomllib.loads(path.read_text(encoding="utf-8")).get(NAME)
+        except (OSError, ValueError):
+            continue
+        found[path.stem] = str(name or path.stem)
+    return found
 
 
 def t(text: str, **values: object) -> str:

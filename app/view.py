@@ -41,6 +41,14 @@ class Shown(Enum):
     STRAIN = "Strain"
 
 
+class Popup(Enum):
+    """Panels over the window, one at a time."""
+
+    SHORTCUTS = "Keyboard and pointer…"
+    PREFERENCES = "Preferences…"
+    ABOUT = "About ObjectMorpher"
+
+
 @dataclass(eq=False)
 class View:
     """Mutable: the tools and panels write it, the window reads it each frame."""
@@ -57,6 +65,7 @@ class View:
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
+    popup: Popup | None = None
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
 
     @property

@@ -6,15 +6,24 @@ from ..editor import Editor
 from ..tasks import LIFT, SELECT
 from ..texts import t
 from ..view import ToolName
-from . import compose, edit, files, look, place, pose, select
+from . import compose, edit, files, look, place, pose, select, window
 from .command import Command
 
-__all__ = ["COMMANDS", "Command", "keys_of", "next_step", "run", "why_not"]
+__all__ = ["COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "why_not"]
 
+GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
+    "File": files.COMMANDS,
+    "Edit": edit.COMMANDS,
+    "Select": select.COMMANDS,
+    "Pose": pose.COMMANDS,
+    "Place": place.COMMANDS,
+    "Look": look.COMMANDS,
+    "Compose": compose.COMMANDS,
+    "Window": window.COMMANDS,
+}
 COMMANDS: dict[str, Command] = {
-    **files.COMMANDS, **edit.COMMANDS, **select.COMMANDS, **pose.COMMANDS, **place.COMMANDS,
-    **look.COMMANDS, **compose.COMMANDS,
-}  # fmt: skip
+    name: command for group in GROUPS.values() for name, command in group.items()
+}
 
 
 def why_not(editor: Editor, name: str) -> str | None:

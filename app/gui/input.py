@@ -8,9 +8,11 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ..commands import COMMANDS, keys_of, run
+from ..commands import run
 from ..editor import Editor
 from ..feedback import Hover
+from ..shortcuts import Shortcuts
+from ..texts import t
 from ..tools import navigate
 from ..tools.pointer import Button, Pointer, Shape, Tool
 from ..tools.registry import TOOLS
@@ -19,13 +21,15 @@ from .layout import Rect
 log = logging.getLogger(__name__)
 
 ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
+HELP = "?"
 FAR = 10  # px that an arrow with Shift moves
 
 
 class Input:
     """One frame's input to the editor; remembers only what the pointer looks like."""
 
-    def __init__(self) -> None:
+    def __init__(self, shortcuts: Shortcuts) -> None:
+        self._shortcuts = shortcuts
         self.shape = Shape.ARROW
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
@@ -70,7 +74,7 @@ class Input:
 
     def hint(self, editor: Editor) -> str:
         if editor.document is None:
-            return "Open a photo, drop one here, or try a sample"
+            return t("Open a photo, drop one here, or try a sample")
         return TOOLS[editor.view.tool].hint(editor)
 
     def take_key(self, keys: str) -> None:
@@ -80,6 +84,8 @@ class Input:
     def _run_keys(self, editor: Editor) -> None:
         """What was pressed since the last frame; nothing while a field or a dialog has the keys."""
         pressed, self._pressed = self._pressed, []
+        if pressed and self._shortcuts.take(pressed[-1]):
+            return
         any_popup = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
         if imgui.get_io().want_text_input or imgui.is_popup_open("", any_popup):
             editor.view.is_before = False
@@ -90,12 +96,16 @@ class Input:
 
     def _run_key(self, editor: Editor, keys: str) -> None:
         far, direction = keys.startswith("Shift+"), ARROWS.get(keys.removeprefix("Shift+"))
-        if keys == "Escape":
+        if keys == "Escape" and editor.view.popup is not None:
+            editor.view.popup = None
+        elif keys == "Escape":
             editor.escape()
+        elif keys == HELP:
+            run(editor, "shortcuts")
         elif direction is not None:
             step = FAR if far else 1
             editor.posing.nudge(direction[0] * step, direction[1] * step)
-        elif (name := _command_of(editor, keys)) is not None:
+        elif (name := self._shortcuts.command_of(keys)) is not None:
             run(editor, name)
 
     def _begin(self, editor: Editor, pointer: Pointer) -> None:
@@ -151,11 +161,3 @@ class Input:
             editor.posing.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))
-
-
-def _command_of(editor: Editor, keys: str) -> str | None:
-    """The command that a chord runs."""
-    for name, command in COMMANDS.items():
-        if keys == keys_of(editor, name) or keys in command.other_keys:
-            return name
-    return None

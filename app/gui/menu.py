@@ -6,9 +6,9 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from ..commands import COMMANDS, run
+from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
-from ..painter import shown_now
+from ..texts import t
 from ..view import Shown
 from .layout import Rect
 from .theme import Icon, theme
@@ -16,12 +16,14 @@ from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
-    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
-    "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
+    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place", "-", "preferences"),
+    "Object": ("subject", "clear", "-", "lift"),
+    "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
-        "-", "split", "points", "-", "theme",
+        "-", "split", "points",
     ),
+    "Help": ("shortcuts", "about"),
 }  # fmt: skip
 
 
@@ -35,7 +37,7 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(12, 10))
     for title, names in MENUS.items():
-        if imgui.begin_menu(title):
+        if imgui.begin_menu(f"{t(title)}##{title}"):
             _draw_items(editor, names)
             imgui.end_menu()
     imgui.pop_style_var(2)
@@ -52,10 +54,6 @@ def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
             imgui.separator()
         elif name == "recent":
             _draw_recent(editor)
-        elif name == "theme":
-            is_light = editor.settings.theme == "light"
-            if imgui.menu_item("Light theme", "", is_light)[0]:
-                editor.set_theme("dark" if is_light else "light")
         else:
             _draw_command(editor, name)
 
@@ -63,28 +61,20 @@ def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
 def _draw_command(editor: Editor, name: str) -> None:
     command = COMMANDS[name]
     reason = command.why_not(editor)
-    label = command.label
+    label = t(command.label)
     if name == "undo" and editor.history and editor.history.undo_label:
-        label = f"Undo: {editor.history.undo_label}"
+        label = t("Undo: {label}", label=editor.history.undo_label)
     if name == "redo" and editor.history and editor.history.redo_label:
-        label = f"Redo: {editor.history.redo_label}"
-    is_on = name in _switched_on(editor)
-    if imgui.menu_item(f"{label}##{name}", command.keys, is_on, reason is None)[0]:
+        label = t("Redo: {label}", label=editor.history.redo_label)
+    is_on = command.is_on is not None and command.is_on(editor)
+    if imgui.menu_item(f"{label}##{name}", keys_of(editor, name), is_on, reason is None)[0]:
         run(editor, name)
     if reason is not None:
         tooltip(reason)
 
 
-def _switched_on(editor: Editor) -> set[str]:
-    """The toggles that are on, and the view that is chosen."""
-    view = editor.view
-    names = {f"show_{shown_now(editor.document, view).name.lower()}"}
-    names |= {"split"} if view.split is not None else set()
-    return names | ({"points"} if view.has_points else set())
-
-
 def _draw_recent(editor: Editor) -> None:
-    if imgui.begin_menu("Open recent", bool(editor.settings.recent)):
+    if imgui.begin_menu(t("Open recent"), bool(editor.settings.recent)):
         for path in editor.settings.recent:
             if imgui.menu_item(f"{Path(path).name}##{path}", "", False)[0]:
                 editor.filing.open(Path(path))
@@ -99,7 +89,7 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     side = rect.height - theme.pt(4)
     buttons = 2 * side + theme.pt(4 + 12)
     name = editor.path.name if editor.path else editor.document.photo.name
-    state = "" if editor.is_saved else "edited"
+    state = "" if editor.is_saved else t("edited")
     if (text := imgui.calc_text_size(name).x) > rect.width * 0.4:
         name = f"{name[:24]}…"
         text = imgui.calc_text_size(name).x
@@ -116,6 +106,6 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
             imgui.same_line(0, theme.pt(4))
         imgui.set_cursor_pos_y(theme.pt(2))
         command = COMMANDS[name]
-        hint = f"{command.label} ({command.keys})"
+        hint = f"{t(command.label)} ({keys_of(editor, name)})"
         if icon_button(icon, name, hint, command.why_not(editor), points):
             run(editor, name)

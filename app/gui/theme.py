@@ -45,13 +45,13 @@ class Palette:
 
 DARK = Palette(
     surround="#1E1F22", panel="#26282C", raised="#30333A", hovered="#3A3E46", pressed="#454A54",
-    line="#34373D", text="#E6E7E9", secondary="#A4A8B0", accent="#5AA9FF",
+    line="#34373D", text="#E6E7E9", secondary="#A9ADB5", accent="#5AA9FF",
     accent_hovered="#7BBBFF", on_accent="#0C1A29", warning="#F2B84B", error="#F2695C",
 )  # fmt: skip
 LIGHT = Palette(
     surround="#D9DADC", panel="#F4F5F6", raised="#E4E6E9", hovered="#D8DBDF", pressed="#C9CDD3",
     line="#D5D7DB", text="#1D1F23", secondary="#555A63", accent="#1668C8",
-    accent_hovered="#2A7BDB", on_accent="#FFFFFF", warning="#8A5A00", error="#B3261E",
+    accent_hovered="#0F5AB2", on_accent="#FFFFFF", warning="#8A5A00", error="#B3261E",
 )  # fmt: skip
 PALETTES = {"dark": DARK, "light": LIGHT}
 

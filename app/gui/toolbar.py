@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from ..commands import COMMANDS, run
+from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
+from ..texts import t
 from ..view import ToolName
 from .layout import Rect
 from .panes import edge, pane
@@ -50,6 +51,6 @@ def _draw_tool(editor: Editor, tool: ToolName, icon: str, name: str, hint: str) 
     imgui.pop_font()
     imgui.pop_style_var()
     imgui.pop_style_color(3 if is_active else 2)
-    tooltip(f"{command.label} ({command.keys})\n{reason or hint}")
+    tooltip(f"{t(command.label)} ({keys_of(editor, name)})\n{reason or t(hint)}")
     if is_pressed:
         run(editor, name)

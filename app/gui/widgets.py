@@ -19,6 +19,7 @@ class Kind(Enum):
     """How much a button asks for attention."""
 
     PRIMARY = "primary"
+    PRIMARY_SMALL = "primary, as high as the others"
     WAITING = "waiting"  # a primary button while the next step is the user's, in the photo
     PLAIN = "plain"
     QUIET = "quiet"  # no frame until hovered
@@ -80,6 +81,7 @@ def button(
 
 _ROLES = {
     Kind.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
+    Kind.PRIMARY_SMALL: ("accent", "accent_hovered", "accent", "on_accent"),
     Kind.WAITING: ("raised", "raised", "raised", "secondary"),
     Kind.PLAIN: ("raised", "hovered", "pressed", "text"),
     Kind.QUIET: ("none", "hovered", "pressed", "text"),

@@ -23,14 +23,17 @@ from ..options import WindowOptions
 from ..render.renderer import Renderer
 from ..resources import resource
 from ..settings import read_settings, settings_path, write_settings
+from ..shortcuts import Shortcuts
+from ..texts import ENGLISH, t, use_language
 from ..tools.pointer import Shape
 from . import theme as looks
 from .dialogs import Dialogs
-from .input import Input
+from .input import HELP, Input
 from .inspector import draw_inspector
 from .layout import Rect, lay_out
 from .menu import draw_menu
 from .overlays import draw_overlays
+from .popups import Popups
 from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
@@ -53,6 +56,13 @@ KEY_NAMES = {
     glfw.KEY_RIGHT: "Right",
     glfw.KEY_UP: "Up",
     glfw.KEY_DOWN: "Down",
+    glfw.KEY_TAB: "Tab",
+    glfw.KEY_HOME: "Home",
+    glfw.KEY_END: "End",
+    glfw.KEY_PAGE_UP: "PageUp",
+    glfw.KEY_PAGE_DOWN: "PageDown",
+    glfw.KEY_INSERT: "Insert",
+    **{glfw.KEY_F1 + n: f"F{n + 1}" for n in range(12)},
 }
 CURSORS = {
     Shape.ARROW: glfw.ARROW_CURSOR,
@@ -94,11 +104,14 @@ class Window:
         self.editor = Editor(settings, wake=glfw.post_empty_event)
         self.editor.filing = Filing(self.editor, options.fov, options.seed)
         self._saved_settings = settings
+        self._language = ENGLISH
         self._look: tuple[str, float] = ("", 0.0)
-        self._input = Input()
+        self._shortcuts = Shortcuts(self.editor)
+        self._input = Input(self._shortcuts)
         self._start_imgui()
         self._start = StartScreen(self._renderer)
         self._dialogs = Dialogs()
+        self._popups = Popups(self._shortcuts)
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
         self._title = ""
@@ -178,6 +191,7 @@ class Window:
             draw_inspector(self.editor, layout.inspector)
             draw_overlays(self.editor, layout.canvas, ratio)
         draw_status(self.editor, layout.status, self._input.hint(self.editor))
+        self._popups.draw(self.editor)
         self._dialogs.draw(self.editor)
         self._set_cursor()
         self._set_title()
@@ -210,7 +224,9 @@ class Window:
         io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
         looks.load_fonts()
         take_key: Any = self._take_key
+        take_character: Any = self._take_character
         glfw.set_key_callback(self._handle, take_key)  # before ImGui's, which calls it too
+        glfw.set_char_callback(self._handle, take_character)
         address = ctypes.cast(self._handle, ctypes.c_void_p).value
         assert address is not None
         imgui.backends.glfw_init_for_opengl(address, True)
@@ -223,6 +239,9 @@ class Window:
         if self._options.theme is not None and settings.theme == self._saved_settings.theme:
             name = self._options.theme
         scale = self._options.scale or settings.scale or self._monitor_scale()
+        if settings.language != self._language:
+            self._language = settings.language
+            use_language(settings.language)
         if (name, scale) != self._look:
             self._look = (name, scale)
             looks.apply(name if name in looks.PALETTES else "dark", scale)
@@ -252,7 +271,8 @@ class Window:
         title = "ObjectMorpher"
         if editor.document is not None:
             name = editor.path.name if editor.path else editor.document.photo.name
-            title = f"{name}{'' if editor.is_saved else ' — edited'} · ObjectMorpher"
+            state = "" if editor.is_saved else f" — {t('edited')}"
+            title = f"{name}{state} · ObjectMorpher"
         if title != self._title:
             self._title = title
             glfw.set_window_title(self._handle, title)
@@ -267,6 +287,11 @@ class Window:
         if name:
             held = [word for word, bit in MODIFIERS if mods & bit]
             self._input.take_key("+".join([*held, name[:1].upper() + name[1:]]))
+
+    def _take_character(self, _window: object, code: int) -> None:
+        """The one shortcut that is a character, wherever the keyboard has it."""
+        if chr(code) == HELP:
+            self._input.take_key(HELP)
 
     def _take_drop(self, _window: object, paths: Any) -> None:
         if paths:

@@ -1,0 +1,37 @@
+"""What the pointer and the held keys do: for the table of shortcuts. English keys of texts."""
+
+from __future__ import annotations
+
+GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
+    "Everywhere": (
+        ("Space-drag, middle drag", "Pan"),
+        ("Wheel", "Zoom at the pointer"),
+        ("X (hold)", "Show the photo as it was"),
+        ("Esc", "Take back the stroke, deselect"),
+    ),
+    "Select": (
+        ("Click", "Add to the selection"),
+        ("Right-click, Alt-click", "Remove from the selection"),
+        ("Drag", "Draw a box around the object"),
+    ),
+    "Refine mask": (
+        ("Drag", "Paint"),
+        ("Alt-drag, right drag", "Erase"),
+    ),
+    "Pose": (
+        ("Drag", "Move a point of the object"),
+        ("Shift-drag", "Along one axis of the picture"),
+        ("Alt-drag", "Along the surface's normal"),
+        ("Ctrl-drag", "Turn the point"),
+        ("Wheel while dragging", "Nearer, farther"),
+        ("Alt-click", "Pin that stays"),
+        ("Right-click", "Remove a point"),
+        ("Arrows, with Shift", "Nudge by 1 px, by 10 px"),
+    ),
+    "Place": (
+        ("Drag", "Move the object"),
+        ("Wheel while dragging", "Nearer, farther"),
+        ("Corner", "Scale"),
+        ("Ring", "Turn · Shift: in steps of 15°"),
+    ),
+}

@@ -1,0 +1,38 @@
+"""What this program is, and where its parts come from."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from ... import __version__
+from ...editor import Editor
+from ...logs import log_path
+from ...resources import resource
+from ...texts import t
+from ..widgets import Kind, button, gap, note
+from .frame import popup
+
+SIZE = (520.0, 420.0)  # points
+
+
+def draw_about(editor: Editor) -> None:
+    """Version, licences, and where the log is."""
+    with popup(editor, t("About ObjectMorpher"), *SIZE):
+        imgui.text_unformatted(t("Version {version}", version=__version__))
+        gap(12)
+        note(t("Open a photo, click an object, drag its points in 3D, save the photo."))
+        note(t("After “ObjectMorpher” (CVPR 2026). Everything runs on this computer."))
+        gap(12)
+        note(t("The log is {path}", path=log_path()))
+        if button(t("Copy the log"), Kind.PLAIN, width=200):
+            imgui.set_clipboard_text(_log())
+            editor.say(t("The log is in the clipboard"))
+        gap(12)
+        note(resource("assets/licences.txt").read_text(encoding="utf-8"))
+
+
+def _log() -> str:
+    try:
+        return log_path().read_text(encoding="utf-8")
+    except OSError:
+        return ""

@@ -1,0 +1,42 @@
+"""The frame that panels over the window share: title, close button, a place in the middle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import ImVec2, imgui
+
+from ...editor import Editor
+from ...texts import t
+from ..theme import FIELD, Icon, theme
+from ..widgets import bold_text, icon_button
+
+PAD = 20.0  # points
+LEAST_AROUND = 48.0  # points of the window that stay visible around it
+TITLE = 20.0  # ImGui's font size
+
+
+@contextmanager
+def popup(editor: Editor, title: str, width: float, height: float) -> Iterator[None]:
+    """A panel of so many points, or less where the window is small; closed by X or Esc."""
+    room, around = imgui.get_io().display_size, theme.pt(LEAST_AROUND)
+    size = ImVec2(min(theme.pt(width), room.x - around), min(theme.pt(height), room.y - 2 * around))
+    centre = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(size)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(PAD, PAD))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+    imgui.begin(f"{title}##popup", None, flags | imgui.WindowFlags_.no_move)
+    imgui.pop_style_var(3)
+    with bold_text(TITLE):
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(title)
+    imgui.set_cursor_pos(ImVec2(size.x - theme.pt(PAD + FIELD), theme.pt(PAD)))
+    if icon_button(Icon.CLOSE, "close", t("Close (Esc)")):
+        editor.view.popup = None
+    imgui.dummy(theme.size(0, 4))
+    yield
+    imgui.end()
