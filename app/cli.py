@@ -79,6 +79,7 @@ def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
     add("--seed", type=int, default=0)
     add("--frames", type=int, metavar="N", help="close after N frames")
     add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
+    add("--frame-log", type=Path, metavar="F.json", help="when each frame was shown")
     return parser.parse_args(list(arguments))
 
 
@@ -90,7 +91,7 @@ def window_options(options: argparse.Namespace) -> WindowOptions:
     width, height = options.size
     return WindowOptions(
         file, options.renderer, options.theme, options.scale, (int(width), int(height)),
-        options.fov, options.seed, options.frames, options.screenshot,
+        options.fov, options.seed, options.frames, options.screenshot, options.frame_log,
     )  # fmt: skip
 
 

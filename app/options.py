@@ -21,3 +21,4 @@ class WindowOptions:
     seed: int = 0
     frames: int | None = None  # close after so many frames; None: stay
     screenshot: Path | None = None  # PNG of the last frame
+    frame_log: Path | None = None  # JSON, when which frame was shown

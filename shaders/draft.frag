@@ -14,7 +14,6 @@ uniform float zoom;       // canvas px per image px
 uniform vec4 photo_box;   // x0, y0, x1, y1 canvas px; nothing is drawn outside
 uniform float split;      // canvas px, left of which the photo is shown as it was
 uniform sampler2D marks;  // share that shows the object but nothing of the photo
-uniform float marked;     // 1: hatches that
 
 in vec2 xy;
 out vec4 color;
@@ -31,7 +30,11 @@ void main() {
     float covered = clamp(2.0 * coarse.a, 0.0, 1.0);
     vec4 sharp = vec4(texel.rgb * texel.a, texel.a) * covered;
     color = mix(coarse, sharp, look.z);
+#ifdef HAS_MARKS
     float share = clamp(texture(marks, at).r / max(coarse.a, 1e-3), 0, 1);
-    color.rgb = hatched(color.rgb, color.a, marked * share, xy);
+    color.rgb = hatched(color.rgb, color.a, share, xy);
+#endif
+#ifdef HAS_BLEND
     color *= texture(blend, xy / cells).r;
+#endif
 }

@@ -8,9 +8,7 @@ uniform vec4 box;         // x0, y0, x1, y1 canvas px
 uniform vec4 photo_box;   // x0, y0, x1, y1 canvas px; nothing is drawn outside
 uniform float split;      // canvas px, left of which the photo is shown as it was
 uniform sampler2D marks;  // share that shows the object but nothing of the photo
-uniform float marked;     // 1: hatches that
 uniform float opacity;
-uniform float blended;    // 1: the blend counts
 
 in vec2 xy;
 out vec4 color;
@@ -21,11 +19,16 @@ void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
     vec2 at = (xy - box.xy) / (box.zw - box.xy);
     color = texture(layer, at);
+#ifdef HAS_MARKS
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel
     float share = color.a - texture(marks, at).g;
 #else
     float share = texture(marks, at).r;
 #endif
-    color.rgb = hatched(color.rgb, color.a, marked * clamp(share / max(color.a, 1e-3), 0, 1), xy);
-    color *= opacity * mix(1.0, texture(blend, xy / cells).r, blended);
+    color.rgb = hatched(color.rgb, color.a, clamp(share / max(color.a, 1e-3), 0, 1), xy);
+#endif
+#ifdef HAS_BLEND
+    color *= texture(blend, xy / cells).r;
+#endif
+    color *= opacity;
 }

@@ -1,5 +1,6 @@
 #version 330
-// The photo, the plate over it, and what the selection says about it.
+// The photo, the plate over it, and what the selection says about it. What a scene lacks is not
+// looked up: HAS_PLATE, HAS_MASK, HAS_BLEND, HAS_PAPER.
 
 uniform sampler2D photo;
 uniform sampler2D plate;
@@ -14,8 +15,7 @@ uniform float split;      // canvas px, left of which the photo is shown as it w
 uniform vec3 surround;    // sRGB
 uniform float veil;       // share of black over what is outside the mask
 uniform float hatch;      // share of the hatching over the mask
-uniform float bare;       // 1: paper instead of the photo
-uniform vec3 paper;       // sRGB
+uniform vec3 paper;       // sRGB, instead of the photo
 uniform vec3 checked;     // sRGB, of every other square
 
 in vec2 xy;
@@ -37,17 +37,27 @@ vec3 checker(vec2 point) {
 
 void main() {
     vec2 point = corner + xy / zoom;  // image px
+#ifdef HAS_PAPER
+    vec3 picture = checker(point);
+#else
     vec3 picture = texture(photo, point / photo_size).rgb;
-    if (xy.x >= split) {
-        float edited = texture(blend, xy / cells).r;
-        vec2 in_plate = (point - plate_box.xy) / (plate_box.zw - plate_box.xy);
-        if (all(greaterThan(in_plate, vec2(0))) && all(lessThan(in_plate, vec2(1)))) {
-            picture = mix(picture, texture(plate, in_plate).rgb, edited);
-        }
-        float meant = texture(mask, point / photo_size).r;
-        picture = mix(picture, vec3(0), veil * (1.0 - meant));
-        picture = hatched(picture, 1.0, hatch * meant * edited, xy);
-        picture = mix(picture, checker(point), bare);
+#endif
+#ifdef HAS_BLEND
+    float edited = texture(blend, xy / cells).r;
+#else
+    float edited = 1.0;
+#endif
+#ifdef HAS_PLATE
+    vec2 in_plate = (point - plate_box.xy) / (plate_box.zw - plate_box.xy);
+    if (all(greaterThan(in_plate, vec2(0))) && all(lessThan(in_plate, vec2(1)))) {
+        picture = mix(picture, texture(plate, in_plate).rgb, edited);
     }
+#endif
+#ifdef HAS_MASK
+    float meant = texture(mask, point / photo_size).r;
+    picture = mix(picture, vec3(0), veil * (1.0 - meant));
+    picture = hatched(picture, 1.0, hatch * meant * edited, xy);
+#endif
+    if (xy.x < split) picture = texture(photo, point / photo_size).rgb;
     color = vec4(mix(surround, picture, inside(point, vec4(0, 0, photo_size))), 1);
 }

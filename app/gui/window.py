@@ -28,6 +28,7 @@ from ..texts import ENGLISH, t, use_language
 from ..tools.pointer import Shape
 from . import theme as looks
 from .dialogs import Dialogs
+from .frame_log import FrameLog
 from .input import HELP, Input
 from .inspector import draw_inspector
 from .layout import Rect, lay_out
@@ -115,6 +116,7 @@ class Window:
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
         self._title = ""
+        self._frame_log = FrameLog(options.frame_log) if options.frame_log else None
         if options.frames is not None:
             self.editor.derived.layers.frame_time = math.inf
         take_drop: Any = self._take_drop
@@ -130,13 +132,20 @@ class Window:
                 glfw.poll_events()
             has_news = self.editor.poll() or self.editor.posing.is_restless
             lively = SETTLE if has_news else lively - 1
+            if self._frame_log is not None:
+                self._frame_log.begin()
             self._frame()
             drawn += 1
             if self._is_over(drawn):
                 break
             glfw.swap_buffers(self._handle)
+            if self._frame_log is not None:
+                mouse = imgui.get_io().mouse_pos
+                self._frame_log.end(self.editor, (mouse.x, mouse.y))
             if drawn == 1:
                 self._open_first()
+        if self._frame_log is not None:
+            self._frame_log.write()
         if self._options.screenshot is not None:
             self._write_screenshot(self._options.screenshot)
 

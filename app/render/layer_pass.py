@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
@@ -12,13 +12,14 @@ from ..view import View
 from .blend_texture import BLEND, blend_cells
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
-from .shaders import build_program, set_uniforms
+from .shaders import Programs, set_uniforms
 from .textures import PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPicture
 
 LAYER, LOOKS, CROP, MARKS = range(4)  # texture units
+_UNITS = {"layer": LAYER, "looks": LOOKS, "crop": CROP, "marks": MARKS, "blend": BLEND}
 KEPT_CROPS = 4
 TINT = 0.6  # opacity
 
@@ -28,33 +29,23 @@ class LayerPass:
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
-        self._exact, self._exact_quad = self._build("layer.frag")
-        self._drawn, self._drawn_quad = self._build("layer.frag", "DETAIL")  # by the GPU
-        self._draft, self._draft_quad = self._build("draft.frag")
+        self._exact = Programs(context, "quad.vert", "layer.frag", _UNITS)
+        self._draft = Programs(context, "quad.vert", "draft.frag", _UNITS)
         self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
         self._crops: dict[int, tuple[np.ndarray, PictureTexture]] = {}
-        self._nothing = context.texture((1, 1), 4, bytes(4))
-
-    def _build(self, fragment: str, *defines: str) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        program = build_program(self._context, "quad.vert", fragment, *defines)
-        set_uniforms(program, layer=LAYER, looks=LOOKS, crop=CROP, marks=MARKS, blend=BLEND)
-        return program, self._context.vertex_array(program, [])
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
         self._forget(scene.layers)
         for layer in scene.layers:
-            self._nothing.use(MARKS)
             for unit, texture in self._textures(layer).items():
                 texture.use(unit)
-            is_exact = layer.draft is None
-            program, quad = (
-                (self._exact, self._exact_quad) if is_exact else (self._draft, self._draft_quad)
-            )
+            programs = self._exact if layer.draft is None else self._draft
+            defines = _defines(scene, layer.invented is not None, layer.is_tint)
+            program, quad = programs(*defines)
             if layer.draft is not None:
-                self._use_draft(layer.draft, view)
-            set_uniforms(program, box=layer.box, **_appearance(layer.is_tint))
-            set_uniforms(program, marked=0.0 if layer.invented is None else 1.0)
+                set_uniforms(program, **self._use_draft(layer.draft, view))
+            set_uniforms(program, box=layer.box, opacity=TINT if layer.is_tint else 1.0)
             self._render(program, quad, scene, view)
 
     def draw_picture(
@@ -62,11 +53,13 @@ class LayerPass:
     ) -> None:
         """A picture of the whole canvas that is on the GPU already."""
         picture.color.use(LAYER)
-        (picture.detail or self._nothing).use(MARKS)
-        box = (0, 0, view.width, view.height)
-        set_uniforms(self._drawn, box=box, **_appearance(item.is_tint))
-        set_uniforms(self._drawn, marked=1.0 if item.is_marked else 0.0)
-        self._render(self._drawn, self._drawn_quad, scene, view)
+        is_marked = item.is_marked and picture.detail is not None
+        if picture.detail is not None:
+            picture.detail.use(MARKS)
+        program, quad = self._exact("DETAIL", *_defines(scene, is_marked, item.is_tint))
+        box, opacity = (0, 0, view.width, view.height), TINT if item.is_tint else 1.0
+        set_uniforms(program, box=box, opacity=opacity)
+        self._render(program, quad, scene, view)
 
     def _render(
         self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: View
@@ -84,17 +77,18 @@ class LayerPass:
         quad.render(moderngl.TRIANGLE_STRIP, 4)
         self._context.disable(moderngl.BLEND)
 
-    def _use_draft(self, draft: Draft, view: View) -> None:
+    def _use_draft(self, draft: Draft, view: View) -> dict[str, Any]:
+        """Binds its crop of the photo; the uniforms that say where it is."""
         height, width = draft.texture.shape[:2]
         crop_box = (draft.left, draft.top, draft.left + width, draft.top + height)
         corner = (view.left, view.top)
-        set_uniforms(self._draft, crop_box=crop_box, corner=corner, zoom=view.zoom)
         if id(draft.texture) not in self._crops:
             picture = PictureTexture(self._context)
             picture.upload(_as_u8(draft.texture))
             kept = list(self._crops.items())[: KEPT_CROPS - 1]
             self._crops = {id(draft.texture): (draft.texture, picture), **dict(kept)}
         self._crops[id(draft.texture)][1].use(CROP, min(view.zoom, 1.0))
+        return {"crop_box": crop_box, "corner": corner, "zoom": view.zoom}
 
     def _forget(self, layers: tuple[Layer, ...]) -> None:
         """Releases what is not shown any more."""
@@ -124,8 +118,10 @@ class LayerPass:
         return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
 
 
-def _appearance(is_tint: bool) -> dict[str, float]:
-    return {"opacity": TINT if is_tint else 1.0, "blended": 0.0 if is_tint else 1.0}
+def _defines(scene: Scene, is_marked: bool, is_tint: bool) -> list[str]:
+    """What of the shaders is needed: a tint lies over photo and edit alike."""
+    defines = ["HAS_MARKS"] if is_marked else []
+    return defines + (["HAS_BLEND"] if scene.blend is not None and not is_tint else [])
 
 
 def _photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:

@@ -9,22 +9,21 @@ import moderngl
 from ..view import View
 from .blend_texture import BLEND, blend_cells
 from .scene import Hatch, Scene
-from .shaders import build_program, set_uniforms
+from .shaders import Programs, set_uniforms
 from .textures import PictureTexture
 
 PHOTO, PLATE, MASK = range(3)  # texture units; BLEND is bound by the renderer
+_UNITS = {"photo": PHOTO, "plate": PLATE, "mask": MASK, "blend": BLEND}
 
 
 class PhotoPass:
     """One rectangle over the whole canvas."""
 
     def __init__(self, context: moderngl.Context) -> None:
-        self._program = build_program(context, "quad.vert", "photo.frag")
-        self._quad = context.vertex_array(self._program, [])
+        self._programs = Programs(context, "quad.vert", "photo.frag", _UNITS)
         self._photo = PictureTexture(context)
         self._plate = PictureTexture(context)
         self._mask = PictureTexture(context)
-        set_uniforms(self._program, photo=PHOTO, plate=PLATE, mask=MASK, blend=BLEND)
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -36,8 +35,9 @@ class PhotoPass:
         self._mask.use(MASK, view.zoom)
         height, width = scene.photo.shape[:2]
         plate_box = scene.plate.box if scene.plate else (0, 0, -1, -1)
+        program, quad = self._programs(*_defines(scene))
         set_uniforms(
-            self._program,
+            program,
             canvas=(view.width, view.height),
             box=(0, 0, view.width, view.height),
             corner=(view.left, view.top),
@@ -52,7 +52,7 @@ class PhotoPass:
             **_paper_uniforms(scene),
             cells=blend_cells(scene),
         )
-        self._quad.render(moderngl.TRIANGLE_STRIP, 4)
+        quad.render(moderngl.TRIANGLE_STRIP, 4)
 
 
 def hatch_uniforms(hatch: Hatch | None, view: View) -> dict[str, Any]:
@@ -67,5 +67,14 @@ def hatch_uniforms(hatch: Hatch | None, view: View) -> dict[str, Any]:
 
 def _paper_uniforms(scene: Scene) -> dict[str, Any]:
     if scene.paper is None:
-        return {"bare": 0.0}
-    return {"bare": 1.0, "paper": scene.paper[0], "checked": scene.paper[1]}
+        return {}
+    return {"paper": scene.paper[0], "checked": scene.paper[1]}
+
+
+def _defines(scene: Scene) -> list[str]:
+    """What of photo.frag the scene needs."""
+    parts = {
+        "HAS_PLATE": scene.plate, "HAS_MASK": scene.mask, "HAS_BLEND": scene.blend,
+        "HAS_PAPER": scene.paper,
+    }  # fmt: skip
+    return [name for name, part in parts.items() if part is not None]

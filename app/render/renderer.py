@@ -10,15 +10,18 @@ import numpy as np
 
 from ..view import View
 from .blend_texture import BlendTexture
+from .kept_canvas import KeptCanvas
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
-from .scene import Scene, SplatObject
+from .scene import Colour, Scene, SplatObject
 from .textures import PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPass, SplatPicture
 
 log = logging.getLogger(__name__)
+
+Viewport = tuple[int, int, int, int]  # left, bottom, width, height of the canvas, framebuffer px
 
 SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")
 
@@ -37,15 +40,32 @@ class Renderer:
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
         self._splat_pass: SplatPass | None = None
+        self._kept = KeptCanvas(context)
+        self._target = context.screen
+        self._surround: Colour = (0.0, 0.0, 0.0)
+        self._size = (1, 1)
         log.info("OpenGL by %s; objects drawn by %s", self.gl_name, self.kind)
 
-    def clear(self, color: tuple[float, float, float], size: tuple[int, int]) -> None:
+    def clear(self, color: Colour, size: tuple[int, int]) -> None:
         """Begins a frame of `size` px: the whole window in one colour."""
+        self._surround, self._size = color, size
+        self._target = self._context.screen
         self._begin((0, 0, *size))
-        self._context.screen.clear(*color, 1.0)
+        self._target.clear(*color, 1.0)
 
-    def draw(self, scene: Scene, view: View, viewport: tuple[int, int, int, int]) -> None:
-        """`viewport`: left, bottom, width, height of the canvas, framebuffer px."""
+    def draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+        """The scene in `viewport` of the window that was cleared."""
+        kept, place = self._kept, (self._surround, self._size, viewport)
+        if not kept.shows(scene, view, place):
+            self._target = kept.begin(self._size, self._surround)
+            self._draw(scene, view, viewport)
+            self._target = self._context.screen
+        assert kept.buffer is not None
+        self._context.copy_framebuffer(self._target, kept.buffer)
+        self._begin(viewport)
+
+    def _draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+        """Into the target."""
         self._begin(viewport)
         self._blend.use(scene)
         self._photo_pass.draw(scene, view)
@@ -83,8 +103,8 @@ class Renderer:
         data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
         return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
 
-    def _begin(self, viewport: tuple[int, int, int, int]) -> None:
-        self._context.screen.use()
+    def _begin(self, viewport: Viewport) -> None:
+        self._target.use()
         self._context.viewport = viewport
         self._context.enable_only(moderngl.NOTHING)
 

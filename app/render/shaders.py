@@ -45,6 +45,25 @@ def _included(name: str, files: dict[str, str]) -> str:
     return INCLUDE.sub(lambda match: _included(files.get(match[1], match[1]), files), text)
 
 
+class Programs:
+    """A program's variants by their defines, each with a vertex array that reads no vertices."""
+
+    def __init__(
+        self, context: moderngl.Context, vertex: str, fragment: str, units: dict[str, int]
+    ) -> None:
+        """`units`: texture units of its samplers."""
+        self._context, self._files, self._units = context, (vertex, fragment), units
+        self._made: dict[tuple[str, ...], tuple[moderngl.Program, moderngl.VertexArray]] = {}
+
+    def __call__(self, *defines: str) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        """Compiled when it is first needed."""
+        if defines not in self._made:
+            program = build_program(self._context, *self._files, *defines)
+            set_uniforms(program, **self._units)
+            self._made[defines] = (program, self._context.vertex_array(program, []))
+        return self._made[defines]
+
+
 def set_uniforms(program: moderngl.Program, **values: Any) -> None:
     """Sets uniforms by name; the ones the compiler found unused are skipped."""
     for name, value in values.items():
