@@ -10,6 +10,7 @@ from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
 from ..texts import t
 from ..view import Shown
+from .landmarks import mark
 from .layout import Rect
 from .theme import Icon, theme
 from .widgets import icon_button, tooltip
@@ -37,7 +38,9 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(12, 10))
     for title, names in MENUS.items():
-        if imgui.begin_menu(f"{t(title)}##{title}"):
+        is_open = imgui.begin_menu(f"{t(title)}##{title}")
+        mark(f"Menu: {t(title)}")
+        if is_open:
             _draw_items(editor, names)
             imgui.end_menu()
     imgui.pop_style_var(2)
@@ -69,6 +72,7 @@ def _draw_command(editor: Editor, name: str) -> None:
     is_on = command.is_on is not None and command.is_on(editor)
     if imgui.menu_item(f"{label}##{name}", keys_of(editor, name), is_on, reason is None)[0]:
         run(editor, name)
+    mark(label)
     if reason is not None:
         tooltip(reason)
 

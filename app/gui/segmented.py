@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 
 from imgui_bundle import ImVec2, imgui
 
+from .landmarks import mark
 from .theme import FIELD, RADIUS, theme
 from .widgets import tooltip
 
@@ -40,6 +41,7 @@ def segmented(name: str, choices: Sequence[Choice[T]], chosen: T, width: float =
         imgui.begin_disabled(choice.why_not is not None)
         if imgui.invisible_button(f"##{name}{i}", size):
             chosen = choice.value
+        mark(choice.hint or choice.label)
         imgui.end_disabled()
         is_hovered = imgui.is_item_hovered()
         if choice.hint or choice.why_not:

@@ -13,6 +13,7 @@ from ..editor import Editor
 from ..render.renderer import Renderer
 from ..render.textures import PictureTexture
 from ..resources import resource
+from .landmarks import mark
 from .layout import Rect
 from .panes import FLAGS
 from .theme import TITLE_SIZE, Icon, theme
@@ -97,6 +98,7 @@ class StartScreen:
         imgui.begin_group()
         if imgui.invisible_button(f"##{name}", ImVec2(size.x, size.y)):
             editor.filing.open_sample(Path(str(resource(f"assets/samples/{name}.jpg"))))
+        mark(title)
         is_hovered = imgui.is_item_hovered()
         if is_hovered:
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)

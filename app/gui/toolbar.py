@@ -8,6 +8,7 @@ from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
 from ..texts import t
 from ..view import ToolName
+from .landmarks import mark
 from .layout import Rect
 from .panes import edge, pane
 from .theme import Icon, theme
@@ -47,6 +48,7 @@ def _draw_tool(editor: Editor, tool: ToolName, icon: str, name: str, hint: str) 
     imgui.push_font(None, ICON)
     imgui.begin_disabled(reason is not None)
     is_pressed = imgui.button(f"{icon}##{name}", theme.size(SIDE, SIDE))
+    mark(f"Tool: {t(command.label)}")
     imgui.end_disabled()
     imgui.pop_font()
     imgui.pop_style_var()

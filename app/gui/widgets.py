@@ -9,6 +9,7 @@ from enum import Enum
 
 from imgui_bundle import ImVec2, imgui
 
+from .landmarks import mark
 from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
@@ -70,6 +71,7 @@ def button(
     if is_tall:
         imgui.push_font(theme.bold, 0.0)
     is_pressed = imgui.button(label, ImVec2(across, theme.pt(height)))
+    mark(label)
     if is_tall:
         imgui.pop_font()
     imgui.end_disabled()
@@ -96,6 +98,7 @@ def icon_button(
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
     imgui.begin_disabled(why_not is not None)
     is_pressed = imgui.button(f"{icon}##{name}", theme.size(side, side))
+    mark(hint.partition("\n")[0])
     imgui.end_disabled()
     imgui.pop_style_var()
     imgui.pop_style_color()
@@ -176,6 +179,7 @@ def number_field(number: Number, value: float) -> Change:
     is_changed, new = imgui.drag_float(
         "##value", value, number.speed, number.low, number.high, number.format, int(flags)
     )
+    mark(number.name)
     if is_changed or imgui.is_item_deactivated_after_edit():
         changed = Change(new, is_changed, imgui.is_item_deactivated_after_edit())
     for sign, icon in ((-1, Icon.MINUS), (1, Icon.PLUS)):
@@ -203,5 +207,6 @@ def checkbox(label: str, is_on: bool) -> bool:
     """A small box with a label; whether it is on now."""
     imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 1))
     is_on = imgui.checkbox(label, is_on)[1]
+    mark(label)
     imgui.pop_style_var()
     return is_on

@@ -26,6 +26,7 @@ from ..settings import read_settings, settings_path, write_settings
 from ..shortcuts import Shortcuts
 from ..texts import ENGLISH, t, use_language
 from ..tools.pointer import Shape
+from . import landmarks
 from . import theme as looks
 from .dialogs import Dialogs
 from .frame_log import FrameLog
@@ -207,6 +208,7 @@ class Window:
         imgui.render()
         self._draw(layout.canvas, ratio, size)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        landmarks.write()
         self._save_settings()
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:

@@ -136,4 +136,9 @@ def window_environment(display: str, tmp_path: Path) -> dict[str, str]:
     """For a process with a window: its display, and settings of its own."""
     settings = tmp_path / "settings.toml"
     settings.write_text('dialogs = "built-in"\ngaussians = 3000\n', encoding="utf-8")
-    return {**os.environ, "DISPLAY": display, "OBJECTMORPHER_SETTINGS": str(settings)}
+    return {
+        **os.environ,
+        "DISPLAY": display,
+        "OBJECTMORPHER_SETTINGS": str(settings),
+        "OBJECTMORPHER_LANDMARKS": str(tmp_path / "landmarks.json"),
+    }

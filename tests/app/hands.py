@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -25,6 +26,7 @@ class Hands:
     def __init__(self, environment: dict[str, str]) -> None:
         self._environment = environment
         self._display = environment["DISPLAY"]
+        self._landmarks = Path(environment["OBJECTMORPHER_LANDMARKS"])
 
     def xdotool(self, *arguments: object) -> str:
         command = ["xdotool", *(str(a) for a in arguments)]
@@ -43,6 +45,40 @@ class Hands:
             x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
             self.xdotool("mousemove", round(x), round(y))
         self.xdotool("mouseup", 1)
+
+    @contextmanager
+    def script(self) -> Iterator[Callable[[str], None]]:
+        """Writes lines to one xdotool, which does them one after the other."""
+        command = ["xdotool", "-"]
+        with subprocess.Popen(
+            command, env=self._environment, stdin=subprocess.PIPE, text=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        ) as process:  # fmt: skip
+            assert process.stdin is not None
+            stdin = process.stdin
+
+            def write(line: str) -> None:
+                stdin.write(line + "\n")
+                stdin.flush()
+
+            yield write
+            stdin.close()
+
+    def places(self) -> dict[str, tuple[float, float, float, float]]:
+        """x0, y0, x1, y1 px on the screen of all that has a label."""
+        if not self._landmarks.exists():
+            return {}
+        return json.loads(self._landmarks.read_text(encoding="utf-8"))
+
+    def place(self, label: str) -> tuple[float, float]:
+        """The middle of the button or field that says `label`; waits until there is one."""
+        self.wait(lambda: label in self.places(), f"showing {label}")
+        x0, y0, x1, y1 = self.places()[label]
+        return (x0 + x1) / 2, (y0 + y1) / 2
+
+    def choose(self, label: str) -> None:
+        """Clicks the button that says `label`."""
+        self.click(*self.place(label))
 
     def press(self, keys: str) -> None:
         self.xdotool("key", keys)

@@ -1,0 +1,47 @@
+"""Where the window's buttons and fields are, by what they say: for tests and tours.
+
+With OBJECTMORPHER_LANDMARKS=FILE in the environment the window writes them there whenever they
+change. Without it nothing is collected.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+VARIABLE = "OBJECTMORPHER_LANDMARKS"
+
+_file = os.environ.get(VARIABLE)
+_places: dict[str, tuple[float, float, float, float]] = {}
+_written = ""
+
+
+def mark(label: str) -> None:
+    """The last item is called `label`; what stands after ## or before an icon is left out."""
+    if _file is None or not imgui.is_item_visible():
+        return
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    _places[clean(label)] = (low.x, low.y, high.x, high.y)
+
+
+def clean(label: str) -> str:
+    """What a user reads of it: no icon (they are in the private use area), no id."""
+    text = label.partition("##")[0]
+    return "".join(c for c in text if not "\ue000" <= c <= "\uf8ff").strip()
+
+
+def write() -> None:
+    """At the end of a frame: x0, y0, x1, y1 window units of each. The next frame begins anew."""
+    global _written
+    if _file is None:
+        return
+    text = json.dumps(_places)
+    _places.clear()
+    if text != _written:
+        _written = text
+        temporary = Path(f"{_file}.tmp")
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(_file)
