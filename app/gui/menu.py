@@ -16,12 +16,13 @@ from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
-    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
+    "Edit": ("undo", "redo", "history", "-", "remove_handle", "reset_pose", "reset_place"),
     "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
         "-", "split", "points", "-", "theme",
     ),
+    "Window": ("models",),
 }  # fmt: skip
 
 
@@ -80,6 +81,7 @@ def _switched_on(editor: Editor) -> set[str]:
     view = editor.view
     names = {f"show_{shown_now(editor.document, view).name.lower()}"}
     names |= {"split"} if view.split is not None else set()
+    names |= {"history"} if view.has_history else set()
     return names | ({"points"} if view.has_points else set())
 
 
