@@ -82,7 +82,7 @@ class Autosave:
         self._orders = queue.SimpleQueue()
         self._problem: str | None = None  # why the last write failed
         self._is_told = False
-        self._is_writing = threading.Event()
+        self._given = self._done = 0  # orders; the one counted here, the other in the thread
         self._thread: threading.Thread | None = None
 
     def poll(self) -> None:
@@ -96,17 +96,17 @@ class Autosave:
                 self._order(None)
             return
         now = time.monotonic()
-        if document is self._asked or self._is_writing.is_set() or now - self._asked_at < INTERVAL:
+        is_early = now - self._asked_at < INTERVAL
+        if document is self._asked or self._given > self._done or is_early:
             return
         self._asked, self._asked_at = document, now
-        self._is_writing.set()
         self._order((document, self._about(document)))
 
     @property
     def is_up_to_date(self) -> bool:
-        """Whether the disk holds what is unsaved."""
-        is_asked = self._editor.is_saved or self._asked is self._editor.committed
-        return is_asked and not self._is_writing.is_set() and self._orders.empty()
+        """Whether the disk holds what is unsaved, and nothing else of this editor."""
+        wanted = None if self._editor.is_saved else self._editor.committed
+        return self._asked is wanted and self._given == self._done
 
     def adopt(self, held: Held) -> None:
         """Goes on in the folder of an editor that crashed, whose document is open now."""
@@ -141,6 +141,7 @@ class Autosave:
     # In the thread
 
     def _order(self, order: tuple[Document, About] | Held | None) -> None:
+        self._given += 1
         self._orders.put(order)
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, daemon=True, name="autosave")
@@ -157,8 +158,7 @@ class Autosave:
                 log.exception("Unsaved work cannot be kept safe")
                 self._problem = str(error) or type(error).__name__
             finally:
-                if isinstance(order, tuple):
-                    self._is_writing.clear()
+                self._done += 1
         if self._held is not None:
             self._held.lock.release()
 
