@@ -17,17 +17,22 @@ import numpy as np
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, EditObject
 
+from .autosave import Autosave
+from .background import Background
 from .derived import Derived
 from .editing.composing import Composing
+from .editing.exporting import Exporting
+from .editing.models import Models
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
 from .editing.selection import Selection
-from .feedback import Hover, Message
-from .filing import Filing
+from .feedback import Action, Hover, Message
+from .filing import OPEN, Filing
 from .history import History
 from .job_functions import WARM
 from .jobs import JobError, Jobs
+from .recovery import Recovery
 from .settings import Settings
 from .tasks import SELECT, Tasks
 from .texts import t
@@ -44,12 +49,15 @@ class Editor:
         self.view = View()
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
+        self.background = Background(wake)
+        self.autosave, self.recovery = Autosave(self), Recovery(self)
         self.derived = Derived()
         self.tasks = Tasks(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.composing = Composing(self)
+        self.exporting, self.models = Exporting(self), Models(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -107,22 +115,24 @@ class Editor:
 
     # Saying things
 
-    def say(self, text: str) -> None:
-        self.message = Message(text)
+    def say(self, text: str, action: Action | None = None) -> None:
+        self.message = Message(text, action=action)
 
-    def complain(self, text: str, details: str = "") -> None:
+    def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
-        self.message = Message(text[:1].upper() + text[1:], is_error=True, details=details)
+        sentence = text[:1].upper() + text[1:]
+        self.message = Message(sentence, is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
-        self.complain(error.sentence, error.trace)
+        retry = Action(t("Retry"), error.retry) if error.retry else None
+        self.complain(error.sentence, error.trace, retry)
 
     # Steps
 
     def start(self, document: Document) -> None:
         """A photo or a session was opened."""
         self.close_document()
-        self.history = History(document)
+        self.history = History(document, limit=self.settings.history_mb << 20)
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE
@@ -133,6 +143,7 @@ class Editor:
     def close_document(self) -> None:
         self.hand.abort(self)
         self.jobs.cancel()
+        self.background.cancel(OPEN)
         self.tasks.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
@@ -172,6 +183,13 @@ class Editor:
         self.history.redo()
         self._after_travel(t("Done again: {label}", label=label) if label else t("Nothing to redo"))
 
+    def travel(self, index: int) -> None:
+        """To the step at `index` of the history, back or forth."""
+        if self.hand.is_busy or self.history is None or index == self.history.cursor:
+            return
+        self.history.jump(index)
+        self._after_travel(t("Now after: {label}", label=self.history.steps[index]))
+
     def _after_travel(self, text: str) -> None:
         """The document may have lost what the view points at."""
         self.hover = Hover()
@@ -209,11 +227,16 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
-        return self.tasks.ensure_plate() or is_changed
+        is_changed = self.background.poll() or is_changed
+        is_changed = self.tasks.ensure_plate() or is_changed
+        self.autosave.poll()
+        return is_changed
 
     def set_theme(self, theme: str) -> None:
         """ "dark" or "light"."""
         self.settings = replace(self.settings, theme=theme)
 
     def shut_down(self) -> None:
+        self.background.close()
+        self.autosave.close()
         self.jobs.close()

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import SurfacePoint
+
+
+@dataclass(frozen=True)
+class Action:
+    """A button beside a message that does something about it."""
+
+    label: str
+    run: Callable[[], None]
 
 
 @dataclass(frozen=True)
@@ -16,6 +25,7 @@ class Message:
     text: str
     is_error: bool = False
     details: str = ""
+    action: Action | None = None
 
 
 @dataclass(frozen=True)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from objectmorpher_core.document import Document
+from .jobs import JobError
+from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
+from .texts import t
 
 if TYPE_CHECKING:
     from .editor import Editor
 
-SESSION_ENDING = ".omorph"
-PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
 EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
-ZIP_MAGIC = b"PK\x03\x04"
+OPEN = "open"  # kind of what runs in the background
+EXPECTED = ("OpeningError",)  # errors that need no details
+NAMED = 3  # files named in a message
 
 
 class Dialog(Enum):
@@ -24,7 +26,7 @@ class Dialog(Enum):
 
     OPEN = "Open"
     SAVE = "Save session"
-    EXPORT = "Export photo"
+    EXPORT = "Export to"
 
 
 class Filing:
@@ -40,18 +42,35 @@ class Filing:
 
     def open(self, path: Path) -> None:
         """Opens a photo or a session, after the question about unsaved changes."""
-        self.guard(lambda: self._open(path))
+        self.guard(lambda: self._open(path, lambda: self._remember(path)))
+
+    def drop(self, paths: Sequence[Path]) -> None:
+        """Files were dropped on the window: the first that can be opened is."""
+        if not paths:
+            return
+        kinds = (*PHOTO_ENDINGS, SESSION_ENDING)
+        usable = [p for p in paths if p.suffix.lower() in kinds and not p.is_dir()]
+        chosen = usable[0] if usable else paths[0]
+        others = [p.name for p in paths if p is not chosen]
+
+        def then() -> None:
+            self._remember(chosen)
+            if others:
+                self._editor.say(t("Opened {name}; not opened: {others}", name=chosen.name,
+                                   others=_listed(others)))  # fmt: skip
+
+        self.guard(lambda: self._open(chosen, then))
 
     def open_sample(self, path: Path) -> None:
         """Opens a photo that came with the program: it is nobody's file to go back to."""
 
-        def go_on() -> None:
-            settings = self._editor.settings
-            self._open(path)
+        def forget_file() -> None:
             self._editor.source = None
-            self._editor.settings = settings
 
-        self.guard(go_on)
+        self.guard(lambda: self._open(path, forget_file))
+
+    def _remember(self, path: Path) -> None:
+        self._editor.settings = self._editor.settings.with_recent(path)
 
     def guard(self, then: Callable[[], None]) -> None:
         """`then`, at once where nothing would be lost, or after the user's answer."""
@@ -79,8 +98,10 @@ class Filing:
             self.open(path)
         elif dialog is Dialog.SAVE:
             self.save_as(path if path.suffix else path.with_suffix(SESSION_ENDING))
+        elif self._editor.exporting.draft is not None:
+            self._editor.exporting.set_path(path)
         else:
-            self.export(path if path.suffix else path.with_suffix(".png"))
+            self._editor.exporting.export_to(path)
 
     def cancel_dialog(self) -> None:
         """The user closed a dialog without choosing."""
@@ -100,13 +121,6 @@ class Filing:
         then, self._after_save = self._after_save, None
         self._editor.tasks.save(path, then)
 
-    def export(self, path: Path) -> None:
-        if path.suffix.lower() not in EXPORT_ENDINGS:
-            known = ", ".join(e[1:].upper() for e in (".png", ".jpg", ".tif", ".webp"))
-            self._editor.complain(f"a photo cannot be written as {path.suffix}; choose {known}")
-            return
-        self._editor.tasks.export(path)
-
     def suggestion(self, dialog: Dialog) -> Path:
         """The file name a dialog begins with."""
         editor = self._editor
@@ -118,37 +132,46 @@ class Filing:
         stem = Path(name).stem
         if dialog is Dialog.SAVE:
             return editor.path or folder / f"{stem}{SESSION_ENDING}"
+        if editor.exporting.draft is not None:
+            return editor.exporting.path
         return folder / f"{stem}-edited.png"
 
-    def _open(self, path: Path) -> None:
-        editor = self._editor
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            editor.complain(f"{path.name} cannot be opened: {error.strerror or error}")
-            return
-        is_session = data[:4] == ZIP_MAGIC
-        try:
-            document = self._decode(data, path.name, is_session)
-        except (ValueError, OSError, MemoryError) as error:
-            editor.complain(f"{path.name} cannot be opened: {error}")
-            return
-        editor.start(document)
-        editor.path = path if is_session else None
-        editor.source = None if is_session else path
-        editor.settings = editor.settings.with_recent(path)
+    def _open(self, path: Path, then: Callable[[], None]) -> None:
+        """Reads the file in the background; `then` is called when it is shown.
 
-    def _decode(self, data: bytes, name: str, is_session: bool) -> Document:
-        if is_session:
-            from objectmorpher_core.session_file import decode_session
+        What is open now may be lost: that was asked. What is done to it meanwhile may not.
+        """
+        editor, given_up = self._editor, self._editor.committed
+        fov, seed = self._fov, self._seed
 
-            return decode_session(data)
-        from objectmorpher_core.pipeline import open_photo
+        def show(opened: Opened) -> None:
+            editor.start(opened.document)
+            editor.path = path if opened.is_session else None
+            editor.source = None if opened.is_session else path
+            then()
 
-        return open_photo(data, name, fov=self._fov, seed=self._seed)
+        def accept(opened: Opened) -> None:
+            if editor.committed is given_up or editor.is_saved:
+                show(opened)
+            else:
+                self.guard(lambda: show(opened))
+
+        def fail(error: JobError) -> None:
+            editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
+
+        editor.background.start(
+            t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),
+            kind=OPEN, done=accept, failed=fail,
+        )  # fmt: skip
 
     def forget_recent(self, path: str) -> None:
         """A recent file that is not there any more."""
         settings = self._editor.settings
         recent = tuple(r for r in settings.recent if r != path)
         self._editor.settings = replace(settings, recent=recent)
+
+
+def _listed(names: list[str]) -> str:
+    """A few of them, and how many there are besides."""
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (t(" and {count} more", count=more) if more > 0 else "")

@@ -58,6 +58,10 @@ class PhotoMemory:
         self._segmenter: Segmenter | None = None
         self._reading: Reading | None = None
 
+    def forget(self) -> None:
+        """Nothing is remembered."""
+        self._backend, self._segmenter, self._reading = "", None, None
+
     def reading(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
         """The photo as the segmenter sees it; at once where it is the last one."""
         from objectmorpher_core import segment
@@ -82,6 +86,11 @@ def _is_same(a: Pixels, b: Pixels) -> bool:
 def read_photo(pixels: Pixels, backend: str, progress: Progress) -> None:
     """Prepares for clicks on a photo that was just opened."""
     _memory.reading(pixels, backend, progress)
+
+
+def forget_segmenter(progress: Progress) -> None:
+    """The next photo or click chooses the backend anew: a model was added."""
+    _memory.forget()
 
 
 def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
@@ -133,20 +142,6 @@ def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -
     from objectmorpher_core.pipeline import make_plate
 
     return make_plate(pixels, covered, choice.backend, progress=progress, seed=choice.seed)
-
-
-def write_picture(document: Document, path: Path, quality: int, progress: Progress) -> None:
-    """Renders the edited photo and writes it in the format that the path's ending names."""
-    from objectmorpher_core.files import write_all
-    from objectmorpher_core.image import encode_picture
-    from objectmorpher_core.pipeline import export
-    from objectmorpher_core.progress import part
-
-    picture = export(document, progress=part(progress, 0.05, 0.7))
-    progress(0.7, "encoding")
-    data = encode_picture(picture, path.suffix, quality)
-    progress(0.95, "writing")
-    write_all({path: data})
 
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:

@@ -16,9 +16,8 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
-from multiprocessing.synchronize import Event
 from typing import Any
 
 from objectmorpher_core.progress import Cancelled
@@ -27,7 +26,8 @@ from .wire import Reader, Writer
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 2.0  # s between asking a job to stop and ending its process
+PATIENCE = 0.35  # s between asking a job to stop and ending its process
+TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
 
 
@@ -38,6 +38,7 @@ class JobError:
     name: str  # the exception's type, or "Crash"
     sentence: str  # for the status line
     trace: str  # for "Details" and the log
+    retry: Callable[[], None] | None = None  # asks for the same once more, where that may help
 
     @classmethod
     def of(cls, error: Exception, what: str) -> JobError:
@@ -71,7 +72,9 @@ class Worker:
     def __init__(self, warm: tuple[str, ...], wake: Callable[[], None]) -> None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        self.stop: Event = context.Event()
+        # Without a lock: one that the process took with it when it was ended would stop us, too.
+        self.stop: Any = context.RawValue("b", 0)
+        self.has_answered = False
         self.answers: queue.SimpleQueue[tuple[str, int, Any]] = queue.SimpleQueue()
         self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.process = context.Process(
@@ -122,7 +125,9 @@ class Jobs:
     def __init__(self, warm: tuple[str, ...] = (), wake: Callable[[], None] = lambda: None) -> None:
         """`warm`: modules the worker imports at once. `wake` is called from another thread."""
         self._warm, self._wake = warm, wake
-        self._worker = Worker(warm, wake)
+        self._worker: Worker | None = Worker(warm, wake)
+        self._deaths = 0  # processes in a row that ended without a word
+        self.restarted: Callable[[], None] = lambda: None  # told that the worker's memory is lost
         self._waiting: dict[str, Job] = {}  # kind -> newest request, in the order they came
         self._count = 0
         self.current: Job | None = None
@@ -147,11 +152,19 @@ class Jobs:
         kind = kind or function.__name__
         job = Job(title, function, arguments, done, failed, cancelled, kind)
         job.number, job.is_quiet = self._count, is_quiet
-        self._waiting.pop(kind, None)
-        self._waiting[kind] = job
-        if self.current is not None and self.current.kind == kind:
+        self._wait_for(job)
+
+    def _wait_for(self, job: Job) -> None:
+        self._waiting.pop(job.kind, None)
+        self._waiting[job.kind] = job
+        if self.current is not None and self.current.kind == job.kind:
             self._ask_to_stop(self.current)
         self._send_next()
+
+    def _again(self, job: Job) -> None:
+        """The request of a job that failed, once more."""
+        self._count += 1
+        self._wait_for(replace(job, number=self._count, fraction=0.0, note="", stop_asked=None))
 
     def is_busy(self, kind: str) -> bool:
         """Whether a request of this kind waits or runs."""
@@ -174,7 +187,7 @@ class Jobs:
     def poll(self) -> bool:
         """Delivers answers; once a frame, on the main thread. Whether anything changed."""
         is_changed = False
-        while not self._worker.answers.empty():
+        while self._worker is not None and not self._worker.answers.empty():
             self._take(*self._worker.answers.get())
             is_changed = True
         job = self.current
@@ -182,37 +195,44 @@ class Jobs:
             log.info("%s did not stop when asked; restarting the worker", job.title)
             self._restart()
             self._finish(job, job.cancelled)
+            self.restarted()
             is_changed = True
         return is_changed
 
     def close(self) -> None:
         self._waiting.clear()
-        self._worker.close()
+        if self._worker is not None:
+            self._worker.close()
 
     def _ask_to_stop(self, job: Job) -> None:
-        if job.stop_asked is None:
+        if job.stop_asked is None and self._worker is not None:
             job.stop_asked = time.monotonic()
-            self._worker.stop.set()
+            self._worker.stop.value = 1
 
     def _send_next(self) -> None:
         if self.current is None and self._waiting:
             job = self.current = self._waiting.pop(next(iter(self._waiting)))
             job.started = time.monotonic()
-            self._worker.stop.clear()
+            self._worker = self._worker or Worker(self._warm, self._wake)
+            self._worker.stop.value = 0
             self._worker.send(job)
 
     def _restart(self) -> None:
+        """Another process, which knows nothing of what was read before."""
+        assert self._worker is not None
+        self._deaths = 0 if self._worker.has_answered else self._deaths + 1
         self._worker.close()
-        self._worker = Worker(self._warm, self._wake)
+        is_hopeless = self._deaths >= TRIES
+        self._worker = None if is_hopeless else Worker(self._warm, self._wake)
 
     def _take(self, what: str, number: int, value: Any) -> None:
         job = self.current
         if what == "gone":
-            self._restart()
-            if job is not None:
-                sentence = f"{job.title} stopped: the worker process ended unexpectedly"
-                self._finish(job, lambda: job.failed(JobError("Crash", sentence, sentence)))
-        elif job is None or number != job.number:
+            self._crash(job)
+            return
+        assert self._worker is not None
+        self._worker.has_answered = True
+        if job is None or number != job.number:
             return  # an answer of a process that was ended
         elif what == "progress":
             job.fraction, job.note = value
@@ -225,6 +245,19 @@ class Jobs:
             level = logging.DEBUG if job.is_quiet else logging.INFO
             log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
             self._finish(job, lambda: _accept(job, value))
+
+    def _crash(self, job: Job | None) -> None:
+        """The process ended by itself, or someone ended it."""
+        log.error("The worker process ended unexpectedly")
+        self._restart()
+        if job is not None and job.stop_asked is not None:
+            self._finish(job, job.cancelled)
+        elif job is not None:
+            sentence = f"{job.title} stopped: the worker process ended unexpectedly"
+            error = JobError("Crash", sentence, sentence, lambda: self._again(job))
+            self._finish(job, lambda: job.failed(error))
+        if self._worker is not None:
+            self.restarted()
 
     def _finish(self, job: Job, tell: Callable[[], None]) -> None:
         self.current = None
@@ -243,7 +276,7 @@ def _accept(job: Job, value: Any) -> None:
         job.failed(JobError.of(error, job.title))
 
 
-def _work(connection: Connection, stop: Event, warm: tuple[str, ...]) -> None:
+def _work(connection: Connection, stop: Any, warm: tuple[str, ...]) -> None:
     """The worker's main loop; ends with the pipe."""
     _lower_priority()
     for module in warm:
@@ -269,13 +302,13 @@ def _lower_priority() -> None:
         os.nice(5)
 
 
-def _reporter(writer: Writer, number: int, stop: Event) -> Callable[[float, str], None]:
+def _reporter(writer: Writer, number: int, stop: Any) -> Callable[[float, str], None]:
     last = ""
     last_time = 0.0
 
     def progress(fraction: float, note: str) -> None:
         nonlocal last, last_time
-        if stop.is_set():
+        if stop.value:
             raise Cancelled
         now = time.monotonic()
         if note != last or now - last_time > REPORT_EVERY:

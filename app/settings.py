@@ -36,8 +36,15 @@ class Settings:
     scale: float = 0.0  # canvas px per point; 0: the monitor's
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
     is_motion_reduced: bool = False
-    quality: int = 95  # of JPEG and WebP exports
+    quality: int = 95  # of JPEG exports
+    webp_quality: int = 100  # of WebP exports; 100 is lossless
+    export_what: str = "Photo"  # the last export's, see `exporting.py`
+    export_format: str = "PNG"
+    export_bits: int = 0  # 8 or 16; 0: the photo's own
+    export_folder: str = ""  # for photos that are no file of the user's
+    declined_models: tuple[str, ...] = ()  # ids of those that are not offered any more
     gaussians: int = GAUSSIANS  # of a lifted object
+    history_mb: int = 1024  # MiB that steps which can be undone may hold
     recent: tuple[str, ...] = ()  # paths, newest first
     language: str = "en"
     backends: Backends = field(default_factory=Backends)
@@ -68,8 +75,9 @@ def read_settings(path: Path) -> Settings:
         return Settings()
     backends = Backends(**_matching(Backends(), values.pop("backends", {})))
     shortcuts = _words(values.pop("shortcuts", {}))
-    if isinstance(values.get("recent"), list):
-        values["recent"] = tuple(str(r) for r in values["recent"])
+    for name in ("recent", "declined_models"):
+        if isinstance(values.get(name), list):
+            values[name] = tuple(str(r) for r in values[name])
     return replace(
         Settings(backends=backends, shortcuts=shortcuts), **_matching(Settings(), values)
     )

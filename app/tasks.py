@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
-from objectmorpher_core.document import Document, LiftedObject, Matte, Plate, Prompt
+from objectmorpher_core.document import Document, LiftedObject, Matte, Photo, Plate, Prompt
 
 from . import job_functions
 from .job_functions import Choice, Cut
@@ -34,21 +34,33 @@ class Tasks:
         self.prompt: Prompt | None = None  # asked, not answered yet
         self._plate: tuple[tuple[Mask | None, ...], Plate] | None = None  # of these masks
         self._no_plate: tuple[Mask | None, ...] | None = None  # asked or failed for these masks
+        self._unreadable: Photo | None = None  # reading it has ended the worker
+        editor.jobs.restarted = self._read_again
 
     def forget(self) -> None:
         """Another document is opened."""
         self.prompt = self._plate = self._no_plate = None
 
-    def read_photo(self) -> None:
+    def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
         editor, document = self._editor, self._editor.document
         if document is None:
             return
+
+        def fail(error: JobError) -> None:
+            self._unreadable = document.photo
+
         editor.jobs.start(
             "Reading the photo", job_functions.read_photo, document.photo.pixels,
             editor.settings.backends.segment,
-            done=lambda _: None, failed=lambda error: None, kind=READ,
+            done=lambda _: None, failed=fail, kind=READ, is_quiet=is_quiet,
         )  # fmt: skip
+
+    def _read_again(self) -> None:
+        """The worker was started anew; the next click is not to wait for what it has forgotten."""
+        document = self._editor.committed
+        if document is not None and document.photo is not self._unreadable:
+            self.read_photo(is_quiet=True)
 
     def segment(self, prompt: Prompt, label: str) -> None:
         """Asks for the mask of `prompt`; what was said before it is in it."""
@@ -169,21 +181,6 @@ class Tasks:
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,
             done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
-        )  # fmt: skip
-
-    def export(self, path: Path) -> None:
-        """Writes the edited photo."""
-        editor = self._editor
-        document = editor.history.document if editor.history else None
-        if document is None:
-            return
-        if editor.source is not None and path.absolute() == editor.source.absolute():
-            editor.complain("the export would overwrite the opened photo; choose another name")
-            return
-        editor.jobs.start(
-            f"Exporting {path.name}", job_functions.write_picture, document, path,
-            editor.settings.quality, done=lambda _: editor.say(f"Exported {path.name}"),
-            failed=editor.complain_of, kind=f"{WRITE} {path}",
         )  # fmt: skip
 
     def save(self, path: Path, then: Callable[[], None] | None = None) -> None:

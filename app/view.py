@@ -64,6 +64,7 @@ class View:
     is_before: bool = False  # X is held: the photo as it was
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
+    has_history: bool = False  # the list of steps is shown
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
     brush: Brush = field(default_factory=Brush)  # of every tool that paints

@@ -23,6 +23,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")  # that can be wri
 MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
 WEBP_MAX_SIDE = 16383  # px
 JPEG_MAX_SIDE = 65535  # px
+LOSSLESS = 100  # quality of WebP that keeps every pixel
 
 Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, which fires before ours in some formats
 
@@ -168,12 +169,15 @@ def _upright(samples: np.ndarray, orientation: int) -> np.ndarray:
     return samples
 
 
-def encode_picture(picture: Picture, ending: str, quality: int = 95) -> bytes:
+def encode_picture(
+    picture: Picture, ending: str, quality: int = 95, webp_quality: int = LOSSLESS
+) -> bytes:
     """The bytes of an image file of the kind that `ending` (".png", "jpg") names.
 
-    PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for JPEG and WebP. WebP is lossless,
-    `quality` is JPEG's. Grey stays grey (not in WebP, which has none). Raises ImageError for an
-    unknown ending, and where the format cannot hold the picture.
+    PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for JPEG and WebP. `quality` is
+    JPEG's; WebP is lossless unless `webp_quality` is below 100. Grey stays grey (not in WebP,
+    which has none). Raises ImageError for an unknown ending, and where the format cannot hold
+    the picture.
     """
     ending = "." + ending.lower().removeprefix(".")
     if ending not in ENDINGS:
@@ -182,7 +186,7 @@ def encode_picture(picture: Picture, ending: str, quality: int = 95) -> bytes:
         if ending in (".jpg", ".jpeg"):
             return _encode_jpeg(picture, quality)
         if ending == ".webp":
-            return _encode_webp(picture)
+            return _encode_webp(picture, webp_quality)
         codec = png if ending == ".png" else tiff
         samples = _Channels(picture)
         return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
@@ -234,7 +238,7 @@ def _encode_jpeg(picture: Picture, quality: int) -> bytes:
     return out.getvalue()
 
 
-def _encode_webp(picture: Picture) -> bytes:
+def _encode_webp(picture: Picture, quality: int) -> bytes:
     height, width = picture.pixels.shape[:2]
     if max(width, height) > WEBP_MAX_SIDE:
         raise ImageError(f"WebP cannot hold {width} x {height} px; choose .png or .tif")
@@ -242,8 +246,9 @@ def _encode_webp(picture: Picture) -> bytes:
     if picture.alpha is not None:
         pixels = np.dstack([pixels, to_u8(picture.alpha)])
     out = io.BytesIO()
+    how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
     Image.fromarray(pixels).save(
-        out, "WEBP", lossless=True, exact=True,  # exact: colours under transparency stay
+        out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
         icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
     )  # fmt: skip
     return out.getvalue()

@@ -89,11 +89,18 @@ def decode_session(data: bytes) -> Document:
         if hashlib.sha256(members[name]).hexdigest() != expected:
             raise SessionError(f"the session is damaged: {name} is not what was saved")
     trusted = {name: members[name] for name in hashes}
-    reader = Reader(trusted, _arrays(trusted))
-    tree = head.get("document")
+    return build_document(head.get("document"), trusted, _arrays(trusted))
+
+
+def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.ndarray]) -> Document:
+    """The document of document.json's tree; `members` hold the photo's file and the pictures.
+
+    Raises SessionError where the parts do not fit each other.
+    """
+    reader = Reader(members, arrays)
     if not isinstance(tree, dict):
         raise SessionError("the session's document.json is damaged: document is missing")
-    photo = _photo(tree.get("photo"), trusted, reader)
+    photo = _photo(tree.get("photo"), members, reader)
     try:
         document = reader.value(Document, tree | {"photo": photo}, "document")
         _check(document)

@@ -39,7 +39,12 @@ def _points(editor: Editor) -> None:
     editor.view.has_points = not editor.view.has_points
 
 
+def _history(editor: Editor) -> None:
+    editor.view.has_history = not editor.view.has_history
+
+
 COMMANDS: dict[str, Command] = {
+    "history": Command("History", "Ctrl+H", _history, is_on=lambda e: e.view.has_history),
     "fit": Command("Fit to window", "F", _fit),
     "actual": Command("Actual size", "Ctrl+1", lambda e: navigate.zoom_to(e, 1.0)),
     "zoom_in": Command("Zoom in", "Ctrl+=", lambda e: navigate.zoom_step(e, 1)),

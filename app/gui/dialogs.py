@@ -12,7 +12,9 @@ from imgui_bundle import portable_file_dialogs as pfd
 
 from ..editor import Editor
 from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog
+from .export_dialog import draw_export
 from .file_chooser import FileChooser
+from .models_dialog import draw_models
 from .theme import FIELD, PRIMARY, theme
 from .widgets import Kind, bold_text, button, note
 
@@ -49,6 +51,9 @@ class Dialogs:
             self._open(editor, wanted)
         self._poll_native(editor)
         self._chooser.draw(editor)
+        if not self.is_open:  # one at a time; the export waits for the file that is chosen for it
+            draw_export(editor)
+            draw_models(editor)
         self._draw_question(editor)
 
     def _open(self, editor: Editor, dialog: Dialog) -> None:

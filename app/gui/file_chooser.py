@@ -14,7 +14,7 @@ from .widgets import Kind, bold_text, button, icon_button, note
 TITLE = "Choose a file"
 SIZE = (640.0, 480.0)  # points
 ROW = 28.0
-VERBS = {Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Export"}
+VERBS = {Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose"}
 
 
 class FileChooser:
@@ -151,7 +151,7 @@ class FileChooser:
             self._enter(path)
             self._name = "" if self._dialog is Dialog.OPEN else self._name
             return
-        if self._dialog is not Dialog.OPEN and path.exists() and path != self._replacing:
+        if self._dialog is Dialog.SAVE and path.exists() and path != self._replacing:
             self._replacing = path
             return
         self._close()

@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ..commands import next_step, run, why_not
 from ..editor import Editor
 from ..view import ToolName
+from .history_list import draw_history
 from .layout import Rect
 from .panels.compose import draw_compose
 from .panels.look import draw_look
@@ -30,6 +31,7 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
         _draw_objects(editor)
         rule()
         _PANELS[editor.view.tool](editor)
+        draw_history(editor)
         imgui.end_child()
         _draw_foot(editor, rect, foot)
         edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))

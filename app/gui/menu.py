@@ -17,13 +17,14 @@ from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
-    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place", "-", "preferences"),
+    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
     "Object": ("subject", "clear", "-", "lift"),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
         "-", "split", "points",
     ),
+    "Window": ("history", "models", "preferences"),
     "Help": ("shortcuts", "about"),
 }  # fmt: skip
 

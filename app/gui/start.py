@@ -16,6 +16,7 @@ from ..resources import resource
 from .landmarks import mark
 from .layout import Rect
 from .panes import FLAGS
+from .recovery_list import draw_recovery, recovery_height
 from .theme import TITLE_SIZE, Icon, theme
 from .widgets import Kind, bold_text, button, note, tooltip
 
@@ -42,9 +43,11 @@ class StartScreen:
         column = min(theme.pt(COLUMN), rect.width - theme.pt(48))
         recent = [Path(r) for r in editor.settings.recent[:RECENT]]
         content = DROP_HEIGHT + 12 + 80 + THUMB[1] + 64 + (28 * len(recent) + 44 if recent else 0)
+        content += recovery_height(editor)
         top = max((rect.height - theme.pt(content)) / 2, theme.pt(24))
         imgui.set_cursor_pos(ImVec2((rect.width - column) / 2, top))
         imgui.begin_group()
+        draw_recovery(editor, column)
         self._draw_drop_target(editor, column)
         imgui.dummy(theme.size(0, 12))
         self._draw_samples(editor, column)

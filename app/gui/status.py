@@ -6,7 +6,12 @@ import time
 
 from imgui_bundle import ImVec2, imgui
 
+from ..background import Chore
+from ..editing.models import DOWNLOAD
 from ..editor import Editor
+from ..feedback import Message
+from ..jobs import Job
+from ..texts import t
 from .layout import Rect
 from .panes import edge, pane
 from .theme import Icon, theme
@@ -49,10 +54,18 @@ def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
     imgui.text_colored(theme.vec("secondary"), _facts(editor))
 
 
+def _shown_job(editor: Editor) -> Job | Chore | None:
+    """What the user waits for most: what opens, before what is computed."""
+    chore, job = editor.background.shown, editor.jobs.current
+    if chore is not None and (chore.kind != DOWNLOAD or job is None or job.is_quiet):
+        return chore
+    return None if job is None or job.is_quiet else job
+
+
 def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     """Name, bar, share and Cancel; the left end of what it drew."""
-    job = editor.jobs.current
-    if job is None or job.is_quiet or time.monotonic() - job.started < JOB_DELAY:
+    job = _shown_job(editor)
+    if job is None or time.monotonic() - job.started < JOB_DELAY:
         return right
     side = rect.height - theme.pt(4)
     text = job.title if not job.note else f"{job.title}: {job.note}"
@@ -61,7 +74,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     x = right - theme.pt(16) - side
     imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
     if icon_button(Icon.CLOSE, "cancel", "Cancel", None, side / theme.scale):
-        editor.jobs.cancel(job.kind)
+        (editor.jobs if isinstance(job, Job) else editor.background).cancel(job.kind)
     x -= imgui.calc_text_size("100 %").x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
     imgui.text_unformatted(share)
@@ -97,21 +110,30 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
         imgui.text_colored(theme.vec(role if message.is_error else "accent"), icon)
         imgui.same_line(0, theme.pt(6))
         imgui.text_colored(theme.vec(role), message.text)
-        if message.is_error:
-            _draw_error_buttons(editor)
+        if message.is_error or message.action is not None:
+            _draw_buttons(editor, message)
     imgui.pop_clip_rect()
 
 
-def _draw_error_buttons(editor: Editor) -> None:
-    message = editor.message
-    assert message is not None
-    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(6, 0))
+def _draw_buttons(editor: Editor, message: Message) -> None:
+    """What can be done about the message: what mends it first."""
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(8, 2))
+    imgui.same_line(0, theme.pt(12))
+    top = imgui.get_cursor_pos_y() - theme.pt(2)  # the buttons' texts stand on the line
+    if message.action is not None:
+        imgui.set_cursor_pos_y(top)
+        if imgui.button(message.action.label):
+            editor.message = None
+            message.action.run()
+        imgui.same_line(0, theme.pt(8))
     if message.details:
-        imgui.same_line(0, theme.pt(12))
-        if imgui.button("Copy details"):
+        imgui.set_cursor_pos_y(top)
+        if imgui.button(t("Details")):
             imgui.set_clipboard_text(message.details)
-        tooltip(message.details[-600:])
-    imgui.same_line(0, theme.pt(8))
-    if imgui.button("Dismiss"):
+            editor.say(t("The details are in the clipboard"))
+        tooltip(t("Copies this:") + "\n" + message.details[-600:])
+        imgui.same_line(0, theme.pt(8))
+    imgui.set_cursor_pos_y(top)
+    if imgui.button(t("Dismiss")) and editor.message is message:
         editor.message = None
     imgui.pop_style_var()

@@ -163,8 +163,13 @@ class Window:
         """What takes a second to import waits until the window has been drawn."""
         if self._options.file is not None:
             self.editor.filing.open(self._options.file)
-        elif self._options.frames is None:
+        if self._options.frames is None:
+            self.editor.recovery.look()
+            self.editor.models.look()
             warm_up()
+        while self._options.frames is not None and not self.editor.background.is_idle:
+            self.editor.poll()
+            time.sleep(SOON)
 
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""
@@ -305,8 +310,7 @@ class Window:
             self._input.take_key(HELP)
 
     def _take_drop(self, _window: object, paths: Any) -> None:
-        if paths:
-            self.editor.filing.open(Path(paths[0]))
+        self.editor.filing.drop([Path(path) for path in paths])
 
     def _save_settings(self) -> None:
         if self.editor.settings is not self._saved_settings:

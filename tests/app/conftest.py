@@ -53,8 +53,14 @@ def photo_path(tmp_path: Path, photo_bytes: bytes) -> Path:
     return path
 
 
+@pytest.fixture(scope="session", autouse=True)
+def data_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """What editors keep safe is not the user's."""
+    os.environ["OBJECTMORPHER_DATA"] = str(tmp_path_factory.mktemp("data"))
+
+
 @pytest.fixture(scope="session")
-def shared_editor() -> Iterator[Editor]:
+def shared_editor(data_folder: None) -> Iterator[Editor]:
     editor = Editor(Settings(gaussians=3000))
     editor.view.resize((720, 560), 1.0, None)
     yield editor
@@ -66,7 +72,7 @@ def editor(shared_editor: Editor, photo_path: Path) -> Editor:
     """An editor with the made photo open; the worker is shared, it takes seconds to start."""
     shared_editor.close_document()
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
-    shared_editor.filing.open(photo_path)
+    open_file(shared_editor, photo_path)
     assert shared_editor.message is None, shared_editor.message
     return shared_editor
 
@@ -79,8 +85,14 @@ def ball(
     path = tmp_path_factory.mktemp("ball") / "ball.png"
     path.write_bytes(photo_bytes)
     shared_editor.close_document()
-    shared_editor.filing.open(path)
+    open_file(shared_editor, path)
     return lift_ball(shared_editor)
+
+
+def open_file(editor: Editor, path: Path) -> None:
+    """Opens it and waits for it, or for the question about unsaved changes."""
+    editor.filing.open(path)
+    wait_until(editor, lambda: editor.background.is_idle)
 
 
 def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
@@ -93,7 +105,10 @@ def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
 
 
 def wait_for_jobs(editor: Editor) -> None:
-    wait_until(editor, lambda: not editor.poll() and editor.jobs.is_idle)
+    wait_until(
+        editor,
+        lambda: not editor.poll() and editor.jobs.is_idle and editor.background.is_idle,
+    )
 
 
 def lift_ball(editor: Editor) -> Document:
@@ -140,5 +155,6 @@ def window_environment(display: str, tmp_path: Path) -> dict[str, str]:
         **os.environ,
         "DISPLAY": display,
         "OBJECTMORPHER_SETTINGS": str(settings),
+        "OBJECTMORPHER_DATA": str(tmp_path / "data"),
         "OBJECTMORPHER_LANDMARKS": str(tmp_path / "landmarks.json"),
     }

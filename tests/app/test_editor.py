@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CENTRE, lift_ball, wait_for_jobs
+from conftest import CENTRE, lift_ball, open_file, wait_for_jobs
 from PIL import Image
 
 from app.commands import COMMANDS, next_step, run
@@ -83,6 +83,7 @@ def test_the_whole_job(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> No
 
     editor.filing.open(session)
     editor.filing.answer_discard()
+    wait_for_jobs(editor)
     assert editor.path == session
     assert editor.is_saved
     assert editor.object is not None
@@ -163,19 +164,19 @@ def test_errors_are_one_sentence_and_change_nothing(editor: Editor, tmp_path: Pa
     broken = tmp_path / "broken.jpg"
     broken.write_bytes(b"\xff\xd8\xff not a photo")
     for path in (broken, tmp_path / "missing.png", tmp_path):
-        editor.filing.open(path)
+        open_file(editor, path)
         assert editor.message is not None
         assert editor.message.is_error
         assert "\n" not in editor.message.text
         assert editor.document is document
-    editor.filing.export(tmp_path / "out.gif")
+    editor.exporting.export_to(tmp_path / "out.gif")
     assert editor.message.is_error
     assert "gif" in editor.message.text
 
 
 def test_the_opened_photo_is_never_overwritten(editor: Editor, photo_bytes: bytes) -> None:
     assert editor.source is not None
-    editor.filing.export(editor.source)
+    editor.exporting.export_to(editor.source)
     wait_for_jobs(editor)
     assert editor.message is not None
     assert editor.message.is_error
@@ -183,7 +184,7 @@ def test_the_opened_photo_is_never_overwritten(editor: Editor, photo_bytes: byte
 
 
 def test_an_export_that_cannot_be_written_says_so(editor: Editor, tmp_path: Path) -> None:
-    editor.filing.export(tmp_path / "no folder" / "out.png")
+    editor.exporting.export_to(tmp_path / "no folder" / "out.png")
     wait_for_jobs(editor)
     assert editor.message is not None
     assert editor.message.is_error

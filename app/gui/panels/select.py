@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...commands import run, why_not
 from ...editor import Editor
+from ..models_dialog import draw_offer
 from ..theme import Icon
 from ..widgets import button, gap, heading, note
 
@@ -30,3 +31,4 @@ def draw_select(editor: Editor) -> None:
         note("Right-click what does not belong to the object, then lift it.")
     else:
         note("The photo is shown as it was. A new click makes a new selection and a new lift.")
+    draw_offer(editor)

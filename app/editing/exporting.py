@@ -1,0 +1,256 @@
+"""The export that the user puts together: what, how, and where to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..export_functions import write_export
+from ..exporting import FORMATS, NAMES, Format, Plan, What, format_of
+from ..texts import t
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+WRITE = "write"  # kind of jobs
+KNOWN = "PNG, JPG, TIF, WEBP"
+
+
+@dataclass(frozen=True)
+class Draft:
+    """The choices so far."""
+
+    what: What
+    format: Format
+    bits: int  # 0: the photo's own
+    quality: int  # of JPEG
+    webp_quality: int
+    folder: Path
+    name: str  # as typed: a file name, or a whole path
+
+
+class Exporting:
+    """The export dialog's state, and what may be done with it."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.draft: Draft | None = None  # None: no dialog
+        self._replacing: Path | None = None  # asked whether it may be overwritten
+
+    # Choosing
+
+    def open(self) -> None:
+        """Begins with what was exported last."""
+        editor, settings = self._editor, self._editor.settings
+        self._replacing = None
+        what = next((w for w in What if w.value == settings.export_what), What.PHOTO)
+        what = what if self.why_not(what) is None else What.PHOTO
+        format = next((f for f in Format if f.value == settings.export_format), Format.PNG)
+        file = editor.source or editor.path
+        last = Path(settings.export_folder)
+        is_kept = file is None and settings.export_folder and last.is_dir()
+        folder = file.parent if file else (last if is_kept else Path.home())
+        draft = Draft(
+            what, format, settings.export_bits, settings.quality, settings.webp_quality, folder, ""
+        )
+        self.draft = self._named(self._fitting(draft))
+
+    def close(self) -> None:
+        self.draft = self._replacing = None
+
+    def why_not(self, what: What) -> str | None:
+        """Why this cannot be exported now, or None."""
+        editor = self._editor
+        document = editor.committed
+        if what in (What.CUTOUT, What.MASK) and editor.mask is None:
+            return t("Click an object in the photo first")
+        has_plate = document is not None and document.plate is not None
+        if what in (What.BACKGROUND, What.LAYERS) and not has_plate:
+            return t("Lift an object first")
+        return None
+
+    def choose_what(self, what: What) -> None:
+        self._change(replace(self._draft, what=what), is_named=True)
+
+    def choose_format(self, format: Format) -> None:
+        draft = self._draft
+        name = str(Path(draft.name).with_suffix(format.endings[0])) if draft.name else ""
+        self._change(replace(draft, format=format, name=name))
+
+    def choose_bits(self, bits: int) -> None:
+        """8 or 16 a channel; 0 the photo's own."""
+        self._change(replace(self._draft, bits=bits))
+
+    def choose_quality(self, quality: int) -> None:
+        draft = self._draft
+        is_webp = draft.format is Format.WEBP
+        self._change(
+            replace(draft, webp_quality=quality) if is_webp else replace(draft, quality=quality)
+        )
+
+    def set_name(self, name: str) -> None:
+        """As typed; an ending chooses the format."""
+        draft = replace(self._draft, name=name)
+        format = format_of(Path(name).suffix)
+        if format is not None and format in FORMATS[draft.what]:
+            draft = replace(draft, format=format)
+        self._change(draft)
+
+    def set_path(self, path: Path) -> None:
+        """A file was chosen in a file dialog."""
+        self._change(replace(self._draft, folder=path.parent))
+        self.set_name(path.stem if self._draft.what is What.LAYERS else path.name)
+
+    # What it comes to
+
+    @property
+    def formats(self) -> tuple[Format, ...]:
+        return FORMATS[self._draft.what]
+
+    @property
+    def own_bits(self) -> int:
+        """The photo's bits a channel."""
+        document = self._editor.committed
+        return 8 if document is None else 8 * document.photo.pixels.dtype.itemsize
+
+    @property
+    def bits(self) -> int:
+        """Bits a channel of what will be written."""
+        draft = self._draft
+        if not self.has_bits:
+            return 8
+        return draft.bits or self.own_bits
+
+    @property
+    def has_bits(self) -> bool:
+        """Whether there is a choice of bit depth."""
+        return self._draft.format.has_16_bits and self._draft.what is not What.MASK
+
+    @property
+    def quality(self) -> int:
+        draft = self._draft
+        return draft.webp_quality if draft.format is Format.WEBP else draft.quality
+
+    @property
+    def path(self) -> Path:
+        """The file, or the layers' folder."""
+        draft = self._draft
+        typed = draft.folder / Path(draft.name.strip()).expanduser()
+        if draft.what is What.LAYERS or format_of(typed.suffix) is not None:
+            return typed
+        return typed.with_name(typed.name + draft.format.endings[0])
+
+    @property
+    def is_replacing(self) -> bool:
+        """Whether the next click replaces a file that is there."""
+        return self._replacing is not None and self._replacing == self.path
+
+    @property
+    def label(self) -> str:
+        """What the button says: what will be written."""
+        name = self.path.name if self._draft.name.strip() else ""
+        return (
+            t("Replace {name}", name=name) if self.is_replacing else t("Export {name}", name=name)
+        )
+
+    @property
+    def problem(self) -> str | None:
+        """Why this cannot be written, one sentence; None where it can be tried."""
+        draft, path = self._draft, self.path
+        ending = Path(draft.name.strip()).suffix
+        if not draft.name.strip():
+            return t("Type a file name")
+        if (reason := self.why_not(draft.what)) is not None:
+            return reason
+        if draft.what is not What.LAYERS and _is_other_kind(ending, FORMATS[draft.what]):
+            known = ", ".join(f.value for f in FORMATS[draft.what])
+            return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
+        if not path.parent.is_dir():
+            return t("There is no folder {folder}", folder=path.parent)
+        if self._is_opened(path):
+            return t("The export would overwrite the opened photo; choose another name")
+        if draft.what is not What.LAYERS and path.is_dir():
+            return t("{name} is a folder", name=path.name)
+        return None
+
+    def confirm(self) -> None:
+        """Exports; asks once more where that replaces a file."""
+        if self.problem is not None:
+            return
+        draft, path = self._draft, self.path
+        if path.exists() and not self.is_replacing:
+            self._replacing = path
+            return
+        self._remember(draft, path)
+        plan = Plan(draft.what, path, self._editor.current, self.bits, self.quality)
+        self.close()
+        self._start(plan)
+
+    def export_to(self, path: Path) -> None:
+        """The edited photo into this file, in the format of its ending, without a dialog."""
+        editor, settings = self._editor, self._editor.settings
+        format = format_of(path.suffix)
+        if format is None:
+            editor.complain(f"a photo cannot be written as {path.suffix}; choose {KNOWN}")
+        elif self._is_opened(path):
+            editor.complain("the export would overwrite the opened photo; choose another name")
+        else:
+            is_webp = format is Format.WEBP
+            quality = settings.webp_quality if is_webp else settings.quality
+            self._start(Plan(What.PHOTO, path, quality=quality))
+
+    # Inside
+
+    @property
+    def _draft(self) -> Draft:
+        assert self.draft is not None, "the dialog is open"
+        return self.draft
+
+    def _change(self, draft: Draft, is_named: bool = False) -> None:
+        """`is_named`: the name is to be the usual one of what is exported."""
+        draft = self._fitting(draft)
+        self.draft = self._named(draft) if is_named else draft
+        if self._replacing != self.path:
+            self._replacing = None
+
+    def _fitting(self, draft: Draft) -> Draft:
+        """The format is one that can hold it."""
+        known = FORMATS[draft.what]
+        return draft if draft.format in known else replace(draft, format=known[0])
+
+    def _named(self, draft: Draft) -> Draft:
+        document = self._editor.committed
+        stem = Path(document.photo.name).stem if document is not None else "photo"
+        ending = "" if draft.what is What.LAYERS else draft.format.endings[0]
+        return replace(draft, name=f"{stem}-{NAMES[draft.what]}{ending}")
+
+    def _is_opened(self, path: Path) -> bool:
+        source = self._editor.source
+        return source is not None and path.resolve() == source.resolve()
+
+    def _remember(self, draft: Draft, path: Path) -> None:
+        editor = self._editor
+        editor.settings = replace(
+            editor.settings, export_what=draft.what.value, export_format=draft.format.value,
+            export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
+            export_folder=str(path.parent.absolute()),
+        )  # fmt: skip
+
+    def _start(self, plan: Plan) -> None:
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return
+        name = plan.path.name
+        editor.jobs.start(
+            t("Exporting {name}", name=name), write_export, document, plan,
+            done=lambda _: editor.say(t("Exported {name}", name=name)),
+            failed=editor.complain_of, kind=f"{WRITE} {plan.path}",
+        )  # fmt: skip
+
+
+def _is_other_kind(ending: str, formats: tuple[Format, ...]) -> bool:
+    """Whether a typed ending names a file of a kind that is not offered."""
+    if format_of(ending) is not None:
+        return format_of(ending) not in formats
+    return 2 < len(ending) < 6 and ending[1:].isalpha()

@@ -1,0 +1,117 @@
+"""Learned models: which are there, and getting one. None is downloaded without being asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from objectmorpher_core import models
+from objectmorpher_core.models import State, Weight
+from objectmorpher_core.progress import Progress
+
+from .. import job_functions
+from ..jobs import JobError
+from ..texts import t
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
+SELECTING = ("dinov2-vits14", "u2netp")  # what the Select tool does better with, best first
+
+
+@dataclass(frozen=True)
+class Names:
+    """What a model is called for people, and what it is good for."""
+
+    name: str
+    gain: str
+
+
+NAMES = {
+    "dinov2-vits14": Names("DINOv2 ViT-S/14", "A click selects the whole object, not its colour"),
+    "u2netp": Names("U²-Net small", "Select subject, and better outlines"),
+}
+
+
+class Models:
+    """What the window offers about models."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.states: tuple[State, ...] = ()  # empty until they were looked at
+        self.is_open = False  # the window shows the list
+        self._loading = ""
+
+    def look(self) -> None:
+        """Reads anew what is there; a damaged file counts as none."""
+        self._editor.background.start(
+            "Looking at the models", lambda progress: models.verify(),
+            kind=LOOK, done=self._take, failed=lambda error: None, is_quiet=True,
+        )  # fmt: skip
+
+    def open(self) -> None:
+        """Shows the list."""
+        self.is_open = True
+        self.look()
+
+    @property
+    def offered(self) -> Weight | None:
+        """A model that would make selecting better, is not there and was not declined."""
+        declined = self._editor.settings.declined_models
+        missing = {s.weight.id: s.weight for s in self.states if s.state != "ok"}
+        return next((missing[m] for m in SELECTING if m in missing and m not in declined), None)
+
+    @property
+    def downloading(self) -> str | None:
+        """The model on its way."""
+        return self._loading if self._editor.background.is_busy(DOWNLOAD) else None
+
+    def download(self, id: str) -> None:
+        """Gets a model; the user has clicked the button that says so."""
+        editor = self._editor
+        self._loading = id
+        editor.message = None
+
+        def fetch(progress: Progress) -> Path:
+            return models.fetch(id, progress)
+
+        def accept(_: Path) -> None:
+            self.look()
+            self._use_anew()
+            editor.say(t("{name} is ready", name=names_of(id).name))
+
+        editor.background.start(
+            t("Downloading {name}", name=names_of(id).name), fetch, kind=DOWNLOAD,
+            done=accept, failed=self._complain, cancelled=self.look,
+        )  # fmt: skip
+
+    def cancel(self) -> None:
+        """Stops the download; nothing of it stays."""
+        self._editor.background.cancel(DOWNLOAD)
+
+    def decline(self, id: str) -> None:
+        """Not now: it is not offered again, but stays in the list."""
+        settings = self._editor.settings
+        declined = (*settings.declined_models, id)
+        self._editor.settings = replace(settings, declined_models=declined)
+
+    def _take(self, states: tuple[State, ...]) -> None:
+        self.states = states
+
+    def _complain(self, error: JobError) -> None:
+        self._editor.complain(error.sentence)
+
+    def _use_anew(self) -> None:
+        """The worker chooses its segmenter again, and reads the photo with it."""
+        self._editor.jobs.start(
+            "Changing the model", job_functions.forget_segmenter,
+            done=lambda _: self._editor.tasks.read_photo(), failed=lambda error: None,
+            kind=FORGET, is_quiet=True,
+        )  # fmt: skip
+
+
+def names_of(id: str) -> Names:
+    """For people."""
+    return NAMES.get(id) or Names(id, models.weight(id).purpose)

@@ -1,0 +1,80 @@
+"""What can be exported, in which formats, and under which names. Plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+LOSSLESS = 100  # quality of WebP at which every pixel is kept
+
+
+class What(Enum):
+    """The things that an export may hold."""
+
+    PHOTO = "Photo"
+    CUTOUT = "Object cut-out"
+    MASK = "Mask"
+    BACKGROUND = "Background"
+    LAYERS = "Layers"
+
+
+class Format(Enum):
+    """Kinds of image files."""
+
+    PNG = "PNG"
+    JPEG = "JPEG"
+    TIFF = "TIFF"
+    WEBP = "WebP"
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """The usual one first."""
+        return _ENDINGS[self]
+
+    @property
+    def has_16_bits(self) -> bool:
+        return self in (Format.PNG, Format.TIFF)
+
+    @property
+    def has_quality(self) -> bool:
+        return self in (Format.JPEG, Format.WEBP)
+
+
+_ENDINGS = {
+    Format.PNG: (".png",),
+    Format.JPEG: (".jpg", ".jpeg"),
+    Format.TIFF: (".tif", ".tiff"),
+    Format.WEBP: (".webp",),
+}
+_TRANSPARENT = (Format.PNG, Format.TIFF, Format.WEBP)
+FORMATS = {
+    What.PHOTO: tuple(Format),
+    What.CUTOUT: _TRANSPARENT,
+    What.MASK: (Format.PNG,),
+    What.BACKGROUND: tuple(Format),
+    What.LAYERS: (Format.PNG,),
+}
+NAMES = {  # what follows the photo's name
+    What.PHOTO: "edited",
+    What.CUTOUT: "object",
+    What.MASK: "mask",
+    What.BACKGROUND: "background",
+    What.LAYERS: "layers",
+}
+
+
+def format_of(ending: str) -> Format | None:
+    """The format that an ending (".JPG") names."""
+    return next((f for f in Format if ending.lower() in f.endings), None)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An export that was decided on."""
+
+    what: What
+    path: Path  # the file; of layers the folder
+    object: int = 0  # index of the one whose cut-out or mask it is
+    bits: int = 0  # 8 or 16 a channel; 0: the photo's own
+    quality: int = 95  # of JPEG, and of WebP where LOSSLESS is just that

@@ -1,0 +1,189 @@
+"""What to export, how, and where to; the button says what will be written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+from imgui_bundle import ImVec2, imgui
+
+from ..editing.exporting import Exporting
+from ..editor import Editor
+from ..exporting import LOSSLESS, Format, What
+from ..filing import Dialog
+from ..texts import t
+from .popup import popup
+from .theme import FIELD, PRIMARY, theme
+from .widgets import Kind, button, note, tooltip
+
+T = TypeVar("T")
+
+WIDTH = 480.0  # points
+LABELS = 88.0  # width of the names left of the fields
+BROWSE = 96.0
+DEPTHS = (8, 16)  # bits a channel
+ABOUT = {
+    What.PHOTO: "The whole photo with the edit in it.",
+    What.CUTOUT: "The current object alone, where it is now, on nothing.",
+    What.MASK: "The current object's selection in the opened photo, white on black.",
+    What.BACKGROUND: "The photo with its objects painted out.",
+    What.LAYERS: "A folder of PNG files: background, objects from back to front, and the photo.",
+}
+
+
+def draw_export(editor: Editor) -> None:
+    """While the editor has an export to decide on."""
+    exporting = editor.exporting
+    if exporting.draft is None:
+        return
+    with popup(t("Export"), WIDTH) as is_shown:
+        if is_shown:
+            _draw_what(exporting)
+            _draw_how(exporting)
+            is_entered = _draw_where(editor)
+            _draw_foot(exporting, is_entered)
+            if exporting.draft is None or editor.filing.wanted is not None:
+                imgui.close_current_popup()
+
+
+def _draw_what(exporting: Exporting) -> None:
+    assert exporting.draft is not None
+    _name(t("What"))
+    if (chosen := _choice("what", What, exporting.draft.what, exporting)) is not None:
+        exporting.choose_what(chosen)
+    imgui.set_cursor_pos_x(_field())
+    note(t(ABOUT[exporting.draft.what]))
+    imgui.dummy(theme.size(0, 0))
+
+
+def _draw_how(exporting: Exporting) -> None:
+    assert exporting.draft is not None
+    _name(t("Format"))
+    formats = exporting.formats
+    names = [format.value for format in formats]
+    format = _segments("format", formats, exporting.draft.format, names)
+    if format is not None:
+        exporting.choose_format(format)
+    if exporting.has_bits:
+        _name(t("Depth"))
+        names = [t("{bits} bit", bits=bits) for bits in DEPTHS]
+        bits = _segments("bits", DEPTHS, exporting.bits, names)
+        if bits is not None:
+            exporting.choose_bits(0 if bits == exporting.own_bits else bits)
+    elif exporting.draft.format.has_quality:
+        _name(t("Quality"))
+        imgui.set_next_item_width(-1)
+        is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
+        shown = t("lossless") if is_lossless else "%d"
+        is_changed, quality = imgui.slider_int("##quality", exporting.quality, 50, 100, shown)
+        if is_changed:
+            exporting.choose_quality(quality)
+        tooltip(t("Higher is larger and truer. Below lossless, every pixel changes a little."))
+    imgui.dummy(theme.size(0, 0))
+
+
+def _draw_where(editor: Editor) -> bool:
+    """Name and folder; True when Enter was pressed in the name."""
+    exporting = editor.exporting
+    assert exporting.draft is not None
+    _name(t("Folder") if exporting.draft.what is What.LAYERS else t("Name"))
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    imgui.set_next_item_width(-1)
+    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+    name = exporting.draft.name
+    is_entered, typed = imgui.input_text_with_hint("##name", t("name or path"), name, flags)
+    if typed != name:
+        exporting.set_name(typed)
+    _name(t("In"))
+    imgui.align_text_to_frame_padding()
+    room = imgui.get_content_region_avail().x - theme.pt(BROWSE + 8)
+    folder = str(exporting.path.parent)
+    imgui.text_colored(theme.vec("secondary"), _shortened(folder, room))
+    tooltip(folder)
+    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BROWSE))
+    if button(t("Browse…"), width=BROWSE):
+        editor.filing.wanted = Dialog.EXPORT
+    return is_entered
+
+
+def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
+    """What is wrong, or what will be replaced; Cancel and the button that does it."""
+    problem = exporting.problem
+    imgui.dummy(theme.size(0, 4))
+    warning = t("{name} is there already.", name=exporting.path.name)
+    text = problem or (warning if exporting.is_replacing else "")
+    imgui.push_style_color(imgui.Col_.text, theme.vec("warning"))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(text or " ")
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+    top = imgui.get_cursor_pos_y()
+    imgui.set_cursor_pos_y(top + theme.pt((PRIMARY - FIELD) / 2))
+    is_cancelled = button(t("Cancel"), width=BROWSE)
+    imgui.same_line()
+    imgui.set_cursor_pos_y(top)
+    label = f"{_shortened(exporting.label, theme.pt(WIDTH - 3 * 20 - BROWSE - 16))}###go"
+    is_pressed = button(label, Kind.PRIMARY, problem)
+    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
+    is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
+    if is_cancelled or is_escape:
+        exporting.close()
+    elif is_pressed or is_entered or (is_enter and not imgui.is_any_item_active()):
+        exporting.confirm()
+
+
+def _name(text: str) -> None:
+    """Left of a field."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), text)
+    imgui.same_line(_field())
+
+
+def _field() -> float:
+    """Where the fields begin, window units."""
+    return theme.pt(20 + LABELS)
+
+
+def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporting) -> What | None:
+    """A list that unfolds; what cannot be chosen says why. What was chosen, or None."""
+    found = None
+    imgui.set_next_item_width(-1)
+    if imgui.begin_combo(f"##{name}", t(chosen.value)):
+        for choice in choices:
+            reason = exporting.why_not(choice)
+            flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
+            if imgui.selectable(t(choice.value), choice is chosen, flags)[0]:
+                found = choice
+            if reason:
+                tooltip(reason)
+        imgui.end_combo()
+    return found
+
+
+def _segments(name: str, choices: Sequence[T], chosen: T, labels: Sequence[str]) -> T | None:
+    """Buttons side by side, of which one is down. The one that was pressed, or None."""
+    found = None
+    room = imgui.get_content_region_avail().x
+    width = (room - theme.pt(2) * (len(choices) - 1)) / len(choices)
+    for k, choice in enumerate(choices):
+        if k:
+            imgui.same_line(0, theme.pt(2))
+        is_on = choice == chosen
+        role, text = ("accent", "on_accent") if is_on else ("raised", "text")
+        imgui.push_style_color(imgui.Col_.button, theme.vec(role))
+        imgui.push_style_color(imgui.Col_.button_hovered, theme.vec(role if is_on else "hovered"))
+        imgui.push_style_color(imgui.Col_.text, theme.vec(text))
+        if imgui.button(f"{labels[k]}##{name}{k}", ImVec2(width, theme.pt(FIELD))):
+            found = choice
+        imgui.pop_style_color(3)
+    return found
+
+
+def _shortened(text: str, room: float) -> str:
+    """The text's end, as much as fits."""
+    if imgui.calc_text_size(text).x <= room:
+        return text
+    while text and imgui.calc_text_size(f"…{text}").x > room:
+        text = text[1:]
+    return f"…{text}"

@@ -1,0 +1,60 @@
+"""The steps since the file was opened: the current one marked, a click travels."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from ..editor import Editor
+from ..texts import t
+from .theme import theme
+from .widgets import heading, rule
+
+ROW = 28.0  # points
+MOST = 9  # rows shown without scrolling
+
+
+def draw_history(editor: Editor) -> None:
+    """At the inspector's end, while it is switched on."""
+    history = editor.history
+    if history is None or not editor.view.has_history:
+        return
+    rule()
+    heading(t("History"))
+    steps, cursor = history.steps, history.cursor
+    height = theme.pt(ROW) * min(len(steps), MOST)
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
+    imgui.begin_child("##history", ImVec2(0, height))
+    for k, label in enumerate(steps):
+        if _draw_step(k, label, cursor):
+            editor.travel(k)
+        if k == cursor and _has_moved(cursor, len(steps)):
+            imgui.set_scroll_here_y(0.5)
+    imgui.end_child()
+    imgui.pop_style_var()
+
+
+def _draw_step(k: int, label: str, cursor: int) -> bool:
+    """One row; whether it was clicked. Steps that were undone are dimmed."""
+    start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    is_clicked = imgui.invisible_button(f"##step{k}", ImVec2(width, theme.pt(ROW)))
+    draw, end = imgui.get_window_draw_list(), ImVec2(start.x + width, start.y + theme.pt(ROW))
+    if k == cursor or imgui.is_item_hovered():
+        role = "raised" if k == cursor else "hovered"
+        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(4))
+    if k == cursor:
+        bar = ImVec2(start.x + theme.pt(3), end.y)
+        draw.add_rect_filled(start, bar, theme.u32("accent"), theme.pt(2))
+    middle = start.y + (theme.pt(ROW) - imgui.get_font_size()) / 2
+    role, alpha = ("text", 1.0) if k <= cursor else ("secondary", 0.6)
+    draw.add_text(ImVec2(start.x + theme.pt(12), middle), theme.u32(role, alpha), t(label))
+    return is_clicked
+
+
+_seen = (-1, -1)
+
+
+def _has_moved(cursor: int, count: int) -> bool:
+    """Whether the current step is another one than when this was asked last."""
+    global _seen
+    before, _seen = _seen, (cursor, count)
+    return before != _seen

@@ -1,0 +1,40 @@
+"""A box in the middle of the window, over everything else, for one matter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import ImVec2, imgui
+
+from .theme import theme
+from .widgets import bold_text, note
+
+PADDING = 20.0  # points
+
+
+@contextmanager
+def popup(title: str, width: float, about: str = "") -> Iterator[bool]:
+    """Opens it and yields whether it is drawn; `width` in points. What is inside closes it.
+
+    The title doubles as its id.
+    """
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
+    centre = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(ImVec2(theme.pt(width), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(PADDING, PADDING))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+    is_shown = imgui.begin_popup_modal(title, None, flags)[0]
+    imgui.pop_style_var(2)
+    if is_shown:
+        with bold_text():
+            imgui.text_unformatted(title)
+        if about:
+            note(about)
+        imgui.dummy(theme.size(0, 4))
+    yield is_shown
+    if is_shown:
+        imgui.end_popup()

@@ -1,0 +1,73 @@
+"""Reads what the user opens: a photo or a session; everything else is a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from objectmorpher_core.document import Document
+from objectmorpher_core.progress import Progress
+
+SESSION_ENDING = ".omorph"
+PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
+OBJECT_ENDINGS = (
+    ".ply", ".splat", ".ksplat", ".spz", ".sog", ".obj", ".glb", ".gltf", ".fbx", ".stl",
+)  # fmt: skip
+ZIP_MAGIC = b"PK\x03\x04"
+MAX_BYTES = 4 << 30  # of a file; no photo and no session is larger
+BLOCK = 1 << 24  # bytes read at a time
+
+
+class OpeningError(ValueError):
+    """The file cannot be opened; one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What a file held."""
+
+    document: Document
+    is_session: bool
+
+
+def read_document(path: Path, fov: float | None, seed: int, progress: Progress) -> Opened:
+    """The document in a file; `fov` (degrees) and `seed` are for photos. Raises OpeningError."""
+    if path.is_dir():
+        raise OpeningError(f"{path.name} is a folder; choose a photo in it")
+    if path.suffix.lower() in OBJECT_ENDINGS:
+        raise OpeningError(f"{path.name} is a 3D object, which cannot be placed in a photo yet")
+    try:
+        data = _read(path, progress)
+        progress(0.35, "")
+        if data[:4] == ZIP_MAGIC:
+            from objectmorpher_core.session_file import decode_session
+
+            return Opened(decode_session(data), is_session=True)
+        from objectmorpher_core.pipeline import open_photo
+
+        return Opened(open_photo(data, path.name, fov=fov, seed=seed), is_session=False)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OpeningError(f"{path.name} cannot be opened: {reason}") from error
+    except MemoryError as error:
+        raise OpeningError(f"{path.name} does not fit into the memory") from error
+    except ValueError as error:
+        raise OpeningError(f"{path.name} cannot be opened: {error}") from error
+
+
+def _read(path: Path, progress: Progress) -> bytes:
+    """The file's bytes, as long as it is one that ends."""
+    size = path.stat().st_size
+    if not path.is_file():
+        raise OpeningError(f"{path.name} is no file")
+    if size > MAX_BYTES:
+        raise OpeningError(
+            f"{path.name} is {size / (1 << 30):.1f} GiB, more than the {MAX_BYTES >> 30} GiB "
+            "that can be opened"
+        )
+    parts = []
+    with path.open("rb") as file:
+        while block := file.read(BLOCK):
+            parts.append(block)
+            progress(0.3 * min(len(parts) * BLOCK / max(size, 1), 1.0), "")
+    return b"".join(parts)

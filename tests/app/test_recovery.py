@@ -1,0 +1,117 @@
+"""What crashed editors have left is offered, whatever state it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from conftest import wait_until
+from edit_until_killed import base_document, step_document
+from test_autosave import folders, settle
+
+from app.autosave import LOCK, recovery_root
+from app.editor import Editor
+from app.file_lock import FileLock
+from objectmorpher_core.journal import DOCUMENT, Journal
+
+
+@pytest.fixture
+def editor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_editor: Editor
+) -> Iterator[Editor]:
+    """With nothing open, and a data folder of its own."""
+    shared_editor.close_document()
+    settle(shared_editor)
+    monkeypatch.setenv("OBJECTMORPHER_DATA", str(tmp_path / "data"))
+    yield shared_editor
+    shared_editor.close_document()
+    settle(shared_editor)
+
+
+def leave(name: str, hour: int, step: int = 1) -> Path:
+    """What an editor leaves that crashes."""
+    folder = recovery_root() / name
+    about = {"name": f"{name}.jpg", "edited": f"2026-05-04T{hour:02}:02:00", "objects": 1,
+             "path": None, "source": f"/photos/{name}.jpg"}  # fmt: skip
+    Journal(folder).write(step_document(base_document(), step), about)
+    return folder
+
+
+def recover(editor: Editor, name: str) -> None:
+    (left,) = (left for left in editor.recovery.left if left.folder.name == name)
+    editor.recovery.recover(left)
+    wait_until(editor, lambda: editor.background.is_idle)
+
+
+def test_every_crashed_editor_is_listed_the_newest_first(editor: Editor) -> None:
+    leave("cat", 9), leave("dog", 14)
+    editor.recovery.look()
+    assert [left.name for left in editor.recovery.left] == ["dog.jpg", "cat.jpg"]
+
+
+def test_what_is_recovered_is_unsaved_and_stays_safe(editor: Editor) -> None:
+    folder = leave("cat", 9, step=7)
+    editor.recovery.look()
+    recover(editor, "cat")
+    assert editor.committed is not None
+    assert editor.committed.objects[0].placement.move == (7.0, 0.0)
+    assert not editor.is_saved
+    assert editor.source == Path("/photos/cat.jpg")
+    assert editor.recovery.left == ()
+    settle(editor)
+    assert folders(recovery_root()) == [folder]  # another crash would lose nothing
+    editor.close_document()
+    settle(editor)
+    assert folders(recovery_root()) == []
+
+
+def test_discarding_deletes_it(editor: Editor) -> None:
+    folder = leave("cat", 9)
+    editor.recovery.look()
+    editor.recovery.discard(editor.recovery.left[0])
+    assert not folder.exists()
+    assert editor.recovery.left == ()
+
+
+def test_a_running_editors_work_is_not_offered(editor: Editor) -> None:
+    folder = leave("cat", 9)
+    lock = FileLock.take(folder / LOCK)
+    assert lock is not None
+    editor.recovery.look()
+    assert editor.recovery.left == ()
+    lock.release()
+    editor.recovery.look()
+    assert len(editor.recovery.left) == 1
+
+
+@pytest.mark.parametrize("victim", [DOCUMENT, "*.photo", "*.npy"])
+def test_damage_is_a_sentence_and_the_rest_is_still_offered(editor: Editor, victim: str) -> None:
+    broken = leave("cat", 9)
+    leave("dog", 14)
+    path = next(broken.glob(victim))
+    path.write_bytes(path.read_bytes()[:50])
+    editor.recovery.look()
+    assert len(editor.recovery.left) == 2
+    if victim != DOCUMENT:
+        recover(editor, "cat")
+        assert editor.committed is None
+        assert editor.message is not None and editor.message.is_error
+    (damaged,) = (left for left in editor.recovery.left if left.folder == broken)
+    assert damaged.problem and "\n" not in damaged.problem
+    recover(editor, "dog")
+    assert editor.committed is not None
+    editor.recovery.discard(damaged)
+    assert not broken.exists()
+
+
+def test_other_unsaved_work_is_asked_about_first(editor: Editor) -> None:
+    leave("cat", 9)
+    base = base_document()
+    editor.start(base)
+    editor.apply("Step", step_document(base, 1))
+    editor.recovery.look()
+    editor.recovery.recover(editor.recovery.left[0])
+    assert editor.filing.question is not None
+    editor.filing.answer_cancel()
+    assert editor.committed is not None and editor.committed.objects[0].placement.move[0] == 1.0
