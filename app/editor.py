@@ -19,9 +19,11 @@ from objectmorpher_core.document import Document, EditObject
 
 from .derived import Derived
 from .editing.composing import Composing
+from .editing.handle_numbers import HandleNumbers
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
+from .editing.rigging import Rigging
 from .editing.selection import Selection
 from .feedback import Hover, Message
 from .filing import Filing
@@ -49,6 +51,7 @@ class Editor:
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.posing, self.placing = Posing(self), Placing(self)
+        self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.composing = Composing(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
