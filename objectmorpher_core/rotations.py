@@ -40,10 +40,8 @@ def vector_from_matrix(matrix: np.ndarray, near: np.ndarray | None = None) -> F6
     if near is None or not np.any(near):
         axis = np.array([x, y, z]) / half if half > 1e-12 else np.array([0.0, 0.0, 1.0])
         return angle * axis
-    if half < 1e-9:  # no turn at all, or whole ones about any axis
-        axis = near / np.linalg.norm(near)
-    else:
-        axis = np.array([x, y, z]) / half
+    is_whole = half < 1e-9  # no turn at all, or whole ones about any axis
+    axis = near / np.linalg.norm(near) if is_whole else np.array([x, y, z]) / half
     turns = np.round((axis @ near - angle) / (2 * np.pi))
     return (angle + 2 * np.pi * turns) * axis
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -207,7 +208,7 @@ class Rigging:
 def gaps_to_way(points: F64, way: F64) -> F64:
     """(N,) px from points (N, 2) to a line (S, 2) through places; S >= 1."""
     gaps = np.linalg.norm(points - way[0], axis=1)
-    for start, end in zip(way[:-1], way[1:], strict=True):
+    for start, end in pairwise(way):
         along = end - start
         share = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0, 1)
         gaps = np.minimum(gaps, np.linalg.norm(points - start - share[:, None] * along, axis=1))

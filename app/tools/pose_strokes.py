@@ -54,9 +54,8 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
         if is_moved:
             _follow(editor, held, start, pointer, depth)
     if is_moved:
-        posing.finish(
-            t("Drag {count} points", count=len(chosen)) if chosen[1:] else t("Drag point")
-        )
+        count = len(chosen)
+        posing.finish(t("Drag {count} points", count=count) if count > 1 else t("Drag point"))
     elif is_new:
         posing.finish(t("Add pin") if start.alt else t("Add handle"))
     else:

@@ -102,9 +102,7 @@ class PoseTool:
         if editor.hover.part == RING_PART:
             return t("Drag along the ring to turn the point · Shift: steps of 15° · R hides it")
         if editor.hover.handle is not None:
-            return t(
-                "Drag moves it · Ctrl-drag turns it · Shift-click selects more · Del removes it"
-            )
+            return t("Drag moves it · Ctrl-drag turns it · Shift-click adds it · Del removes it")
         if editor.hover.surface is not None:
             return t("Drag this point · Ctrl-drag turns it · Click sets a handle · Alt-click a pin")
         return t("Drag a point of the object · Drag beside it selects handles · Space-drag pans")

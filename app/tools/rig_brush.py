@@ -17,7 +17,7 @@ HINTS = {
     PoseMode.FREEZE: "Paint what must stay as in the photo · Alt erases · [ and ] size the brush",
     PoseMode.STIFFEN: "Paint what must bend less · Alt erases · [ and ] size the brush",
     PoseMode.BODY: "Paint what must move as one rigid piece · Alt erases · [ and ] size the brush",
-    PoseMode.CUT: "Draw a line where parts must come loose: it cuts right through · Alt erases cuts",
+    PoseMode.CUT: "Draw a line where parts must come loose; it cuts right through · Alt erases",
     PoseMode.GLUE: "Drag from one part to another: the ends are joined · Alt erases glue",
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..arrays import F64, I32
@@ -16,7 +18,7 @@ def sides_of_cut(pairs: np.ndarray, picture: F64, stroke: F64) -> tuple[I32, I32
     """
     votes = np.zeros(len(picture))
     a, b = picture[pairs[:, 0]], picture[pairs[:, 1]]
-    for start, end in zip(stroke[:-1], stroke[1:], strict=True):
+    for start, end in pairwise(stroke):
         along = end - start
         if not along.any():
             continue

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from imgui_bundle import ImVec2
 
@@ -39,7 +41,7 @@ def _draw_arc(canvas: Canvas, at: ImVec2, turn: float) -> None:
     angles = np.linspace(0, end, max(int(abs(np.degrees(end)) / 4), 1) + 1)
     xy = np.column_stack([at.x + radius * np.sin(angles), at.y - radius * np.cos(angles)])
     if abs(turn) > 0.5:
-        places = [ImVec2(x, y) for x, y in xy.tolist()]
+        places: list[Any] = [ImVec2(x, y) for x, y in xy.tolist()]
         canvas.draw.add_polyline(places, theme.u32(ACCENT), theme.pt(4), 0)
     knob = ImVec2(*xy[-1])
     canvas.draw.add_circle_filled(knob, theme.pt(5.5), theme.u32(DARK, 0.8))
