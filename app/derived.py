@@ -20,6 +20,7 @@ from .blend import build_blend
 from .layers import Layers
 from .memo import Memo
 from .painter import Painter
+from .surface_facts import SurfaceFacts
 from .view import View
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Derived:
         self._shapes, self._posed = Memo(), Memo()
         self.layers = Layers(self)
         self.painter = Painter(self)
+        self.facts = SurfaceFacts(self)
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
@@ -151,12 +153,16 @@ class Derived:
         points = thing.pose.points if thing.pose else deformer.points
         return self.project(document, k, points[index])
 
-    def control_points(self, document: Document, k: int) -> F64:
-        """Where the control points are seen: (M, 2) image px."""
+    def control_places(self, document: Document, k: int) -> F64:
+        """Where the control points are now: (M, 3) world."""
         thing = document.objects[k]
         assert thing.lifted is not None
         points = thing.pose.points if thing.pose else thing.lifted.control_points
-        return self.project(document, k, points)
+        return self.world(document, k, points)
+
+    def control_points(self, document: Document, k: int) -> F64:
+        """Where the control points are seen: (M, 2) image px."""
+        return document.photo.camera.project(self.control_places(document, k))
 
     def links(self, document: Document, k: int, count: int) -> F64:
         """The strongest links of each control point: (L, 2, 2) image px of their ends."""
@@ -167,7 +173,8 @@ class Derived:
 
     # Between the object's frame and the picture
 
-    def _world(self, document: Document, k: int, points: np.ndarray) -> F64:
+    def world(self, document: Document, k: int, points: np.ndarray) -> F64:
+        """World positions (..., 3) of object-frame points, after the placement."""
         thing = document.objects[k]
         assert thing.lifted is not None
         motion = thing.placement.matrix(thing.lifted, document.photo.camera)
@@ -175,13 +182,13 @@ class Derived:
 
     def project(self, document: Document, k: int, points: np.ndarray) -> F64:
         """Image px (..., 2) of object-frame points (..., 3), after the placement."""
-        return document.photo.camera.project(self._world(document, k, points))
+        return document.photo.camera.project(self.world(document, k, points))
 
     def spot(self, document: Document, k: int, point: np.ndarray) -> Spot:
         """Where an object-frame point (3,) is seen."""
         lifted = document.objects[k].lifted
         assert lifted is not None
-        world = self._world(document, k, np.asarray(point))
+        world = self.world(document, k, np.asarray(point))
         xy = document.photo.camera.project(world)
         scale = document.objects[k].placement.scale
         return Spot(xy, float(world[2]), lifted.diameter * lifted.scale * scale)

@@ -22,10 +22,12 @@ from .background import Background
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
+from .editing.handle_numbers import HandleNumbers
 from .editing.models import Models
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
+from .editing.rigging import Rigging
 from .editing.selection import Selection
 from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
@@ -56,6 +58,7 @@ class Editor:
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.posing, self.placing = Posing(self), Placing(self)
+        self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.composing = Composing(self)
         self.exporting, self.models = Exporting(self), Models(self)
         self.derived.layers.ask = self.tasks.render_exact

@@ -14,6 +14,8 @@ import numpy as np
 from objectmorpher_core.brush import Brush
 from objectmorpher_core.camera import Camera
 
+from .pose_view import PoseView
+
 MARGIN = 24.0  # points between the fitted photo and the canvas's edge
 MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px
 KEEP_VISIBLE = 48.0  # px of the photo that panning leaves on the canvas
@@ -68,6 +70,7 @@ class View:
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
+    pose: PoseView = field(default_factory=PoseView)
 
     @property
     def place(self) -> tuple[float, ...]:

@@ -114,6 +114,14 @@ def turn_handle(document: Document, k: int, h: int, turn: np.ndarray | None) -> 
     return document.with_object(k, replace(item, handles=handles))
 
 
+def set_pin(document: Document, k: int, h: int, is_pin: bool) -> Document:
+    """Whether handle `h` of object `k` is there to hold, or to be dragged."""
+    item = document.objects[k]
+    changed = replace(item.handles[h], is_pin=is_pin)
+    handles = tuple(changed if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
 def soften_handle(document: Document, k: int, h: int, softness: float) -> Document:
     """How much handle `h` of object `k` gives way: 0 = not at all."""
     if not 0 <= softness < np.inf:

@@ -28,6 +28,45 @@ def matrix_from_vector(vector: np.ndarray) -> F64:
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
 
 
+def vector_from_matrix(matrix: np.ndarray, near: np.ndarray | None = None) -> F64:
+    """The rotation vector (3,) of a rotation matrix (3, 3), radians.
+
+    A rotation has many: turns of 360 degrees more, about its axis or against it. It is the one
+    nearest to the vector `near` (3,), else the shortest.
+    """
+    w, x, y, z = quats_from_matrices(np.asarray(matrix, np.float64)[None])[0]
+    half = float(np.linalg.norm([x, y, z]))
+    angle = 2.0 * np.arctan2(half, w)
+    if near is None or not np.any(near):
+        axis = np.array([x, y, z]) / half if half > 1e-12 else np.array([0.0, 0.0, 1.0])
+        return angle * axis
+    is_whole = half < 1e-9  # no turn at all, or whole ones about any axis
+    axis = near / np.linalg.norm(near) if is_whole else np.array([x, y, z]) / half
+    turns = np.round((axis @ near - angle) / (2 * np.pi))
+    return (angle + 2 * np.pi * turns) * axis
+
+
+def turn_about(vector: np.ndarray, axis: np.ndarray) -> float:
+    """How far the rotation `vector` (3,) turns about a unit `axis` (3,): radians.
+
+    The twist of swing and twist: one more turn by a about the axis adds a to it.
+    """
+    angle = float(np.linalg.norm(vector))
+    along = float(vector @ axis)
+    if abs(angle - abs(along)) < 1e-9 * max(angle, 1.0):  # about the axis itself, any angle
+        return along
+    return float(2.0 * np.arctan2(np.sin(angle / 2) * along / angle, np.cos(angle / 2)))
+
+
+def turned_by(vector: np.ndarray, more: np.ndarray) -> F64:
+    """The rotation vector (3,) of `vector` and then `more` (3,), radians, any angles."""
+    size = max(float(np.linalg.norm(vector)), float(np.linalg.norm(more)))
+    if np.linalg.norm(np.cross(vector, more)) <= 1e-12 * max(size, 1e-6) ** 2:  # about one axis
+        return np.asarray(vector + more, np.float64)
+    both = matrix_from_vector(more) @ matrix_from_vector(vector)
+    return vector_from_matrix(both, np.asarray(vector) + more)
+
+
 def quats_from_matrices(matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (N, 4) wxyz, w >= 0, of rotation matrices (N, 3, 3).
 

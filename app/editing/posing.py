@@ -1,7 +1,8 @@
-"""Dragging points of the lifted object, and what holds it."""
+"""Dragging and turning points of the lifted object, and what holds it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.document import Document
+from objectmorpher_core.rotations import turned_by, vector_from_matrix
 
 from ..derived import Spot
 from ..texts import t
+from .mirroring import Mirroring
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import SurfacePoint
@@ -27,7 +30,9 @@ class Posing:
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
-        self.handle: int | None = None  # selected
+        self.mirroring = Mirroring(editor)
+        self.readout = ""  # of the turn in progress: "34°"
+        self._selected: tuple[int, ...] = ()
         self._restless: Document | None = None  # the preview, as long as its pose is not at rest
 
     # What there is
@@ -55,6 +60,25 @@ class Posing:
         target = editor.object.handles[handle].target
         return editor.derived.spot(editor.document, editor.current, target)
 
+    def line(self, handle: int) -> tuple[F64, F64]:
+        """A handle's target (3,) and the surface's normal (3,) there, both world."""
+        editor = self._editor
+        assert editor.document is not None and editor.object is not None
+        own = editor.object.handles[handle]
+        place = editor.derived.world(editor.document, editor.current, own.target)
+        return place, editor.derived.facts.normal_at(editor.document, editor.current, own.point)
+
+    def turn_of(self, handle: int) -> F64:
+        """The rotation vector (3,) of a handle, object frame: its own, or as it comes."""
+        editor = self._editor
+        assert editor.object is not None
+        own, pose = editor.object.handles[handle], editor.object.pose
+        if own.turn is not None:
+            return own.turn
+        if pose is None:
+            return np.zeros(3)
+        return vector_from_matrix(pose.rotations[own.control_point])
+
     @property
     def is_restless(self) -> bool:
         """Whether the previewed pose still moves towards its rest."""
@@ -62,49 +86,116 @@ class Posing:
 
     # Selecting
 
-    def select(self, handle: int | None) -> None:
-        """The handle that keys and fields change."""
-        self.handle = handle
+    @property
+    def selected(self) -> tuple[int, ...]:
+        """The handles that keys and fields change, in the order in which they were selected."""
+        thing = self._editor.object
+        count = 0 if thing is None else len(thing.handles)
+        return tuple(h for h in self._selected if h < count)
+
+    @property
+    def handle(self) -> int | None:
+        """The handle that was selected last."""
+        return self.selected[-1] if self.selected else None
+
+    def select(self, *handles: int | None) -> None:
+        """These handles, the last of them the current one; None is no handle."""
+        self._selected = tuple(dict.fromkeys(h for h in handles if h is not None))
+
+    def toggle(self, handle: int) -> None:
+        """Adds a handle to the selection, or takes it out."""
+        others = tuple(h for h in self.selected if h != handle)
+        self.select(*(others if handle in self.selected else (*others, handle)))
+
+    def select_all(self) -> None:
+        thing = self._editor.object
+        self.select(*range(len(thing.handles) if thing else 0))
+
+    def select_box(self, low: np.ndarray, high: np.ndarray, is_added: bool) -> None:
+        """The handles seen between two corners (2,) image px; added to the others or instead."""
+        positions = self.positions()
+        inside = np.flatnonzero(((positions >= low) & (positions <= high)).all(1)).tolist()
+        self.select(*(self.selected if is_added else ()), *inside)
 
     def forget_lost(self) -> None:
         """Deselects what the document does not have any more."""
-        thing = self._editor.object
-        if thing is None or (self.handle or 0) >= len(thing.handles):
-            self.handle = None
+        self._selected = self.selected
 
     # Strokes
 
-    def start_handle(self, canvas_xy: np.ndarray, is_pin: bool) -> int | None:
-        """Previews a new handle on the surface; its index, or None beside the object."""
+    def start_handle(
+        self, canvas_xy: np.ndarray, is_pin: bool, is_added: bool = False
+    ) -> int | None:
+        """Previews a new handle on the surface; its index, or None beside the object.
+
+        It is selected instead of the others, or with them.
+        """
         editor = self._editor
         seen = self.surface_at(canvas_xy)
         if seen is None or editor.document is None or editor.object is None:
             return None
         k, item = editor.current, editor.object
         assert item.lifted is not None
+        others = self.selected if is_added else ()
         nearest = edits.nearest_control_point(item.lifted, seen.rest)
         for h, other in enumerate(item.handles):
             if other.control_point == nearest:  # one control point, one handle
-                self.handle = h
+                self.select(*others, h)
                 editor.preview = editor.document
                 return h
         target = editor.derived.unplaced(editor.document, k, seen.world)
         changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
-        self._preview(changed, DRAG_SECONDS)
-        self.handle = len(item.handles)
-        return self.handle
+        added = len(item.handles)
+        self._preview(self.mirroring.followed(changed, (added,)), DRAG_SECONDS)
+        self.select(*others, added)
+        return added
+
+    def unpin(self, handle: int) -> None:
+        """Previews a pin as a handle: it is dragged."""
+        editor = self._editor
+        if editor.document is not None:
+            changed = edits.set_pin(editor.document, editor.current, handle, False)
+            editor.preview = self.mirroring.followed(changed, (handle,))
 
     def drag(self, handle: int, spot: Spot) -> None:
         """Previews the handle at another place of the picture."""
+        self.drag_all({handle: spot})
+
+    def drag_all(self, spots: Mapping[int, Spot]) -> None:
+        """Previews handles at other places of the picture."""
         editor = self._editor
-        if editor.document is None or editor.object is None:
+        if editor.document is None:
+            return
+        camera = editor.document.photo.camera
+        self.move_all({h: camera.unproject(s.xy, s.depth) for h, s in spots.items()})
+
+    def move_all(self, places: Mapping[int, F64]) -> None:
+        """Previews handles at other places of the world, (3,) each."""
+        editor = self._editor
+        changed, k = editor.document, editor.current
+        if changed is None or editor.object is None:
             return
         try:
-            target = editor.derived.object_point(editor.document, editor.current, spot)
+            for h, place in places.items():
+                target = editor.derived.unplaced(changed, k, place)
+                changed = edits.move_handle(changed, k, h, target)
         except ValueError as error:
             editor.complain(str(error))
             return
-        changed = edits.move_handle(editor.document, editor.current, handle, target)
+        self._preview(self.mirroring.followed(changed, tuple(places)), DRAG_SECONDS)
+
+    def turn(self, handle: int, start: F64, turn: F64) -> None:
+        """Previews the handle turned from `start` (3,), object frame, by `turn` (3,), world."""
+        editor = self._editor
+        if editor.document is None or editor.object is None:
+            return
+        k = editor.current
+        own = editor.derived.facts.turn_of(editor.document, k).T @ turn
+        changed = edits.turn_handle(editor.document, k, handle, turned_by(start, own))
+        self._preview(self.mirroring.followed(changed, (handle,)), DRAG_SECONDS)
+
+    def change(self, changed: Document) -> None:
+        """Previews handles that are changed otherwise."""
         self._preview(changed, DRAG_SECONDS)
 
     def _preview(self, changed: Document, seconds: float) -> None:
@@ -140,26 +231,46 @@ class Posing:
 
     # Steps
 
+    def finish(self, label: str) -> None:
+        """What is previewed becomes one step."""
+        self.settle()
+        self._editor.commit(label)
+
     def nudge(self, dx: float, dy: float) -> None:
-        """Moves the selected handle by image px; one step each."""
-        editor = self._editor
-        if self.handle is not None and not editor.hand.is_busy:
-            spot = self.spot(self.handle)
-            self.drag(self.handle, spot.moved(np.array([dx, dy]), 0.0))
-            self.settle()
-            editor.commit(t("Nudge point"))
+        """Moves the selected handles by image px; one step each."""
+        if self.selected and not self._editor.hand.is_busy:
+            delta = np.array([dx, dy])
+            self.drag_all({h: self.spot(h).moved(delta, 0.0) for h in self.selected})
+            self.finish(t("Nudge point"))
 
     def remove(self, handle: int | None = None) -> None:
-        """Removes a handle, or the selected one; the object relaxes to what is left."""
+        """Removes a handle, or all selected ones; the object relaxes to what is left."""
         editor = self._editor
-        handle = self.handle if handle is None else handle
-        if handle is None or editor.document is None or editor.hand.is_busy:
+        gone = self.selected if handle is None else (handle,)
+        if not gone or editor.document is None or editor.object is None or editor.hand.is_busy:
             return
-        is_pin = editor.object is not None and editor.object.handles[handle].is_pin
-        changed = edits.remove_handle(editor.document, editor.current, handle)
-        self.handle = None
-        solved = editor.derived.solved(changed, editor.current, None)
-        editor.apply(t("Remove pin") if is_pin else t("Remove handle"), solved)
+        is_pin = all(editor.object.handles[h].is_pin for h in gone)
+        label = t("Remove pin") if is_pin else t("Remove handle")
+        if len(gone) > 1:
+            label = t("Remove {count} handles", count=len(gone))
+        changed = editor.document
+        for h in sorted(gone, reverse=True):
+            changed = edits.remove_handle(changed, editor.current, h)
+        left = [h for h in self.selected if h not in gone]
+        self.select(*(h - sum(g < h for g in gone) for h in left))
+        editor.apply(label, editor.derived.solved(changed, editor.current, None))
+
+    def send_back(self, handles: tuple[int, ...], label: str) -> None:
+        """These handles to where their points were in the photo, and free to turn."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or not handles:
+            return
+        changed, k = editor.document, editor.current
+        for h in handles:
+            changed = edits.move_handle(changed, k, h, editor.object.handles[h].point)
+            changed = edits.turn_handle(changed, k, h, None)
+        changed = self.mirroring.followed(changed, handles)
+        editor.apply(label, editor.derived.solved(changed, k, None))
 
     def set_auto_anchors(self, has_auto_anchors: bool) -> None:
         """Whether the far side of the object holds still by itself."""
@@ -170,12 +281,12 @@ class Posing:
             editor.apply(t("Hold far side") if has_auto_anchors else t("Free far side"), solved)
 
     def reset(self) -> None:
-        """The object's shape as it was in the photo."""
+        """The object's shape as it was in the photo, without handles."""
         editor = self._editor
         document, k = editor.document, editor.current
         if document is None or editor.object is None or not editor.object.handles:
             return
         for h in reversed(range(len(editor.object.handles))):
             document = edits.remove_handle(document, k, h)
-        self.handle = None
+        self.select(None)
         editor.apply(t("Reset pose"), edits.set_pose(document, k, None))

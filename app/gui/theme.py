@@ -88,6 +88,11 @@ class Icon:
     ERASE = "\uf12d"
     SPLIT = "\uf0db"
     ARROW = "\uf061"
+    FREEZE = "\uf2dc"
+    STIFFEN = "\uf44b"
+    BODY = "\uf247"
+    CUT = "\uf0c4"
+    GLUE = "\uf0c1"
 
 
 class Theme:

@@ -7,25 +7,37 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .pointer import Button, Pointer, Shape, Stroke, has_moved
+from ..pose_view import PoseMode
+from ..texts import t
+from . import pose_strokes, rig_brush
+from .pointer import Button, Pointer, Shape, Stroke
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
 REACH = 10.0  # points around a handle where a press takes it
-DEPTH_STEP = 0.03  # object diameters per notch of the wheel
+RING = 28.0  # points, radius of the ring around the current handle
+RING_REACH = 6.0  # points beside the ring where a press takes it
+RING_PART = "ring"
 
 
 class PoseTool:
-    """Click adds a handle, Alt-click a pin; dragging moves the point in the picture's plane."""
+    """Click adds a handle, Alt-click a pin; dragging moves the point, Ctrl turns it."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
+        if editor.view.pose.mode is not PoseMode.DRAG:
+            return rig_brush.paint(editor, pointer)
         handle = self.handle_at(editor, pointer)
         if pointer.button is Button.RIGHT:
             return self._remove(editor, handle)
-        if handle is not None:
-            return self._drag(editor, pointer, handle, is_new=False)
-        return self._add(editor, pointer)
+        if handle is None and self.is_on_ring(editor, pointer):
+            assert editor.posing.handle is not None
+            return pose_strokes.turn(editor, pointer, editor.posing.handle, is_ring=True)
+        if handle is None:
+            return self._add(editor, pointer)
+        if pointer.ctrl:
+            return pose_strokes.turn(editor, pointer, handle, is_ring=False)
+        return pose_strokes.drag(editor, pointer, handle, is_new=False)
 
     def _remove(self, editor: Editor, handle: int | None) -> Stroke:
         while (yield).is_down:
@@ -34,31 +46,16 @@ class PoseTool:
             editor.posing.remove(handle)
 
     def _add(self, editor: Editor, pointer: Pointer) -> Stroke:
-        """A new handle at the surface point under the pointer."""
-        handle = editor.posing.start_handle(pointer.xy, is_pin=pointer.alt)
+        """A new handle at the surface point under the pointer; a box where there is none."""
+        is_pin = pointer.alt and not pointer.ctrl
+        handle = editor.posing.start_handle(pointer.xy, is_pin, is_added=pointer.shift)
         if handle is None:
-            editor.posing.select(None)
-            while (yield).is_down:
-                pass
-            return
-        yield from self._drag(editor, pointer, handle, is_new=True)
-
-    def _drag(self, editor: Editor, pointer: Pointer, handle: int, is_new: bool) -> Stroke:
-        """The handle follows the pointer at its own depth, which the wheel changes."""
-        editor.posing.select(handle)
-        start, is_moved, depth = pointer, False, 0.0
-        held = editor.posing.spot(handle)
-        while (pointer := (yield)).is_down:
-            depth -= pointer.wheel * DEPTH_STEP
-            is_moved = is_moved or has_moved(editor, start, pointer) or pointer.wheel != 0
-            if is_moved:
-                delta = (pointer.xy - start.xy) / editor.view.zoom
-                if pointer.shift:  # along one axis of the picture
-                    delta[np.abs(delta).argmin()] = 0.0
-                editor.posing.drag(handle, held.moved(delta, depth))
-        editor.posing.settle()
-        label = "Drag point" if is_moved else "Add pin" if start.alt else "Add handle"
-        editor.commit(label if is_new or is_moved else "")
+            yield from pose_strokes.box(editor, pointer)
+        elif pointer.ctrl:
+            yield from pose_strokes.turn(editor, pointer, handle, is_ring=False)
+        else:
+            is_new = editor.preview is not editor.committed
+            yield from pose_strokes.drag(editor, pointer, handle, is_new)
 
     def handle_at(self, editor: Editor, pointer: Pointer) -> int | None:
         """The handle a press would take."""
@@ -69,19 +66,43 @@ class PoseTool:
         nearest = int(gaps.argmin())
         return nearest if gaps[nearest] <= REACH * editor.view.scale else None
 
+    def is_on_ring(self, editor: Editor, pointer: Pointer) -> bool:
+        """Whether a press would turn the current handle by its ring."""
+        current = editor.posing.handle
+        if current is None or not editor.view.pose.has_ring:
+            return False
+        centre = editor.view.canvas_from_image(editor.posing.spot(current).xy)
+        gap = float(np.linalg.norm(pointer.xy - centre)) / editor.view.scale
+        return abs(gap - RING) <= RING_REACH
+
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+        if editor.view.pose.mode is not PoseMode.DRAG:
+            editor.hover = replace(editor.hover, handle=None, surface=None, part=None)
+            return Shape.CROSS
         handle = self.handle_at(editor, pointer)
-        point = None if handle is not None else editor.posing.surface_at(pointer.xy)
-        editor.hover = replace(editor.hover, handle=handle, surface=point, is_pin=pointer.alt)
+        is_ring = handle is None and self.is_on_ring(editor, pointer)
+        is_beside = handle is None and not is_ring
+        point = editor.posing.surface_at(pointer.xy) if is_beside else None
+        part = RING_PART if is_ring else None
+        is_pin = pointer.alt and not pointer.ctrl
+        editor.hover = replace(editor.hover, handle=handle, surface=point, is_pin=is_pin, part=part)
+        if is_ring or (pointer.ctrl and not (is_beside and point is None)):
+            return Shape.TURN
         if handle is not None:
             return Shape.MOVE
         return Shape.CROSS if point is not None else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
+        if editor.view.pose.mode is not PoseMode.DRAG:
+            return rig_brush.hint(editor)
         if editor.hand.is_busy:
-            return "Wheel moves it in depth · Shift keeps one axis · Esc takes it back"
+            if editor.posing.readout:
+                return t("Shift on the ring turns in steps of 15° · Esc takes it back")
+            return t("Shift keeps one axis · Alt follows the surface's normal · Wheel: depth · Esc")
+        if editor.hover.part == RING_PART:
+            return t("Drag along the ring to turn the point · Shift: steps of 15° · R hides it")
         if editor.hover.handle is not None:
-            return "Drag moves the point · Right-click or Del removes it · Arrows nudge"
+            return t("Drag moves it · Ctrl-drag turns it · Shift-click adds it · Del removes it")
         if editor.hover.surface is not None:
-            return "Drag this point · Click sets a handle · Alt-click sets a pin that stays"
-        return "Point at the object and drag · Space-drag pans · Wheel zooms"
+            return t("Drag this point · Ctrl-drag turns it · Click sets a handle · Alt-click a pin")
+        return t("Drag a point of the object · Drag beside it selects handles · Space-drag pans")

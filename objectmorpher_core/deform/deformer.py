@@ -207,6 +207,24 @@ class Deformer:
         """How much `pose` bends and stretches the object at each control point."""
         return measure_strain(self.points, self._solver.weights, pose)
 
+    def influence(
+        self, handles: tuple[Handle, ...], h: int, has_auto_anchors: bool, pose: Pose | None
+    ) -> F64:
+        """(M,) how much each control point goes along with handle `h`: 1 = as far as it does.
+
+        For a small move from `pose`. With the rotations as they are, all follow linearly, and by
+        the same share in every direction.
+        """
+        self._constrain(handles, self.anchors(handles, has_auto_anchors))
+        rotations = (pose or self.rest()).rotations
+        step = np.array([self.diameter, 0.0, 0.0])
+        there = replace(handles[h], target=handles[h].target + step)
+        before = self._solver.positions(rotations)
+        self._solver.aim(self._hold.targets((*handles[:h], there, *handles[h + 1 :])))
+        after = self._solver.positions(rotations)
+        self._solver.aim(self._hold.targets(handles))
+        return np.linalg.norm(after - before, axis=1) / self.diameter
+
     def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> None:
         """Aims the solver at the handles; it is prepared anew only when their set changed."""
         key = (

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from imgui_bundle import ImVec2
+from imgui_bundle import ImVec2, ImVec4, imgui
 
+from objectmorpher_core.document import EditObject
+
+from ...pose_view import PoseMode
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
+from .rig import draw_brush, draw_regions
+from .ring import draw_ring
+from .select import draw_rubber
 
 MAX_LINKED = 3  # links drawn from each control point
+MOVES = 0.02  # of the handle's way: what follows less is not marked
+COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the influence
 
 
 def draw_pose(canvas: Canvas) -> None:
@@ -17,22 +25,69 @@ def draw_pose(canvas: Canvas) -> None:
     document, thing = editor.document, editor.object
     if document is None or thing is None or thing.lifted is None:
         return
+    pose, is_dragging = editor.view.pose, editor.view.pose.mode is PoseMode.DRAG
+    if pose.is_mirrored:
+        _draw_mirror(canvas)
+    if pose.has_influence and editor.posing.handle is not None:
+        _draw_influence(canvas, editor.posing.handle)
+    if pose.has_regions or not is_dragging:
+        draw_regions(canvas)
     if thing.handles:
-        for at in canvas.on_photo(editor.derived.anchors(document, editor.current)):
-            canvas.hollow_diamond(at, 4)
-        rests = np.array([h.point for h in thing.handles])
-        starts = canvas.at(editor.derived.project(document, editor.current, rests))
-        ends = canvas.at(editor.posing.positions())
-        for start, end in zip(starts, ends, strict=True):
-            _draw_pull(canvas, start, end)
-        for h, end in enumerate(ends):
-            is_hovered = h == editor.hover.handle
-            is_selected = h == editor.posing.handle
-            _draw_handle(canvas, end, thing.handles[h].is_pin, is_selected, is_hovered)
-    elif editor.hover.surface is None:
+        _draw_handles(canvas, thing)
+    elif editor.hover.surface is None and is_dragging:
         _draw_hint_points(canvas)
+    if not is_dragging:
+        draw_brush(canvas)
     if editor.hover.surface is not None and not editor.hand.is_busy:
         _draw_surface_point(canvas)
+    if editor.rubber is not None:
+        draw_rubber(canvas)
+
+
+def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
+    """Anchors, how far the points went, the handles, the ring."""
+    editor = canvas.editor
+    document = editor.document
+    assert document is not None
+    pose = editor.view.pose
+    if pose.has_anchors:
+        for at in canvas.on_photo(editor.derived.anchors(document, editor.current)):
+            canvas.hollow_diamond(at, 4)
+    rests = np.array([h.point for h in thing.handles])
+    starts = canvas.at(editor.derived.project(document, editor.current, rests))
+    ends = canvas.at(editor.posing.positions())
+    for start, end in zip(starts, ends, strict=True):
+        _draw_pull(canvas, start, end)
+    current = editor.posing.handle
+    if current is not None and pose.has_ring and pose.mode is PoseMode.DRAG:
+        draw_ring(canvas, ends[current])
+    for h, end in enumerate(ends):
+        is_hovered = h == editor.hover.handle
+        is_selected = h in editor.posing.selected
+        _draw_handle(canvas, end, thing.handles[h].is_pin, is_selected, is_hovered)
+
+
+def _draw_mirror(canvas: Canvas) -> None:
+    """Where the mirror plane meets the object."""
+    way = canvas.editor.posing.mirroring.outline()
+    if len(way) > 1:
+        canvas.dashes(canvas.at(way), WHITE, is_closed=False)
+
+
+def _draw_influence(canvas: Canvas, handle: int) -> None:
+    """How much each control point goes along: larger and warmer dots."""
+    editor = canvas.editor
+    assert editor.document is not None
+    shares = editor.derived.facts.influence(editor.document, editor.current, handle)
+    places = canvas.at(editor.derived.control_points(editor.document, editor.current))
+    for at, share in zip(places, np.clip(shares, 0, 1).tolist(), strict=True):
+        if share < MOVES:
+            continue
+        r, g, b = ((1 - share) * COLD + share * HOT).tolist()
+        color = imgui.color_convert_float4_to_u32(ImVec4(r, g, b, 0.85))
+        radius = theme.scale * (1.2 + 3.0 * share)
+        canvas.draw.add_circle_filled(at, radius + theme.scale, theme.u32(DARK, 0.4), 12)
+        canvas.draw.add_circle_filled(at, radius, color, 12)
 
 
 def draw_control_points(canvas: Canvas) -> None:

@@ -1,64 +1,82 @@
-"""The Pose tool's settings: handles, anchors, reset."""
+"""The Pose tool's settings."""
 
 from __future__ import annotations
 
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 
-from ...commands import COMMANDS, run
+from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
+from objectmorpher_core.document import EditObject
+
+from ...commands import run, why_not
 from ...editor import Editor
+from ...painter import shown_now
+from ...pose_view import PoseMode
+from ...texts import t
+from ...view import Shown
+from ..segmented import Choice, segmented
 from ..theme import Icon, theme
-from ..widgets import button, checkbox, gap, heading, icon_button, note, tooltip
+from ..widgets import button, checkbox, gap, heading, note, tooltip
+from .pose_handle import draw_handles, draw_numbers
+from .pose_rig import draw_modes, draw_regions
 
-ROW = 28.0  # points
-VISIBLE_ROWS = 8
+NAMES = {Rigidity.RIGID: "Rigid", Rigidity.NORMAL: "Normal", Rigidity.SOFT: "Soft"}
 
 
 def draw_pose(editor: Editor) -> None:
-    heading("Handles")
     thing = editor.object
-    if thing is None or not thing.handles:
-        note("Drag a point on the object: it follows, and the far side holds still.")
-    else:
-        for h in range(len(thing.handles)):
-            _draw_handle(editor, h)
+    if thing is None:
+        return
+    draw_modes(editor)
+    if editor.view.pose.mode is PoseMode.DRAG:
+        gap(8)
+        draw_handles(editor)
+        draw_numbers(editor)
+    draw_regions(editor)
     gap(12)
-    if thing is not None:
-        is_on = checkbox("Hold the far side still", thing.has_auto_anchors)
-        tooltip("With one handle, the part farthest from it is anchored by itself")
-        if is_on != thing.has_auto_anchors:
-            editor.posing.set_auto_anchors(is_on)
-    editor.view.has_points = checkbox("Show control graph", editor.view.has_points)
+    _draw_material(editor, thing)
     gap(12)
-    reason = COMMANDS["reset_pose"].why_not(editor)
-    if reason is None and thing is not None and not thing.handles:
-        reason = "There is no handle yet"
-    if button(f"{Icon.RESET}  Reset pose", why_not=reason):
+    _draw_symmetry(editor)
+    _draw_overlays(editor)
+    gap(12)
+    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
+    if button(t("All to rest"), why_not=why_not(editor, "reset_handles"), width=half):
+        run(editor, "reset_handles")
+    imgui.same_line(0, theme.pt(8))
+    label = f"{Icon.RESET}  {t('Reset pose')}"
+    if button(label, why_not=why_not(editor, "reset_pose"), width=half):
         run(editor, "reset_pose")
 
 
-def _draw_handle(editor: Editor, h: int) -> None:
-    assert editor.object is not None
-    handle = editor.object.handles[h]
-    start = imgui.get_cursor_screen_pos()
-    size = ImVec2(imgui.get_content_region_avail().x, theme.pt(ROW))
-    imgui.set_next_item_allow_overlap()
-    if imgui.invisible_button(f"##handle{h}", size):
-        editor.posing.select(h)
-    draw = imgui.get_window_draw_list()
-    end = ImVec2(start.x + size.x, start.y + size.y)
-    is_current = h == editor.posing.handle
-    if is_current or imgui.is_item_hovered():
-        draw.add_rect_filled(start, end, theme.u32("raised" if is_current else "hovered"), 6)
-    middle = ImVec2(start.x + theme.pt(16), (start.y + end.y) / 2)
-    if handle.is_pin:
-        draw.add_ngon_filled(middle, theme.pt(6), theme.u32("text"), 4)
-    else:
-        draw.add_circle_filled(middle, theme.pt(5), theme.u32("accent"))
-    top = start.y + (size.y - imgui.get_font_size()) / 2
-    name = f"{'Pin' if handle.is_pin else 'Handle'} {h + 1}"
-    draw.add_text(ImVec2(start.x + theme.pt(34), top), theme.u32("text"), name)
-    imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(28), start.y))
-    if icon_button(Icon.CLOSE, f"remove{h}", "Remove it (Del)"):
-        editor.posing.remove(h)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(2)))
-    imgui.dummy(ImVec2(0, 0))
+def _draw_material(editor: Editor, thing: EditObject) -> None:
+    heading(t("Rigidity"))
+    now = rigidity_of(thing.deform)
+    presets: tuple[Choice[Rigidity | None], ...] = tuple(Choice(r, t(NAMES[r])) for r in Rigidity)
+    chosen = segmented("rigidity", presets, now)
+    if chosen is not None and chosen is not now:
+        editor.rigging.set_rigidity(chosen)
+    is_on = checkbox(t("Hold the far side still"), thing.has_auto_anchors)
+    tooltip(t("With one handle, the part farthest from it is anchored by itself"))
+    if is_on != thing.has_auto_anchors:
+        editor.posing.set_auto_anchors(is_on)
+
+
+def _draw_symmetry(editor: Editor) -> None:
+    heading(t("Symmetry"))
+    pose, mirroring = editor.view.pose, editor.posing.mirroring
+    pose.is_mirrored = checkbox(t("Drag the mirrored point too"), pose.is_mirrored)
+    if pose.is_mirrored and not mirroring.is_found():
+        note(t("No mirror plane was found: an upright one through the middle is used."))
+    gap(12)
+
+
+def _draw_overlays(editor: Editor) -> None:
+    heading(t("Show"))
+    pose, view = editor.view.pose, editor.view
+    pose.has_ring = checkbox(t("Rotation ring (R)"), pose.has_ring)
+    pose.has_anchors = checkbox(t("Anchors"), pose.has_anchors)
+    pose.has_regions = checkbox(t("Regions"), pose.has_regions)
+    pose.has_influence = checkbox(t("Influence of the handle"), pose.has_influence)
+    view.has_points = checkbox(t("Control graph"), view.has_points)
+    is_strain = shown_now(editor.document, view) is Shown.STRAIN
+    if checkbox(t("Strain"), is_strain) != is_strain:
+        view.shown = Shown.COMPOSITE if is_strain else Shown.STRAIN
