@@ -44,7 +44,7 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     elif shown is Shown.PROVENANCE:
         mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
     return Scene(
-        photo, surround, document.plate if is_edited else None, layers, objects, mask,
+        photo, surround, editor.derived.plate(document) if is_edited else None, layers, objects, mask,
         hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
     )  # fmt: skip
 
