@@ -76,7 +76,7 @@ class Derived:
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
-        self._links, self._plates = Memo(), Memo()
+        self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -124,6 +124,19 @@ class Derived:
         return self._posed.setdefault(k, Memo(POSES))(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
+
+    def body_points(self, document: Document, k: int) -> F64:
+        """(N, 3) object frame: object `k`'s solid Gaussians, deformed."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        if thing.pose is None:
+            return thing.lifted.body.means.astype(np.float64)
+        return self._bodies(lambda: self._deformed_body(document, k), thing.lifted, thing.pose)
+
+    def _deformed_body(self, document: Document, k: int) -> F64:
+        splats = self.posed(document, k)
+        is_solid = splats.rest.lifted.texture.solidity > 0.5
+        return splats.skinned.points[is_solid if is_solid.any() else slice(None)]
 
     def drawable(self, document: Document, k: int, view: View) -> Drawable:
         """Object `k`'s Gaussians on the canvas."""

@@ -57,6 +57,7 @@ class View:
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
+    is_grounded: bool = False  # moving an object slides it over the ground
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
 
     @property

@@ -14,6 +14,7 @@ from ..feedback import Hover
 from ..tools import navigate
 from ..tools.pointer import Button, Pointer, Shape, Tool
 from ..tools.registry import TOOLS
+from ..view import ToolName
 from .layout import Rect
 
 log = logging.getLogger(__name__)
@@ -94,7 +95,9 @@ class Input:
             editor.escape()
         elif direction is not None:
             step = FAR if far else 1
-            editor.posing.nudge(direction[0] * step, direction[1] * step)
+            is_placing = editor.view.tool is ToolName.PLACE
+            nudge = editor.placing.nudge if is_placing else editor.posing.nudge
+            nudge(direction[0] * step, direction[1] * step)
         elif (name := _command_of(editor, keys)) is not None:
             run(editor, name)
 

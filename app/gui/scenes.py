@@ -38,13 +38,14 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if shown in BARE:
         paper = _paper(shown)
         return Scene(photo, surround, layers=layers, objects=objects, paper=paper, split=split)
+    plate = editor.derived.plate(document) if is_edited else None
     mask, hatch = None, None
     if document.plate is None and is_edited:
         mask, hatch = editor.derived.moved_mask(document), MISSING
     elif shown is Shown.PROVENANCE:
         mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
     return Scene(
-        photo, surround, editor.derived.plate(document) if is_edited else None, layers, objects, mask,
+        photo, surround, plate, layers, objects, mask,
         hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
     )  # fmt: skip
 
