@@ -19,6 +19,7 @@ from objectmorpher_core.document import Document, EditObject
 
 from .derived import Derived
 from .editing.composing import Composing
+from .editing.looking import Looking
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
@@ -49,7 +50,7 @@ class Editor:
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.posing, self.placing = Posing(self), Placing(self)
-        self.composing = Composing(self)
+        self.composing, self.looking = Composing(self), Looking(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -126,6 +127,7 @@ class Editor:
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE
+        self.view.orbit = None
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
@@ -176,6 +178,7 @@ class Editor:
         """The document may have lost what the view points at."""
         self.hover = Hover()
         self.posing.forget_lost()
+        self.objects.forget_lost()
         if not self.is_lifted:
             self.view.tool = ToolName.SELECT
         self.say(text)

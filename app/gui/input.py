@@ -108,7 +108,8 @@ class Input:
         tool = TOOLS[editor.view.tool]
         for button in Button:
             if imgui.is_mouse_clicked(button.value):
-                pressed = replace(pointer, button=button)
+                clicks = imgui.get_mouse_clicked_count(button.value)
+                pressed = replace(pointer, button=button, clicks=clicks)
                 if navigate.wants_pan(pressed):
                     stroke = navigate.pan(editor, pressed)
                 elif navigate.is_on_split(editor, pressed):

@@ -17,10 +17,14 @@ from .widgets import icon_button, tooltip
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
-    "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
+    "Object": (
+        "subject", "clear", "-", "lift", "-", "rename", "duplicate", "remove_object", "-",
+        "forward", "backward", "to_front", "to_back", "-", "ground", "-",
+        "select", "mask", "pose", "place", "look", "compose",
+    ),
     "View": (
-        "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
-        "-", "split", "points", "-", "theme",
+        "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
+        *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points", "-", "theme",
     ),
 }  # fmt: skip
 
@@ -80,6 +84,7 @@ def _switched_on(editor: Editor) -> set[str]:
     view = editor.view
     names = {f"show_{shown_now(editor.document, view).name.lower()}"}
     names |= {"split"} if view.split is not None else set()
+    names |= {"ground"} if view.is_grounded else set()
     return names | ({"points"} if view.has_points else set())
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from imgui_bundle import ImVec2
+from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.document import Placement
 
@@ -30,11 +30,13 @@ def draw_frame(canvas: Canvas) -> None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)
     canvas.polyline(corners, WHITE, width=1.0, alpha=0.7)
-    for name in TURNS:
+    names = [name for name in TURNS if part == name or not editor.hand.is_busy]
+    for name in names:
         _draw_back(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
-    for name in TURNS:
+    for name in names:
         _draw_front(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
-    _draw_arrow(canvas, shown.arrow, ACCENT if part == "depth" else WHITE)
+    if part == "depth" or not editor.hand.is_busy:  # what is not dragged is out of the way
+        _draw_arrow(canvas, shown.arrow, ACCENT if part == "depth" else WHITE)
     for corner in corners:
         canvas.square(corner, 5, ACCENT if part == "scale" else WHITE)
     _draw_centre(canvas, shown)
@@ -78,9 +80,10 @@ def _draw_arrow(canvas: Canvas, arrow: Arrow, color: str) -> None:
         [across(near, -1.6), across(near, 1.6), arrow.at(arrow.near)],
         [across(far, -1.6), arrow.at(arrow.far), across(far, 1.6)],
     )
+    closed = int(imgui.ImDrawFlags_.closed)
     shapes = [canvas.on_canvas(np.array(piece)) for piece in pieces]
     for shape in shapes:
-        canvas.draw.add_polyline(shape, theme.u32(DARK, 0.75), theme.pt(3), 1)
+        canvas.draw.add_polyline(shape, theme.u32(DARK, 0.75), theme.pt(3), closed)
     for shape in shapes:
         canvas.draw.add_convex_poly_filled(shape, theme.u32(color))
 
@@ -121,7 +124,7 @@ def _value(part: str, placement: Placement, horizon: float) -> str:
     yaw, pitch, roll = placement.turn
     away = t("{away} away", away=f"{placement.depth:+.2f} ×")
     values = {
-        "move": f"{placement.move[0]:+.0f}, {placement.move[1]:+.0f} px",
+        "move": f"{round(placement.move[0]):+d}, {round(placement.move[1]):+d} px",
         "depth": away,
         "scale": f"{100 * placement.scale:.0f} %",
         "yaw": f"{t('Yaw')} {yaw:.1f}°",
