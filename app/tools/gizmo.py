@@ -30,6 +30,7 @@ AROUND = 0.52  # x the object's diameter, radius of the rings
 OUTERMOST = 1.2  # x that, radius of the ring for roll
 CLOSEST = 0.7  # x the centre's depth, radius of a ring at most
 SAMPLES = 360  # of a ring
+THIRDS = 45  # steps, each to two thirds: from a sample to a billionth of a degree
 SPACE = 16.0  # points between the ring for roll and the arrow
 ARROW = 52.0  # points, its length
 TURNS = ("yaw", "pitch", "roll")
@@ -61,12 +62,19 @@ class Ring:
         away = (self.points(angles) - self.centre) @ self.centre
         return np.asarray(away <= 1e-9 * np.linalg.norm(self.centre) ** 2)
 
-    def nearest(self, xy: np.ndarray) -> tuple[float, float]:
-        """The angle of its front that is seen nearest to canvas px (2,), and how far from it."""
+    def gap(self, xy: np.ndarray) -> float:
+        """How far from its front canvas px (2,) are, to a fraction of the space of its samples."""
+        return float(self._front_gaps(xy)[1].min())
+
+    def nearest(self, xy: np.ndarray) -> float:
+        """The angle of its front that is seen nearest to canvas px (2,)."""
+        angles, gaps = self._front_gaps(xy)
+        return self._refined(float(angles[gaps.argmin()]), xy)
+
+    def _front_gaps(self, xy: np.ndarray) -> tuple[F64, F64]:
+        """Angles all around, and how far each is seen from canvas px (2,); the back is endless."""
         angles = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False)
-        gaps = np.where(self.is_front(angles), self._gaps(angles, xy), np.inf)
-        angle = self._refined(float(angles[gaps.argmin()]), xy)
-        return angle, float(self._gaps(np.array([angle]), xy)[0])
+        return angles, np.where(self.is_front(angles), self._gaps(angles, xy), np.inf)
 
     def followed(self, xy: np.ndarray, angle: float) -> float:
         """The angle at which it is nearest to canvas px (2,), going along it from `angle`."""
@@ -85,7 +93,7 @@ class Ring:
     def _refined(self, angle: float, xy: np.ndarray) -> float:
         """The minimum within a sample beside `angle`: thirds, until nothing is left between."""
         low, high = angle - 2 * np.pi / SAMPLES, angle + 2 * np.pi / SAMPLES
-        for _ in range(60):
+        for _ in range(THIRDS):
             thirds = np.array([low + (high - low) / 3, high - (high - low) / 3])
             a, b = self._gaps(thirds, xy)
             low, high = (low, thirds[1]) if a < b else (thirds[0], high)

@@ -92,7 +92,7 @@ def _handle_at(shown: Gizmo, xy: np.ndarray, reach: float) -> str | None:
         return "scale"
     if shown.arrow.gap(xy) <= reach:
         return "depth"
-    gaps = {part: ring.nearest(xy)[1] for part, ring in shown.rings.items()}
+    gaps = {part: ring.gap(xy) for part, ring in shown.rings.items()}
     nearest = min(gaps, key=gaps.__getitem__)
     return nearest if gaps[nearest] <= reach else None
 
@@ -158,7 +158,7 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
         shown, start = gizmo(editor), editor.placing.placement
         assert shown is not None and start is not None
         ring = shown.rings[part]
-        begun = last = ring.nearest(first.xy)[0]
+        begun = last = ring.nearest(first.xy)
 
         def change(now: Pointer, away: float) -> Placement:
             nonlocal last

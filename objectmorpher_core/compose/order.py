@@ -37,8 +37,16 @@ def stack(document: Document, posed: Posed) -> dict[int, PosedSplats]:
 
 
 def back_to_front(objects: tuple[EditObject, ...], splats: dict[int, PosedSplats]) -> list[int]:
-    """The keys of `splats` by layer, and within a layer by depth, the farthest first."""
-    return sorted(splats, key=lambda k: (objects[k].layer, -splats[k].middle_depth))
+    """The keys of `splats` by layer, and within a layer by depth, the farthest first.
+
+    Of two at one depth the later is in front: a copy that was moved aside.
+    """
+    return sorted(splats, key=lambda k: (objects[k].layer, -_depth(splats[k]), k))
+
+
+def _depth(splats: PosedSplats) -> float:
+    """World units; without its last digits, which differ between equal depths."""
+    return float(np.float32(splats.middle_depth))
 
 
 def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:
@@ -46,18 +54,21 @@ def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) ->
 
     Object `k` is the one that was put elsewhere; other layers are raised only where they must be.
     """
-    objects, depths = list(document.objects), {i: posed(i).middle_depth for i in order}
+    objects, depths = list(document.objects), {i: _depth(posed(i)) for i in order}
+
+    def is_nearer(one: int, other: int) -> bool:
+        return (-depths[one], one) > (-depths[other], other)
 
     def least(below: int, above: int) -> int:
         """The lowest layer of `above` that puts it in front of `below`."""
-        return objects[below].layer + (0 if depths[above] < depths[below] else 1)
+        return objects[below].layer + (0 if is_nearer(above, below) else 1)
 
     place = list(order).index(k)
     if place > 0:
         objects[k] = replace(objects[k], layer=least(order[place - 1], k))
     elif len(order) > 1:
         above = order[1]
-        lower = 0 if depths[above] < depths[k] else 1
+        lower = 0 if is_nearer(above, k) else 1
         objects[k] = replace(objects[k], layer=objects[above].layer - lower)
     for below, above in pairwise(order):
         objects[above] = replace(

@@ -105,6 +105,12 @@ def test_the_edge_of_an_object_at_rest_is_kept_beside_a_hole():
     assert np.array_equal(hidden[60, 80], [128, 128, 128])
 
 
+def test_a_copy_moved_aside_is_in_front_of_what_it_is_a_copy_of():
+    document = edits.duplicate(_two_discs(), 0)
+    for move in ((20.0, 0.0), (-13.7, 5.1), (3.3, -9.9)):
+        assert _order(_moved(document, 2, Placement(move=move)))[-1] == 2
+
+
 # ---- putting in order -----------------------------------------------------------------------
 
 
