@@ -28,6 +28,7 @@ REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one co
 def build_blend(derived: Derived, document: Document, view: View) -> F32:
     """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
     from objectmorpher_core.compose import composite
+    from objectmorpher_core.compose.order import leaves_a_hole
     from objectmorpher_core.compose.plate import hole_margin
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
@@ -40,6 +41,8 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
         rest = splats.rest.lifted.texture.u0.astype(np.float64)
         now = camera.project(splats.means) if thing.is_visible else None
         points = _moved_points(rest, now, max(composite.STILL, TOLERANCE / view.zoom))
+        if not leaves_a_hole(document.objects, k):  # a copy of it is still there
+            points = rest[:0] if now is None else now
         reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
         if len(points):
             distance = np.minimum(distance, _distance(points, view, (height, width)) - reach)

@@ -14,7 +14,7 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F32, F64, I32, Mask, Sparse
-from objectmorpher_core.document import Document, EditObject, Photo, Pose
+from objectmorpher_core.document import Document, EditObject, Photo, Plate, Pose
 
 from .blend import build_blend
 from .layers import Layers
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from objectmorpher_core.raster.tiles import Drawable
 
 PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
+MOST_SHAPES = 24  # remembered: every object of a document needs its own in each frame
+POSES = 3  # remembered of each object: as it is, as a stroke has it, as somebody looks at it
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
 
@@ -68,23 +70,40 @@ class Derived:
     """Solver, posed Gaussians and rendered layers of the document's objects."""
 
     def __init__(self) -> None:
-        self._shapes, self._posed = Memo(), Memo()
+        self._shapes = Memo(MOST_SHAPES)
+        self._posed: dict[int, Memo] = {}  # of each object
         self.layers = Layers(self)
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
-        self._links = Memo()
+        self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
         return self._shares(lambda: float(mask.mean()), mask)
 
     def moved_mask(self, document: Document) -> Mask:
-        """Where the moved objects were in the photo."""
-        masks = [o.mask for o in document.objects if o.is_moved and o.mask is not None]
-        return self._holes(lambda: np.logical_or.reduce(masks), *masks)
+        """Where the moved objects were in the photo, and nothing is left."""
+        from objectmorpher_core.compose.order import leaves_a_hole
+
+        objects = document.objects
+        there = [k for k, o in enumerate(objects) if o.is_moved and leaves_a_hole(objects, k)]
+        masks = [mask for k in there if (mask := objects[k].mask) is not None]
+        nothing = np.zeros(document.photo.size[::-1], bool)
+        return self._holes(lambda: np.logical_or.reduce([nothing, *masks]), *masks)
+
+    def plate(self, document: Document) -> Plate | None:
+        """What is seen behind the objects: the photo around those that are still there."""
+        from objectmorpher_core.compose.order import holes
+        from objectmorpher_core.compose.plate import plate_of_holes
+
+        gone = holes(document)
+        return self._plates(
+            lambda: plate_of_holes(document, gone), document.plate,
+            *gone, *(o.mask for o in document.objects),
+        )  # fmt: skip
 
     def contours(self, mask: Mask) -> tuple[F32, ...]:
         """A mask's outlines, each (N, 2) image px."""
@@ -104,9 +123,22 @@ class Derived:
         """Object `k`'s Gaussians where the edit has put them, world."""
         thing = document.objects[k]
         puppet = self.shape(document.photo, thing).puppet
-        return self._posed(
+        return self._posed.setdefault(k, Memo(POSES))(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
+
+    def body_points(self, document: Document, k: int) -> F64:
+        """(N, 3) object frame: object `k`'s solid Gaussians, deformed."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        if thing.pose is None:
+            return thing.lifted.body.means.astype(np.float64)
+        return self._bodies(lambda: self._deformed_body(document, k), thing.lifted, thing.pose)
+
+    def _deformed_body(self, document: Document, k: int) -> F64:
+        splats = self.posed(document, k)
+        is_solid = splats.rest.lifted.texture.solidity > 0.5
+        return splats.skinned.points[is_solid if is_solid.any() else slice(None)]
 
     def drawable(self, document: Document, k: int, view: View) -> Drawable:
         """Object `k`'s Gaussians on the canvas."""
@@ -121,7 +153,8 @@ class Derived:
         return kept[2]
 
     def forget(self, lifted: set[int]) -> None:
-        """Drops what was projected of objects other than these."""
+        """Drops what was posed and projected of objects other than these."""
+        self._posed = {k: kept for k, kept in self._posed.items() if k in lifted}
         self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
 
     def blend(self, document: Document, view: View) -> F32:

@@ -23,6 +23,7 @@ from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
 from .editing.handle_numbers import HandleNumbers
+from .editing.looking import Looking
 from .editing.models import Models
 from .editing.objects import Objects
 from .editing.placing import Placing
@@ -59,8 +60,8 @@ class Editor:
         self.selection, self.objects = Selection(self), Objects(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
-        self.composing = Composing(self)
         self.exporting, self.models = Exporting(self), Models(self)
+        self.composing, self.looking = Composing(self), Looking(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -139,6 +140,7 @@ class Editor:
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE
+        self.view.orbit = None
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
@@ -197,6 +199,7 @@ class Editor:
         """The document may have lost what the view points at."""
         self.hover = Hover()
         self.posing.forget_lost()
+        self.objects.forget_lost()
         if not self.is_lifted:
             self.view.tool = ToolName.SELECT
         self.say(text)

@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import cv2
@@ -149,22 +150,24 @@ class Layers:
             return [Part(k, Shown.COMPOSITE) for k in order]
         if shown is not Shown.STRAIN:
             return [Part(k, shown) for k in order]
-        parts = []
+        parts, drawn = [], self.order(document)
         for k in order:  # the tint right over its object, so that nearer ones cover both
-            if document.objects[k].is_moved:
+            if k in drawn:
                 parts.append(Part(k, Shown.COMPOSITE))
             parts.append(Part(k, Shown.STRAIN))
         return parts
 
     def order(self, document: Document, shown: Shown = Shown.COMPOSITE) -> dict[int, PosedSplats]:
-        """The visible objects back to front; where the photo is shown, too, only moved ones."""
-        is_over_photo = shown in (Shown.COMPOSITE, Shown.PROVENANCE)
-        there = {
-            k: self._derived.posed(document, k)
-            for k, o in enumerate(document.objects)
-            if o.lifted and o.is_visible and (o.is_moved or not is_over_photo)
-        }
-        return dict(sorted(there.items(), key=lambda kv: -kv[1].middle_depth))
+        """The visible objects back to front; over the photo only those that the export draws."""
+        from objectmorpher_core.compose.order import back_to_front, stack
+
+        objects = document.objects
+        posed = partial(self._derived.posed, document)
+        if shown in (Shown.COMPOSITE, Shown.PROVENANCE):
+            drawn = stack(document, posed)
+            return {k: splats for k, splats in drawn.items() if objects[k].is_visible}
+        there = {k: posed(k) for k, o in enumerate(objects) if o.lifted and o.is_visible}
+        return {k: there[k] for k in back_to_front(objects, there)}
 
     def _forget(self, document: Document) -> None:
         """Drops the pictures of objects that are not as they were."""

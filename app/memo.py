@@ -8,13 +8,14 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-KEPT = 6  # results remembered of each kind
+KEPT = 6  # results remembered of each kind, usually
 
 
 class Memo:
     """The last few results of one function, by the identity of what they came from."""
 
-    def __init__(self) -> None:
+    def __init__(self, kept: int = KEPT) -> None:
+        self._kept = kept
         self._results: OrderedDict[tuple[int, ...], tuple[tuple[Any, ...], Any]] = OrderedDict()
 
     def __call__(self, build: Callable[[], T], *sources: Any) -> T:
@@ -22,7 +23,7 @@ class Memo:
         if key not in self._results:
             # The sources are held, so that no other object can get their ids.
             self._results[key] = (sources, build())
-            while len(self._results) > KEPT:
+            while len(self._results) > self._kept:
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key][1]

@@ -106,7 +106,7 @@ class Painter:
 
     def invented_background(self, document: Document) -> Mask | None:
         """(H, W) where the plate is invented; None while there is no plate."""
-        plate = document.plate
+        plate = self._derived.plate(document)
         if plate is None:
             return None
         width, height = document.photo.size

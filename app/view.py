@@ -18,6 +18,8 @@ from .pose_view import PoseView
 
 MARGIN = 24.0  # points between the fitted photo and the canvas's edge
 MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px
+PIXELS_FROM = 8.0  # canvas px per image px, from which on single pixels are looked at
+STEEPEST = 89.0  # degrees that an orbit goes up or down
 KEEP_VISIBLE = 48.0  # px of the photo that panning leaves on the canvas
 
 
@@ -51,6 +53,18 @@ class Popup(Enum):
     ABOUT = "About ObjectMorpher"
 
 
+@dataclass(frozen=True)
+class Orbit:
+    """From where the object is looked at, degrees; it is the object that turns."""
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    def turned(self, yaw: float, pitch: float) -> Orbit:
+        """Farther by so much; never over the top."""
+        return Orbit(self.yaw + yaw, float(np.clip(self.pitch + pitch, -STEEPEST, STEEPEST)))
+
+
 @dataclass(eq=False)
 class View:
     """Mutable: the tools and panels write it, the window reads it each frame."""
@@ -69,8 +83,16 @@ class View:
     has_history: bool = False  # the list of steps is shown
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
+    is_grounded: bool = False  # moving an object slides it over the ground
+    orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
+    color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
     pose: PoseView = field(default_factory=PoseView)
+
+    @property
+    def is_at_pixels(self) -> bool:
+        """Whether single pixels of the photo are looked at."""
+        return self.zoom >= PIXELS_FROM
 
     @property
     def place(self) -> tuple[float, ...]:

@@ -310,6 +310,7 @@ class EditObject:
     pose: Pose | None = None  # None: at rest
     placement: Placement = Placement()
     is_visible: bool = True
+    layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
 
     @property
     def is_moved(self) -> bool:
@@ -358,6 +359,7 @@ class Document:
     plate: Plate | None = None  # None: not made yet for these masks
     backends: tuple[tuple[str, str], ...] = ()  # stage -> backend used
     seed: int = 0
+    horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
 
     def with_object(self, k: int, changed: EditObject) -> Document:
         """Object `k` replaced; the plate stays only where the mask did."""

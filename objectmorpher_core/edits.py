@@ -36,9 +36,11 @@ def add_object(document: Document, name: str | None = None) -> Document:
 
 
 def remove_object(document: Document, k: int) -> Document:
-    """Without object `k`. The plate, which filled its hole, goes too."""
+    """Without object `k`. The plate, which filled its hole, goes too, unless a copy stays."""
     objects = tuple(o for i, o in enumerate(document.objects) if i != k)
-    return replace(document, objects=objects, plate=None)
+    mask = document.objects[k].mask
+    is_copy = mask is not None and any(other.mask is mask for other in objects)
+    return replace(document, objects=objects, plate=document.plate if is_copy else None)
 
 
 def set_mask(document: Document, k: int, mask: Mask | None, prompt: Prompt) -> Document:
@@ -232,3 +234,38 @@ def set_plate(document: Document, plate: Plate | None) -> Document:
     """The photo without its objects."""
     changed = replace(document, plate=plate)
     return changed if plate is None else changed.with_backend("inpaint", plate.backend)
+
+
+def set_horizon(document: Document, horizon: float) -> Document:
+    """The horizon is in this row of the photo, px; it may be outside."""
+    if not np.isfinite(horizon):
+        raise EditError(f"a horizon at {horizon:g} px is no row of the photo")
+    return replace(document, horizon=float(horizon))
+
+
+def rename(document: Document, k: int, name: str) -> Document:
+    """Object `k` under another name."""
+    name = name.strip()
+    if not name:
+        raise EditError("an object needs a name")
+    return document.with_object(k, replace(document.objects[k], name=name))
+
+
+def duplicate(document: Document, k: int) -> Document:
+    """A copy of object `k` after all others, where the object is; its arrays are shared.
+
+    The plate stays: there is nothing new to fill in.
+    """
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before making a copy of it")
+    copy = replace(item, name=_free_name(item.name, {o.name for o in document.objects}))
+    return replace(document, objects=(*document.objects, copy))
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """ "Cat 2", or the next number that nobody has."""
+    stem, _, last = name.rpartition(" ")
+    stem = stem if stem and last.isdigit() else name
+    numbers = (n for n in range(2, len(taken) + 3) if f"{stem} {n}" not in taken)
+    return f"{stem} {next(numbers)}"

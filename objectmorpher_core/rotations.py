@@ -108,3 +108,17 @@ def turn_matrix(yaw: float, pitch: float, roll: float) -> F64:
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
     return about_z @ about_x @ about_y
+
+
+def turn_of(matrix: np.ndarray) -> tuple[float, float, float]:
+    """Yaw, pitch and roll, degrees, of a rotation (3, 3): the inverse of `turn_matrix`.
+
+    Pitch is within 90 degrees. Where it is 90, yaw and roll turn about one axis, and roll is 0.
+    """
+    pitch = np.arcsin(np.clip(matrix[2, 1], -1.0, 1.0))
+    if np.hypot(matrix[2, 0], matrix[2, 2]) < 1e-9:
+        yaw, roll = np.arctan2(matrix[0, 2], matrix[0, 0]), 0.0
+    else:
+        yaw = np.arctan2(-matrix[2, 0], matrix[2, 2])
+        roll = np.arctan2(-matrix[0, 1], matrix[1, 1])
+    return float(np.degrees(yaw)), float(np.degrees(pitch)), float(np.degrees(roll))

@@ -17,6 +17,7 @@ import io
 import json
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -36,6 +37,7 @@ FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the zip format's first day: no clock in the bytes
 MAX_BYTES = 4 << 30  # unpacked, all members: more than any real session, less than a zip bomb
+MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
 PACKED_ENDINGS = (".png", ".npz", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".avif")
 
 
@@ -102,7 +104,7 @@ def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.nd
         raise SessionError("the session's document.json is damaged: document is missing")
     photo = _photo(tree.get("photo"), members, reader)
     try:
-        document = reader.value(Document, tree | {"photo": photo}, "document")
+        document = _with_copies(reader.value(Document, tree | {"photo": photo}, "document"))
         _check(document)
     except SessionError:
         raise
@@ -204,6 +206,19 @@ def _unzip(data: bytes, what: str) -> dict[str, bytes]:
         raise SessionError(f"the {what} is damaged") from error
 
 
+def _with_copies(document: Document) -> Document:
+    """Copies of an object share its mask, by which they are known as copies."""
+    known: list[np.ndarray] = []
+    objects = []
+    for item in document.objects:
+        if item.mask is not None:
+            mask = next((m for m in known if np.array_equal(m, item.mask)), item.mask)
+            known.append(mask)
+            item = item if mask is item.mask else replace(item, mask=mask)
+        objects.append(item)
+    return replace(document, objects=tuple(objects))
+
+
 def _check(document: Document) -> None:
     """ValueError where the document's arrays do not fit each other."""
     width, height = document.photo.size
@@ -216,6 +231,8 @@ def _check(document: Document) -> None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, (width, height))
         _check_lifted(item)
+    if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
+        raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
     if (plate := document.plate) is not None:
         _same("plate", plate.pixels.shape, (*plate.hole.shape, 3))
         _inside("plate", plate.box, (width, height))

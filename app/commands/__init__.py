@@ -6,7 +6,7 @@ from ..editor import Editor
 from ..tasks import LIFT, SELECT
 from ..texts import t
 from ..view import ToolName
-from . import compose, edit, files, look, place, pose, select, window
+from . import compose, edit, files, look, objects, place, pose, select, window
 from .command import Command
 
 __all__ = ["COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "why_not"]
@@ -15,6 +15,7 @@ GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of short
     "File": files.COMMANDS,
     "Edit": edit.COMMANDS,
     "Select": select.COMMANDS,
+    "Objects": objects.COMMANDS,
     "Pose": pose.COMMANDS,
     "Place": place.COMMANDS,
     "Look": look.COMMANDS,
@@ -57,10 +58,12 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
         return (t("Selecting…") if is_busy else t("Click an object in the photo")), None
     if not editor.is_lifted:
         return t("Lift object"), "lift"
-    if editor.view.tool in (ToolName.SELECT, ToolName.MASK):
+    is_moved = editor.object is not None and editor.object.is_moved
+    if editor.view.tool in (ToolName.SELECT, ToolName.MASK) or (
+        editor.view.tool is ToolName.LOOK and not is_moved
+    ):
         return t("Pose the object"), "pose"
-    thing = editor.object
-    if thing is not None and not thing.is_moved:
+    if not is_moved:
         is_posing = editor.view.tool is ToolName.POSE
         return (t("Drag a point on the object") if is_posing else t("Drag the object")), None
     return t("Export photo…"), "export"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from ..editor import Editor
 from ..painter import shown_now
+from ..texts import t
 from ..tools import navigate
 from ..view import Shown
 from .command import Command, no_lift, no_photo, nothing_lifted
@@ -35,6 +36,11 @@ def _split(editor: Editor) -> None:
     editor.view.split = 0.5 if editor.view.split is None else None
 
 
+def _not_turned(editor: Editor) -> str | None:
+    is_turned = editor.looking.orbit is not None
+    return None if is_turned else no_lift(editor) or t("The photo's own view is shown")
+
+
 def _points(editor: Editor) -> None:
     editor.view.has_points = not editor.view.has_points
 
@@ -47,8 +53,13 @@ COMMANDS: dict[str, Command] = {
     "history": Command("History", "Ctrl+H", _history, is_on=lambda e: e.view.has_history),
     "fit": Command("Fit to window", "F", _fit),
     "actual": Command("Actual size", "Ctrl+1", lambda e: navigate.zoom_to(e, 1.0)),
+    "double": Command("Double size", "Ctrl+2", lambda e: navigate.zoom_to(e, 2.0)),
+    "pixels": Command("Pixel level", "Ctrl+8", lambda e: navigate.zoom_to(e, 8.0)),
     "zoom_in": Command("Zoom in", "Ctrl+=", lambda e: navigate.zoom_step(e, 1)),
     "zoom_out": Command("Zoom out", "Ctrl+-", lambda e: navigate.zoom_step(e, -1)),
+    "reset_look": Command(
+        "Back to the photo's view", "", lambda e: e.looking.reset(), _not_turned
+    ),
     "split": Command(
         "Split before/after", "\\", _split, is_on=lambda e: e.view.split is not None
     ),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import edits
 
+from ..tasks import LIFT, SELECT
 from ..texts import t
 from ..view import ToolName
 
@@ -14,10 +16,11 @@ if TYPE_CHECKING:
 
 
 class Objects:
-    """Adding, choosing and hiding them."""
+    """Adding, choosing, naming, hiding and ordering them."""
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
+        self.renaming: int | None = None  # whose name is being typed
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -44,3 +47,95 @@ class Objects:
             is_visible = not editor.document.objects[k].is_visible
             label = t("Show object") if is_visible else t("Hide object")
             editor.apply(label, edits.set_visible(editor.document, k, is_visible))
+
+    def forget_lost(self) -> None:
+        """After a step back: another object is current where the current one is not there."""
+        editor = self._editor
+        self.renaming = None
+        is_selecting = editor.view.tool in (ToolName.SELECT, ToolName.MASK)
+        if editor.document is not None and not is_selecting:
+            editor.current = max(min(editor.current, len(editor.document.objects) - 1), 0)
+
+    def rename(self, k: int, name: str) -> None:
+        """Gives object `k` another name; an empty one changes nothing."""
+        editor = self._editor
+        self.renaming = None
+        document = editor.document
+        if document is None or not name.strip() or name.strip() == document.objects[k].name:
+            return
+        editor.apply(t("Rename object"), edits.rename(document, k, name))
+
+    def duplicate(self) -> None:
+        """A copy of the current object, which the tools change from now on."""
+        editor = self._editor
+        if editor.document is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        copied = edits.duplicate(editor.document, editor.current)
+        editor.apply(t("Duplicate object"), copied)
+        self.choose(len(copied.objects) - 1)
+        if editor.view.tool is ToolName.SELECT:  # a click would select anew: the copy's lift goes
+            editor.view.tool = ToolName.PLACE
+        editor.say(t("{name} lies over what it is a copy of", name=copied.objects[-1].name))
+
+    def remove(self) -> None:
+        """The current object is not edited any more: the photo shows it as it was."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or editor.hand.is_busy:
+            return
+        name, k = editor.object.name, editor.current
+        for job in (SELECT, LIFT):  # what they would bring is for an object by its number
+            editor.jobs.cancel(job)
+        left = edits.remove_object(editor.document, k)
+        editor.apply(t("Remove object"), left)
+        self.choose(max(min(k, len(left.objects) - 1), 0))
+        editor.say(t("{name} is not edited any more", name=name))
+
+    # Which covers which
+
+    def order(self) -> list[int]:
+        """The lifted objects, back to front."""
+        from objectmorpher_core.compose.order import back_to_front
+
+        document = self._editor.committed
+        if document is None:
+            return []
+        lifted = [k for k, o in enumerate(document.objects) if o.lifted]
+        if len(lifted) < 2:
+            return lifted
+        posed = {k: self._editor.derived.posed(document, k) for k in lifted}
+        return back_to_front(document.objects, posed)
+
+    def listed(self) -> list[int]:
+        """All that are selected, as a list shows them: what is in front first."""
+        document = self._editor.document
+        objects = document.objects if document else ()
+        order = [k for k in self.order() if k < len(objects)]
+        others = [k for k, o in enumerate(objects) if o.mask is not None and k not in order]
+        return [*reversed(others), *reversed(order)]
+
+    def why_not_raise(self, steps: int) -> str | None:
+        """Why the current object cannot go so many places to the front, or (negative) back."""
+        order = self.order()
+        if self._editor.current not in order:
+            return t("Lift an object first")
+        if len(order) < 2:
+            return t("There is no other object")
+        place = order.index(self._editor.current)
+        if steps > 0:
+            return t("It is in front of all others") if place == len(order) - 1 else None
+        return t("It is behind all others") if place == 0 else None
+
+    def raise_by(self, steps: int, label: str) -> None:
+        """Takes the current object past so many others, to the front or (negative) to the back."""
+        from objectmorpher_core.compose.order import reordered
+
+        editor = self._editor
+        if editor.document is None or editor.hand.is_busy:
+            return
+        order, k = self.order(), editor.current
+        place = min(max(order.index(k) + steps, 0), len(order) - 1)
+        order.remove(k)
+        order.insert(place, k)
+        document = editor.document
+        posed = partial(editor.derived.posed, document)
+        editor.apply(label, reordered(document, k, order, posed))

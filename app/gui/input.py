@@ -16,6 +16,7 @@ from ..texts import t
 from ..tools import navigate
 from ..tools.pointer import Button, Pointer, Shape, Tool
 from ..tools.registry import TOOLS
+from ..view import ToolName
 from .layout import Rect
 
 log = logging.getLogger(__name__)
@@ -104,7 +105,9 @@ class Input:
             run(editor, "shortcuts")
         elif direction is not None:
             step = FAR if far else 1
-            editor.posing.nudge(direction[0] * step, direction[1] * step)
+            is_placing = editor.view.tool is ToolName.PLACE
+            nudge = editor.placing.nudge if is_placing else editor.posing.nudge
+            nudge(direction[0] * step, direction[1] * step)
         elif (name := self._shortcuts.command_of(keys)) is not None:
             run(editor, name)
 
@@ -115,7 +118,8 @@ class Input:
         tool = TOOLS[editor.view.tool]
         for button in Button:
             if imgui.is_mouse_clicked(button.value):
-                pressed = replace(pointer, button=button)
+                clicks = imgui.get_mouse_clicked_count(button.value)
+                pressed = replace(pointer, button=button, clicks=clicks)
                 if navigate.wants_pan(pressed):
                     stroke = navigate.pan(editor, pressed)
                 elif navigate.is_on_split(editor, pressed):

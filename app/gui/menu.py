@@ -18,11 +18,14 @@ from .widgets import icon_button, tooltip
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
-    "Object": ("subject", "clear", "-", "lift"),
+    "Object": (
+        "subject", "clear", "-", "lift", "-", "rename", "duplicate", "remove_object", "-",
+        "forward", "backward", "to_front", "to_back", "-", "ground",
+    ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (
-        "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
-        "-", "split", "points",
+        "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
+        *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
     "Window": ("history", "models", "preferences"),
     "Help": ("shortcuts", "about"),

@@ -13,7 +13,7 @@ from .legend import Legend
 from .overlay.canvas import Canvas
 from .overlay.compare import draw_comparison
 from .overlay.compose import draw_compose
-from .overlay.look import draw_look
+from .overlay.look import draw_look, draw_pixel_grid
 from .overlay.mask import draw_mask
 from .overlay.place import draw_frame
 from .overlay.pose import draw_control_points, draw_pose
@@ -35,12 +35,14 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     view, canvas = editor.view, Canvas(editor, rect, pixel_ratio)
     end = ImVec2(rect.x + rect.width, rect.y + rect.height)
     canvas.draw.push_clip_rect(ImVec2(rect.x, rect.y), end, True)
+    draw_pixel_grid(canvas)
     if not view.is_before:
-        if view.has_points and editor.is_lifted:
+        if view.has_points and editor.is_lifted and editor.looking.orbit is None:
             draw_control_points(canvas)
         if editor.is_lifted or view.tool in ON_ANYTHING:
             DRAWN[view.tool](canvas)
         Legend(editor, rect).draw()
-    if view.is_before or view.split is not None:
+    is_split = view.split is not None and editor.looking.orbit is None
+    if view.is_before or is_split:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()

@@ -19,7 +19,7 @@ BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 def build_scene(editor: Editor, renderer: str) -> Scene | None:
     """The canvas's picture, or None while no photo is open. `renderer`: "gl" or "tiles"."""
-    document, view = editor.document, editor.view
+    document, view = editor.looking.document, editor.view
     if document is None:
         return None
     photo, surround = document.photo.pixels, theme.rgb("surround")
@@ -27,6 +27,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if shown is Shown.COMPOSITE and view.tool is ToolName.SELECT:  # is about the photo as it was
         is_veiled = editor.mask is not None and not view.is_before
         return Scene(photo, surround, mask=editor.mask, veil=VEIL if is_veiled else 0.0)
+    if editor.looking.orbit is not None and not view.is_before:
+        return _alone(editor, document, renderer)
     is_edited = any(o.is_moved for o in document.objects)
     if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
         return Scene(photo, surround)
@@ -38,21 +40,35 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if shown in BARE:
         paper = _paper(shown)
         return Scene(photo, surround, layers=layers, objects=objects, paper=paper, split=split)
+    plate = editor.derived.plate(document) if is_edited else None
     mask, hatch = None, None
     if document.plate is None and is_edited:
         mask, hatch = editor.derived.moved_mask(document), MISSING
     elif shown is Shown.PROVENANCE:
         mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
     return Scene(
-        photo, surround, document.plate if is_edited else None, layers, objects, mask,
+        photo, surround, plate, layers, objects, mask,
         hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
     )  # fmt: skip
+
+
+def _alone(editor: Editor, document: Document, renderer: str) -> Scene:
+    """The object from somewhere else, on a checker: the photo does not show what is behind."""
+    photo, surround, shown = document.photo.pixels, theme.rgb("surround"), editor.view.shown
+    shown = Shown.OBJECT if shown is Shown.COMPOSITE else shown
+    if shown is Shown.DEPTH and not editor.hand.is_busy:
+        editor.derived.painter.measure(document)
+    layers = editor.derived.layers.draw(document, editor.view, shown) if renderer == "tiles" else ()
+    objects = _objects(editor, document, shown) if renderer == "gl" else ()
+    paper = _paper(shown)
+    return Scene(photo, surround, layers=layers, objects=objects, paper=paper, marks=LIFTED)
 
 
 def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """A checker says that nothing is there; under colours that mean something it would disturb."""
     panel = theme.rgb("panel")
-    return panel, theme.rgb("raised") if shown is Shown.OBJECT else panel
+    is_plain = shown not in (Shown.DEPTH, Shown.NORMALS)
+    return panel, theme.rgb("raised") if is_plain else panel
 
 
 def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject, ...]:

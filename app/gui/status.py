@@ -42,7 +42,17 @@ def _facts(editor: Editor) -> str:
         return ""
     zoom = editor.view.zoom * 100
     megapixels = size[0] * size[1] / 1e6
-    return f"{zoom:.0f} %   ·   {size[0]} × {size[1]}   ·   {megapixels:.1f} MP"
+    return f"{_pixel(editor)}{zoom:.0f} %   ·   {size[0]} × {size[1]}   ·   {megapixels:.1f} MP"
+
+
+def _pixel(editor: Editor) -> str:
+    """Place and colour of the pixel under the pointer, where single pixels are looked at."""
+    color, pointer = editor.view.color, editor.pointer
+    if color is None or pointer is None:
+        return ""
+    x, y = editor.view.image_from_canvas(pointer.xy)
+    code = "".join(f"{value:02X}" for value in color)
+    return f"{int(x)}, {int(y)}   #{code}   ·   "
 
 
 def _facts_width(editor: Editor) -> float:

@@ -82,6 +82,8 @@ class Icon:
     INFO = "\uf05a"
     CHECK = "\uf00c"
     UP = "\uf062"
+    DOWN = "\uf063"
+    COPY = "\uf24d"
     FOLDER = "\uf07b"
     FILE = "\uf15b"
     RESET = "\uf2ea"

@@ -225,6 +225,15 @@ class Window:
             left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
             viewport = (left, size[1] - bottom, view.width, view.height)
             self._renderer.draw(scene, view, viewport)
+            self._read_color(viewport)
+
+    def _read_color(self, viewport: tuple[int, int, int, int]) -> None:
+        """What the picture shows under the pointer, where single pixels are looked at."""
+        view, pointer = self.editor.view, self.editor.pointer
+        view.color = None
+        if pointer is not None and view.is_at_pixels and self.editor.is_on_photo(pointer.xy):
+            left, bottom = viewport[0] + int(pointer.x), viewport[1] + view.height - 1
+            view.color = self._renderer.read_pixel(left, bottom - int(pointer.y))
 
     def _resize_canvas(self, canvas: Rect, ratio: float) -> None:
         size = (max(round(canvas.width * ratio), 1), max(round(canvas.height * ratio), 1))

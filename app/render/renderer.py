@@ -103,6 +103,11 @@ class Renderer:
         data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
         return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
 
+    def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
+        """One of the window's pixels, u8."""
+        data = self._context.screen.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
+        return data[0], data[1], data[2]
+
     def _begin(self, viewport: Viewport) -> None:
         self._target.use()
         self._context.viewport = viewport

@@ -1,24 +1,37 @@
-"""The Look tool."""
+"""Walking around the object: it turns, and nothing is changed."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .pointer import Pointer, Shape, Stroke
+from ..texts import t
+from ..view import Orbit
+from .pointer import Button, Pointer, Shape, Stroke, has_moved
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
+TURN_SPEED = 0.4  # degrees per point that the pointer moves
+
 
 class LookTool:
-    """Not there yet."""
+    """Drag turns the object, a double click shows the photo again."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        while (yield).is_down:
-            pass
+        start, is_moved = editor.looking.orbit or Orbit(), False
+        first = pointer
+        if first.clicks == 2:
+            editor.looking.reset()
+        while (pointer := (yield)).is_down:
+            is_moved = is_moved or has_moved(editor, first, pointer)
+            if is_moved and first.button is Button.LEFT:
+                dx, dy = (pointer.xy - first.xy) / editor.view.scale * TURN_SPEED
+                editor.looking.turn(start.turned(-float(dx), float(dy)))
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.ARROW
+        return Shape.TURN
 
     def hint(self, editor: Editor) -> str:
-        return ""
+        if editor.looking.orbit is not None:
+            return t("Drag turns the object · Wheel zooms · Double-click goes back to the photo")
+        return t("Drag to see the object from all sides · Wheel zooms · Hold X for the photo")

@@ -56,6 +56,7 @@ class Pointer:
     alt: bool = False
     ctrl: bool = False
     space: bool = False
+    clicks: int = 1  # in quick succession, of which this press is the last
     wheel: float = 0.0  # notches since the last event, positive = away from the user
 
     @property

@@ -25,11 +25,13 @@ from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
 from ..raster.texture import TextureLevels, build_levels
 from .blend import FEATHER_START as FEATHER_START  # the view looks here for these two
-from .blend import NEAR, Blend, Box, Rows, differ, displacement, map_in_threads
+from .blend import NEAR, STILL_ALPHA, Blend, Box, Rows, differ, displacement, map_in_threads
 from .blend import STILL as STILL
-from .plate import hole_margin, plate_crop
+from .order import holes, leaves_a_hole, stack
+from .plate import hole_margin, plate_crop, plate_of_holes
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
+OPAQUE = 1 - STILL_ALPHA
 PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the processor's cache
 
 
@@ -45,10 +47,11 @@ class Shares:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A moved object, and where its Gaussians are now."""
+    """An object of the edit, and where its Gaussians are now."""
 
     item: EditObject
     splats: PosedSplats
+    has_hole: bool = True  # nothing stands where it was
 
     @property
     def matte(self) -> Matte:
@@ -67,7 +70,7 @@ class Composite:
     outside_footprint_changed: int  # px, 0 by construction; counted, not assumed
     shares: Shares
     camera: Camera  # the photo's
-    moved: tuple[Moved, ...]  # far ones first
+    moved: tuple[Moved, ...]  # back to front
 
 
 def object_texture(matte: Matte) -> TextureLevels:
@@ -87,11 +90,13 @@ def composite(
     them. It changes no pixel how many that are.
     """
     photo, camera = document.photo.pixels, document.photo.camera
-    moved = _moved(document, puppets or {})
+    things = _stack(document, puppets or {})
+    moved = tuple(thing for thing in things if thing.item.is_moved)
     if not moved:
         nothing = np.zeros(photo.shape[:2], bool)
         return Composite(photo, nothing, 0, 0, Shares(), camera, ())
-    drawing = _Drawing(moved, camera)
+    document = replace(document, plate=plate_of_holes(document, holes(document)))
+    drawing = _Drawing(things, camera)
     _, y0, _, y1 = drawing.box
     blend = Blend(photo, hole_margin(camera.width, camera.height), drawing.box, rows)
     for top, bottom in drawing.strips():
@@ -104,30 +109,32 @@ def composite(
     return Composite(pixels, footprint, changed, outside, shares, camera, moved)
 
 
-def _moved(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
-    """The objects that are not as in the photo, also the hidden ones; far ones first."""
-    moved = []
-    for k, item in enumerate(document.objects):
-        if item.is_moved:
-            puppet = puppets.get(k) or puppet_of(item, document.photo.camera)
-            moved.append(Moved(item, puppet.posed(item.pose, item.placement)))
-    return tuple(sorted(moved, key=lambda thing: -thing.splats.middle_depth))
+def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
+    """What is drawn over the plate, back to front."""
+    objects, camera = document.objects, document.photo.camera
+
+    def posed(k: int) -> PosedSplats:
+        puppet = puppets.get(k) or puppet_of(objects[k], camera)
+        return puppet.posed(objects[k].pose, objects[k].placement)
+
+    drawn = stack(document, posed).items()
+    return tuple(Moved(objects[k], splats, leaves_a_hole(objects, k)) for k, splats in drawn)
 
 
 class _Drawing:
-    """The moved objects as the photo's camera sees them."""
+    """The objects of an edit as the photo's camera sees them."""
 
-    def __init__(self, moved: tuple[Moved, ...], camera: Camera) -> None:
-        self._moved = moved
-        shown = [k for k, thing in enumerate(moved) if thing.item.is_visible]
-        self._drawables = {k: tiles.prepare(moved[k].splats, camera, camera) for k in shown}
-        self._textures = {k: object_texture(moved[k].matte) for k in shown}
+    def __init__(self, things: tuple[Moved, ...], camera: Camera) -> None:
+        self._things = things
+        shown = [k for k, t in enumerate(things) if t.item.is_moved and t.item.is_visible]
+        self._drawables = {k: tiles.prepare(things[k].splats, camera, camera) for k in shown}
+        self._textures = {k: object_texture(things[k].matte) for k in shown}
         self.box = self._region(camera)
 
     def _region(self, camera: Camera) -> Box:
         """Everything the edit can touch."""
         margin = int(np.ceil(hole_margin(camera.width, camera.height))) + 2
-        boxes = [thing.matte.box for thing in self._moved]
+        boxes = [thing.matte.box for thing in self._things if thing.item.is_moved]
         boxes += [box for shown in self._drawables.values() if (box := shown.box()) is not None]
         x0, y0 = (int(low) - margin for low in np.min(boxes, axis=0)[:2])
         x1, y1 = (int(high) + margin for high in np.max(boxes, axis=0)[2:])
@@ -152,19 +159,21 @@ class _Drawing:
         # `displacement` looks around each pixel. A whole row of tiles more above, and the tiles
         # stay where they are: what the rasteriser rounds, it rounds tile by tile.
         above, below = max(top - TILE, y0), min(bottom + NEAR // 2, y1)
-        for k, thing in enumerate(self._moved):
+        for k, thing in enumerate(self._things):
             picture = self._draw(k, above, below)
-            if picture is None:
+            if picture is not None:
+                rows = map_in_threads(partial(_with, thing, picture, above), rows)
+            elif not thing.item.is_moved:
+                rows = map_in_threads(partial(_at_rest, thing.matte), rows)
+            elif thing.has_hole:
                 rows = map_in_threads(partial(_without, thing.matte), rows)
-            else:
-                rows = map_in_threads(partial(_with, thing.matte, picture, above), rows)
         return rows
 
     def alone(self, top: int, bottom: int) -> F32:
-        """The objects on nothing (bottom - top, w, 4), premultiplied."""
+        """The moved objects on nothing (bottom - top, w, 4), premultiplied."""
         x0, _, x1, _ = self.box
         result = np.zeros((bottom - top, x1 - x0, 4), np.float32)
-        for k in range(len(self._moved)):
+        for k in range(len(self._things)):
             if (drawn := self._draw(k, top, bottom)) is not None:
                 picture = _part(drawn, 0, bottom - top)
                 result *= 1 - picture.alpha[..., None]
@@ -173,7 +182,7 @@ class _Drawing:
         return result
 
     def _draw(self, k: int, top: int, bottom: int) -> Picture3D | None:
-        """The rows `top`..`bottom` of an object's picture; None where it is hidden."""
+        """The rows `top`..`bottom` of an object's picture; None where it is hidden, or at rest."""
         if k not in self._drawables:
             return None
         part = (self.box[0], top, self.box[2], bottom)
@@ -210,12 +219,29 @@ def _without(matte: Matte, rows: Rows) -> Rows:
     return replace(rows, moved=moved, is_covered=rows.is_covered | was_there)
 
 
-def _with(matte: Matte, drawn: Picture3D, above: int, rows: Rows) -> Rows:
+def _at_rest(matte: Matte, rows: Rows) -> Rows:
+    """`rows` with an object over them that is where it was: what it hides may move as it likes."""
+    alpha = np.minimum(crop(matte.alpha, matte.box, rows.box), 1.0)
+    own, through = alpha[..., None], 1 - alpha
+    return replace(
+        rows,
+        colour=own * crop(matte.foreground, matte.box, rows.box) + (1 - own) * rows.colour,
+        from_photo=alpha + through * rows.from_photo,
+        from_lifter=through * rows.from_lifter,
+        from_inpainter=through * rows.from_inpainter,
+        moved=np.where(alpha >= OPAQUE, np.float32(0), rows.moved),
+    )
+
+
+def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
     """`rows` with an object over them whose picture `drawn` begins at row `above`."""
+    matte = thing.matte
     x0, y0, x1, y1 = rows.box
     top, bottom = max(y0 - NEAR // 2, above), min(y1 + NEAR // 2, above + len(drawn.alpha))
     around = _part(drawn, top - above, bottom - above)
     rest = crop(matte.alpha, matte.box, (x0, top, x1, bottom))
+    if not thing.has_hole:
+        rest = np.zeros_like(rest)
     inner = slice(y0 - top, y1 - top)
     moved = displacement(around, rest)[inner]
     picture = _part(around, inner.start, inner.stop)

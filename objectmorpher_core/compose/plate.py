@@ -8,11 +8,13 @@ editing, Perez et al. 2003), so that no line shows where the object was.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
-from ..document import Document, Plate
+from ..document import Document, Matte, Plate
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
 from . import Inpainter
@@ -99,6 +101,25 @@ def _correction(difference: F32, ring: Mask, margin: float) -> F32:
     away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
     mean *= np.exp(-away / (REACH * margin * scale))[..., None]
     return np.asarray(cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None:
+    """The document's plate, invented only where what stood in these `holes` is gone.
+
+    Around objects that are still there it is the photo.
+    """
+    plate = document.plate
+    rest = [o for o in document.objects if o.mask is not None and o.matte not in holes]
+    if plate is None or not rest:
+        return plate
+    covered = np.zeros(plate.hole.shape, bool)
+    for matte in holes:
+        covered |= crop(matte.alpha, matte.box, plate.box) > 0
+    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    hole = plate.hole & (away < SEAM * hole_margin(*document.photo.size))
+    x0, y0, x1, y1 = plate.box
+    pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
+    return replace(plate, pixels=pixels, hole=hole)
 
 
 def plate_picture(document: Document) -> Pixels:

@@ -1,9 +1,87 @@
-"""The Look tool's settings."""
+"""The Look tool's settings: what is shown, beside what, and from how near."""
 
 from __future__ import annotations
 
+from imgui_bundle import ImVec2, imgui
+
+from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor import Editor
+from ...painter import shown_now
+from ...texts import t
+from ...view import Shown
+from ..theme import Icon, theme
+from ..widgets import button, checkbox, gap, heading, note, small_text, tooltip
+
+ROW = 28.0  # points
+ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "800 %"))
 
 
 def draw_look(editor: Editor) -> None:
     """In the inspector."""
+    heading(t("View"))
+    for shown in Shown:
+        _draw_view(editor, shown)
+    gap(12)
+    if button(
+        f"{Icon.RESET}  {t(COMMANDS['reset_look'].label)}", why_not=why_not(editor, "reset_look")
+    ):
+        run(editor, "reset_look")
+    gap(12)
+    heading(t("Before and after"))
+    is_split = editor.view.split is not None
+    keys = keys_of(editor, "split")
+    if checkbox(f"{t('Split the view')}  ({keys})", is_split) != is_split:
+        run(editor, "split")
+    note(t("Hold X to see the photo as it was."))
+    gap(12)
+    heading(t("Zoom"))
+    _draw_zooms(editor)
+
+
+def _draw_view(editor: Editor, shown: Shown) -> None:
+    """A row: the name of a view, and the keys that show it."""
+    name = f"show_{shown.name.lower()}"
+    reason = why_not(editor, name)
+    start = imgui.get_cursor_screen_pos()
+    size = ImVec2(imgui.get_content_region_avail().x, theme.pt(ROW))
+    imgui.begin_disabled(reason is not None)
+    is_pressed = imgui.invisible_button(name, size)
+    imgui.end_disabled()
+    draw = imgui.get_window_draw_list()
+    end = ImVec2(start.x + size.x, start.y + size.y)
+    is_current = shown_now(editor.document, editor.view) is shown
+    if is_current or (imgui.is_item_hovered() and reason is None):
+        role = "raised" if is_current else "hovered"
+        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
+    dim = 0.45 if reason is not None else 1.0
+    top = start.y + (size.y - imgui.get_font_size()) / 2
+    role = "accent" if is_current else "text"
+    draw.add_text(ImVec2(start.x + theme.pt(8), top), theme.u32(role, dim), t(shown.value))
+    with small_text():
+        keys = keys_of(editor, name)
+        width = imgui.calc_text_size(keys).x
+        top = start.y + (size.y - imgui.get_font_size()) / 2
+        at = ImVec2(end.x - theme.pt(8) - width, top)
+        draw.add_text(at, theme.u32("secondary", dim), keys)
+    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y - theme.pt(6)))  # 2 with the spacing
+    imgui.dummy(ImVec2(0, 0))
+    if reason is not None:
+        tooltip(reason)
+    elif is_pressed:
+        run(editor, name)
+
+
+def _draw_zooms(editor: Editor) -> None:
+    """Buttons side by side."""
+    space = theme.pt(4)
+    across = (imgui.get_content_region_avail().x - (len(ZOOMS) - 1) * space) / len(ZOOMS)
+    for i, (name, label) in enumerate(ZOOMS):
+        if i:
+            imgui.same_line(0, space)
+        imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 6))
+        if button(t(label), why_not=why_not(editor, name), width=across / theme.scale):
+            run(editor, name)
+        imgui.pop_style_var()
+        if why_not(editor, name) is None:
+            keys = keys_of(editor, name)
+            tooltip(t(COMMANDS[name].label) + (f" ({keys})" if keys else ""))

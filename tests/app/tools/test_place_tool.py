@@ -1,96 +1,317 @@
-"""Taking the whole object: what a press does where, and that angles stay in range."""
+"""Taking the whole object by its parts, with a real object and real pointers."""
 
 from __future__ import annotations
-
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from app.derived import ObjectFrame
-from app.feedback import Hover
-from app.tools.place_tool import PlaceTool, gizmo, wrapped
-from app.tools.pointer import Button, Hand, Pointer
-from app.view import View
-from objectmorpher_core.document import Placement
+from app.commands import run, why_not
+from app.editor import Editor
+from app.tools.gizmo import TURNS, gizmo
+from app.tools.place_tool import PlaceTool, wrapped
+from app.tools.pointer import Button, Pointer, Shape
+from app.view import ToolName
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.placements import centre_of
 
-
-class FakeObject:
-    """As much of the editor as the tool sees: a square object, 100 px, around (200, 150)."""
-
-    def __init__(self) -> None:
-        self.view = View(width=400, height=300)
-        self.hover, self.hand = Hover(), Hand()
-        self.placement = Placement()
-        self.preview: Placement | None = None
-        self.label = ""
-
-    def object_frame(self) -> ObjectFrame:
-        centre = np.array([200.0, 150.0]) + self.placement.move
-        offsets = np.array([[-50, -50], [50, -50], [50, 50], [-50, 50]])
-        return ObjectFrame(centre + offsets, centre, 90.0)
-
-    def surface_at(self, xy: np.ndarray) -> object | None:
-        return "surface" if np.abs(xy - (200, 150)).max() < 50 else None
-
-    def place(self, placement: Placement) -> None:
-        self.preview = placement
-
-    def commit(self, label: str) -> None:
-        self.label = label
+PIXEL = 1.0  # canvas px
+EXACT = 1e-6
+DEGREES = 1e-3
+START = Placement(move=(6.0, -4.0), depth=0.2, turn=(20.0, -30.0, 40.0), scale=1.1)
 
 
 @pytest.fixture
-def editor() -> Any:
-    return FakeObject()
+def placed(editor: Editor, ball: Document) -> Editor:
+    """The lifted ball, moved and turned, and the Place tool."""
+    editor.start(edits.set_placement(ball, 0, START))
+    editor.view.tool, editor.view.is_grounded = ToolName.PLACE, False
+    return editor
 
 
-def stroke(editor: Any, start: tuple[float, float], end: tuple[float, float], **held: bool) -> Any:
-    pointer = Pointer(*start, button=Button.LEFT, is_down=True)
-    editor.hand.press(PlaceTool().press(editor, pointer), Button.LEFT)
-    editor.hand.move(Pointer(*end, is_down=True, **held))
-    editor.hand.move(Pointer(*end, is_down=False))
-    return editor.preview
+def stroke(editor: Editor, *places: np.ndarray, wheel: float = 0.0, **held: bool) -> Placement:
+    """Press at the first place, go to the others, let go; the wheel turns at the last one."""
+    tool = PlaceTool()
+    tool.hover(editor, Pointer(*places[0]))
+    editor.hand.press(
+        tool.press(editor, Pointer(*places[0], button=Button.LEFT, is_down=True)), Button.LEFT
+    )
+    for at in places[1:]:
+        editor.hand.move(Pointer(*at, is_down=True, **held))
+    if wheel:
+        editor.hand.move(Pointer(*places[-1], is_down=True, wheel=wheel, **held))
+    editor.hand.move(Pointer(*places[-1], is_down=False))
+    assert editor.object is not None
+    return editor.object.placement
 
 
-def test_dragging_the_object_moves_it_by_the_same_px(editor: Any) -> None:
-    assert stroke(editor, (200, 150), (230, 140)) == Placement(move=(30.0, -10.0))
-    assert editor.label == "Move object"
+def seen_from(editor: Editor, world: np.ndarray) -> np.ndarray:
+    assert editor.document is not None
+    return editor.view.canvas_from_image(editor.document.photo.camera.project(world))
 
 
-def test_shift_keeps_one_axis(editor: Any) -> None:
-    assert stroke(editor, (200, 150), (230, 140), shift=True).move == (30.0, 0.0)
-
-
-def test_dragging_a_corner_outwards_scales_up(editor: Any) -> None:
-    placement = stroke(editor, (250, 200), (300, 250))
-    assert placement.scale == pytest.approx(2.0)
-
-
-def test_dragging_along_the_ring_rolls(editor: Any) -> None:
-    placement = stroke(editor, (290, 150), (200, 240))
-    assert placement.turn == pytest.approx((0, 0, 90))
-
-
-def test_dragging_beside_the_object_to_the_right_turns_its_front_to_the_right(editor: Any) -> None:
-    yaw, pitch, roll = stroke(editor, (20, 20), (70, 20)).turn
-    assert yaw < 0  # DESIGN section 6: positive yaw turns the front to the left
-    assert pitch == roll == 0
-
-
-def test_a_click_changes_nothing(editor: Any) -> None:
-    assert stroke(editor, (200, 150), (201, 150)) is None
-    assert editor.label == ""
-
-
-def test_the_gizmo_stays_on_the_canvas_at_any_zoom(editor: Any) -> None:
-    editor.view = replace(editor.view, zoom=20.0)
+def spot_on(editor: Editor) -> np.ndarray:
+    """Canvas px on the object, away from rings, arrow and corners."""
     shown = gizmo(editor)
     assert shown is not None
+    for angle in np.linspace(0, 2 * np.pi, 60):
+        for share in (0.3, 0.45, 0.6):
+            way = np.array([np.cos(angle), np.sin(angle)])
+            at = shown.centre + share * 100 * way
+            if PlaceTool().part_at(editor, Pointer(*at)) == "move":
+                return at
+    raise AssertionError("nothing of the object is free")
+
+
+@pytest.mark.parametrize("part", TURNS)
+@pytest.mark.parametrize("degrees", [35.0, -80.0, 170.0, -250.0])
+def test_a_ring_turns_about_its_axis_by_the_angle_along_it(
+    placed: Editor, part: str, degrees: float
+) -> None:
+    shown = gizmo(placed)
+    assert shown is not None
+    ring, tool = shown.rings[part], PlaceTool()
+    begins = np.linspace(0, 2 * np.pi, 90)
+    begin = next(
+        float(a)
+        for a, at, front in zip(begins, ring.seen(begins), ring.is_front(begins), strict=True)
+        if front and tool.part_at(placed, Pointer(*at)) == part
+    )
+    way = begin + np.radians(np.linspace(0, degrees, 40))
+    placement = stroke(placed, *ring.seen(way))
+    axis = TURNS.index(part)
+    turned = np.array(placement.turn) - START.turn
+    assert wrapped(turned[axis]) == pytest.approx(wrapped(degrees), abs=DEGREES)
+    assert np.delete(turned, axis) == pytest.approx(0, abs=EXACT)
+    assert (placement.move, placement.depth, placement.scale) == (START.move, 0.2, 1.1)
+
+
+@pytest.mark.parametrize("part", TURNS)
+def test_a_point_of_the_object_on_a_ring_goes_along_the_ring(placed: Editor, part: str) -> None:
+    """The rings are those of a gimbal: what a number changes, its ring shows."""
+    assert placed.document is not None and placed.object is not None
+    shown, lifted = gizmo(placed), placed.object.lifted
+    assert shown is not None and lifted is not None
+    ring, camera = shown.rings[part], placed.document.photo.camera
+    turn = list(START.turn)
+    turn[TURNS.index(part)] += 25.0
+    later = Placement(START.move, START.depth, (turn[0], turn[1], turn[2]), START.scale)
+    before, after = START.matrix(lifted, camera), later.matrix(lifted, camera)
+    begin, end = ring.points(np.radians([10.0, 35.0]))
+    moved = after @ np.linalg.inv(before) @ [*begin, 1.0]
+    np.testing.assert_allclose(moved[:3], end, atol=1e-9)
+
+
+def test_shift_snaps_rings_to_steps_of_15_degrees(placed: Editor) -> None:
+    shown = gizmo(placed)
+    assert shown is not None
+    way = shown.rings["roll"].seen(np.radians([200.0, 205.0, 212.0]))
+    assert stroke(placed, *way, shift=True).turn == pytest.approx((20, -30, 45), abs=EXACT)
+
+
+@pytest.mark.parametrize("wheel", [0.0, 4.0, -6.0])
+def test_what_was_grabbed_stays_under_the_pointer(placed: Editor, wheel: float) -> None:
+    start = spot_on(placed)
+    held = placed.posing.surface_at(start)
+    assert held is not None and placed.document is not None and placed.object is not None
+    rest = placed.derived.unplaced(placed.document, 0, held.world)
+    end = start + (70, -45)
+    placement = stroke(placed, start, start + (30, -10), end, wheel=wheel)
+    assert (placement.depth > START.depth) == (wheel < 0) or wheel == 0
+    now = placed.derived.project(placed.document, 0, rest)
+    gap = placed.view.canvas_from_image(now) - end
+    assert np.linalg.norm(gap) < PIXEL
+    assert placement.turn == START.turn
+
+
+def test_shift_keeps_one_axis(placed: Editor) -> None:
+    start = spot_on(placed)
+    shown = gizmo(placed)
+    assert shown is not None
+    before = shown.centre
+    stroke(placed, start, start + (60, 9), shift=True)
+    after = gizmo(placed)
+    assert after is not None
+    assert abs(after.centre[1] - before[1]) < 0.5
+    assert after.centre[0] - before[0] > 40
+
+
+def test_dragging_a_corner_outwards_scales_up(placed: Editor) -> None:
+    shown = gizmo(placed)
+    assert shown is not None
+    corner = shown.corners[0]
+    end = shown.centre + 1.5 * (corner - shown.centre)
+    assert stroke(placed, corner, end).scale == pytest.approx(1.5 * START.scale)
+    assert placed.history is not None and placed.history.undo_label == "Scale object"
+
+
+def test_the_arrow_follows_the_pointer_into_depth(placed: Editor) -> None:
+    """A point off the centre, dragged in depth, is seen at f r / z from it."""
+    shown = gizmo(placed)
+    assert shown is not None and placed.document is not None and placed.object is not None
+    lifted, camera = placed.object.lifted, placed.document.photo.camera
+    assert lifted is not None
+    arrow = shown.arrow
+    middle = (arrow.near + arrow.far) / 2
+    before = centre_of(START, lifted, camera)
+    placement = stroke(placed, arrow.at(middle), arrow.at(0.8 * middle))
+    after = centre_of(placement, lifted, camera)
+    assert after[2] == pytest.approx(before[2] / 0.8, rel=EXACT)
+    np.testing.assert_allclose(camera.project(after), camera.project(before), atol=EXACT)
+    assert placement.move == pytest.approx(START.move, abs=EXACT)
+
+
+def test_dragging_beside_the_object_to_the_right_turns_its_front_to_the_right(
+    placed: Editor,
+) -> None:
+    yaw, pitch, roll = stroke(placed, np.array([8.0, 8.0]), np.array([58.0, 8.0])).turn
+    assert yaw < START.turn[0]  # DESIGN section 6: positive yaw turns the front to the left
+    assert (pitch, roll) == START.turn[1:]
+
+
+def test_a_click_changes_nothing(placed: Editor) -> None:
+    before, at = placed.document, spot_on(placed)
+    assert stroke(placed, at, at + (1, 0)) == START
+    assert placed.document is before
+
+
+def test_an_aborted_turn_changes_nothing(placed: Editor) -> None:
+    before, shown = placed.document, gizmo(placed)
+    assert shown is not None
+    a, b = shown.rings["roll"].seen(np.radians([200.0, 260.0]))
+    tool = PlaceTool()
+    placed.hand.press(tool.press(placed, Pointer(*a, button=Button.LEFT, is_down=True)), None)
+    placed.hand.move(Pointer(*b, is_down=True))
+    assert placed.document is not before
+    placed.escape()
+    assert placed.document is before
+
+
+def test_the_pointer_tells_what_it_would_take(placed: Editor) -> None:
+    shown, tool = gizmo(placed), PlaceTool()
+    assert shown is not None
+    assert tool.hover(placed, Pointer(*spot_on(placed))) is Shape.MOVE
+    assert tool.hover(placed, Pointer(*shown.corners[1])) is Shape.SIZE
+    reach = 9.0 * placed.view.scale  # hit areas are 10 points
+    beside = shown.arrow.at((shown.arrow.near + shown.arrow.far) / 2) + (reach, 0)
+    assert tool.part_at(placed, Pointer(*beside)) == "depth"
+    assert tool.hint(placed)
+
+
+@pytest.mark.parametrize("zoom", [0.3, 1.0, 20.0])
+def test_the_gizmo_stays_within_reach_at_any_zoom(placed: Editor, zoom: float) -> None:
+    placed.view.set_zoom(zoom, (360, 280), (180, 140))
+    shown = gizmo(placed)
+    assert shown is not None
     assert (shown.corners >= 0).all()
-    assert (shown.corners <= (400, 300)).all()
-    assert shown.radius < 150
+    assert (shown.corners <= (placed.view.width, placed.view.height)).all()
+    for ring in shown.rings.values():
+        seen = ring.seen(np.linspace(0, 2 * np.pi, 50))
+        reach = np.linalg.norm(seen - shown.centre, axis=1).max()
+        assert 40 < reach < 0.75 * placed.view.height
+
+
+def test_arrows_nudge_the_object_by_pixels(placed: Editor) -> None:
+    placed.placing.nudge(10, -1)
+    assert placed.placing.placement is not None
+    assert placed.placing.placement.move == pytest.approx((16.0, -5.0), abs=EXACT)
+
+
+def test_each_group_of_numbers_goes_back_by_itself(placed: Editor) -> None:
+    run(placed, "reset_turn")
+    assert placed.placing.placement == Placement(START.move, START.depth, (0, 0, 0), START.scale)
+    assert why_not(placed, "reset_turn") == "The object is not turned"
+    run(placed, "reset_size")
+    run(placed, "reset_position")
+    assert placed.placing.placement == Placement()
+    assert why_not(placed, "reset_place") == "The object is where it was in the photo"
+    for _ in range(3):
+        run(placed, "undo")
+    assert placed.placing.placement == START
+    run(placed, "reset_place")
+    assert placed.placing.placement == Placement()
+
+
+# ---- on the ground --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def grounded(placed: Editor, ball: Document) -> Editor:
+    """The ball at rest, which stands on the ground; the horizon is above its foot."""
+    placed.start(edits.set_horizon(ball, 40.0))
+    placed.view.tool, placed.view.is_grounded = ToolName.PLACE, True
+    return placed
+
+
+def below_ground(editor: Editor) -> float:
+    """Object diameters by which the object is below the ground."""
+    hold = editor.placing.hold()
+    assert hold.ground is not None and editor.document is not None and editor.object is not None
+    splats = editor.derived.posed(editor.document, 0)
+    body = splats.means[splats.rest.lifted.texture.solidity > 0.5]
+    return float(hold.ground.below(body).max()) / hold.unit
+
+
+def test_an_object_on_the_ground_slides_over_it(grounded: Editor) -> None:
+    start = spot_on(grounded)
+    before = grounded.placing.hold()
+    placement = stroke(grounded, start, start + (40, -50))
+    after = grounded.placing.hold()
+    assert placement.depth > 0.05, "up in the picture is farther away"
+    assert abs(below_ground(grounded)) < EXACT
+    gone = (after.xy - before.xy) * grounded.view.zoom
+    np.testing.assert_allclose(gone, [40, -50], atol=1e-3)
+
+
+def test_the_wheel_slides_it_away(grounded: Editor) -> None:
+    start = spot_on(grounded)
+    before = grounded.placing.hold()
+    placement = stroke(grounded, start, start, wheel=-4.0)
+    after = grounded.placing.hold()
+    assert placement.depth == pytest.approx(0.2)
+    assert abs(below_ground(grounded)) < EXACT
+    assert after.xy[0] == pytest.approx(before.xy[0], abs=EXACT)
+    assert after.xy[1] < before.xy[1]
+
+
+@pytest.mark.parametrize("part", ["scale", "roll", "depth"])
+def test_it_stays_on_the_ground_whatever_is_done(grounded: Editor, part: str) -> None:
+    shown = gizmo(grounded)
+    assert shown is not None
+    if part == "scale":
+        stroke(grounded, shown.corners[0], shown.corners[0] - (50, 50))
+    elif part == "roll":
+        stroke(grounded, *shown.rings["roll"].seen(np.radians([200.0, 230.0, 260.0])))
+    else:
+        stroke(grounded, shown.arrow.at(shown.arrow.far + 20), shown.arrow.at(shown.arrow.far))
+    assert grounded.placing.placement != Placement()
+    assert abs(below_ground(grounded)) < EXACT
+
+
+def test_the_horizon_can_be_dragged_and_is_one_step(grounded: Editor) -> None:
+    shown = gizmo(grounded)
+    assert shown is not None and shown.horizon is not None
+    at = np.array([20.0, shown.horizon])
+    tool = PlaceTool()
+    assert tool.part_at(grounded, Pointer(*at)) == "horizon"
+    stroke(grounded, at, at - (0, 10 * grounded.view.zoom))
+    assert grounded.document is not None
+    assert grounded.document.horizon == pytest.approx(30.0)
+    assert grounded.history is not None and grounded.history.undo_label == "Move the horizon"
+    run(grounded, "undo")
+    assert grounded.document.horizon == 40.0
+
+
+def test_above_the_horizon_it_says_why_and_does_not_snap(grounded: Editor) -> None:
+    grounded.placing.drag_horizon(135.0)
+    grounded.commit("Move the horizon")
+    start = spot_on(grounded)
+    placement = stroke(grounded, start, start + (40, -40))
+    assert grounded.message is not None
+    assert grounded.message.text == (
+        "The object's lowest point is above the horizon, so it cannot stand"
+    )
+    assert placement.depth == pytest.approx(0, abs=EXACT)
 
 
 @pytest.mark.parametrize(("angle", "same"), [(190, -170), (-180, 180), (540, 180), (0, 0)])

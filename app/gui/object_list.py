@@ -1,0 +1,125 @@
+"""The photo's objects, what is in front first: choose, name, hide, copy, remove, reorder."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from ..commands import COMMANDS, keys_of, run, why_not
+from ..editor import Editor
+from ..texts import t
+from .theme import SMALL_SIZE, Icon, theme
+from .widgets import Kind, button, heading, icon_button, note
+
+ROW = 32.0  # points
+SIDE = 24.0  # of the buttons beside the title
+NAME = 34.0  # from the row's left to the name
+BUTTONS = (
+    (Icon.UP, "forward"), (Icon.DOWN, "backward"), (Icon.COPY, "duplicate"),
+    (Icon.TRASH, "remove_object"),
+)  # fmt: skip
+
+
+class _Typing:
+    """The name that is being typed. One list is drawn, so one is remembered."""
+
+    def __init__(self) -> None:
+        self.of: int | None = None
+        self.text = ""
+
+
+_typing = _Typing()
+
+
+def draw_objects(editor: Editor) -> None:
+    """In the inspector."""
+    shown = editor.objects.listed()
+    _draw_title(editor, has_buttons=bool(shown))
+    if not shown:
+        note(t("Click something in the photo."))
+    for k in shown:
+        _draw_object(editor, k)
+    if editor.object is not None and editor.is_lifted:
+        imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
+        if button(f"{Icon.PLUS}  {t('Another object')}", Kind.QUIET):
+            run(editor, "another")
+        imgui.pop_style_color()
+
+
+def _draw_title(editor: Editor, has_buttons: bool) -> None:
+    """At the right what can be done with the current object."""
+    top = imgui.get_cursor_pos_y()
+    heading(t("Objects"))
+    if not has_buttons:
+        return
+    end, gap = imgui.get_content_region_avail().x + imgui.get_cursor_pos_x(), theme.pt(2)
+    left = end - len(BUTTONS) * theme.pt(SIDE) - (len(BUTTONS) - 1) * gap
+    imgui.push_font(None, SMALL_SIZE - 1)
+    for i, (icon, name) in enumerate(BUTTONS):
+        imgui.same_line(left + i * (theme.pt(SIDE) + gap))
+        imgui.set_cursor_pos_y(top - theme.pt(4))
+        keys = keys_of(editor, name)
+        hint = t(COMMANDS[name].label) + (f" ({keys})" if keys else "")
+        if icon_button(icon, name, hint, why_not(editor, name), SIDE):
+            run(editor, name)
+    imgui.pop_font()
+
+
+def _draw_object(editor: Editor, k: int) -> None:
+    document = editor.document
+    if document is None or k >= len(document.objects):  # a button of this frame removed it
+        return
+    thing = document.objects[k]
+    start = imgui.get_cursor_screen_pos()
+    width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
+    end = ImVec2(start.x + width, start.y + height)
+    imgui.set_next_item_allow_overlap()
+    if imgui.invisible_button(f"##object{k}", ImVec2(width, height)):
+        editor.objects.choose(k)
+    is_hovered = imgui.is_item_hovered()
+    if is_hovered and imgui.is_mouse_double_clicked(0):
+        editor.objects.renaming = k
+    draw, is_current = imgui.get_window_draw_list(), k == editor.current
+    if is_current or is_hovered:
+        role = "raised" if is_current else "hovered"
+        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
+    middle = start.y + (height - imgui.get_font_size()) / 2
+    icon = Icon.CUBE if thing.lifted else Icon.SELECT
+    role = "accent" if is_current else "secondary"
+    draw.add_text(ImVec2(start.x + theme.pt(8), middle), theme.u32(role), icon)
+    if editor.objects.renaming == k:
+        _draw_field(editor, k, start, width)
+    else:
+        _draw_name(thing.name, thing.is_visible, ImVec2(start.x + theme.pt(NAME), middle), end)
+    if thing.lifted is not None:
+        imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(30), start.y + theme.pt(2)))
+        eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
+        if icon_button(eye, f"eye{k}", t("Hide or show the object")):
+            editor.objects.toggle_visible(k)
+    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(4)))
+    imgui.dummy(ImVec2(0, 0))
+
+
+def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
+    """As much of it as there is room for before the eye."""
+    draw = imgui.get_window_draw_list()
+    draw.push_clip_rect(at, ImVec2(end.x - theme.pt(34), end.y), True)
+    draw.add_text(at, theme.u32("text" if is_visible else "secondary"), name)
+    draw.pop_clip_rect()
+
+
+def _draw_field(editor: Editor, k: int, start: ImVec2, width: float) -> None:
+    """Enter or a click elsewhere takes the name, Esc leaves the old one."""
+    assert editor.document is not None
+    is_new = _typing.of != k
+    if is_new:
+        _typing.of, _typing.text = k, editor.document.objects[k].name
+        imgui.set_keyboard_focus_here()
+    imgui.set_cursor_screen_pos(ImVec2(start.x + theme.pt(NAME - 8), start.y + theme.pt(2)))
+    imgui.set_next_item_width(width - theme.pt(NAME - 8 + 34))
+    flags = imgui.InputTextFlags_.auto_select_all | imgui.InputTextFlags_.enter_returns_true
+    is_entered, _typing.text = imgui.input_text("##name", _typing.text, int(flags))
+    if imgui.is_key_pressed(imgui.Key.escape):
+        editor.objects.renaming = _typing.of = None
+    elif is_entered or (imgui.is_item_deactivated() and not is_new):
+        _typing.of = None
+        editor.objects.rename(k, _typing.text)

@@ -1,0 +1,120 @@
+"""Which lifted objects an edit draws, and in which order: the same in the view and the export."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..document import Document, EditObject, Matte
+from ..raster.posed import PosedSplats
+from .plate import hole_margin
+
+EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
+Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
+Posed = Callable[[int], PosedSplats]
+
+
+def stack(document: Document, posed: Posed) -> dict[int, PosedSplats]:
+    """What is drawn over the plate, back to front, by the objects' indices.
+
+    These are the moved objects, also the hidden ones, whose holes show; and objects at rest where
+    a moved one comes near, which may hide them or be hidden by them. `posed` gives an object's
+    Gaussians where the edit has put them. Of copies that all rest, one is drawn.
+    """
+    objects = document.objects
+    there = {k: posed(k) for k, item in enumerate(objects) if item.is_moved}
+    reach = [_reach(document, k, splats) for k, splats in there.items()]
+    for k, item in enumerate(objects):
+        if item.lifted is None or item.matte is None or item.is_moved:
+            continue
+        is_second = any(_rests(other, item) for other in objects[:k])
+        if not is_second and any(_meet(item.matte.box, bounds) for bounds in reach):
+            there[k] = posed(k)
+    return {k: there[k] for k in back_to_front(objects, there)}
+
+
+def back_to_front(objects: tuple[EditObject, ...], splats: dict[int, PosedSplats]) -> list[int]:
+    """The keys of `splats` by layer, and within a layer by depth, the farthest first.
+
+    Of two at one depth the later is in front: a copy that was moved aside.
+    """
+    return sorted(splats, key=lambda k: (objects[k].layer, -_depth(splats[k]), k))
+
+
+def _depth(splats: PosedSplats) -> float:
+    """World units; without its last digits, which differ between equal depths."""
+    return float(np.float32(splats.middle_depth))
+
+
+def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:
+    """The document with layers such that the lifted objects are drawn in `order`, back to front.
+
+    Object `k` is the one that was put elsewhere; other layers are raised only where they must be.
+    """
+    objects, depths = list(document.objects), {i: _depth(posed(i)) for i in order}
+
+    def is_nearer(one: int, other: int) -> bool:
+        return (-depths[one], one) > (-depths[other], other)
+
+    def least(below: int, above: int) -> int:
+        """The lowest layer of `above` that puts it in front of `below`."""
+        return objects[below].layer + (0 if is_nearer(above, below) else 1)
+
+    place = list(order).index(k)
+    if place > 0:
+        objects[k] = replace(objects[k], layer=least(order[place - 1], k))
+    elif len(order) > 1:
+        above = order[1]
+        lower = 0 if is_nearer(above, k) else 1
+        objects[k] = replace(objects[k], layer=objects[above].layer - lower)
+    for below, above in pairwise(order):
+        objects[above] = replace(
+            objects[above], layer=max(objects[above].layer, least(below, above))
+        )
+    return replace(document, objects=tuple(objects))
+
+
+def leaves_a_hole(objects: tuple[EditObject, ...], k: int) -> bool:
+    """Whether nothing stands where object `k` was in the photo: no copy of it at rest."""
+    item = objects[k]
+    return not any(_rests(other, item) for i, other in enumerate(objects) if i != k)
+
+
+def holes(document: Document) -> tuple[Matte, ...]:
+    """Where objects were in the photo that are not there any more."""
+    objects = document.objects
+    return tuple(
+        item.matte
+        for k, item in enumerate(objects)
+        if item.is_moved and item.matte is not None and leaves_a_hole(objects, k)
+    )
+
+
+def _rests(other: EditObject, item: EditObject) -> bool:
+    """Whether `other` is a copy of `item`, or it itself, where it was in the photo."""
+    return other.mask is item.mask and other.lifted is not None and not other.is_moved
+
+
+def _reach(document: Document, k: int, splats: PosedSplats) -> Bounds:
+    """All of the photo that a moved object can change."""
+    item, camera = document.objects[k], document.photo.camera
+    assert item.matte is not None
+    x0, y0, x1, y1 = (float(v) for v in item.matte.box)
+    means = splats.means
+    if item.is_visible and (means[:, 2] > 0).all():
+        xy = camera.project(means)
+        zoom = camera.focal / float(means[:, 2].min())  # px per world unit, the largest
+        edge = EDGE * splats.rest.spacing * splats.scale * zoom
+        (left, top), (right, bottom) = xy.min(0) - edge, xy.max(0) + edge
+        x0, y0, x1, y1 = min(x0, left), min(y0, top), max(x1, right), max(y1, bottom)
+    elif item.is_visible:
+        x0, y0, x1, y1 = -np.inf, -np.inf, np.inf, np.inf
+    margin = hole_margin(camera.width, camera.height)
+    return x0 - margin, y0 - margin, x1 + margin, y1 + margin
+
+
+def _meet(a: tuple[int, int, int, int], b: Bounds) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -1,0 +1,133 @@
+"""Objects as things in a list: names, copies, removing, which covers which."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import wait_for_jobs
+from PIL import Image
+
+from app.commands import run, why_not
+from app.editor import Editor
+from app.tasks import PLATE
+from app.view import ToolName
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.session_file import decode_session, encode_session
+
+
+@pytest.fixture
+def copied(editor: Editor, ball: Document) -> Editor:
+    """The ball, and a copy of it that was moved to the right."""
+    editor.start(ball)
+    editor.view.tool = ToolName.PLACE
+    run(editor, "duplicate")
+    editor.placing.move_to(Placement(move=(30.0, 0.0)))
+    editor.commit("Move object")
+    return editor
+
+
+def test_a_copy_is_one_step_and_becomes_current(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.PLACE
+    run(editor, "duplicate")
+    assert editor.current == 1
+    assert editor.is_lifted
+    assert editor.document is not None and editor.document.plate is ball.plate
+    assert editor.history is not None and editor.history.undo_label == "Duplicate object"
+    editor.poll()
+    assert not editor.jobs.is_busy(PLATE), "no background has to be filled in"
+    editor.undo()
+    assert editor.document is ball
+    assert editor.current == 0
+    assert editor.view.tool is ToolName.PLACE
+
+
+def test_the_export_of_a_moved_copy_keeps_the_object(
+    copied: Editor, ball: Document, tmp_path: Path
+) -> None:
+    copied.filing.export(tmp_path / "two.png")
+    wait_for_jobs(copied)
+    pixels, photo = np.asarray(Image.open(tmp_path / "two.png")), ball.photo.pixels
+    left = (slice(0, 140), slice(0, 78))  # the copy does not reach it
+    assert np.array_equal(pixels[left], photo[left])
+    assert pixels[72, 140, 0] > photo[72, 140, 0] + 60, "the copy, before the wall"
+
+
+def test_the_view_of_a_moved_copy_keeps_the_object(copied: Editor) -> None:
+    document, view = copied.document, copied.view
+    assert document is not None
+    assert list(copied.derived.layers.order(document)) == [0, 1]
+    assert not copied.derived.moved_mask(document).any()
+    plate = copied.derived.plate(document)
+    assert plate is not None and not plate.hole.any()
+    blend = copied.derived.blend(document, view)
+    at = view.canvas_from_image(np.array([62.0, 72.0])) / 4
+    assert blend[int(at[1]), int(at[0])] == 0, "the object's left side is the photo"
+
+
+def test_copies_are_known_as_copies_in_a_session_too(copied: Editor) -> None:
+    assert copied.document is not None
+    again = decode_session(encode_session(copied.document))
+    assert again.objects[0].mask is again.objects[1].mask
+
+
+def test_order_can_be_changed_and_says_why_not(copied: Editor) -> None:
+    assert copied.objects.order() == [0, 1]
+    assert copied.objects.listed() == [1, 0]
+    assert why_not(copied, "forward") == "It is in front of all others"
+    run(copied, "backward")
+    assert copied.objects.order() == [1, 0]
+    assert copied.document is not None
+    assert list(copied.derived.layers.order(copied.document)) == [1, 0]
+    assert why_not(copied, "to_back") == "It is behind all others"
+    run(copied, "to_front")
+    assert copied.objects.order() == [0, 1]
+    run(copied, "undo")
+    run(copied, "undo")
+    assert copied.document.objects[1].layer == 0
+    assert copied.objects.order() == [0, 1]
+
+
+def test_with_one_object_there_is_no_order(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    assert why_not(editor, "forward") == "There is no other object"
+
+
+def test_removing_the_copy_leaves_the_object_and_its_background(copied: Editor) -> None:
+    run(copied, "remove_object")
+    assert copied.document is not None
+    assert [o.name for o in copied.document.objects] == ["Object 1"]
+    assert copied.document.plate is not None
+    assert copied.current == 0
+    run(copied, "undo")
+    assert len(copied.document.objects) == 2
+
+
+def test_removing_the_last_object_gives_the_photo_back(editor: Editor, ball: Document) -> None:
+    editor.start(edits.set_placement(ball, 0, Placement(move=(9.0, 0.0))))
+    run(editor, "remove_object")
+    assert editor.document is not None and editor.document.objects == ()
+    assert editor.document.plate is None
+    assert editor.view.tool is ToolName.SELECT
+    assert why_not(editor, "remove_object") == "Click an object in the photo first"
+    run(editor, "undo")
+    assert editor.is_lifted
+
+
+def test_a_name_is_one_step_and_an_empty_one_none(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    run(editor, "rename")
+    assert editor.objects.renaming == 0
+    editor.objects.rename(0, " Red ball ")
+    assert editor.objects.renaming is None
+    assert editor.object is not None and editor.object.name == "Red ball"
+    assert editor.document is not None and editor.document.plate is ball.plate
+    before = editor.document
+    editor.objects.rename(0, "  ")
+    editor.objects.rename(0, "Red ball")
+    assert editor.document is before
+    run(editor, "undo")
+    assert editor.document is ball

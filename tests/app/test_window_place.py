@@ -1,0 +1,46 @@
+"""The Place and Look tools by hand, in the real window under Xvfb."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import lift_ball
+from hands import opened
+
+from app.editor import Editor
+from app.tools.gizmo import gizmo
+from app.view import ToolName
+from objectmorpher_core.session_file import save_session
+
+pytestmark = pytest.mark.window
+
+CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
+PRIMARY = (1160, 839)  # in the primary button, left of its label
+PLACE_TOOL = (10, 176)  # in the Place tool's button, beside its icon
+
+
+def test_turning_by_a_ring_and_going_back(
+    window_environment: dict[str, str], editor: Editor, tmp_path: Path
+) -> None:
+    session = tmp_path / "ball.omorph"
+    save_session(lift_ball(editor), session)
+    size, scale = (editor.view.width, editor.view.height), editor.view.scale
+    editor.view.resize((CANVAS[2], CANVAS[3]), 1.0, editor.photo_size)
+    editor.view.tool = ToolName.PLACE
+    shown = gizmo(editor)
+    assert shown is not None
+    ring = shown.rings["roll"].seen(np.radians([200.0, 260.0])) + CANVAS[:2]
+    editor.view.resize(size, scale, editor.photo_size)
+    with opened(window_environment, session) as hands:
+        middle = (CANVAS[0] + 30, CANVAS[1] + 30)
+        hands.xdotool("mousemove", *middle)
+        hands.press("4")
+        hands.wait(lambda: hands.is_accent(PLACE_TOOL), "choosing the tool")
+        hands.drag(tuple(ring[0]), tuple(ring[1]))
+        hands.wait(lambda: hands.is_accent(PRIMARY), "turning")
+        hands.wait(lambda: "edited" in hands.title(), "turning")
+        hands.press("ctrl+z")
+        hands.wait(lambda: "edited" not in hands.title(), "going back")
+        assert not hands.is_accent(PRIMARY)

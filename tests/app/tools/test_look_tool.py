@@ -1,0 +1,111 @@
+"""Walking around the object: what is shown turns, the document stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.commands import next_step, run, why_not
+from app.editor import Editor
+from app.tools.look_tool import TURN_SPEED, LookTool
+from app.tools.pointer import Button, Pointer
+from app.view import STEEPEST, Shown, ToolName
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.rotations import turn_matrix
+
+PLACED = Placement(move=(20.0, 5.0), depth=0.3, turn=(10.0, 20.0, 30.0), scale=0.8)
+
+
+@pytest.fixture
+def looking(editor: Editor, ball: Document) -> Editor:
+    editor.start(edits.set_placement(ball, 0, PLACED))
+    editor.choose_tool(ToolName.LOOK)
+    return editor
+
+
+def drag(editor: Editor, dx: float, dy: float, clicks: int = 1) -> None:
+    start = Pointer(300, 200, button=Button.LEFT, is_down=True, clicks=clicks)
+    editor.hand.press(LookTool().press(editor, start), Button.LEFT)
+    editor.hand.move(Pointer(300 + dx, 200 + dy, is_down=True))
+    editor.hand.move(Pointer(300 + dx, 200 + dy, is_down=False))
+
+
+def test_dragging_turns_what_is_shown_and_not_the_document(looking: Editor) -> None:
+    before = looking.document
+    assert looking.looking.document is before
+    drag(looking, 100, 50)
+    assert looking.document is before
+    assert looking.history is not None and looking.history.undo_label is None
+    shown = looking.looking.document
+    assert shown is not None and shown is not before
+    lifted, camera = shown.objects[0].lifted, shown.photo.camera
+    assert lifted is not None
+    motion = shown.objects[0].placement.matrix(lifted, camera)
+    turn = turn_matrix(-100 * TURN_SPEED, 50 * TURN_SPEED, 0) @ turn_matrix(*PLACED.turn)
+    np.testing.assert_allclose(motion[:3, :3], 0.8 * turn, atol=1e-9)
+    middle = camera.project(motion[:3, :3] @ lifted.centre + motion[:3, 3])
+    np.testing.assert_allclose(middle, [90, 70], atol=1e-6)
+    assert looking.looking.document is shown, "the same as long as nothing changes"
+
+
+def test_it_never_turns_over_the_top(looking: Editor) -> None:
+    drag(looking, 0, 4000)
+    assert looking.view.orbit is not None
+    assert looking.view.orbit.pitch == STEEPEST
+
+
+@pytest.mark.parametrize("way", ["double click", "button", "tool"])
+def test_the_photos_view_comes_back(looking: Editor, way: str) -> None:
+    before = looking.document
+    drag(looking, 80, 0)
+    assert why_not(looking, "reset_look") is None
+    if way == "double click":
+        drag(looking, 0, 0, clicks=2)
+    elif way == "button":
+        run(looking, "reset_look")
+    else:
+        run(looking, "place")
+    assert looking.looking.orbit is None
+    assert looking.looking.document is before
+
+
+@pytest.mark.parametrize("shown", [Shown.OBJECT, Shown.DEPTH, Shown.PROVENANCE, Shown.STRAIN])
+def test_pictures_are_right_when_switching_there_and_back(looking: Editor, shown: Shown) -> None:
+    layers, document = looking.derived.layers, looking.document
+    layers.frame_time = np.inf
+    assert document is not None
+    before = [layer.rgba.copy() for layer in layers.draw(document, looking.view, shown)]
+    drag(looking, 120, 0)
+    turned = looking.looking.document
+    assert turned is not None
+    there = layers.draw(turned, looking.view, shown)
+    assert there[-1].rgba.shape != before[-1].shape
+    after = layers.draw(document, looking.view, shown)
+    assert len(after) == len(before)
+    for a, b in zip(after, before, strict=True):
+        np.testing.assert_array_equal(a.rgba, b)
+    layers.frame_time = 0.028
+
+
+def test_only_the_current_object_is_shown(looking: Editor) -> None:
+    run(looking, "duplicate")
+    drag(looking, 60, 0)
+    shown = looking.looking.document
+    assert shown is not None
+    assert list(looking.derived.layers.order(shown, Shown.OBJECT)) == [1]
+
+
+def test_the_next_step_after_looking_is_posing(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    run(editor, "look")
+    assert next_step(editor) == ("Pose the object", "pose")
+
+
+def test_zooms_have_commands(looking: Editor) -> None:
+    for name, zoom in (("actual", 1.0), ("double", 2.0), ("pixels", 8.0)):
+        run(looking, name)
+        assert looking.view.zoom == zoom
+    assert looking.view.is_at_pixels
+    run(looking, "fit")
+    assert looking.view.is_fitted

@@ -1,0 +1,199 @@
+"""Several objects in one photo: who covers whom, and what copies leave behind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from objectmorpher_core import edits
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.order import back_to_front, leaves_a_hole, reordered, stack
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.puppet import puppet_of
+from objectmorpher_core.raster.posed import PosedSplats
+from tests import shapes
+
+WIDTH, HEIGHT = 320, 120
+LEFT, RIGHT = 60.0, 260.0  # px, the discs' middles
+RADIUS = 26.0
+ACROSS = 180.0  # px, a move that takes one disc over half of the other
+ROUNDING = 2  # of 255: a soft edge mixed anew
+
+
+@cache
+def _two_discs() -> Document:
+    """Two discs side by side before a wall, both lifted; object 0 is the left one."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    discs = [np.hypot(x - middle, y - 60) < RADIUS for middle in (LEFT, RIGHT)]
+    pixels = shapes.picture(discs[0] | discs[1])
+    pixels[discs[1]] = pixels[discs[1]][:, ::-1]  # another colour
+    scenes = [shapes.lifted_scene(pixels, disc, 700) for disc in discs]
+    first, second = (scene.document() for scene in scenes)
+    both = replace(first, objects=(first.objects[0], replace(second.objects[0], name="Right")))
+    return replace(both, plate=shapes.grey_plate(discs[0] | discs[1]))
+
+
+def _posed(document: Document, k: int) -> PosedSplats:
+    item = document.objects[k]
+    return puppet_of(item, document.photo.camera).posed(item.pose, item.placement)
+
+
+def _moved(document: Document, k: int, placement: Placement) -> Document:
+    return edits.set_placement(document, k, placement)
+
+
+def _order(document: Document) -> list[int]:
+    return list(stack(document, lambda k: _posed(document, k)))
+
+
+def test_an_object_at_rest_covers_what_moves_behind_it():
+    document = _two_discs()
+    away = _moved(document, 0, Placement(move=(ACROSS, 0.0), depth=1.0))
+    result = composite(away)
+    photo = document.photo.pixels
+    right = document.objects[1].matte
+    assert right is not None
+    x0, y0, x1, y1 = right.box
+    is_opaque = right.alpha >= 1
+    own = result.pixels[y0:y1, x0:x1][is_opaque]
+    assert np.array_equal(own, photo[y0:y1, x0:x1][is_opaque]), "its own bytes"
+    at = (60, int(RIGHT - RADIUS - 3))
+    assert np.abs(result.pixels[at].astype(int) - photo[at]).max() > 30, (
+        "what moved is seen beside it"
+    )
+    assert result.outside_footprint_changed == 0
+
+
+def test_what_moves_in_front_of_an_object_at_rest_covers_it():
+    document = _two_discs()
+    near = _moved(document, 0, Placement(move=(ACROSS, 0.0), depth=-0.5))
+    pixels = composite(near).pixels
+    middle = document.photo.pixels[60, int(RIGHT)].astype(int)
+    assert np.abs(pixels[60, int(RIGHT)] - middle).max() > 30
+
+
+def test_a_layer_in_front_wins_over_the_depth():
+    document = _two_discs()
+    near = _moved(document, 0, Placement(move=(ACROSS, 0.0), depth=-0.5))
+    assert _order(near) == [1, 0]
+    raised = replace(near, objects=(near.objects[0], replace(near.objects[1], layer=1)))
+    assert _order(raised) == [0, 1]
+    photo, at = document.photo.pixels, (60, int(RIGHT))
+    assert np.array_equal(composite(raised).pixels[at], photo[at])
+
+
+def test_an_object_at_rest_far_from_what_moves_is_not_drawn():
+    document = _two_discs()
+    assert _order(_moved(document, 0, Placement(move=(-8.0, 0.0)))) == [0]
+    assert _order(_moved(document, 0, Placement(move=(ACROSS, 0.0)))) in ([0, 1], [1, 0])
+    assert _order(document) == []
+
+
+def test_the_edge_of_an_object_at_rest_is_kept_beside_a_hole():
+    """The plate is without both objects: beside the hole it would show through the edge."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    halves = [(np.hypot(x - 100, y - 60) < 40) & side for side in (x < 100, x >= 100)]
+    pixels = shapes.picture(halves[0] | halves[1])
+    first, second = (shapes.lifted_scene(pixels, half, 700).document() for half in halves)
+    document = replace(first, objects=(*first.objects, *second.objects))
+    document = replace(document, plate=shapes.grey_plate(halves[0] | halves[1]))
+    hidden = composite(edits.set_visible(document, 0, False)).pixels
+    assert np.array_equal(hidden[40:80, 104:130], pixels[40:80, 104:130])
+    assert np.array_equal(hidden[60, 80], [128, 128, 128])
+
+
+def test_a_copy_moved_aside_is_in_front_of_what_it_is_a_copy_of():
+    document = edits.duplicate(_two_discs(), 0)
+    for move in ((20.0, 0.0), (-13.7, 5.1), (3.3, -9.9)):
+        assert _order(_moved(document, 2, Placement(move=move)))[-1] == 2
+
+
+# ---- putting in order -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", [[1, 0, 2], [2, 1, 0], [0, 2, 1], [0, 1, 2], [1, 2, 0]])
+def test_any_order_can_be_had_whatever_the_depths(order: list[int]):
+    document = edits.duplicate(_two_discs(), 0)
+    for k, depth in enumerate((0.3, 0.0, -0.3)):
+        document = _moved(document, k, Placement(depth=depth))
+    posed = {k: _posed(document, k) for k in range(3)}
+    for k in range(3):
+        changed = reordered(document, k, order, posed.__getitem__)
+        assert back_to_front(changed.objects, posed) == order
+
+
+def test_putting_back_the_order_of_depth_needs_no_layers():
+    document = _two_discs()
+    document = _moved(document, 0, Placement(depth=0.5))
+    posed = {k: _posed(document, k) for k in range(2)}
+    front = reordered(document, 0, [1, 0], posed.__getitem__)
+    assert [o.layer for o in front.objects] == [1, 0]
+    back = reordered(front, 0, [0, 1], posed.__getitem__)
+    assert [o.layer for o in back.objects] == [0, 0]
+
+
+# ---- copies ---------------------------------------------------------------------------------
+
+
+def test_a_copy_at_rest_changes_nothing():
+    document = edits.duplicate(_two_discs(), 0)
+    assert [o.name for o in document.objects] == ["Object 1", "Right", "Object 2"]
+    assert document.objects[2].lifted is document.objects[0].lifted
+    assert document.plate is _two_discs().plate
+    assert np.array_equal(composite(document).pixels, document.photo.pixels)
+
+
+@pytest.mark.parametrize("k", [0, 2], ids=["the object", "its copy"])
+@pytest.mark.parametrize("is_shown", [True, False], ids=["moved", "hidden"])
+def test_of_a_copied_object_one_stays_and_there_is_no_hole(k: int, is_shown: bool):
+    document = edits.duplicate(_two_discs(), 0)
+    photo, mask = document.photo.pixels, document.objects[0].mask
+    assert mask is not None
+    if is_shown:
+        changed = _moved(document, k, Placement(move=(0.0, -70.0)))  # above where it was
+    else:
+        changed = edits.set_visible(document, k, False)
+    assert not leaves_a_hole(changed.objects, k)
+    result = composite(changed)
+    below = slice(50, HEIGHT)
+    assert np.array_equal(result.pixels[below], photo[below]), "and nothing around it"
+    assert (result.changed > 0) == is_shown
+    assert result.shares.from_inpainter < 0.05
+
+
+def test_a_copy_moved_by_a_little_lies_over_the_object():
+    document = edits.duplicate(_two_discs(), 0)
+    result = composite(_moved(document, 2, Placement(move=(20.0, 0.0), depth=-0.3)))
+    photo = document.photo.pixels
+    left = (slice(36, 84), slice(0, int(LEFT - 12)))  # what the copy does not reach
+    assert np.abs(result.pixels[left].astype(int) - photo[left]).max() <= ROUNDING
+    assert not (result.pixels == 128).all(-1).any(), "no plate is seen"
+
+
+def test_where_the_object_and_its_copy_both_left_the_hole_shows():
+    document = edits.duplicate(_two_discs(), 0)
+    for k, up in ((0, -90.0), (2, 90.0)):
+        document = _moved(document, k, Placement(move=(0.0, up)))
+    assert leaves_a_hole(document.objects, 0) and leaves_a_hole(document.objects, 2)
+    pixels = composite(document).pixels
+    assert np.array_equal(pixels[60, int(LEFT)], [128, 128, 128])
+
+
+def test_removing_an_object_takes_the_plate_unless_a_copy_stays():
+    document = edits.duplicate(_two_discs(), 0)
+    one = edits.remove_object(document, 0)
+    assert one.plate is document.plate
+    assert [o.name for o in one.objects] == ["Right", "Object 2"]
+    assert edits.remove_object(one, 1).plate is None
+
+
+def test_names_can_be_changed_but_not_be_empty():
+    document = edits.rename(_two_discs(), 0, "  Cat 3 ")
+    assert document.objects[0].name == "Cat 3"
+    assert document.plate is not None
+    assert edits.duplicate(document, 0).objects[2].name == "Cat 2"
+    with pytest.raises(edits.EditError, match="name"):
+        edits.rename(document, 0, " ")

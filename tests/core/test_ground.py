@@ -1,0 +1,135 @@
+"""The ground under an object, and objects that are held, on it and off it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Placement
+from objectmorpher_core.ground import GroundError, ground_under
+from objectmorpher_core.placements import Hold, centre_of, with_centre
+from objectmorpher_core.rotations import turn_matrix, turn_of
+from tests import shapes
+
+EXACT = 1e-9
+PLANE = 1e-6  # object diameters
+horizons = pytest.mark.parametrize("horizon", [20.0, 60.0, -200.0])
+
+
+@pytest.fixture(scope="module")
+def scene() -> shapes.Scene:
+    return shapes.scene("ellipse", 300)
+
+
+def _points(scene: shapes.Scene) -> np.ndarray:
+    return scene.lifted.world_points(scene.lifted.body.means)
+
+
+def _hold(scene: shapes.Scene, horizon: float) -> Hold:
+    ground = ground_under(_points(scene), scene.camera, horizon)
+    contact = ground.lowest(_points(scene))
+    return Hold(Placement(), scene.lifted, scene.camera, contact, ground)
+
+
+@horizons
+def test_the_object_stands_on_its_ground(scene, horizon):
+    ground = ground_under(_points(scene), scene.camera, horizon)
+    below = ground.below(_points(scene))
+    assert below.max() == pytest.approx(0, abs=EXACT)
+    assert np.linalg.norm(ground.normal) == pytest.approx(1)
+    assert ground.normal[1] > 0, "down"
+
+
+@horizons
+def test_the_ground_vanishes_at_the_horizon(scene, horizon):
+    ground = ground_under(_points(scene), scene.camera, horizon)
+    for x in (-50.0, 80.0, 400.0):
+        ray = scene.camera.unproject(np.array([x, horizon]), 1.0)
+        assert ray @ ground.normal == pytest.approx(0, abs=EXACT)
+        far = ground.at_depth(scene.camera, x, 30 * ground.height)
+        assert scene.camera.project(far)[1] > horizon
+
+
+@horizons
+@pytest.mark.parametrize("delta", [(0, 0), (30, 8), (-60, 40), (10, -300)])
+@pytest.mark.parametrize("away", [0.0, 0.7, -0.2])
+def test_the_contact_stays_on_the_plane(scene, horizon, delta, away):
+    hold = _hold(scene, horizon)
+    placement = hold.moved(np.array(delta, float), away)
+    motion = placement.matrix(scene.lifted, scene.camera)
+    contact = motion[:3, :3] @ hold.point + motion[:3, 3]
+    assert abs(hold.ground.below(contact)) < PLANE * hold.unit
+
+
+@horizons
+def test_the_contact_follows_the_pointer(scene, horizon):
+    hold = _hold(scene, horizon)
+    placement = hold.moved(np.array([25.0, 6.0]))
+    seen = scene.puppet.picture_of(scene.lifted.object_points(hold.point), None, placement)
+    np.testing.assert_allclose(seen, hold.xy + [25.0, 6.0], atol=PLANE)
+
+
+def test_its_size_in_the_picture_goes_with_one_over_the_depth(scene):
+    hold = _hold(scene, 20.0)
+    offsets = np.array([[-0.3, 0.0, 0.0], [0.3, 0.0, 0.0]]) * hold.unit  # at the centre's depth
+    sizes, depths = [], []
+    for away in (0.0, 0.5, 2.0):
+        placement = hold.moved(np.zeros(2), away)
+        centre = centre_of(placement, scene.lifted, scene.camera)
+        left, right = scene.camera.project(centre + offsets)
+        sizes.append(right[0] - left[0])
+        depths.append(centre[2])
+    np.testing.assert_allclose(np.array(sizes) * depths, sizes[0] * depths[0], rtol=1e-9)
+    assert depths[2] - depths[0] == pytest.approx(2.0 * hold.unit)
+
+
+def test_a_contact_above_the_horizon_is_refused(scene):
+    lowest = scene.camera.project(_points(scene))[:, 1].max()
+    with pytest.raises(GroundError, match="horizon"):
+        ground_under(_points(scene), scene.camera, float(lowest) + 3.0)
+
+
+def test_standing_moves_the_lowest_point_onto_the_plane(scene):
+    ground = ground_under(_points(scene), scene.camera, 20.0)
+    offsets = (_points(scene) - scene.lifted.centre) @ turn_matrix(30, 40, 50).T
+    centre = ground.stood(scene.lifted.centre + [0.1, -0.4, 0.2], offsets)
+    assert ground.below(centre + offsets).max() == pytest.approx(0, abs=EXACT)
+
+
+@pytest.mark.parametrize("away", [0.0, 0.8, -0.3])
+def test_a_point_that_is_held_goes_where_it_is_taken(scene, away):
+    placement = Placement((7.0, 3.0), 0.4, (30.0, 10.0, -20.0), 1.3)
+    matrix = placement.matrix(scene.lifted, scene.camera)
+    rest = _points(scene)[17]
+    hold = Hold(placement, scene.lifted, scene.camera, matrix[:3, :3] @ rest + matrix[:3, 3])
+    later = hold.moved(np.array([21.0, -13.0]), away)
+    seen = scene.puppet.picture_of(scene.lifted.object_points(rest), None, later)
+    np.testing.assert_allclose(seen, hold.xy + [21.0, -13.0], atol=PLANE)
+    assert later.depth == pytest.approx(0.4 + away)
+    assert (later.turn, later.scale) == (placement.turn, placement.scale)
+
+
+def test_the_centre_goes_where_it_is_put(scene):
+    centre = np.array([0.3, -0.2, 4.0])
+    placement = with_centre(Placement(turn=(5, 6, 7)), centre, scene.lifted, scene.camera)
+    np.testing.assert_allclose(centre_of(placement, scene.lifted, scene.camera), centre)
+
+
+def test_a_tilted_camera_has_a_tilted_ground():
+    """With the horizon at the top of the photo the camera looks down, and the ground rises."""
+    camera = Camera.from_fov(160, 120)
+    points = camera.unproject(np.array([[80.0, 100.0]]), np.array([3.0]))
+    ground = ground_under(points, camera, 0.0)
+    assert ground.normal[2] > 0
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (30, -40, 170), (-170, 89, 12), (120, -89.9, -60)])
+def test_a_turn_is_found_from_its_matrix(turn):
+    assert turn_of(turn_matrix(*turn)) == pytest.approx(turn, abs=1e-6)
+
+
+@pytest.mark.parametrize("pitch", [90.0, -90.0])
+def test_at_right_angles_the_turn_is_the_same_with_no_roll(pitch):
+    matrix = turn_matrix(25, pitch, 10)
+    np.testing.assert_allclose(turn_matrix(*turn_of(matrix)), matrix, atol=1e-7)
