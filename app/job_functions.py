@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.arrays import Mask, Pixels, Selection
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     Document,
@@ -47,7 +47,7 @@ class Cut:
 
     pixels: Pixels
     camera: Camera
-    mask: Mask
+    mask: Selection
 
 
 class PhotoMemory:

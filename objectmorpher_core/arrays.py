@@ -12,6 +12,8 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
+U8 = npt.NDArray[np.uint8]
+Selection = Mask | U8  # (H, W): bool, or how much of each pixel is meant, 255 for all of it
 RGB = npt.NDArray[np.uint8]  # (H, W, 3)
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]  # (H, W, 3), the photo's own bit depth
 
