@@ -19,6 +19,7 @@ from objectmorpher_core.document import Document, EditObject
 
 from .derived import Derived
 from .editing.composing import Composing
+from .editing.masking import Masking
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
@@ -48,6 +49,7 @@ class Editor:
         self.tasks = Tasks(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
+        self.masking = Masking(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.composing = Composing(self)
         self.derived.layers.ask = self.tasks.render_exact
@@ -158,25 +160,27 @@ class Editor:
     def undo(self) -> None:
         if self.hand.abort(self) or self.history is None:
             return
-        if self.tasks.prompt is not None:
+        if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
-        label = self.history.undo_label
+        label, before = self.history.undo_label, self.history.document
         self.history.undo()
+        self.objects.follow(before)
         self._after_travel(t("Undone: {label}", label=label) if label else t("Nothing to undo"))
 
     def redo(self) -> None:
         if self.hand.is_busy or self.history is None:
             return
-        label = self.history.redo_label
+        label, before = self.history.redo_label, self.history.document
         self.history.redo()
+        self.objects.follow(before)
         self._after_travel(t("Done again: {label}", label=label) if label else t("Nothing to redo"))
 
     def _after_travel(self, text: str) -> None:
         """The document may have lost what the view points at."""
         self.hover = Hover()
         self.posing.forget_lost()
-        if not self.is_lifted:
+        if not self.is_lifted and self.view.tool is not ToolName.MASK:
             self.view.tool = ToolName.SELECT
         self.say(text)
 
@@ -184,7 +188,7 @@ class Editor:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
             self.rubber = None
-        elif self.tasks.prompt is not None:
+        elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
             self.posing.select(None)
@@ -195,9 +199,6 @@ class Editor:
     def choose_tool(self, tool: ToolName) -> None:
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
-        if tool is ToolName.MASK and self.mask is None:
-            self.say(t("Click an object in the photo first"))
-            return
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(t("Lift an object first"))
             return

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from objectmorpher_core.document import Document
 
-DEPTH = 500  # steps; documents share their arrays, so a step costs kilobytes
+DEPTH = 500  # steps; documents share their arrays, so most steps cost kilobytes
+MASKS = 1 << 30  # bytes of all steps' masks: each step of a brush has one, 24 MB of a large photo
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class History:
         if document is self.document:
             return
         self._steps = [*self._steps[: self._cursor + 1], Step(label, document)][-DEPTH:]
+        self._steps = self._steps[-_affordable(self._steps) :]
         self._cursor = len(self._steps) - 1
 
     def amend(self, document: Document) -> None:
@@ -68,3 +70,19 @@ class History:
 
     def redo(self) -> None:
         self._cursor = min(self._cursor + 1, len(self._steps) - 1)
+
+
+def _affordable(steps: list[Step]) -> int:
+    """How many of the last steps, at least two, have masks that are not too much together."""
+    seen: set[int] = set()
+    total = 0
+    for count, step in enumerate(reversed(steps)):
+        for thing in step.document.objects:
+            for mask in (thing.mask, thing.coverage, thing.found):
+                owner = mask if mask is None or mask.base is None else mask.base  # views share it
+                if owner is not None and id(owner) not in seen:
+                    seen.add(id(owner))
+                    total += mask.nbytes if mask is not None else 0
+        if total > MASKS and count >= 2:
+            return count
+    return len(steps)

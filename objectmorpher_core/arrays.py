@@ -13,7 +13,7 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 Mask = npt.NDArray[np.bool_]
 U8 = npt.NDArray[np.uint8]
-Selection = Mask | U8  # (H, W): bool, or how much of each pixel is meant, 255 for all of it
+Selection = npt.NDArray[Any]  # (H, W) bool, or u8: how much of a pixel is meant, 255 for all
 RGB = npt.NDArray[np.uint8]  # (H, W, 3)
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]  # (H, W, 3), the photo's own bit depth
 

@@ -280,7 +280,7 @@ def encode_coverage(coverage: U8) -> bytes:
 
 
 def read_mask(data: bytes, size: tuple[int, int]) -> Mask:
-    """Mask (H, W) out of an image file, see `read_coverage`; what is at least half is the object."""
+    """Mask (H, W) out of an image file: what `read_coverage` finds at least half covered."""
     return read_coverage(data, size) > MASK_THRESHOLD
 
 

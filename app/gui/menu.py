@@ -17,7 +17,10 @@ from .widgets import icon_button, tooltip
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
-    "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
+    "Object": (
+        "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",
+        "-", "import_mask", "export_mask", "-", "lift", "-", "select", "mask", "pose", "place",
+    ),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
         "-", "split", "points", "-", "theme",

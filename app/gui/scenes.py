@@ -14,6 +14,7 @@ VEIL = 0.45  # share of black outside the selection, while selecting
 MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
+OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
@@ -24,9 +25,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
         return None
     photo, surround = document.photo.pixels, theme.rgb("surround")
     shown = shown_now(document, view)
-    if shown is Shown.COMPOSITE and view.tool is ToolName.SELECT:  # is about the photo as it was
-        is_veiled = editor.mask is not None and not view.is_before
-        return Scene(photo, surround, mask=editor.mask, veil=VEIL if is_veiled else 0.0)
+    if shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO:
+        return _selecting(editor, document)
     is_edited = any(o.is_moved for o in document.objects)
     if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
         return Scene(photo, surround)
@@ -46,6 +46,16 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     return Scene(
         photo, surround, document.plate if is_edited else None, layers, objects, mask,
         hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
+    )  # fmt: skip
+
+
+def _selecting(editor: Editor, document: Document) -> Scene:
+    """The photo as it was, veiled where it is not selected."""
+    selection, painting = editor.masking.shown, editor.masking.painting
+    is_veiled = selection is not None and not editor.view.is_before
+    return Scene(
+        document.photo.pixels, theme.rgb("surround"), mask=selection,
+        touched=painting.touched if painting else (), veil=VEIL if is_veiled else 0.0,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from ..arrays import U8, Mask, Selection
 from ..document import SELECTED as HALF
 
 FULL = 255
+FINE = 4  # bits of a px that corners are given to
 EXACT = 1e-4  # px, rounding of distances
 LARGEST_SMOOTHING = 127.0  # px; what OpenCV's median takes
 LARGEST_REACH = 500.0  # px that an edge is moved or softened at once
@@ -35,6 +36,29 @@ def as_coverage(selection: Selection) -> U8:
     if selection.dtype == np.bool_:
         return selection.view(np.uint8) * np.uint8(FULL)
     return selection.copy().view(np.uint8)
+
+
+def enclosed(outline: np.ndarray, size: tuple[int, int]) -> Mask:
+    """(H, W) what is inside a closed line (N, 2) px, in a picture of `size` (width, height) px."""
+    inside = np.zeros((size[1], size[0]), np.uint8)
+    corners = np.rint((np.asarray(outline) - 0.5) * (1 << FINE)).astype(np.int32)
+    if len(corners) > 2:
+        cv2.fillPoly(inside, [corners], (1,), cv2.LINE_8, FINE)
+    return inside.view(np.bool_)
+
+
+def united(selection: Selection | None, mask: Mask) -> Selection:
+    """`selection` and `mask` (H, W) besides."""
+    if selection is None or selection.dtype == np.bool_:
+        return mask if selection is None else selection | mask
+    return np.where(mask, np.uint8(FULL), selection)
+
+
+def without(selection: Selection | None, mask: Mask) -> Selection:
+    """`selection` less `mask` (H, W)."""
+    if selection is None or selection.dtype == np.bool_:
+        return np.zeros_like(mask) if selection is None else selection & ~mask
+    return np.where(mask, np.uint8(0), selection)
 
 
 def grow(selection: Selection, px: float) -> Selection:
@@ -109,7 +133,7 @@ def feather(selection: Selection, px: float) -> U8:
 
 
 def _around(selection: Selection, px: float) -> tuple[slice, slice] | None:
-    """The box of what is at all selected with `px` around it, inside the photo; None for nothing."""
+    """The box around what is selected, `px` larger, inside the photo; None for nothing."""
     rows, columns = np.flatnonzero(selection.any(1)), np.flatnonzero(selection.any(0))
     if len(rows) == 0:
         return None
@@ -144,7 +168,8 @@ def _dilated(coverage: U8, px: float) -> U8:
 
 def _closed_in(outside: Mask, meant: Mask) -> Mask:
     """The pieces (H, W) of `outside` that hold something of `meant` and do not touch the frame."""
-    count, labels = cv2.connectedComponents(outside.view(np.uint8), connectivity=4)
+    count, found = cv2.connectedComponents(outside.view(np.uint8), connectivity=4)
+    labels = np.asarray(found, np.int32)
     is_hole = np.zeros(count, bool)
     is_hole[np.unique(labels[meant])] = True
     for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):

@@ -54,7 +54,7 @@ def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndar
 
 
 def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Selection:
-    """`mask` (H, W), bool or soft u8, continued like `extended`, but only where it touches the frame.
+    """`mask` (H, W), bool or u8, continued like `extended`, but only where it touches the frame.
 
     What merely stands near the frame must not come back as its own mirror image.
     """
@@ -71,7 +71,8 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
 def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
     """Soft cut-out of `mask` (H, W) in the photo (H, W, 3), on a crop with `margin` px around it.
 
-    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha. Where the object leaves the photo the crop does so too, see `frame_extension`.
+    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha.
+    Where the object leaves the photo the crop does so too, see `frame_extension`.
     Raises ValueError for an empty mask or one that is not the photo's size.
     """
     if mask.shape != pixels.shape[:2]:

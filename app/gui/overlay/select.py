@@ -21,6 +21,8 @@ def draw_selection(canvas: Canvas) -> None:
         _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
     if editor.rubber is not None:
         draw_rubber(canvas)
+    if editor.selection.path is not None:
+        draw_line(canvas, editor.selection.path)
 
 
 def draw_edge(canvas: Canvas) -> None:
@@ -38,6 +40,14 @@ def draw_rubber(canvas: Canvas) -> None:
     low, high = canvas.on_canvas(np.array([[x0, y0], [x1, y1]]))
     canvas.draw.add_rect_filled(low, high, theme.u32(ACCENT, 0.12))
     canvas.draw.add_rect(low, high, theme.u32(ACCENT), 0.0, theme.pt(1.5))
+
+
+def draw_line(canvas: Canvas, path: list[np.ndarray]) -> None:
+    """The line that is being drawn around something, canvas px (2,) each; its end is dashed."""
+    points = canvas.on_canvas(np.array(path))
+    if len(points) > 1:
+        canvas.polyline(points, ACCENT, 1.5, is_closed=False)
+        canvas.dashes([points[-1], points[0]], is_closed=False)
 
 
 def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
