@@ -8,6 +8,7 @@ menu, shortcuts, tools and tests call the same ones. No GL, no ImGui, no window 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, EditObject
 
+from .candidate import Candidates
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.masking import Masking
@@ -52,6 +54,7 @@ class Editor:
         self.masking = Masking(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.composing = Composing(self)
+        self.candidates = Candidates(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -210,6 +213,7 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
+        self.candidates.poll(time.monotonic())
         return self.tasks.ensure_plate() or is_changed
 
     def set_theme(self, theme: str) -> None:

@@ -104,6 +104,18 @@ def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matt
     return matte, lifted
 
 
+def candidate(
+    pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress
+) -> tuple[Mask, str] | str:
+    """As `segment`; where nothing can be selected, the sentence that says so."""
+    from objectmorpher_core.segment import SelectionError
+
+    try:
+        return segment(pixels, prompt, choice, progress)
+    except SelectionError as error:
+        return str(error)
+
+
 def change_mask(
     selection: Selection, change: Callable[[Selection], Selection], progress: Progress
 ) -> Selection:

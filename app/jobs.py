@@ -63,6 +63,7 @@ class Job:
     stop_asked: float | None = None  # s, monotonic
     number: int = 0
     is_quiet: bool = False
+    is_spare: bool = False
 
 
 class Worker:
@@ -137,21 +138,35 @@ class Jobs:
         cancelled: Callable[[], None] = lambda: None,
         kind: str = "",
         is_quiet: bool = False,
+        is_spare: bool = False,
     ) -> None:
         """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
 
         A request of the same `kind` that waits or runs is replaced; its answer never comes.
-        A quiet one is not the user's: the status line does not show it.
+        A quiet one is not the user's: the status line does not show it. A spare one besides gives
+        way: any other request ends it.
         """
         self._count += 1
         kind = kind or function.__name__
         job = Job(title, function, arguments, done, failed, cancelled, kind)
-        job.number, job.is_quiet = self._count, is_quiet
+        job.number, job.is_quiet, job.is_spare = self._count, is_quiet, is_spare
         self._waiting.pop(kind, None)
         self._waiting[kind] = job
-        if self.current is not None and self.current.kind == kind:
-            self._ask_to_stop(self.current)
+        current = self.current
+        if current is not None and (current.kind == kind or (current.is_spare and not is_spare)):
+            self._ask_to_stop(current)
         self._send_next()
+
+    def promote(self, kind: str, wanted: str) -> bool:
+        """The spare job that runs is the user's own from now on, of the kind `wanted`.
+
+        Whether there was one.
+        """
+        job = self.current
+        if job is None or job.kind != kind or job.stop_asked is not None:
+            return False
+        job.kind, job.is_quiet, job.is_spare = wanted, False, False
+        return True
 
     def is_busy(self, kind: str) -> bool:
         """Whether a request of this kind waits or runs."""

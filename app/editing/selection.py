@@ -157,7 +157,9 @@ class Selection:
 
     def _ask(self, prompt: Prompt, label: str, combine: Combine = Combine.REFINED) -> None:
         editor = self._editor
-        editor.tasks.segment(Question(prompt, label, editor.current, combine))
+        question = Question(prompt, label, editor.current, combine)
+        if not editor.candidates.take(question):
+            editor.tasks.segment(question)
 
     def _combine_click(self, click: Click, before: Prompt) -> None:
         """The object that a click is on, besides a selection that no prompt made, or not in it.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..feedback import Hover
 from ..tasks import Combine
 from ..texts import t
 from ..view import SelectMode
@@ -64,7 +65,10 @@ class SelectTool:
             editor.selection.set_outline(outline, _combine(start))
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
+        is_on_photo = editor.is_on_photo(pointer.xy)
+        x, y = editor.view.image_from_canvas(pointer.xy)
+        editor.hover = Hover(place=(float(x), float(y)) if is_on_photo else None)
+        return Shape.CROSS if is_on_photo else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:

@@ -62,7 +62,7 @@ def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
 
 
 def keep_touched(mask: Mask, prompt: Prompt) -> Mask:
-    """The pieces (H, W) that a positive click touches; the sizeable ones without, and of a group."""
+    """The pieces (H, W) that a positive click touches; of a group all that are sizeable, too."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     if count <= 1:
         return mask
