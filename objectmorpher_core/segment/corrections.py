@@ -55,4 +55,4 @@ def _softness(mask: Mask, soft: Mask) -> float:
     """How far, in px, what is soft (H, W) reaches from the mask's edge."""
     from .matte import signed_distance
 
-    return float(np.abs(signed_distance(mask))[soft].max(initial=0.0))
+    return 1.0 + float(np.abs(signed_distance(mask))[soft].max(initial=0.0))
