@@ -8,6 +8,7 @@ menu, shortcuts, tools and tests call the same ones. No GL, no ImGui, no window 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,11 +20,13 @@ from objectmorpher_core.document import Document, EditObject
 
 from .autosave import Autosave
 from .background import Background
+from .candidate import Candidates
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
 from .editing.handle_numbers import HandleNumbers
 from .editing.looking import Looking
+from .editing.masking import Masking
 from .editing.models import Models
 from .editing.objects import Objects
 from .editing.placing import Placing
@@ -58,10 +61,12 @@ class Editor:
         self.tasks = Tasks(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
+        self.masking = Masking(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.exporting, self.models = Exporting(self), Models(self)
         self.composing, self.looking = Composing(self), Looking(self)
+        self.candidates = Candidates(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -174,18 +179,20 @@ class Editor:
     def undo(self) -> None:
         if self.hand.abort(self) or self.history is None:
             return
-        if self.tasks.prompt is not None:
+        if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
-        label = self.history.undo_label
+        label, before = self.history.undo_label, self.history.document
         self.history.undo()
+        self.objects.follow(before)
         self._after_travel(t("Undone: {label}", label=label) if label else t("Nothing to undo"))
 
     def redo(self) -> None:
         if self.hand.is_busy or self.history is None:
             return
-        label = self.history.redo_label
+        label, before = self.history.redo_label, self.history.document
         self.history.redo()
+        self.objects.follow(before)
         self._after_travel(t("Done again: {label}", label=label) if label else t("Nothing to redo"))
 
     def travel(self, index: int) -> None:
@@ -200,7 +207,7 @@ class Editor:
         self.hover = Hover()
         self.posing.forget_lost()
         self.objects.forget_lost()
-        if not self.is_lifted:
+        if not self.is_lifted and self.view.tool is not ToolName.MASK:
             self.view.tool = ToolName.SELECT
         self.say(text)
 
@@ -208,7 +215,7 @@ class Editor:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
             self.rubber = None
-        elif self.tasks.prompt is not None:
+        elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
             self.posing.select(None)
@@ -219,9 +226,6 @@ class Editor:
     def choose_tool(self, tool: ToolName) -> None:
         """Changes the tool; the ones that need a lifted object say so."""
         self.hand.abort(self)
-        if tool is ToolName.MASK and self.mask is None:
-            self.say(t("Click an object in the photo first"))
-            return
         if tool not in (ToolName.SELECT, ToolName.MASK) and not self.is_lifted:
             self.say(t("Lift an object first"))
             return
@@ -236,6 +240,7 @@ class Editor:
         is_changed = self.background.poll() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         self.autosave.poll()
+        self.candidates.poll(time.monotonic())
         return is_changed
 
     def set_theme(self, theme: str) -> None:

@@ -36,3 +36,4 @@ class Hover:
     surface: SurfacePoint | None = None
     is_pin: bool = False  # a click would set a pin
     part: str | None = None  # of the Place tool's frame
+    place: tuple[float, float] | None = None  # image px, where a click would select something

@@ -27,6 +27,13 @@ class Dialog(Enum):
     OPEN = "Open"
     SAVE = "Save session"
     EXPORT = "Export to"
+    MASK_OPEN = "Import mask"
+    MASK_SAVE = "Export mask"
+
+    @property
+    def is_opening(self) -> bool:
+        """Whether it asks for a file that is there."""
+        return self in (Dialog.OPEN, Dialog.MASK_OPEN)
 
 
 class Filing:
@@ -98,6 +105,10 @@ class Filing:
             self.open(path)
         elif dialog is Dialog.SAVE:
             self.save_as(path if path.suffix else path.with_suffix(SESSION_ENDING))
+        elif dialog is Dialog.MASK_OPEN:
+            self._editor.masking.open_file(path)
+        elif dialog is Dialog.MASK_SAVE:
+            self._editor.masking.write_file(path if path.suffix else path.with_suffix(".png"))
         elif self._editor.exporting.draft is not None:
             self._editor.exporting.set_path(path)
         else:
@@ -126,12 +137,14 @@ class Filing:
         editor = self._editor
         source = editor.source or editor.path
         folder = source.parent if source else Path.home()
-        if dialog is Dialog.OPEN:
+        if dialog.is_opening:
             return folder
         name = editor.document.photo.name if editor.document else "photo"
         stem = Path(name).stem
         if dialog is Dialog.SAVE:
             return editor.path or folder / f"{stem}{SESSION_ENDING}"
+        if dialog is Dialog.MASK_SAVE:
+            return folder / f"{stem}-mask.png"
         if editor.exporting.draft is not None:
             return editor.exporting.path
         return folder / f"{stem}-edited.png"

@@ -6,13 +6,14 @@ starts without them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.arrays import U8, Mask, Pixels, Selection
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     Document,
@@ -47,7 +48,7 @@ class Cut:
 
     pixels: Pixels
     camera: Camera
-    mask: Mask
+    mask: Selection
 
 
 class PhotoMemory:
@@ -110,6 +111,45 @@ def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matt
     progress(0.95, "getting ready to pose")
     _rehearse(cut, matte, lifted)
     return matte, lifted
+
+
+def candidate(
+    pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress
+) -> tuple[Mask, str] | str:
+    """As `segment`; where nothing can be selected, the sentence that says so."""
+    from objectmorpher_core.segment import SelectionError
+
+    try:
+        return segment(pixels, prompt, choice, progress)
+    except SelectionError as error:
+        return str(error)
+
+
+def change_mask(
+    selection: Selection, change: Callable[[Selection], Selection], progress: Progress
+) -> Selection:
+    """The selection, its edge moved, smoothed or softened."""
+    return change(selection)
+
+
+def read_coverage(path: Path, size: tuple[int, int], progress: Progress) -> U8:
+    """The soft mask in a picture file, for a photo of `size` (width, height) px."""
+    from objectmorpher_core import image
+
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path.name} cannot be opened: {error.strerror or error}") from error
+    return image.read_coverage(data, size)
+
+
+def write_coverage(selection: Selection, path: Path, progress: Progress) -> None:
+    """Writes a mask as an 8-bit grey PNG file."""
+    from objectmorpher_core.files import write_all
+    from objectmorpher_core.image import encode_coverage
+    from objectmorpher_core.segment.mask_edit import as_coverage
+
+    write_all({path: encode_coverage(as_coverage(selection))})
 
 
 def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:

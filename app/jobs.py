@@ -64,6 +64,7 @@ class Job:
     stop_asked: float | None = None  # s, monotonic
     number: int = 0
     is_quiet: bool = False
+    is_spare: bool = False
 
 
 class Worker:
@@ -142,24 +143,40 @@ class Jobs:
         cancelled: Callable[[], None] = lambda: None,
         kind: str = "",
         is_quiet: bool = False,
+        is_spare: bool = False,
     ) -> None:
         """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
 
         A request of the same `kind` that waits or runs is replaced; its answer never comes.
-        A quiet one is not the user's: the status line does not show it.
+        A quiet one is not the user's: the status line does not show it. A spare one besides gives
+        way: any other request ends it.
         """
         self._count += 1
         kind = kind or function.__name__
         job = Job(title, function, arguments, done, failed, cancelled, kind)
-        job.number, job.is_quiet = self._count, is_quiet
+        job.number, job.is_quiet, job.is_spare = self._count, is_quiet, is_spare
         self._wait_for(job)
 
     def _wait_for(self, job: Job) -> None:
         self._waiting.pop(job.kind, None)
         self._waiting[job.kind] = job
-        if self.current is not None and self.current.kind == job.kind:
-            self._ask_to_stop(self.current)
+        current = self.current
+        if current is not None and (
+            current.kind == job.kind or (current.is_spare and not job.is_spare)
+        ):
+            self._ask_to_stop(current)
         self._send_next()
+
+    def promote(self, kind: str, wanted: str) -> bool:
+        """The spare job that runs is the user's own from now on, of the kind `wanted`.
+
+        Whether there was one.
+        """
+        job = self.current
+        if job is None or job.kind != kind or job.stop_asked is not None:
+            return False
+        job.kind, job.is_quiet, job.is_spare = wanted, False, False
+        return True
 
     def _again(self, job: Job) -> None:
         """The request of a job that failed, once more."""

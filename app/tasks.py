@@ -7,6 +7,8 @@ the mask of a document never change, they are replaced.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,12 +28,31 @@ if TYPE_CHECKING:
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 
 
+class Combine(Enum):
+    """What an answer is to the selection that is there."""
+
+    ANEW = "anew"  # instead of it
+    REFINED = "refined"  # the same, told better
+    ADDED = "added"
+    REMOVED = "removed"
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is meant, and of which object."""
+
+    prompt: Prompt
+    label: str  # of the step
+    k: int
+    combine: Combine = Combine.REFINED
+
+
 class Tasks:
     """Segmenting, lifting, inpainting, writing."""
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
-        self.prompt: Prompt | None = None  # asked, not answered yet
+        self.question: Question | None = None  # asked, not answered yet
         self._plate: tuple[tuple[Mask | None, ...], Plate] | None = None  # of these masks
         self._no_plate: tuple[Mask | None, ...] | None = None  # asked or failed for these masks
         self._unreadable: Photo | None = None  # reading it has ended the worker
@@ -39,7 +60,7 @@ class Tasks:
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.prompt = self._plate = self._no_plate = None
+        self.question = self._plate = self._no_plate = None
 
     def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
@@ -62,50 +83,40 @@ class Tasks:
         if document is not None and document.photo is not self._unreadable:
             self.read_photo(is_quiet=True)
 
-    def segment(self, prompt: Prompt, label: str) -> None:
-        """Asks for the mask of `prompt`; what was said before it is in it."""
+    def segment(self, question: Question) -> None:
+        """Asks for the mask of a prompt; what was said before it is in it."""
         editor, document = self._editor, self._editor.document
         if document is None:
             return
         editor.message = None
-        self.prompt = prompt
-        photo, k = document.photo, editor.current
+        self.question = question
+        photo = document.photo
 
         def accept(answer: tuple[Mask, str]) -> None:
-            self.prompt = None
+            self.question = None
             current = editor.document
-            if current is None or current.photo is not photo or editor.hand.is_busy:
-                return
-            mask, backend = answer
-            if k == len(current.objects):
-                current = edits.add_object(current)
-            try:
-                changed = edits.set_mask(current, k, mask, prompt).with_backend("segment", backend)
-            except ValueError as error:
-                editor.complain(str(error))
-                return
-            editor.posing.select(None)
-            editor.view.tool = ToolName.SELECT
-            editor.apply(label, changed)
+            if current is not None and current.photo is photo and not editor.hand.is_busy:
+                editor.selection.take(question, *answer)
 
         editor.jobs.start(
-            "Selecting", job_functions.segment, photo.pixels, prompt,
+            "Selecting", job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
             done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind=SELECT,
         )  # fmt: skip
 
     def _fail_segment(self, error: JobError) -> None:
-        self.prompt = None
+        self.question = None
         self._editor.complain_of(error)
 
     def _drop_prompt(self) -> None:
-        self.prompt = None
+        self.question = None
 
     def lift(self) -> None:
         """Asks for the current object in 3D."""
         editor, document = self._editor, self._editor.document
         mask, k = editor.mask, editor.current
-        if document is None or mask is None:
+        selection = editor.object.selection if editor.object else None
+        if document is None or selection is None:
             return
         editor.message = None
         settings = editor.settings
@@ -124,7 +135,7 @@ class Tasks:
 
         photo = document.photo
         editor.jobs.start(
-            "Lifting the object", job_functions.lift, Cut(photo.pixels, photo.camera, mask),
+            "Lifting the object", job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip

@@ -34,6 +34,24 @@ class ToolName(Enum):
     COMPOSE = "Compose"
 
 
+class SelectMode(Enum):
+    """How the Select tool is told what is meant."""
+
+    CLICK = "Click"
+    BOX = "Box"
+    LASSO = "Lasso"
+
+
+@dataclass(eq=False)
+class Selecting:
+    """What the Select and the Mask tool are set to."""
+
+    mode: SelectMode = SelectMode.CLICK
+    level: str = "object"  # of document.LEVELS: what a new click means
+    reach: float = 4.0  # px of the photo, by which an edge is moved, smoothed or softened
+    is_erasing: bool = False  # the brush takes away
+
+
 class Shown(Enum):
     """What the canvas shows of the edit, in the order of the View menu."""
 
@@ -88,6 +106,7 @@ class View:
     color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
     pose: PoseView = field(default_factory=PoseView)
+    selecting: Selecting = field(default_factory=Selecting)
 
     @property
     def is_at_pixels(self) -> bool:

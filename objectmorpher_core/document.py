@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .arrays import F32, F64, I32, Mask, Pixels, frozen
+from .arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from .camera import Camera
 from .gaussians import Gaussians
 from .image import Picture
@@ -48,6 +48,10 @@ class Click:
     is_foreground: bool = True
 
 
+LEVELS = ("part", "object", "group")  # how much around a click is meant, from little to much
+SELECTED = 128  # of 255: from this coverage on a pixel belongs to the mask
+
+
 @dataclass(frozen=True)
 class Prompt:
     """What the user said about which object is meant. `is_subject`: the photo's salient subject."""
@@ -55,6 +59,11 @@ class Prompt:
     clicks: tuple[Click, ...] = ()
     box: tuple[float, float, float, float] | None = None  # x0, y0, x1, y1 px
     is_subject: bool = False
+    level: str = "object"  # of LEVELS: what a click means
+
+    def __post_init__(self) -> None:
+        if self.level not in LEVELS:
+            raise ValueError(f"a click's level is {self.level!r}, not one of {', '.join(LEVELS)}")
 
     @property
     def is_empty(self) -> bool:
@@ -311,6 +320,8 @@ class EditObject:
     placement: Placement = Placement()
     is_visible: bool = True
     layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
+    coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
+    found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
 
     @property
     def is_moved(self) -> bool:
@@ -319,10 +330,26 @@ class EditObject:
             self.pose is not None or not self.placement.is_identity or not self.is_visible
         )
 
-    def with_mask(self, mask: Mask | None, prompt: Prompt) -> EditObject:
-        """A new mask: matte, lift, handles, pose and placement are gone."""
-        mask = None if mask is None else frozen(mask, np.bool_)
-        return EditObject(self.name, prompt=prompt, mask=mask, deform=self.deform)
+    @property
+    def selection(self) -> Selection | None:
+        """The mask, soft where the artist made it so."""
+        return self.mask if self.coverage is None else self.coverage
+
+    def with_mask(
+        self, selection: Selection | None, prompt: Prompt, found: Mask | None = None
+    ) -> EditObject:
+        """A new mask, or coverage: matte, lift, handles, pose and placement are gone."""
+        mask, coverage = None, None
+        if selection is not None:
+            if selection.dtype == np.uint8:
+                mask = frozen(selection >= SELECTED)
+                coverage = frozen(selection) if (selection != mask * np.uint8(255)).any() else None
+            else:
+                mask = frozen(selection, np.bool_)
+        return EditObject(
+            self.name, prompt=prompt, mask=mask, coverage=coverage,
+            found=None if found is None else frozen(found, np.bool_), deform=self.deform,
+        )  # fmt: skip
 
     def with_lifted(self, matte: Matte, lifted: LiftedObject) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import Mask
+from .arrays import Mask, Selection
 from .document import (
     DeformSettings,
     Document,
@@ -43,8 +43,38 @@ def remove_object(document: Document, k: int) -> Document:
     return replace(document, objects=objects, plate=document.plate if is_copy else None)
 
 
-def set_mask(document: Document, k: int, mask: Mask | None, prompt: Prompt) -> Document:
-    """The mask (H, W) of object `k`, and what the user said to get it."""
+def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt) -> Document:
+    """The mask (H, W) of object `k`, bool or soft u8, and what the user said to get it."""
+    return _with_mask(document, k, document.objects[k].with_mask(mask, prompt))
+
+
+def change_mask(document: Document, k: int, mask: Selection) -> Document:
+    """The mask (H, W) of object `k`, bool or soft u8, changed by hand.
+
+    What the prompt had given is kept beside it, so that `answer_prompt` knows what was changed.
+    """
+    item = document.objects[k]
+    found = item.mask if item.found is None and not item.prompt.is_empty else item.found
+    return _with_mask(document, k, item.with_mask(mask, item.prompt, found))
+
+
+def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Document:
+    """The mask (H, W) that was `found` for the prompt of object `k`.
+
+    What was changed by hand since the last answer stays as it is, except where a new click says
+    the contrary: the latest word counts.
+    """
+    from .segment.corrections import corrected
+
+    item = document.objects[k]
+    if item.found is None or item.mask is None:
+        return set_mask(document, k, found, prompt)
+    mask, without = corrected(item, found, prompt)
+    return _with_mask(document, k, item.with_mask(mask, prompt, without))
+
+
+def _with_mask(document: Document, k: int, changed: EditObject) -> Document:
+    mask = changed.mask
     if mask is not None:
         width, height = document.photo.size
         if mask.shape != (height, width):
@@ -53,7 +83,7 @@ def set_mask(document: Document, k: int, mask: Mask | None, prompt: Prompt) -> D
             raise EditError("nothing is selected")
         if mask.all():
             raise EditError("the object covers the whole photo, there is no background left")
-    return document.with_object(k, document.objects[k].with_mask(mask, prompt))
+    return document.with_object(k, changed)
 
 
 def set_lifted(document: Document, k: int, matte: Matte, lifted: LiftedObject) -> Document:

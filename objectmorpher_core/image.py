@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageCms, UnidentifiedImageError
 
 from . import exif, png, tiff
-from .arrays import RGB, Mask, Pixels, frozen
+from .arrays import RGB, U8, Mask, Pixels, frozen
 
 MAX_PIXELS = 250_000_000  # a larger picture does not fit an ordinary machine's memory thrice
 FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "BMP", "GIF")  # plain pixels, no programs
@@ -279,8 +279,18 @@ def encode_mask(mask: Mask) -> bytes:
     return png.encode(np.where(mask, np.uint8(255), np.uint8(0))[..., None], None, None)
 
 
+def encode_coverage(coverage: U8) -> bytes:
+    """8-bit grey PNG file of a soft mask (H, W)."""
+    return png.encode(coverage[..., None], None, None)
+
+
 def read_mask(data: bytes, size: tuple[int, int]) -> Mask:
-    """Mask (H, W) out of an image file: bright and opaque is the object.
+    """Mask (H, W) out of an image file: what `read_coverage` finds at least half covered."""
+    return read_coverage(data, size) > MASK_THRESHOLD
+
+
+def read_coverage(data: bytes, size: tuple[int, int]) -> U8:
+    """Soft mask (H, W) out of an image file: bright and opaque is the object.
 
     `size` is the photo's (width, height) px. Raises ImageError where the mask has another.
     """
@@ -288,7 +298,5 @@ def read_mask(data: bytes, size: tuple[int, int]) -> Mask:
     height, width = picture.pixels.shape[:2]
     if (width, height) != tuple(size):
         raise ImageError(f"the mask is {width} x {height} px, the photo {size[0]} x {size[1]} px")
-    mask = _grey(to_u8(picture.pixels)) > MASK_THRESHOLD
-    if picture.alpha is not None:
-        mask &= to_u8(picture.alpha) > MASK_THRESHOLD
-    return mask
+    coverage = _grey(to_u8(picture.pixels))
+    return coverage if picture.alpha is None else np.minimum(coverage, to_u8(picture.alpha))

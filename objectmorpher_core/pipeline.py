@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import compose, edits, lift, segment
-from .arrays import RGB, Mask, Pixels
+from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import Composite, composite, object_texture
 from .compose.plate import build_plate, plate_cover
@@ -35,6 +35,7 @@ from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
 from .script import EditScript, ScriptError
 from .segment import Segmenter
+from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
@@ -86,19 +87,19 @@ def read_photo(pixels: Pixels, segmenter: Segmenter, progress: Progress = silent
 def lift_mask(
     pixels: Pixels,
     camera: Camera,
-    mask: Mask,
+    mask: Selection,
     backend: str = "auto",
     count: int = GAUSSIANS,
     progress: Progress = silent,
     seed: int = 0,
 ) -> tuple[Matte, LiftedObject]:
-    """The object under `mask` (H, W) as a soft cut-out and as `count` Gaussians."""  # fmt: skip
+    """The object under `mask` (H, W), bool or soft u8, as a cut-out and as `count` Gaussians."""
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
     margin = int(np.ceil(MATTE_MARGIN * band_width(camera.width, camera.height))) + 8
     matte = build_matte(pixels, mask, margin)
     progress_rest = part(progress, 0.3, 1.0)
-    return matte, lifter.lift(pixels, mask, matte, camera, count, progress_rest, seed)
+    return matte, lifter.lift(pixels, is_selected(mask), matte, camera, count, progress_rest, seed)
 
 
 def make_plate(

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from .camera import Camera
-from .document import Document, EditObject, Photo
+from .document import SELECTED, Document, EditObject, Photo
 from .files import write_all
 from .image import ImageError, encode_picture, read_picture
 from .session_tree import Reader, SessionError, Writer
@@ -227,6 +227,7 @@ def _check(document: Document) -> None:
     for item in document.objects:
         if item.mask is not None:
             _same("mask", item.mask.shape, (height, width))
+        _check_coverage(item)
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, (width, height))
@@ -238,6 +239,18 @@ def _check(document: Document) -> None:
         _inside("plate", plate.box, (width, height))
         if plate.pixels.dtype != document.photo.pixels.dtype:
             raise ValueError("the plate has another bit depth than the photo")
+
+
+def _check_coverage(item: EditObject) -> None:
+    """A soft mask and a prompt's answer belong to the mask."""
+    if item.coverage is not None:
+        if item.mask is None or item.coverage.dtype != np.uint8:
+            raise ValueError("an object's coverage belongs to no mask")
+        if not np.array_equal(item.coverage >= SELECTED, item.mask):
+            raise ValueError("an object's coverage is not that of its mask")
+    if item.found is not None:
+        found = None if item.mask is None else item.mask.shape
+        _same("an answer's mask", (item.found.shape, item.found.dtype), (found, np.dtype(bool)))
 
 
 def _check_lifted(item: EditObject) -> None:

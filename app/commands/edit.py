@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ..editor import Editor
 from ..tools import navigate
 from ..view import ToolName
-from .command import Command, Reason, never, no_lift, no_photo, no_redo, no_selection, no_undo
+from .command import Command, Reason, never, no_lift, no_photo, no_redo, no_undo
 
 
 def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
@@ -25,7 +25,7 @@ COMMANDS: dict[str, Command] = {
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
     "select": _tool(ToolName.SELECT, "1", no_photo),
-    "mask": _tool(ToolName.MASK, "2", no_selection),
+    "mask": _tool(ToolName.MASK, "2", no_photo),
     "pose": _tool(ToolName.POSE, "3", no_lift),
     "place": _tool(ToolName.PLACE, "4", no_lift),
     "look": _tool(ToolName.LOOK, "5", no_lift),

@@ -1,11 +1,42 @@
-"""The selection, and lifting what is selected."""
+"""The selection, its edge, its file, and lifting what is selected."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from ..editor import Editor
+from ..filing import Dialog
+from ..texts import t
 from .command import Command, cannot_lift, no_selection
+
+
+def _want(dialog: Dialog) -> Callable[[Editor], None]:
+    def run(editor: Editor) -> None:
+        editor.filing.wanted = dialog
+
+    return run
+
+
+def _no_soft_edge(editor: Editor) -> str | None:
+    is_soft = editor.masking.is_soft
+    return no_selection(editor) or (
+        None if is_soft else t("The edge is found in the photo already")
+    )
+
 
 COMMANDS: dict[str, Command] = {
     "subject": Command("Select subject", "Ctrl+Shift+A", lambda e: e.selection.select_subject()),
+    "invert": Command(
+        "Invert selection", "Ctrl+Shift+I", lambda e: e.masking.invert(), no_selection
+    ),
     "clear": Command("Clear selection", "Ctrl+D", lambda e: e.selection.clear(), no_selection),
+    "grow": Command("Grow", "", lambda e: e.masking.grow(), no_selection),
+    "shrink": Command("Shrink", "", lambda e: e.masking.shrink(), no_selection),
+    "smooth": Command("Smooth", "", lambda e: e.masking.smooth(), no_selection),
+    "feather": Command("Feather", "", lambda e: e.masking.feather(), no_selection),
+    "fill_holes": Command("Fill holes", "", lambda e: e.masking.fill_holes(), no_selection),
+    "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
+    "import_mask": Command("Import mask…", "", _want(Dialog.MASK_OPEN)),
+    "export_mask": Command("Export mask…", "", _want(Dialog.MASK_SAVE), no_selection),
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
 }

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import edits
+from objectmorpher_core.document import Document
 
 from ..tasks import LIFT, SELECT
 from ..texts import t
@@ -39,6 +40,18 @@ class Objects:
         editor.posing.select(None)
         if not editor.is_lifted:
             editor.view.tool = ToolName.SELECT
+
+    def follow(self, before: Document) -> None:
+        """After a step back or forth: the tools change the object that the step changed."""
+        editor, now = self._editor, self._editor.document
+        if now is None:
+            return
+        pairs = enumerate(zip(before.objects, now.objects, strict=False))
+        changed = [k for k, (old, new) in pairs if old is not new]
+        if len(now.objects) != len(before.objects):
+            changed = [min(len(before.objects), len(now.objects))]
+        if changed and editor.current not in changed:
+            editor.current = changed[0]
 
     def toggle_visible(self, k: int) -> None:
         """Shows or hides object `k`."""

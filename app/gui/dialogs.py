@@ -24,6 +24,8 @@ FILTERS = {
     Dialog.OPEN: (*PHOTO_ENDINGS, SESSION_ENDING),
     Dialog.SAVE: (SESSION_ENDING,),
     Dialog.EXPORT: EXPORT_ENDINGS,
+    Dialog.MASK_OPEN: PHOTO_ENDINGS,
+    Dialog.MASK_SAVE: (".png",),
 }
 
 
@@ -63,7 +65,7 @@ class Dialogs:
             return
         patterns = " ".join(f"*{ending}" for ending in FILTERS[dialog])
         filters = [dialog.value, patterns, "All files", "*"]
-        if dialog is Dialog.OPEN:
+        if dialog.is_opening:
             native = pfd.open_file(dialog.value, str(suggestion), filters)
         else:
             native = pfd.save_file(dialog.value, str(suggestion), filters)

@@ -14,7 +14,10 @@ from .widgets import Kind, bold_text, button, icon_button, note
 TITLE = "Choose a file"
 SIZE = (640.0, 480.0)  # points
 ROW = 28.0
-VERBS = {Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose"}
+VERBS = {
+    Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
+    Dialog.MASK_OPEN: "Import", Dialog.MASK_SAVE: "Export",
+}  # fmt: skip
 
 
 class FileChooser:
@@ -149,9 +152,10 @@ class FileChooser:
         """Enters a folder, asks before replacing, else gives the file to the editor."""
         if path.is_dir():
             self._enter(path)
-            self._name = "" if self._dialog is Dialog.OPEN else self._name
+            self._name = "" if self._dialog.is_opening else self._name
             return
-        if self._dialog is Dialog.SAVE and path.exists() and path != self._replacing:
+        is_asking = self._dialog in (Dialog.SAVE, Dialog.MASK_SAVE)  # an export asks by itself
+        if is_asking and path.exists() and path != self._replacing:
             self._replacing = path
             return
         self._close()

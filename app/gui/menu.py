@@ -18,8 +18,12 @@ from .widgets import icon_button, tooltip
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
+    "Select": (
+        "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",
+        "-", "import_mask", "export_mask",
+    ),
     "Object": (
-        "subject", "clear", "-", "lift", "-", "rename", "duplicate", "remove_object", "-",
+        "lift", "-", "rename", "duplicate", "remove_object", "-",
         "forward", "backward", "to_front", "to_back", "-", "ground",
     ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),

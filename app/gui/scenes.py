@@ -14,6 +14,7 @@ VEIL = 0.45  # share of black outside the selection, while selecting
 MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
+OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
@@ -24,9 +25,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
         return None
     photo, surround = document.photo.pixels, theme.rgb("surround")
     shown = shown_now(document, view)
-    if shown is Shown.COMPOSITE and view.tool is ToolName.SELECT:  # is about the photo as it was
-        is_veiled = editor.mask is not None and not view.is_before
-        return Scene(photo, surround, mask=editor.mask, veil=VEIL if is_veiled else 0.0)
+    if shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO:
+        return _selecting(editor, document)
     if editor.looking.orbit is not None and not view.is_before:
         return _alone(editor, document, renderer)
     is_edited = any(o.is_moved for o in document.objects)
@@ -62,6 +62,16 @@ def _alone(editor: Editor, document: Document, renderer: str) -> Scene:
     objects = _objects(editor, document, shown) if renderer == "gl" else ()
     paper = _paper(shown)
     return Scene(photo, surround, layers=layers, objects=objects, paper=paper, marks=LIFTED)
+
+
+def _selecting(editor: Editor, document: Document) -> Scene:
+    """The photo as it was, veiled where it is not selected."""
+    selection, painting = editor.masking.shown, editor.masking.painting
+    is_veiled = selection is not None and not editor.view.is_before
+    return Scene(
+        document.photo.pixels, theme.rgb("surround"), mask=selection,
+        touched=painting.touched if painting else (), veil=VEIL if is_veiled else 0.0,
+    )  # fmt: skip
 
 
 def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

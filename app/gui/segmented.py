@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 from imgui_bundle import ImVec2, imgui
 
-from .landmarks import mark
+from .landmarks import clean, mark
 from .theme import FIELD, RADIUS, theme
 from .widgets import tooltip
 
@@ -24,6 +24,7 @@ class Choice(Generic[T]):
     label: str
     hint: str = ""
     why_not: str | None = None
+    icon: str = ""
 
 
 def segmented(name: str, choices: Sequence[Choice[T]], chosen: T, width: float = 0.0) -> T:
@@ -41,7 +42,7 @@ def segmented(name: str, choices: Sequence[Choice[T]], chosen: T, width: float =
         imgui.begin_disabled(choice.why_not is not None)
         if imgui.invisible_button(f"##{name}{i}", size):
             chosen = choice.value
-        mark(choice.hint or choice.label)
+        mark(choice.label if clean(choice.label) else choice.hint)
         imgui.end_disabled()
         is_hovered = imgui.is_item_hovered()
         if choice.hint or choice.why_not:
@@ -63,6 +64,7 @@ def _draw_part(
         draw.add_rect_filled(inner, outer, fill, theme.pt(RADIUS - INSET))
     role = "on_accent" if is_chosen else "secondary"
     alpha = imgui.get_style().disabled_alpha if choice.why_not else 1.0
-    text = imgui.calc_text_size(choice.label)
+    shown = f"{choice.icon}  {choice.label}" if choice.icon else choice.label
+    text = imgui.calc_text_size(shown)
     at = ImVec2(round(low.x + (size.x - text.x) / 2), round(low.y + (size.y - text.y) / 2))
-    draw.add_text(at, theme.u32(role, alpha), choice.label)
+    draw.add_text(at, theme.u32(role, alpha), shown)

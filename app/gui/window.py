@@ -175,7 +175,8 @@ class Window:
         """Sleeps until an event; how many frames to draw for it."""
         editor = self.editor
         patience = BUSY if editor.jobs.current is not None else IDLE
-        if self._dialogs.is_open or editor.derived.layers.is_waiting:
+        is_due = editor.derived.layers.is_waiting or editor.candidates.is_due
+        if self._dialogs.is_open or is_due:
             patience = SOON
         before = time.monotonic()
         glfw.wait_events_timeout(patience)

@@ -29,7 +29,7 @@ class PhotoPass:
         """Into the current viewport, which is the canvas."""
         self._photo.upload(scene.photo)
         self._plate.upload(scene.plate.pixels if scene.plate else None)
-        self._mask.upload(scene.mask)
+        self._mask.upload(scene.mask, scene.touched)
         self._photo.use(PHOTO, view.zoom)
         self._plate.use(PLATE, view.zoom)
         self._mask.use(MASK, view.zoom)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from objectmorpher_core.arrays import F32, Mask, Pixels
+from objectmorpher_core.arrays import F32, Pixels, Selection
+from objectmorpher_core.brush import Box
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Plate
 
@@ -48,7 +50,8 @@ class Scene:
     plate: Plate | None = None  # shown where there is one
     layers: tuple[Layer, ...] = ()  # objects that are rendered already, back to front
     objects: tuple[SplatObject, ...] = ()  # objects to render, back to front
-    mask: Mask | None = None  # what `veil` and `hatch` refer to
+    mask: Selection | None = None  # what `veil` and `hatch` refer to
+    touched: Sequence[Box] = ()  # of a mask that is painted in place: what changed, in its order
     veil: float = 0.0  # share of black outside the mask
     hatch: Hatch | None = None  # inside the mask
     marks: Hatch | None = None  # on what an object invents, where its layer says so

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import moderngl
 import numpy as np
+
+from objectmorpher_core.brush import Box
 
 SHARP_FROM = 4.0  # magnification from which single pixels are shown
 
@@ -18,11 +22,19 @@ class PictureTexture:
         self._context = context
         self._limit = int(context.info["GL_MAX_TEXTURE_SIZE"])
         self._uploaded: np.ndarray | None = None
+        self._touched = 0  # of what is painted in place: boxes that are uploaded
+        self._is_changing = False
         self.texture = context.texture((1, 1), 1, b"\0")
 
-    def upload(self, pixels: np.ndarray | None) -> None:
-        """`pixels` (h, w) or (h, w, channels): bool, u8, u16 or f32; None is one black px."""
+    def upload(self, pixels: np.ndarray | None, touched: Sequence[Box] = ()) -> None:
+        """`pixels` (h, w) or (h, w, channels): bool, u8, u16 or f32; None is one black px.
+
+        `touched`: of pixels (u8) that are painted in place, the boxes that changed, since they
+        were first shown and in this order. Only the new ones are uploaded.
+        """
+        fresh, self._touched = touched[self._touched :], len(touched)
         if pixels is self._uploaded:
+            self._refresh(fresh)
             return
         self.texture.release()
         self._uploaded = pixels
@@ -32,9 +44,25 @@ class PictureTexture:
         data = np.ascontiguousarray(shown)
         self.texture = self._context.texture((width, height), channels, data, alignment=1)
         self.texture.repeat_x = self.texture.repeat_y = False
+        self._is_changing = bool(touched)
         if self._has_mipmaps:
             self.texture.build_mipmaps()
         self.texture.filter = (self._below, moderngl.LINEAR)
+
+    def _refresh(self, boxes: Sequence[Box]) -> None:
+        """The part around `boxes` once more. Mipmaps wait until the picture is another one."""
+        pixels = self._uploaded
+        if not boxes or pixels is None:
+            return
+        x0, y0 = min(b[0] for b in boxes), min(b[1] for b in boxes)
+        x1, y1 = max(b[2] for b in boxes), max(b[3] for b in boxes)
+        self._is_changing = True
+        if self.texture.size == (pixels.shape[1], pixels.shape[0]):
+            part = np.ascontiguousarray(pixels[y0:y1, x0:x1])
+            self.texture.write(part, viewport=(x0, y0, x1 - x0, y1 - y0), alignment=1)
+        else:  # a photo larger than the GPU takes, shown halved
+            self._uploaded = None
+            self.upload(pixels)
 
     @property
     def glo(self) -> int:
@@ -43,7 +71,8 @@ class PictureTexture:
 
     @property
     def _below(self) -> int:
-        return moderngl.LINEAR_MIPMAP_LINEAR if self._has_mipmaps else moderngl.LINEAR
+        has_mipmaps = self._has_mipmaps and not self._is_changing
+        return moderngl.LINEAR_MIPMAP_LINEAR if has_mipmaps else moderngl.LINEAR
 
     def use(self, unit: int, zoom: float) -> None:
         """Binds it: single pixels at high magnification, smooth below."""

@@ -1,24 +1,43 @@
-"""The Mask tool."""
+"""Painting the selection: the brush adds, or takes away."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .pointer import Pointer, Shape, Stroke
+from ..texts import t
+from .pointer import Button, Pointer, Shape, Stroke
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
 
 class MaskTool:
-    """Not there yet."""
+    """Left paints, right or Alt erases; Shift draws a straight line from the last stroke's end."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        while (yield).is_down:
-            pass
+        is_erasing = self.is_erasing(editor, pointer)
+        editor.masking.start_stroke(pointer, is_erasing)
+        try:
+            while (pointer := (yield)).is_down:
+                editor.masking.move_stroke(pointer)
+            label = t("Erase selection") if is_erasing else t("Paint selection")
+            editor.masking.finish_stroke(label)
+        finally:
+            editor.masking.drop_stroke()
+
+    def is_erasing(self, editor: Editor, pointer: Pointer) -> bool:
+        """Whether a press with these buttons and keys would take away."""
+        is_other = pointer.button is Button.RIGHT or pointer.alt
+        return is_other != editor.view.selecting.is_erasing
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.ARROW
+        return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
-        return ""
+        if editor.hand.is_busy:
+            return t("Esc takes the stroke back")
+        if editor.is_lifted:
+            return t("After a stroke the object will be lifted anew · Undo brings it back")
+        if editor.view.selecting.is_erasing:
+            return t("Drag erases · Right-drag or Alt paints · Shift-click draws a line · [ ] size")
+        return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")

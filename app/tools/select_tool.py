@@ -1,4 +1,4 @@
-"""Choosing the object: clicks that belong to it, clicks that do not, a box."""
+"""Choosing the object: clicks that belong to it and clicks that do not, a box, a line around it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..feedback import Hover
+from ..tasks import Combine
+from ..texts import t
+from ..view import SelectMode
 from .pointer import Button, Pointer, Shape, Stroke, has_moved
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
 MIN_BOX = 3.0  # image px, either side; a smaller box is a slip
+STEP = 1.5  # points between two places of a line that is drawn
 
 
 class SelectTool:
-    """Left click adds, right click removes, drag draws a box."""
+    """Left click adds, right click removes, drag draws a box or, in Lasso mode, a line."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
+        is_left = pointer.button is Button.LEFT
+        if editor.view.selecting.mode is SelectMode.LASSO and is_left:
+            return self._lasso(editor, pointer)
+        return self._click_or_box(editor, pointer)
+
+    def _click_or_box(self, editor: Editor, pointer: Pointer) -> Stroke:
         start, is_box = pointer, False
         while (pointer := (yield)).is_down:
             is_box = is_box or has_moved(editor, start, pointer)
@@ -26,7 +37,7 @@ class SelectTool:
         editor.rubber = None
         if is_box and start.button is Button.LEFT:
             self._choose_box(editor, start, pointer)
-        else:
+        elif editor.view.selecting.mode is SelectMode.CLICK or start.button is Button.RIGHT:
             x, y = editor.view.image_from_canvas(start.xy)
             is_foreground = start.button is Button.LEFT and not start.alt
             editor.selection.add_click(float(x), float(y), is_foreground)
@@ -37,12 +48,50 @@ class SelectTool:
         low = np.clip(corners.min(0), 0, editor.photo_size)
         high = np.clip(corners.max(0), 0, editor.photo_size)
         if (high - low).min() >= MIN_BOX:
-            editor.selection.set_box((float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+            box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+            editor.selection.set_box(box, _combine(start))
+
+    def _lasso(self, editor: Editor, pointer: Pointer) -> Stroke:
+        start, path = pointer, [pointer.xy]
+        editor.selection.path = path
+        try:
+            while (pointer := (yield)).is_down:
+                if np.hypot(*(pointer.xy - path[-1])) >= STEP * editor.view.scale:
+                    path.append(pointer.xy)
+        finally:
+            editor.selection.path = None
+        outline = editor.view.image_from_canvas(np.array(path))
+        if np.ptp(outline, axis=0).min() >= MIN_BOX:
+            editor.selection.set_outline(outline, _combine(start))
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
+        is_on_photo = editor.is_on_photo(pointer.xy)
+        x, y = editor.view.image_from_canvas(pointer.xy)
+        editor.hover = Hover(place=(float(x), float(y)) if is_on_photo else None)
+        return Shape.CROSS if is_on_photo else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
-        if editor.mask is None and editor.selection.pending is None:
-            return "Click an object, or drag a box around it"
-        return "Click adds to the selection · Right-click removes from it · Drag draws a new box"
+        if editor.hand.is_busy:
+            return t("Esc takes it back")
+        is_there = editor.mask is not None or editor.selection.pending is not None
+        mode = editor.view.selecting.mode
+        if mode is SelectMode.LASSO:
+            if not is_there:
+                return t("Drag around the object")
+            return t("Drag around: a new selection · Shift adds to it · Alt removes from it")
+        if mode is SelectMode.BOX:
+            if not is_there:
+                return t("Drag a box around an object")
+            return t("Drag a new box · Shift-drag adds its object · Alt-drag removes it")
+        if not is_there:
+            return t("Click an object, or drag a box around it")
+        return t(
+            "Click adds · Right-click removes · Click again: part, object, group · Drag: a new box"
+        )
+
+
+def _combine(pointer: Pointer) -> Combine:
+    """What a drag that began so does to the selection that is there."""
+    if pointer.alt:
+        return Combine.REMOVED
+    return Combine.ADDED if pointer.shift else Combine.ANEW

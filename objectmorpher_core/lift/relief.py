@@ -22,10 +22,11 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, Matte, PhotoTexture
 from ..gaussians import Gaussians
+from ..pixels import crop
 from ..poisson_disk import thin_to_spacing
 from ..progress import Progress
 from ..rotations import quats_along
-from ..segment.matte import band_width, extended_mask, frame_extension
+from ..segment.matte import band_width, extended_mask, frame_extension, signed_distance
 from . import LiftError
 from .membrane import solve_membrane
 
@@ -40,6 +41,7 @@ TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
 BRIM = 1.8  # x mean spacing: how far Gaussians reach past the matte's soft band
 COLOUR_BLUR = 1.2  # x mean spacing: plain colours, so that neighbours agree
+SOFTEST = 0.15  # x extent: a drawn soft edge that reaches farther out is cut there
 MIN_SPACING = 1.0  # px: more Gaussians than pixels carry nothing
 
 
@@ -78,7 +80,8 @@ class ReliefLifter:
         shape = Inflation.of(mask)
         progress(0.4, "Placing Gaussians")
         rng = np.random.default_rng(seed)
-        surface, spacing = _sample(shape, count, band_width(camera.width, camera.height), rng)
+        band = max(band_width(camera.width, camera.height), _softness(mask, matte, shape.extent))
+        surface, spacing = _sample(shape, count, band, rng)
         progress(0.8, "Choosing control points")
         return _assemble(surface, spacing, matte, camera, shape.extent)  # fmt: skip
 
@@ -206,6 +209,12 @@ def _sample(
     return Surface(
         surface.xy[kept], surface.height[kept], surface.normals[kept], surface.is_brim[kept]
     ), spacing  # fmt: skip
+
+
+def _softness(mask: Mask, matte: Matte, extent: float) -> float:
+    """How far outside the mask (H, W), in px, the matte still covers something."""
+    distance = crop(signed_distance(mask), (0, 0, mask.shape[1], mask.shape[0]), matte.box)
+    return min(-float(distance[matte.alpha > 0].min(initial=0.0)), SOFTEST * extent)
 
 
 def _draw(shape: Inflation, expected: F64, rng: np.random.Generator) -> F64:

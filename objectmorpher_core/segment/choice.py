@@ -3,6 +3,7 @@
 Each positive click proposes outlines (`Walk.regions`), and the subject it stands on. The best has
 strong contrast across its outline, agrees with the subject map and leaves the photo's border free;
 so a click on a part chooses the whole. A negative click takes away the part that it is on.
+At the level "part" a click means just that part, at the level "group" what goes with the whole.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ MINOR = 1.5  # exponent: how much a negative click means a minor part
 SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
 LARGER = 0.03  # exponent: how much a larger region is preferred
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
+LARGER_GROUP = 1.15  # x object's area: what is smaller is still the object
+WORTH_A_GROUP = 0.85  # x object's score: a larger outline that stands out less is no group
+LIKENESS = 0.95  # share of the object's own cells that are as like it as another must be
+LIKE_AREA = (0.05, 1.5)  # x object's area: less is a coincidence, more is what it stands on
 SEEDS_IN_BOX = ((0.5, 0.5), (0.5, 0.3), (0.5, 0.7), (0.3, 0.5), (0.7, 0.5))  # x its size
 SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller box
 
@@ -62,8 +67,16 @@ def guess(walk: Walk, strict: Walk, rgb: RGB, prompt: Prompt, salience: F32 | No
         choices += _subjects(ground)
     elif not wanted:
         choices.append(_in_box(ground, strict))
-    cells = np.any([_settle(strict, choice) for choice in choices], axis=0)
-    subjects = [choice.subject for choice in choices if choice.subject is not None]
+    wholes = [_settle(strict, choice) for choice in choices]
+    if prompt.level == "group":
+        levelled = [_group(walk, *each) for each in zip(wanted, wholes, strict=False)]
+    elif prompt.level == "part":
+        levelled = [_clicked_part(strict, *each) for each in zip(wanted, wholes, strict=False)]
+    else:
+        levelled = wholes[: len(wanted)]
+    cells = np.any([*levelled, *wholes[len(wanted) :]], axis=0)
+    is_finer = prompt.level != "part" or not wanted  # the subject map knows wholes, not parts
+    subjects = [choice.subject for choice in choices if choice.subject is not None and is_finer]
     soft = _sharpen(cells, np.max(subjects, axis=0) if subjects else None)
     kept = inside.copy()
     for cell in unwanted:
@@ -90,6 +103,32 @@ def _part(strict: Walk, cell: tuple[int, int], others: list[tuple[int, int]], wh
         if contrast > best.contrast and share > SMALLEST_PART:
             best = Region(region.mask, contrast)
     return best.mask
+
+
+def _clicked_part(strict: Walk, cell: tuple[int, int], whole: Mask) -> Mask:
+    """(h, w) the part of `whole` that `cell` (row, column) is on; all of it where it has none."""
+    part = _part(strict, cell, [], whole) & whole
+    return part if part.sum() > max(SMALLEST_PART * whole.sum(), 1) else whole
+
+
+def _group(walk: Walk, cell: tuple[int, int], whole: Mask) -> Mask:
+    """(h, w) `whole` with what it stands with, and with what is like it elsewhere in the photo."""
+    larger = [
+        region.mask | whole
+        for region in walk.regions(walk.spread(walk.only(cell)), cell)
+        if (region.mask | whole).sum() > LARGER_GROUP * whole.sum()
+    ]
+    scored = [(_score(Region(m, walk.contrast(m)), None, None), k) for k, m in enumerate(larger)]
+    alone = _score(Region(whole, walk.contrast(whole)), None, None)
+    best, k = max(scored, default=(0.0, -1))
+    group = larger[k] if best > WORTH_A_GROUP * alone else whole
+    gap = np.square(walk.features - walk.features[whole].mean(0)).sum(-1)
+    like = (gap <= np.quantile(gap[whole], LIKENESS)) & ~whole
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(like.astype(np.uint8))
+    for k in range(1, count):
+        if LIKE_AREA[0] < stats[k, cv2.CC_STAT_AREA] / whole.sum() < LIKE_AREA[1]:
+            group = group | (labels == k)
+    return group
 
 
 def _subjects(ground: Ground) -> list[Choice]:

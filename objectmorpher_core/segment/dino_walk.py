@@ -18,6 +18,7 @@ from ..document import Prompt
 from ..progress import Progress, part, silent
 from .choice import guess
 from .edges import cut
+from .level import at_level
 from .selection import SelectionError, check_prompt
 from .subject import DEVIATION, MEAN, SubjectNet
 from .walk import Walk
@@ -48,6 +49,7 @@ class DinoWalk:
     def __init__(self) -> None:
         self._session: Any = None
         self._subject = SubjectNet()
+        self._walks: tuple[Tokens, Walk, Walk] | None = None  # on the last photo
 
     def missing(self) -> str | None:
         """Why this backend cannot run here, or None."""
@@ -82,13 +84,25 @@ class DinoWalk:
         if prompt.is_subject and embedding.salience is None:
             raise SelectionError(f"the subject cannot be found: {self._subject.missing()}")
         progress(0.7, "walking from the clicks")
-        walk = Walk(embedding.tokens, TEMPERATURE)
-        strict = Walk(embedding.tokens, STRICT_TEMPERATURE)
-        soft = guess(walk, strict, rgb, prompt, embedding.salience)
-        progress(0.8, "cutting out the object")
-        mask = cut(rgb, soft, prompt, seed)
+        walks, salience = self._walks_on(embedding, progress), embedding.salience
+
+        def find(meant: Prompt) -> Mask:
+            progress(0.8, "looking for its outline")
+            soft = guess(*walks, rgb, meant, salience)
+            progress(0.9, "cutting out the object")
+            return cut(rgb, soft, meant, seed)
+
+        mask = at_level(prompt, find)
         progress(1.0, "cut out the object")
         return mask
+
+    def _walks_on(self, embedding: Tokens, progress: Progress) -> tuple[Walk, Walk]:
+        """The walk and the strict walk over a photo: the same for every click on it."""
+        if self._walks is None or self._walks[0] is not embedding:
+            walk = Walk(embedding.tokens, TEMPERATURE)
+            progress(0.75, "walking from the clicks")
+            self._walks = embedding, walk, Walk(embedding.tokens, STRICT_TEMPERATURE)
+        return self._walks[1:]
 
     def _tokens(self, rgb: RGB) -> F32:
         """(h, w, 384) for a photo (H, W, 3)."""

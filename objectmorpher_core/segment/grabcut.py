@@ -10,6 +10,7 @@ from ..document import Prompt
 from ..progress import Progress, silent
 from .choice import guess
 from .edges import cut
+from .level import at_level
 from .selection import SelectionError, box_mask, check_prompt
 from .subject import SubjectNet
 from .walk import Walk
@@ -30,6 +31,7 @@ class GrabCut:
 
     def __init__(self) -> None:
         self._subject = SubjectNet()
+        self._walks: tuple[RGB, Walk, Walk] | None = None  # on the last photo
 
     def missing(self) -> str | None:
         """None: it needs nothing."""
@@ -56,16 +58,28 @@ class GrabCut:
                 raise SelectionError(f"the subject cannot be found: {reason}")
             salience = self._subject.salience(rgb)
         progress(0.1, "walking from the clicks")
-        if prompt.clicks or prompt.is_subject:
-            colors = _colors(rgb)
-            walk, strict = Walk(colors, TEMPERATURE), Walk(colors, STRICT_TEMPERATURE)
-            soft = guess(walk, strict, rgb, prompt, salience)
-        else:
-            soft = _box_guess(rgb, prompt)
-        progress(0.5, "cutting out the object")
-        mask = cut(rgb, soft, prompt, seed)
+        has_walk = bool(prompt.clicks) or prompt.is_subject
+        walks = self._walks_on(rgb, progress) if has_walk else None
+
+        def find(meant: Prompt) -> Mask:
+            progress(0.4, "looking for its outline")
+            soft = guess(*walks, rgb, meant, salience) if walks else _box_guess(rgb, meant)
+            progress(0.6, "cutting out the object")
+            return cut(rgb, soft, meant, seed)
+
+        mask = at_level(prompt, find)
         progress(1.0, "cut out the object")
         return mask
+
+    def _walks_on(self, rgb: RGB, progress: Progress) -> tuple[Walk, Walk]:
+        """The walk and the strict walk over a photo: the same for every click on it."""
+        if self._walks is None or self._walks[0] is not rgb:
+            colors = _colors(rgb)
+            progress(0.2, "walking from the clicks")
+            walk = Walk(colors, TEMPERATURE)
+            progress(0.3, "walking from the clicks")
+            self._walks = rgb, walk, Walk(colors, STRICT_TEMPERATURE)
+        return self._walks[1:]
 
 
 def _box_guess(rgb: RGB, prompt: Prompt) -> F32:

@@ -3,7 +3,7 @@
 In a narrow band about the mask's edge each pixel is a mixture of a colour of the object and one
 of the background. Alpha comes from closed-form matting (Levin et al. 2008), solved on the band
 alone; the object's colour is what remains when the background's share is taken out, as far as it
-is near what stands beside it.
+is near what stands beside it. Where the artist drew a soft edge, that edge is alpha.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import F32, Mask, Pixels
+from ..arrays import F32, Mask, Pixels, Selection
 from ..document import Matte
 from ..pixels import unit_pixels
 from .closed_form import solve_alpha
+from .mask_edit import FULL, grow, is_selected, is_soft
 
 BAND = 0.0040  # x the photo's diagonal: half-width of the band where alpha may be soft
 MIN_BAND = 2.0  # px
@@ -52,8 +53,8 @@ def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndar
     return np.pad(image, pads, mode="reflect")
 
 
-def extended_mask(mask: Mask, extension: tuple[int, int, int, int]) -> Mask:
-    """`mask` (H, W) continued like `extended`, but only where it touches the frame.
+def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Selection:
+    """`mask` (H, W), bool or u8, continued like `extended`, but only where it touches the frame.
 
     What merely stands near the frame must not come back as its own mirror image.
     """
@@ -62,23 +63,24 @@ def extended_mask(mask: Mask, extension: tuple[int, int, int, int]) -> Mask:
     height, width = whole.shape
     for axis, near, far in ((0, top, height - bottom), (1, left, width - right)):
         turned = np.moveaxis(whole, axis, 0)  # a view: both sides are changed in place
-        turned[:near] = np.logical_and.accumulate(turned[near::-1])[:0:-1]
-        turned[far:] = np.logical_and.accumulate(turned[far - 1 :])[1:]
+        turned[:near] = np.minimum.accumulate(turned[near::-1])[:0:-1]
+        turned[far:] = np.minimum.accumulate(turned[far - 1 :])[1:]
     return whole
 
 
-def build_matte(pixels: Pixels, mask: Mask, margin: int) -> Matte:
+def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
     """Soft cut-out of `mask` (H, W) in the photo (H, W, 3), on a crop with `margin` px around it.
 
+    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha.
     Where the object leaves the photo the crop does so too, see `frame_extension`.
     Raises ValueError for an empty mask or one that is not the photo's size.
     """
     if mask.shape != pixels.shape[:2]:
         raise ValueError(f"mask is {mask.shape}, photo is {pixels.shape[:2]}")
-    if not mask.any():
+    if not is_selected(mask).any():
         raise ValueError("the mask is empty")
     band = band_width(mask.shape[1], mask.shape[0])
-    extension = frame_extension(mask)
+    extension = frame_extension(is_selected(mask))
     mask = extended_mask(mask, extension)
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
@@ -90,15 +92,20 @@ def build_matte(pixels: Pixels, mask: Mask, margin: int) -> Matte:
     return Matte(int(left) - extension[2], int(top) - extension[0], alpha, foreground)
 
 
-def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:
+def _soft_edge(rgb: F32, selection: Selection, band: float) -> tuple[F32, F32]:
     """Alpha (h, w) and foreground (h, w, 3) for a crop."""
+    mask = is_selected(selection)
     distance = signed_distance(mask)  # px, > 0 inside
     # A limb thinner than the band has its ridge for what is certain.
     ridge = mask & (distance >= cv2.dilate(distance, np.ones((3, 3))) - 0.25)
     inner = (distance > band) | (ridge & (distance > 0.75))
     outer = distance < -band
-    alpha = solve_alpha(rgb, inner, outer, np.clip(0.5 + distance / band, 0, 1))
-    inside = _gather(rgb, (inner & (alpha > 0.98)).astype(np.float32), REACH * band)
+    drawn = _drawn(selection, band)
+    prior = np.clip(0.5 + distance / band, 0, 1)
+    alpha = solve_alpha(rgb, inner | (drawn & mask), outer | (drawn & ~mask), prior)
+    alpha = np.where(drawn, selection / np.float32(FULL), alpha).astype(np.float32)
+    sure = inner & (alpha > 0.98)
+    inside = _gather(rgb, (sure if sure.any() else mask).astype(np.float32), REACH * band)
     outside = _gather(rgb, (outer & (alpha < 0.02)).astype(np.float32), REACH * band)
     # The colour that explains a mixed pixel, as far as it is near what stands beside it: the
     # thinner the pixel's share of the object, the less it says.
@@ -107,7 +114,18 @@ def _soft_edge(rgb: F32, mask: Mask, band: float) -> tuple[F32, F32]:
     room = TRUST * share**2
     mixed = np.clip(unmixed, inside - room, inside + room)
     foreground = np.where(share < 1.0, mixed, rgb)
+    if drawn.any():
+        # There the photo is no mixture: what is inside the line is the object's own colour.
+        own = drawn[..., None] * np.clip(2 * share - 1, 0, 1)
+        foreground += own * (rgb - foreground)
     return alpha, np.clip(foreground, 0, 1).astype(np.float32)
+
+
+def _drawn(selection: Selection, band: float) -> Mask:
+    """Where (h, w) the edge is the artist's: what is drawn soft, and the band beside it."""
+    if selection.dtype == np.bool_:
+        return np.zeros(selection.shape, np.bool_)
+    return grow(is_soft(selection), band)
 
 
 def signed_distance(mask: Mask) -> F32:

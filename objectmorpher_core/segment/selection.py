@@ -62,13 +62,14 @@ def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
 
 
 def keep_touched(mask: Mask, prompt: Prompt) -> Mask:
-    """The pieces (H, W) that a positive click touches; without clicks, the sizeable ones."""
+    """The pieces (H, W) that a positive click touches; of a group all that are sizeable, too."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     if count <= 1:
         return mask
     clicks = [c for c in prompt.clicks if c.is_foreground]
     kept = {int(labels[int(c.y), int(c.x)]) for c in clicks} - {0}
-    if not clicks or prompt.is_subject or (not kept and prompt.box is not None):
+    is_many = prompt.is_subject or prompt.level == "group"
+    if not clicks or is_many or (not kept and prompt.box is not None):
         areas = stats[1:, cv2.CC_STAT_AREA]
         kept |= {int(k) + 1 for k in np.flatnonzero(areas >= SMALL_ISLAND * areas.max())}
     is_kept = np.zeros(count, bool)

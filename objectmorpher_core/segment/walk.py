@@ -35,6 +35,7 @@ class Walk:
     def __init__(self, features: F32, temperature: float) -> None:
         height, width, _ = features.shape
         self.shape = (height, width)
+        self.features = features
         cells = np.arange(height * width).reshape(height, width)
         rows, columns, weights = [], [], []
         for dy in range(REACH + 1):

@@ -7,6 +7,7 @@ import pytest
 
 from objectmorpher_core import edits
 from objectmorpher_core.document import (
+    Click,
     DeformSettings,
     Document,
     Placement,
@@ -15,6 +16,7 @@ from objectmorpher_core.document import (
     Seam,
 )
 from objectmorpher_core.edits import EditError
+from objectmorpher_core.segment.mask_edit import feather, grow, shrink
 from tests import shapes
 
 
@@ -183,3 +185,52 @@ def test_lifting_and_inpainting_are_recorded(document):
 
 def test_handles_do_not_cost_the_plate(document):
     assert edits.add_handle(document, 0, _point(document, 1)).plate is document.plate
+
+
+def _prompted(document: Document, mask: np.ndarray) -> Document:
+    return edits.set_mask(document, 0, mask, Prompt((Click(80.0, 60.0),)))
+
+
+def test_a_mask_changed_by_hand_remembers_what_the_prompt_gave(document):
+    mask = shapes.mask("disc")
+    changed = edits.change_mask(_prompted(document, mask), 0, grow(mask, 3))
+    changed = edits.change_mask(changed, 0, grow(mask, 6))
+    item = changed.objects[0]
+    np.testing.assert_array_equal(item.found, mask)
+    np.testing.assert_array_equal(item.mask, grow(mask, 6))
+    assert item.lifted is None
+    by_hand = edits.change_mask(edits.set_mask(document, 0, mask, Prompt()), 0, grow(mask, 3))
+    assert by_hand.objects[0].found is None, "no prompt, nothing to tell apart"
+
+
+def test_corrections_survive_every_later_answer(document):
+    mask, painted = shapes.mask("disc"), np.zeros_like(shapes.mask("disc"))
+    painted[5:12, 5:30] = True
+    changed = edits.change_mask(_prompted(document, mask), 0, mask | painted)
+    for answer in (mask | painted, shrink(mask, 4), grow(mask, 4)):  # the first one agrees
+        clicks = (*changed.objects[0].prompt.clicks, Click(90.0, 60.0))
+        changed = edits.answer_prompt(changed, 0, answer, Prompt(clicks))
+        assert changed.objects[0].mask is not None
+        assert changed.objects[0].mask[painted].all()
+        np.testing.assert_array_equal(changed.objects[0].mask[20:], answer[20:])
+
+
+def test_a_soft_edge_survives_where_the_outline_does(document):
+    mask = shapes.mask("disc")
+    changed = edits.change_mask(_prompted(document, mask), 0, feather(mask, 4))
+    answer = mask.copy()
+    answer[:, :60] = False
+    clicks = (Click(80.0, 60.0), Click(50.0, 60.0, False))
+    item = edits.answer_prompt(changed, 0, answer, Prompt(clicks)).objects[0]
+    np.testing.assert_array_equal(item.mask, answer)
+    assert item.coverage is not None
+    assert not ((item.coverage > 0) & (item.coverage < 255))[:, :55].any()
+    np.testing.assert_array_equal(item.coverage[:, 80:], feather(mask, 4)[:, 80:])
+
+
+def test_a_coverage_that_is_hard_everywhere_is_just_a_mask(document):
+    mask = shapes.mask("disc")
+    item = edits.set_mask(document, 0, mask * np.uint8(255), Prompt()).objects[0]
+    assert item.coverage is None
+    np.testing.assert_array_equal(item.mask, mask)
+    assert item.selection is item.mask

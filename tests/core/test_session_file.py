@@ -296,3 +296,26 @@ def test_values_beyond_numbers_are_not_saved(document):
     broken = dataclasses.replace(document.objects[0], pose=pose)
     with pytest.raises(SessionError, match="objects/0/pose/points holds values"):
         encode_session(document.with_object(0, broken))
+
+
+def test_a_coverage_that_is_not_the_masks_is_refused(document):
+    item = document.objects[0]
+    coverage = np.where(item.mask, np.uint8(200), np.uint8(30))
+    soft = dataclasses.replace(item, coverage=coverage, found=~item.mask)
+    good = dataclasses.replace(document, objects=(soft, document.objects[1]))
+    back = decode_session(encode_session(good)).objects[0]
+    np.testing.assert_array_equal(back.coverage, coverage)
+    np.testing.assert_array_equal(back.found, ~item.mask)
+    for bad in ({"coverage": 255 - coverage}, {"coverage": coverage / 255}, {"found": coverage}):
+        objects = (dataclasses.replace(soft, **bad), document.objects[1])
+        with pytest.raises(SessionError):
+            decode_session(encode_session(dataclasses.replace(document, objects=objects)))
+
+
+def test_a_level_that_does_not_exist_is_refused(document):
+    item = document.objects[0]
+    strange = dataclasses.replace(item.prompt)
+    object.__setattr__(strange, "level", "planet")
+    objects = (dataclasses.replace(item, prompt=strange), document.objects[1])
+    with pytest.raises(SessionError, match="level is 'planet'"):
+        decode_session(encode_session(dataclasses.replace(document, objects=objects)))

@@ -1,9 +1,17 @@
-"""For the Mask tool."""
+"""The selection's edge while it is painted, and the brush."""
 
 from __future__ import annotations
 
-from .canvas import Canvas
+from ...tools.mask_tool import MaskTool
+from .canvas import WARM, WHITE, Canvas
+from .select import draw_edge
 
 
 def draw_mask(canvas: Canvas) -> None:
-    """What the Mask tool shows over the photo."""
+    """For the Mask tool. During a stroke the veil alone shows the edge: it is there at once."""
+    editor = canvas.editor
+    if editor.masking.painting is None:
+        draw_edge(canvas)
+    if editor.pointer is not None:
+        is_erasing = MaskTool().is_erasing(editor, editor.pointer)
+        canvas.brush(WARM if is_erasing else WHITE)

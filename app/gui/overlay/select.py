@@ -8,11 +8,16 @@ from imgui_bundle import ImVec2
 from ..theme import theme
 from .canvas import ACCENT, DARK, WARM, Canvas
 
+DOTS = 6.0  # points between the dots of a dotted line
+
 
 def draw_selection(canvas: Canvas) -> None:
     """For the Select tool."""
     editor = canvas.editor
     draw_edge(canvas)
+    if editor.candidates.shown is not None:
+        for outline in editor.derived.contours(editor.candidates.shown.mask):
+            _draw_dots(canvas, outline)
     prompt = editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
@@ -21,6 +26,8 @@ def draw_selection(canvas: Canvas) -> None:
         _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
     if editor.rubber is not None:
         draw_rubber(canvas)
+    if editor.selection.path is not None:
+        draw_line(canvas, editor.selection.path)
 
 
 def draw_edge(canvas: Canvas) -> None:
@@ -31,6 +38,16 @@ def draw_edge(canvas: Canvas) -> None:
             canvas.polyline(canvas.at(outline), ACCENT)
 
 
+def _draw_dots(canvas: Canvas, outline: np.ndarray) -> None:
+    """A dotted closed line (N, 2) image px: what a click would select."""
+    corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))
+    along = np.concatenate([[0.0], np.linalg.norm(np.diff(corners, axis=0), axis=1).cumsum()])
+    places = np.arange(0, along[-1], theme.pt(DOTS) * canvas.ratio)
+    dots = np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])
+    for at in canvas.on_canvas(dots):
+        canvas.dot(at, 1.4)
+
+
 def draw_rubber(canvas: Canvas) -> None:
     """The box that is being drawn."""
     assert canvas.editor.rubber is not None
@@ -38,6 +55,14 @@ def draw_rubber(canvas: Canvas) -> None:
     low, high = canvas.on_canvas(np.array([[x0, y0], [x1, y1]]))
     canvas.draw.add_rect_filled(low, high, theme.u32(ACCENT, 0.12))
     canvas.draw.add_rect(low, high, theme.u32(ACCENT), 0.0, theme.pt(1.5))
+
+
+def draw_line(canvas: Canvas, path: list[np.ndarray]) -> None:
+    """The line that is being drawn around something, canvas px (2,) each; its end is dashed."""
+    points = canvas.on_canvas(np.array(path))
+    if len(points) > 1:
+        canvas.polyline(points, ACCENT, 1.5, is_closed=False)
+        canvas.dashes([points[-1], points[0]], is_closed=False)
 
 
 def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:

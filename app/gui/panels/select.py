@@ -2,33 +2,64 @@
 
 from __future__ import annotations
 
-from ...commands import run, why_not
 from ...editor import Editor
+from ...texts import t
+from ...view import SelectMode
 from ..models_dialog import draw_offer
+from ..segmented import Choice, segmented
 from ..theme import Icon
-from ..widgets import button, gap, heading, note
+from ..widgets import gap, heading, note
+from .edge import draw_command, draw_edge, draw_lift_warning
 
 
 def draw_select(editor: Editor) -> None:
-    heading("Selection")
-    gap(4)
-    if button(f"{Icon.PERSON}  Select subject", why_not=why_not(editor, "subject")):
-        run(editor, "subject")
-    if button(f"{Icon.ERASE}  Clear selection", why_not=why_not(editor, "clear")):
-        run(editor, "clear")
+    heading(t("Select by"))
+    selecting = editor.view.selecting
+    selecting.mode = segmented("mode", _modes(), selecting.mode)
+    if selecting.mode is SelectMode.CLICK:
+        level = segmented("level", _levels(), editor.selection.level)
+        if level != editor.selection.level:
+            editor.selection.set_level(level)
+    draw_command(editor, "subject")
+    draw_command(editor, "clear")
+    _draw_facts(editor)
     gap(12)
+    draw_edge(editor)
+
+
+def _modes() -> tuple[Choice[SelectMode], ...]:
+    return (
+        Choice(SelectMode.CLICK, t("Click"), t("Click what belongs to the object"), icon=Icon.WAND),
+        Choice(SelectMode.BOX, t("Box"), t("Drag a box around the object"), icon=Icon.BOX),
+        Choice(SelectMode.LASSO, t("Lasso"), t("Draw a line around it"), icon=Icon.LASSO),
+    )
+
+
+def _levels() -> tuple[Choice[str], ...]:
+    return (
+        Choice("part", t("Part"), t("A click means the part that it is on")),
+        Choice("object", t("Object"), t("A click means the whole object")),
+        Choice("group", t("Group"), t("A click means the object and what belongs to it")),
+    )
+
+
+def _draw_facts(editor: Editor) -> None:
+    """How much is selected, by what, and what to do next."""
     prompt, mask = editor.selection.prompt, editor.mask
-    if mask is not None and editor.document is not None:
-        share = editor.selection.share
-        note(f"{share:.1%} of the photo is selected.")
     adds = sum(c.is_foreground for c in prompt.clicks)
     removes = len(prompt.clicks) - adds
+    facts = []
+    if mask is not None:
+        facts.append(t("{share} of the photo is selected.", share=f"{editor.selection.share:.1%}"))
     if adds or removes:
-        note(f"{adds} added, {removes} removed by click.")
+        facts.append(t("{adds} added, {removes} removed by click.", adds=adds, removes=removes))
+    if editor.object is not None and editor.object.found is not None:
+        facts.append(t("What you changed by hand stays when you click again."))
+    if facts:
+        note(" ".join(facts))
     if mask is None:
-        note("Left click adds what belongs to the object, right click removes what does not.")
+        note(t("Left click adds what belongs to the object, right click removes what does not."))
     elif not editor.is_lifted:
-        note("Right-click what does not belong to the object, then lift it.")
-    else:
-        note("The photo is shown as it was. A new click makes a new selection and a new lift.")
+        note(t("Right-click what does not belong to the object, then lift it."))
+    draw_lift_warning(editor)
     draw_offer(editor)

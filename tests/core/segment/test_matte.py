@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pixels import unit_pixels
+from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.segment.matte import band_width, build_matte, signed_distance
 from tests import shapes
 
@@ -152,3 +153,55 @@ def test_a_mask_of_another_size_or_nothing_is_refused():
         build_matte(pixels, np.ones((120, 161), bool), 5)
     with pytest.raises(ValueError, match="the mask is empty"):
         build_matte(pixels, np.zeros((120, 160), bool), 5)
+
+
+def _with_soft_top(inside: np.ndarray) -> np.ndarray:
+    """`inside` as coverage, drawn 10 px soft in the upper half."""
+    coverage = feather(inside, 10)
+    middle = inside.shape[0] // 2
+    coverage[middle:] = inside[middle:] * np.uint8(255)
+    return coverage
+
+
+def test_a_drawn_soft_edge_is_the_cut_outs_alpha():
+    inside = shapes.mask("disc")
+    coverage = _with_soft_top(inside)
+    matte = build_matte(shapes.picture(inside), coverage, 16)
+    alpha = _on_photo(matte.alpha, matte.box)
+    soft = (coverage > 0) & (coverage < 255)
+    assert soft.sum() > 500
+    np.testing.assert_array_equal(np.rint(alpha[soft] * 255), coverage[soft])
+
+
+def test_where_nothing_was_drawn_soft_the_photo_decides():
+    inside = shapes.mask("disc")
+    coverage = _with_soft_top(inside)
+    drawn = build_matte(shapes.picture(inside), coverage, 30)
+    found = build_matte(shapes.picture(inside), inside, 30)
+    far = np.zeros_like(inside)
+    far[inside.shape[0] // 2 + round(3 * BAND) + 10 :] = True
+    both = [_on_photo(matte.alpha, matte.box) for matte in (drawn, found)]
+    assert np.abs(both[0] - both[1])[far].max() < 0.02
+    hard = build_matte(shapes.picture(inside), inside * np.uint8(255), 30)
+    np.testing.assert_array_equal(hard.alpha, found.alpha)
+    np.testing.assert_array_equal(hard.foreground, found.foreground)
+
+
+def test_inside_a_drawn_edge_colours_are_the_photos_and_outside_the_objects():
+    inside = shapes.mask("disc")
+    pixels = shapes.picture(inside)
+    matte = build_matte(pixels, feather(inside, 10), 16)
+    alpha, colour = (_on_photo(image, matte.box) for image in (matte.alpha, matte.foreground))
+    within = signed_distance(inside) > 3
+    assert np.abs(colour - unit_pixels(pixels))[within & (alpha > 0.7)].max() < 0.1
+    body = np.array([190, 120, 60]) / 255
+    beyond = (signed_distance(inside) < -4) & (alpha > 0)
+    assert np.abs(colour[beyond].mean(0) - body).max() < 0.15
+
+
+def test_the_crop_holds_all_of_a_soft_edge():
+    inside = np.zeros((120, 160), bool)
+    inside[50:70, 60:100] = True
+    matte = build_matte(shapes.picture(inside), feather(inside, 15), 2)
+    assert matte.alpha[0].max() == 0
+    assert matte.alpha[:, 0].max() == 0

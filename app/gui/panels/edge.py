@@ -1,0 +1,64 @@
+"""What the Select and the Mask tool share: the selection's edge, and its file."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from ...commands import COMMANDS, run, why_not
+from ...editor import Editor
+from ...texts import t
+from ..theme import Icon, theme
+from ..widgets import Number, button, gap, heading, note, number_field, tooltip
+
+HINTS = {
+    "grow": "Add a rim of this many pixels",
+    "shrink": "Take away a rim of this many pixels",
+    "smooth": "Straighten the edge: teeth and specks go",
+    "feather": "Make the edge soft by this many pixels to each side",
+}
+ICONS = {
+    "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
+    "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
+    "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT, "harden": Icon.IMAGE,
+    "subject": Icon.PERSON,
+}  # fmt: skip
+
+
+def draw_edge(editor: Editor) -> None:
+    """The edge's buttons and the px they work with."""
+    heading(t("Edge"))
+    reach = Number(t("By"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=500.0)
+    editor.view.selecting.reach = number_field(reach, editor.view.selecting.reach).value
+    draw_pair(editor, "grow", "shrink")
+    draw_pair(editor, "smooth", "feather")
+    draw_pair(editor, "fill_holes", "invert")
+    if editor.masking.is_soft:
+        note(t("Part of the edge was drawn soft, and is cut out so."))
+        draw_command(editor, "harden")
+    gap(12)
+    heading(t("Mask file"))
+    draw_pair(editor, "import_mask", "export_mask")
+
+
+def draw_pair(editor: Editor, left: str, right: str) -> None:
+    """Two commands side by side."""
+    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
+    draw_command(editor, left, half)
+    imgui.same_line()
+    draw_command(editor, right)
+
+
+def draw_command(editor: Editor, name: str, width: float = -1.0) -> None:
+    """A command as a button; `width` in points, -1 fills."""
+    reason = why_not(editor, name)
+    if button(f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}", why_not=reason, width=width):
+        run(editor, name)
+    if reason is None and name in HINTS:
+        tooltip(t(HINTS[name]))
+
+
+def draw_lift_warning(editor: Editor) -> None:
+    """What a changed selection means for what is lifted."""
+    if editor.is_lifted:
+        note(t("The photo is shown as it was. If you change the selection, the object will be "
+               "lifted anew; Undo brings shape and pose back."))  # fmt: skip

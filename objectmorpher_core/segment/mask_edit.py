@@ -1,0 +1,178 @@
+"""Changes of a selection as a whole: its edge, its holes, its inside and outside.
+
+A selection is a mask (H, W) bool or, where an artist made it soft, a coverage (H, W) u8, 255 for
+fully selected. Every change takes either and gives the same kind, and a coverage's mask (what is
+at least half covered) changes as the mask alone would: is_selected(grow(c)) = grow(is_selected(c)).
+The photo's frame is no edge: what is cut by it neither shrinks nor softens there.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import U8, Mask, Selection
+from ..document import SELECTED as HALF
+
+FULL = 255
+FINE = 4  # bits of a px that corners are given to
+EXACT = 1e-4  # px, rounding of distances
+LARGEST_SMOOTHING = 127.0  # px; what OpenCV's median takes
+LARGEST_REACH = 500.0  # px that an edge is moved or softened at once
+
+
+def is_selected(selection: Selection) -> Mask:
+    """(H, W) bool of a mask or a coverage."""
+    return selection if selection.dtype == np.bool_ else selection >= HALF
+
+
+def is_soft(coverage: U8) -> Mask:
+    """(H, W) where a coverage says more than its mask."""
+    return (coverage > 0) & (coverage < FULL)
+
+
+def as_coverage(selection: Selection) -> U8:
+    """(H, W) u8, a copy, of a mask or a coverage."""
+    if selection.dtype == np.bool_:
+        return selection.view(np.uint8) * np.uint8(FULL)
+    return selection.copy().view(np.uint8)
+
+
+def enclosed(outline: np.ndarray, size: tuple[int, int]) -> Mask:
+    """(H, W) what is inside a closed line (N, 2) px, in a picture of `size` (width, height) px."""
+    inside = np.zeros((size[1], size[0]), np.uint8)
+    corners = np.rint((np.asarray(outline) - 0.5) * (1 << FINE)).astype(np.int32)
+    if len(corners) > 2:
+        cv2.fillPoly(inside, [corners], (1,), cv2.LINE_8, FINE)
+    return inside.view(np.bool_)
+
+
+def united(selection: Selection | None, mask: Mask) -> Selection:
+    """`selection` and `mask` (H, W) besides."""
+    if selection is None or selection.dtype == np.bool_:
+        return mask if selection is None else selection | mask
+    return np.where(mask, np.uint8(FULL), selection)
+
+
+def without(selection: Selection | None, mask: Mask) -> Selection:
+    """`selection` less `mask` (H, W)."""
+    if selection is None or selection.dtype == np.bool_:
+        return np.zeros_like(mask) if selection is None else selection & ~mask
+    return np.where(mask, np.uint8(0), selection)
+
+
+def grow(selection: Selection, px: float) -> Selection:
+    """All that is at most `px` from what is selected: round at corners."""
+    changed = selection.copy()
+    window = _around(selection, px + 1)
+    if window is None:
+        return changed
+    part = np.ascontiguousarray(selection[window])
+    if selection.dtype != np.bool_:
+        changed[window] = _dilated(part, px)
+        return changed
+    away = cv2.distanceTransform((~part).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    changed[window] = away <= px + EXACT
+    return changed
+
+
+def shrink(selection: Selection, px: float) -> Selection:
+    """All that is more than `px` from what is not selected."""
+    changed = selection.copy()
+    window = _around(selection, 1)
+    if window is not None:
+        changed[window] = invert(_grown_everywhere(invert(selection[window]), px))
+    return changed
+
+
+def smooth(selection: Selection, px: float) -> Selection:
+    """What most of its surroundings, `px` to each side, are: no more teeth, specks and slits."""
+    reach = round(min(max(px, 1.0), LARGEST_SMOOTHING))
+    changed = selection.copy()
+    window = _around(selection, reach + 1)
+    if window is None:
+        return changed
+    part = np.ascontiguousarray(selection[window]).view(np.uint8)
+    changed[window] = cv2.medianBlur(part, 2 * reach + 1).view(selection.dtype)
+    return changed
+
+
+def fill_holes(selection: Selection) -> Selection:
+    """Without holes: what is not selected and does not reach the photo's frame."""
+    changed = selection.copy()
+    if selection.dtype != np.bool_:
+        # Together with its soft rim; a soft place without a hole in it is meant.
+        for level in (FULL, HALF):
+            changed[_closed_in(changed < level, changed < HALF)] = FULL
+        return changed
+    return changed | _closed_in(~selection, ~selection)
+
+
+def invert(selection: Selection) -> Selection:
+    """What was not selected."""
+    return ~selection  # of u8 it is 255 - c
+
+
+def feather(selection: Selection, px: float) -> U8:
+    """Coverage that falls from full to nothing within `px` of the edge, on either side.
+
+    What is selected stays the same: the half line stays on the edge.
+    """
+    from .matte import signed_distance  # its module needs scipy; the window starts without
+
+    mask = is_selected(selection)
+    coverage = np.zeros(mask.shape, np.uint8)
+    window = _around(mask, px + 1)
+    if window is None:
+        return coverage
+    part = np.ascontiguousarray(mask[window])
+    share = np.clip(0.5 + 0.5 * signed_distance(part) / px, 0, 1)
+    soft = (share * share * (3 - 2 * share) * FULL + 0.5).astype(np.uint8)
+    coverage[window] = np.where(part, np.maximum(soft, HALF), np.minimum(soft, HALF - 1))
+    return coverage
+
+
+def _around(selection: Selection, px: float) -> tuple[slice, slice] | None:
+    """The box around what is selected, `px` larger, inside the photo; None for nothing."""
+    rows, columns = np.flatnonzero(selection.any(1)), np.flatnonzero(selection.any(0))
+    if len(rows) == 0:
+        return None
+    reach, (height, width) = int(np.ceil(px)), selection.shape
+    return (
+        slice(max(int(rows[0]) - reach, 0), min(int(rows[-1]) + reach + 1, height)),
+        slice(max(int(columns[0]) - reach, 0), min(int(columns[-1]) + reach + 1, width)),
+    )
+
+
+def _grown_everywhere(part: Selection, px: float) -> Selection:
+    """`grow` of an array that is wanted as a whole."""
+    if part.dtype != np.bool_:
+        return _dilated(part, px)
+    if not part.any():  # distances to nothing are no distances
+        return part
+    away = cv2.distanceTransform((~part).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return away <= px + EXACT
+
+
+def _dilated(coverage: U8, px: float) -> U8:
+    """Largest value within a disc: of each of its rows, which OpenCV does in one go."""
+    height = len(coverage)
+    most = coverage.copy()
+    for dy in range(min(int(px + EXACT), height - 1) + 1):
+        half = int(np.sqrt(max(px * px - dy * dy, 0.0)) + EXACT)
+        wide = cv2.dilate(coverage, np.ones((1, 2 * half + 1), np.uint8))
+        np.maximum(most[dy:], wide[: height - dy], out=most[dy:])
+        np.maximum(most[: height - dy], wide[dy:], out=most[: height - dy])
+    return most
+
+
+def _closed_in(outside: Mask, meant: Mask) -> Mask:
+    """The pieces (H, W) of `outside` that hold something of `meant` and do not touch the frame."""
+    count, found = cv2.connectedComponents(outside.view(np.uint8), connectivity=4)
+    labels = np.asarray(found, np.int32)
+    is_hole = np.zeros(count, bool)
+    is_hole[np.unique(labels[meant])] = True
+    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        is_hole[side] = False
+    is_hole[0] = False
+    return is_hole[labels]

@@ -1,0 +1,88 @@
+"""What a click would select is found while the pointer rests, and never in anybody's way."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from conftest import CENTRE, wait_for_jobs, wait_until
+
+from app.candidate import CANDIDATE
+from app.commands import run
+from app.editor import Editor
+from app.tasks import SELECT
+from app.tools.pointer import Pointer
+from app.tools.select_tool import SelectTool
+from app.view import Selecting, ToolName
+
+
+def rest_on(editor: Editor, x: float, y: float) -> None:
+    """The pointer hovers over image px."""
+    editor.view.tool, editor.view.selecting = ToolName.SELECT, Selecting()
+    at = editor.view.canvas_from_image(np.array([x, y]))
+    SelectTool().hover(editor, Pointer(*at))
+
+
+def test_a_click_takes_the_candidate_that_is_shown(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.candidates.shown is not None)
+    shown = editor.candidates.shown
+    assert shown is not None
+    assert editor.mask is None
+    editor.selection.add_click(CENTRE[0] + 0.2, CENTRE[1], True)
+    assert editor.mask is not None, "at once"
+    np.testing.assert_array_equal(editor.mask, shown.mask)
+    assert not editor.jobs.is_busy(SELECT)
+    editor.poll()
+    assert editor.candidates.shown is None
+    run(editor, "undo")
+    assert editor.mask is None
+
+
+def test_a_click_while_the_candidate_is_found_waits_for_that_answer(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.jobs.is_busy(CANDIDATE))
+    editor.selection.add_click(*CENTRE, True)
+    assert editor.selection.pending is not None
+    assert editor.jobs.is_busy(SELECT)
+    assert not editor.jobs.is_busy(CANDIDATE)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    assert editor.selection.pending is None
+
+
+def test_the_users_own_request_ends_the_search_for_a_candidate(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.jobs.is_busy(CANDIDATE))
+    editor.selection.set_box((40.0, 15.0, 140.0, 125.0))
+    assert not editor.jobs.is_busy(CANDIDATE)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+
+
+def test_nothing_is_asked_while_the_worker_works_or_something_is_selected(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    editor.selection.add_click(*CENTRE, True)
+    rest_on(editor, 20.0, 20.0)
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        editor.poll()
+        assert not editor.jobs.is_busy(CANDIDATE)
+    wait_for_jobs(editor)
+    editor.poll()
+    assert not editor.candidates.is_due
+
+
+def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.candidates.shown is not None)
+    rest_on(editor, 4.0, 4.0)
+    editor.poll()
+    assert editor.candidates.shown is None
+    rest_on(editor, -50.0, -50.0)
+    editor.poll()
+    assert not editor.candidates.is_due

@@ -1,0 +1,326 @@
+"""The selection changed by hand: strokes, lines, edges, files, and what clicks then do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
+from PIL import Image
+
+from app.commands import run
+from app.editor import Editor
+from app.filing import Dialog
+from app.tasks import Combine
+from app.tools.mask_tool import MaskTool
+from app.tools.pointer import Button, Pointer, Tool
+from app.tools.select_tool import SelectTool
+from app.view import Selecting, SelectMode, ToolName
+from objectmorpher_core.brush import Brush
+from objectmorpher_core.document import Document
+from objectmorpher_core.segment import mask_edit
+from objectmorpher_core.session_file import decode_session, encode_session
+
+FAR = (20.0, 20.0)  # image px, on the wall
+Places = list[tuple[float, float]]
+
+
+@pytest.fixture
+def editor(editor: Editor) -> Iterator[Editor]:
+    editor.view.selecting, editor.view.brush = Selecting(), Brush(6.0, 1.0)
+    yield editor
+    editor.view.selecting, editor.view.brush = Selecting(), Brush()
+
+
+def stroke(
+    editor: Editor, tool: Tool, places: Places, button: Button = Button.LEFT, **held: bool
+) -> None:
+    """A drag through places of the photo, image px."""
+    at = [editor.view.canvas_from_image(np.array(place)) for place in places]
+    first = Pointer(*at[0], button=button, is_down=True, **held)
+    editor.hand.press(tool.press(editor, first), button)
+    for xy in at[1:]:
+        editor.hand.move(Pointer(*xy, is_down=True, **held))
+    editor.hand.move(Pointer(*at[-1], is_down=False, **held))
+
+
+def paint(editor: Editor, *places: tuple[float, float], **held: bool) -> None:
+    editor.view.tool = ToolName.MASK
+    stroke(editor, MaskTool(), list(places), **held)
+
+
+def select_ball(editor: Editor) -> np.ndarray:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert editor.mask is not None, editor.message
+    return editor.mask
+
+
+def test_a_stroke_is_one_step_and_undo_takes_it_back(editor: Editor) -> None:
+    ball = select_ball(editor)
+    document = editor.document
+    paint(editor, FAR, (40.0, 20.0), (60.0, 20.0))
+    assert editor.mask is not None and editor.history is not None
+    added = editor.mask & ~ball
+    assert added[20, 20] and added[20, 60]
+    assert added.sum() == pytest.approx(40 * 12 + np.pi * 36, rel=0.06)
+    assert (editor.mask | ~ball).all()
+    assert editor.history.undo_label == "Paint selection"
+    run(editor, "undo")
+    assert editor.document is document
+    assert editor.view.tool is ToolName.MASK, "one goes on painting"
+
+
+def test_right_and_alt_erase_and_the_toggle_turns_it_round(editor: Editor) -> None:
+    select_ball(editor)
+    x, y = int(CENTRE[0]), int(CENTRE[1])
+    for erased in ({"alt": True}, {"button": Button.RIGHT}):
+        paint(editor, CENTRE, **erased)
+        assert editor.mask is not None and not editor.mask[y, x]
+        run(editor, "undo")
+    editor.view.selecting.is_erasing = True
+    paint(editor, CENTRE)
+    assert not editor.mask[y, x]
+    paint(editor, CENTRE, alt=True)
+    assert editor.mask[y, x]
+
+
+def test_the_stroke_is_seen_while_it_is_painted_and_esc_takes_it_back(editor: Editor) -> None:
+    document = editor.document
+    editor.view.tool = ToolName.MASK
+    at = editor.view.canvas_from_image(np.array(FAR))
+    pointer = Pointer(*at, button=Button.LEFT, is_down=True)
+    editor.hand.press(MaskTool().press(editor, pointer), Button.LEFT)
+    assert editor.masking.shown is not None
+    assert editor.masking.shown[20, 20] == 255
+    editor.hand.move(Pointer(*(at + 80), is_down=True))
+    assert editor.masking.painting is not None
+    assert len(editor.masking.painting.touched) == 2
+    editor.escape()
+    assert editor.masking.painting is None
+    assert editor.masking.shown is None
+    assert editor.document is document
+
+
+def test_shift_draws_a_straight_line_from_the_last_stroke(editor: Editor) -> None:
+    paint(editor, FAR)
+    paint(editor, (120.0, 20.0), shift=True)
+    assert editor.mask is not None
+    assert editor.mask[20, 20:120].all()
+    paint(editor, (120.0, 100.0))
+    assert not editor.mask[60, 120]
+
+
+def test_a_soft_brush_leaves_a_soft_edge_and_a_hard_one_does_not(editor: Editor) -> None:
+    paint(editor, FAR, (40.0, 20.0))
+    assert editor.object is not None and editor.object.coverage is None
+    editor.view.brush = replace(editor.view.brush, hardness=0.2)
+    paint(editor, FAR, (80.0, 20.0))
+    assert editor.object.coverage is not None
+    np.testing.assert_array_equal(editor.object.coverage >= 128, editor.object.mask)
+    run(editor, "harden")
+    assert editor.object.coverage is None
+
+
+def test_painting_a_lifted_object_asks_for_a_new_lift_and_undo_brings_it_back(
+    editor: Editor,
+) -> None:
+    lifted = lift_ball(editor)
+    assert "lifted anew" in MaskTool().hint(editor)
+    paint(editor, FAR)
+    assert not editor.is_lifted
+    run(editor, "undo")
+    assert editor.document is lifted
+
+
+def test_the_lift_keeps_a_drawn_soft_edge(editor: Editor) -> None:
+    select_ball(editor)
+    editor.view.selecting.reach = 6.0
+    run(editor, "feather")
+    wait_for_jobs(editor)
+    assert editor.object is not None
+    coverage = editor.object.coverage
+    assert coverage is not None
+    run(editor, "lift")
+    wait_for_jobs(editor)
+    matte = editor.object.matte
+    assert matte is not None
+    x0, y0, x1, y1 = matte.box
+    np.testing.assert_array_equal(np.rint(matte.alpha * 255), coverage[y0:y1, x0:x1])
+
+
+def test_presses_of_an_edge_button_add_up(editor: Editor) -> None:
+    ball = select_ball(editor)
+    editor.view.selecting.reach = 3.0
+    for _ in range(3):
+        run(editor, "grow")
+    wait_for_jobs(editor)
+    grown = ball
+    for _ in range(3):
+        grown = mask_edit.grow(grown, 3.0)
+    np.testing.assert_array_equal(editor.mask, grown)
+    for _ in range(3):
+        run(editor, "undo")
+    assert editor.mask is ball
+
+
+def test_what_was_painted_stays_when_a_click_follows(editor: Editor) -> None:
+    select_ball(editor)
+    paint(editor, FAR)
+    paint(editor, CENTRE, alt=True)
+    editor.selection.add_click(165.0, 120.0, False)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    x, y = int(CENTRE[0]), int(CENTRE[1])
+    assert editor.mask[20, 20], "added by hand"
+    assert not editor.mask[y, x], "taken away by hand"
+    assert editor.mask[y + 30, x], "the ball"
+    assert len(editor.selection.prompt.clicks) == 2
+    editor.selection.add_click(*FAR, False)
+    wait_for_jobs(editor)
+    assert not editor.mask[20, 20], "the latest word counts"
+    assert not editor.mask[y, x]
+
+
+def test_a_click_on_a_selection_made_by_hand_adds_or_takes_away_an_object(editor: Editor) -> None:
+    paint(editor, FAR)
+    first = editor.mask
+    assert first is not None
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    assert editor.mask[20, 20] and editor.mask[int(CENTRE[1]), int(CENTRE[0])]
+    editor.selection.add_click(*CENTRE, False)
+    wait_for_jobs(editor)
+    assert editor.mask[20, 20] and not editor.mask[int(CENTRE[1]), int(CENTRE[0])]
+
+
+def test_a_line_around_something_is_new_added_or_taken_away(editor: Editor) -> None:
+    editor.view.selecting.mode = SelectMode.LASSO
+    square: Places = [(20, 20), (60, 20), (60, 60), (20, 60)]
+    stroke(editor, SelectTool(), square)
+    assert editor.mask is not None
+    assert editor.mask.sum() == pytest.approx(1600, rel=0.06)
+    stroke(editor, SelectTool(), [(x + 60, y) for x, y in square], shift=True)
+    assert editor.mask.sum() == pytest.approx(3200, rel=0.06)
+    stroke(editor, SelectTool(), [(x + 20, y) for x, y in square], alt=True)
+    assert editor.mask.sum() == pytest.approx(1600, rel=0.06)
+    stroke(editor, SelectTool(), square)
+    assert editor.mask[40, 40] and not editor.mask[40, 110]
+    assert editor.selection.path is None
+
+
+def test_a_box_is_new_added_or_taken_away(editor: Editor) -> None:
+    paint(editor, FAR)
+    box = (CENTRE[0] - 42, CENTRE[1] - 52, CENTRE[0] + 42, CENTRE[1] + 52)
+    editor.selection.set_box(box, Combine.ADDED)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    assert editor.mask[20, 20] and editor.mask[int(CENTRE[1]), int(CENTRE[0])]
+    editor.selection.set_box(box)
+    wait_for_jobs(editor)
+    assert not editor.mask[20, 20] and editor.mask[int(CENTRE[1]), int(CENTRE[0])]
+
+
+def test_a_mask_goes_out_to_a_picture_and_comes_back(editor: Editor, tmp_path: Path) -> None:
+    select_ball(editor)
+    editor.view.selecting.reach = 5.0
+    run(editor, "feather")
+    wait_for_jobs(editor)
+    assert editor.object is not None
+    coverage, path = editor.object.coverage, tmp_path / "mask.png"
+    assert coverage is not None
+    editor.filing.choose(Dialog.MASK_SAVE, path)
+    wait_until(editor, path.exists)
+    wait_for_jobs(editor)
+    written = Image.open(path)
+    assert written.mode == "L"
+    np.testing.assert_array_equal(np.asarray(written), coverage)
+    editor.selection.clear()
+    editor.filing.choose(Dialog.MASK_OPEN, path)
+    wait_for_jobs(editor)
+    np.testing.assert_array_equal(editor.object.coverage, coverage)
+    assert editor.object.prompt.is_empty
+    assert editor.document is not None
+    back = decode_session(encode_session(editor.document))
+    np.testing.assert_array_equal(back.objects[0].coverage, coverage)
+
+
+@pytest.mark.parametrize("name", ["small.png", "missing.png", "text.png"])
+def test_a_picture_that_is_no_mask_is_one_sentence(
+    editor: Editor, tmp_path: Path, name: str
+) -> None:
+    Image.new("L", (WIDTH, HEIGHT - 1), 255).save(tmp_path / "small.png")
+    (tmp_path / "text.png").write_text("no picture", encoding="utf-8")
+    document = editor.document
+    editor.filing.choose(Dialog.MASK_OPEN, tmp_path / name)
+    wait_for_jobs(editor)
+    assert editor.document is document
+    assert editor.message is not None and editor.message.is_error
+    assert "\n" not in editor.message.text
+
+
+def test_inverting_and_filling(editor: Editor) -> None:
+    ball = select_ball(editor)
+    run(editor, "invert")
+    np.testing.assert_array_equal(editor.mask, ~ball)
+    run(editor, "invert")
+    np.testing.assert_array_equal(editor.mask, ball)
+    paint(editor, CENTRE, alt=True)
+    run(editor, "fill_holes")
+    wait_for_jobs(editor)
+    np.testing.assert_array_equal(editor.mask, ball)
+
+
+def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
+    select_ball(editor)
+    levels = []
+    for _ in range(3):
+        editor.selection.add_click(CENTRE[0] + 0.5, CENTRE[1], True)
+        wait_for_jobs(editor)
+        levels.append(editor.selection.prompt.level)
+        assert len(editor.selection.prompt.clicks) == 1
+    assert levels == ["group", "part", "object"]
+    editor.selection.set_level("part")
+    wait_for_jobs(editor)
+    assert editor.selection.prompt.level == "part"
+    assert editor.history is not None and editor.history.undo_label == "Select the part"
+
+
+def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(editor: Editor) -> None:
+    first = lift_ball(editor)
+    editor.objects.start_another()
+    paint(editor, FAR)
+    assert editor.document is not None and editor.current == 1
+    assert len(editor.document.objects) == 2
+    assert editor.document.objects[0] is first.objects[0]
+    paint(editor, (40.0, 20.0))
+    second = editor.mask
+    editor.objects.choose(0)
+    paint(editor, CENTRE, alt=True)
+    assert editor.document.objects[1].mask is second
+    editor.objects.choose(1)
+    run(editor, "undo")
+    assert editor.current == 0, "what is undone is what one looks at"
+    assert editor.document.objects[0] is first.objects[0]
+    run(editor, "undo")
+    assert editor.current == 1
+    run(editor, "undo")
+    assert len(editor.document.objects) == 1
+    assert editor.mask is None
+
+
+def test_the_oldest_steps_go_when_their_masks_are_too_large(
+    editor: Editor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.history.MASKS", 5 * WIDTH * HEIGHT)
+    for k in range(12):
+        paint(editor, (10.0 + 5 * k, 20.0))
+    steps: set[Document | None] = {editor.document}
+    for _ in range(20):
+        run(editor, "undo")
+        steps.add(editor.document)
+    assert 3 <= len(steps) <= 7

@@ -1,0 +1,32 @@
+"""Painting in the real window: what is painted comes out of the veil."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from conftest import CENTRE
+from hands import Hands, opened
+from test_window import PRIMARY, screen_xy
+
+pytestmark = pytest.mark.window
+
+
+def brightness(hands: Hands, x: float, y: float) -> float:
+    left, top = screen_xy(x, y)
+    return float(hands.picture()[round(top), round(left), :3].mean())
+
+
+def test_a_stroke_by_hand_makes_the_selection_larger(
+    window_environment: dict[str, str], photo_path: Path
+) -> None:
+    with opened(window_environment, photo_path) as hands:
+        before = brightness(hands, 30.5, 18.5)
+        hands.click(*screen_xy(*CENTRE))
+        hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
+        hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.7 * before, "veiling")
+        hands.press("2")
+        hands.drag(screen_xy(20, 18), screen_xy(60, 18))
+        hands.wait(lambda: brightness(hands, 30.5, 18.5) > 0.95 * before, "painting")
+        hands.press("ctrl+z")
+        hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.7 * before, "undoing")
