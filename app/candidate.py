@@ -75,7 +75,9 @@ class Candidates:
     def take(self, question: Question) -> bool:
         """Whether the question is answered already, or will be by what runs: then nobody asks."""
         editor, shown = self._editor, self.shown
-        if shown is not None and self._is_same(shown.prompt, question.prompt):
+        photo = editor.document.photo if editor.document else None
+        is_here = shown is not None and shown.photo is photo
+        if shown is not None and is_here and self._is_same(shown.prompt, question.prompt):
             editor.jobs.cancel(CANDIDATE)
             self.shown = self._asked = None
             editor.selection.take(question, shown.mask, shown.backend)

@@ -156,7 +156,8 @@ class Masking:
             self._make_next()
 
         editor.jobs.start(
-            "Changing the selection", job_functions.change_mask, thing.selection, change.function,
+            t("Changing the selection"), job_functions.change_mask,
+            thing.selection, change.function,
             done=accept, failed=self._fail, cancelled=self._forget, kind=CHANGE,
         )  # fmt: skip
 

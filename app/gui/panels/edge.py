@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from objectmorpher_core.segment.mask_edit import LARGEST_REACH
+
 from ...commands import COMMANDS, run, why_not
 from ...editor import Editor
 from ...texts import t
 from ..theme import Icon, theme
 from ..widgets import Number, button, gap, heading, note, number_field, tooltip
 
-HINTS = {
-    "grow": "Add a rim of this many pixels",
-    "shrink": "Take away a rim of this many pixels",
-    "smooth": "Straighten the edge: teeth and specks go",
-    "feather": "Make the edge soft by this many pixels to each side",
-}
 ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
     "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
@@ -27,7 +23,7 @@ ICONS = {
 def draw_edge(editor: Editor) -> None:
     """The edge's buttons and the px they work with."""
     heading(t("Edge"))
-    reach = Number(t("By"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=500.0)
+    reach = Number(t("By"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=LARGEST_REACH)
     editor.view.selecting.reach = number_field(reach, editor.view.selecting.reach).value
     draw_pair(editor, "grow", "shrink")
     draw_pair(editor, "smooth", "feather")
@@ -53,8 +49,22 @@ def draw_command(editor: Editor, name: str, width: float = -1.0) -> None:
     reason = why_not(editor, name)
     if button(f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}", why_not=reason, width=width):
         run(editor, name)
-    if reason is None and name in HINTS:
-        tooltip(t(HINTS[name]))
+    hint = _hint(name)
+    if reason is None and hint:
+        tooltip(hint)
+
+
+def _hint(name: str) -> str:
+    """What a press does, where the label does not say it."""
+    hints = {
+        "grow": t("Add a rim of this many pixels"),
+        "shrink": t("Take away a rim of this many pixels"),
+        "smooth": t("Straighten the edge: teeth and specks go"),
+        "feather": t("Make the edge soft by this many pixels to each side"),
+        "fill_holes": t("Select what the selection encloses"),
+        "harden": t("Make the edge hard again: lifting finds it in the photo"),
+    }
+    return hints.get(name, "")
 
 
 def draw_lift_warning(editor: Editor) -> None:

@@ -57,9 +57,9 @@ def _draw_facts(editor: Editor) -> None:
         facts.append(t("What you changed by hand stays when you click again."))
     if facts:
         note(" ".join(facts))
-    if mask is None:
+    if mask is None and editor.view.selecting.mode is SelectMode.CLICK:
         note(t("Left click adds what belongs to the object, right click removes what does not."))
-    elif not editor.is_lifted:
+    elif mask is not None and not editor.is_lifted:
         note(t("Right-click what does not belong to the object, then lift it."))
     draw_lift_warning(editor)
     draw_offer(editor)
