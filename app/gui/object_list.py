@@ -25,6 +25,7 @@ class _Typing:
     def __init__(self) -> None:
         self.of: int | None = None
         self.text = ""
+        self.has_focus = False
 
 
 _typing = _Typing()
@@ -72,12 +73,7 @@ def _draw_object(editor: Editor, k: int) -> None:
     start = imgui.get_cursor_screen_pos()
     width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
     end = ImVec2(start.x + width, start.y + height)
-    imgui.set_next_item_allow_overlap()
-    if imgui.invisible_button(f"##object{k}", ImVec2(width, height)):
-        editor.objects.choose(k)
-    is_hovered = imgui.is_item_hovered()
-    if is_hovered and imgui.is_mouse_double_clicked(0):
-        editor.objects.renaming = k
+    is_hovered = _take_clicks(editor, k, ImVec2(width, height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
     if is_current or is_hovered:
         role = "raised" if is_current else "hovered"
@@ -99,6 +95,20 @@ def _draw_object(editor: Editor, k: int) -> None:
     imgui.dummy(ImVec2(0, 0))
 
 
+def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
+    """A click chooses the row, a double click begins to name it; whether it is hovered."""
+    if editor.objects.renaming == k:  # its field has the mouse
+        imgui.dummy(size)
+        return False
+    imgui.set_next_item_allow_overlap()
+    if imgui.invisible_button(f"##object{k}", size):
+        editor.objects.choose(k)
+    is_hovered = imgui.is_item_hovered()
+    if is_hovered and imgui.is_mouse_double_clicked(0):
+        editor.objects.renaming = k
+    return is_hovered
+
+
 def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
     """As much of it as there is room for before the eye."""
     draw = imgui.get_window_draw_list()
@@ -110,9 +120,10 @@ def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
 def _draw_field(editor: Editor, k: int, start: ImVec2, width: float) -> None:
     """Enter or a click elsewhere takes the name, Esc leaves the old one."""
     assert editor.document is not None
-    is_new = _typing.of != k
-    if is_new:
+    if _typing.of != k:
         _typing.of, _typing.text = k, editor.document.objects[k].name
+        _typing.has_focus = False
+    if not _typing.has_focus and not imgui.is_mouse_down(0):
         imgui.set_keyboard_focus_here()
     imgui.set_cursor_screen_pos(ImVec2(start.x + theme.pt(NAME - 8), start.y + theme.pt(2)))
     imgui.set_next_item_width(width - theme.pt(NAME - 8 + 34))
@@ -120,6 +131,7 @@ def _draw_field(editor: Editor, k: int, start: ImVec2, width: float) -> None:
     is_entered, _typing.text = imgui.input_text("##name", _typing.text, int(flags))
     if imgui.is_key_pressed(imgui.Key.escape):
         editor.objects.renaming = _typing.of = None
-    elif is_entered or (imgui.is_item_deactivated() and not is_new):
+    elif is_entered or (imgui.is_item_deactivated() and _typing.has_focus):
         _typing.of = None
         editor.objects.rename(k, _typing.text)
+    _typing.has_focus = _typing.has_focus or imgui.is_item_active()

@@ -48,6 +48,7 @@ SETTLE = 3  # frames drawn after the last event: ImGui lays out in two
 IDLE = 0.5  # s between two looks at the clock when nothing happens
 BUSY = 0.2  # s, while a job runs; what it reports wakes the window besides
 SOON = 0.05  # s, while a dialog is open or an exact picture is due
+DOUBLE_CLICK = 0.45  # s between two presses, about as desktops have it; ImGui allows 0.5
 CONTROL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
 MODIFIERS = (("Ctrl", CONTROL), ("Shift", glfw.MOD_SHIFT), ("Alt", glfw.MOD_ALT))
 KEY_NAMES = {
@@ -247,6 +248,7 @@ class Window:
         io = imgui.get_io()
         io.set_ini_filename("")
         io.config_drag_click_to_input_text = True
+        io.mouse_double_click_time = DOUBLE_CLICK
         io.config_flags |= imgui.ConfigFlags_.no_mouse_cursor_change
         looks.load_fonts()
         take_key: Any = self._take_key

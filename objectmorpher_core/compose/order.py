@@ -26,13 +26,14 @@ def stack(document: Document, posed: Posed) -> dict[int, PosedSplats]:
     """
     objects = document.objects
     there = {k: posed(k) for k, item in enumerate(objects) if item.is_moved}
-    reach = [_reach(document, k, splats) for k, splats in there.items()]
-    for k, item in enumerate(objects):
-        if item.lifted is None or item.matte is None or item.is_moved:
-            continue
-        is_second = any(_rests(other, item) for other in objects[:k])
-        if not is_second and any(_meet(item.matte.box, bounds) for bounds in reach):
-            there[k] = posed(k)
+    resting = [k for k, item in enumerate(objects) if _rests(item, item)]
+    if resting and there:
+        reach = [_reach(document, k, splats) for k, splats in there.items()]
+        for k in resting:
+            matte = objects[k].matte
+            is_second = any(_rests(other, objects[k]) for other in objects[:k])
+            if matte and not is_second and any(_meet(matte.box, bounds) for bounds in reach):
+                there[k] = posed(k)
     return {k: there[k] for k in back_to_front(objects, there)}
 
 
@@ -108,8 +109,9 @@ def _reach(document: Document, k: int, splats: PosedSplats) -> Bounds:
         xy = camera.project(means)
         zoom = camera.focal / float(means[:, 2].min())  # px per world unit, the largest
         edge = EDGE * splats.rest.spacing * splats.scale * zoom
-        (left, top), (right, bottom) = xy.min(0) - edge, xy.max(0) + edge
-        x0, y0, x1, y1 = min(x0, left), min(y0, top), max(x1, right), max(y1, bottom)
+        x, y = xy.T
+        x0, y0 = min(x0, float(x.min()) - edge), min(y0, float(y.min()) - edge)
+        x1, y1 = max(x1, float(x.max()) + edge), max(y1, float(y.max()) + edge)
     elif item.is_visible:
         x0, y0, x1, y1 = -np.inf, -np.inf, np.inf, np.inf
     margin = hole_margin(camera.width, camera.height)

@@ -59,6 +59,7 @@ def test_the_contact_stays_on_the_plane(scene, horizon, delta, away):
     placement = hold.moved(np.array(delta, float), away)
     motion = placement.matrix(scene.lifted, scene.camera)
     contact = motion[:3, :3] @ hold.point + motion[:3, 3]
+    assert hold.ground is not None
     assert abs(hold.ground.below(contact)) < PLANE * hold.unit
 
 
