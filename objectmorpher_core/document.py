@@ -16,6 +16,7 @@ from .arrays import F32, F64, I32, Mask, Pixels, frozen
 from .camera import Camera
 from .gaussians import Gaussians
 from .image import Picture
+from .joining import Shadow
 from .rotations import turn_matrix
 
 
@@ -310,6 +311,8 @@ class EditObject:
     pose: Pose | None = None  # None: at rest
     placement: Placement = Placement()
     is_visible: bool = True
+    shadow: Shadow = field(default_factory=Shadow)
+    harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
 
     @property
     def is_moved(self) -> bool:
@@ -337,10 +340,14 @@ class Plate:
     pixels: Pixels  # (h, w, 3) the photo's bit depth
     hole: Mask  # (h, w) True where `pixels` are invented; elsewhere they are the photo's
     backend: str
+    seed: int = 0  # of the last fill; each new one takes the next
+    painted: Mask | None = None  # (h, w) repaired by hand: shown wherever something has moved
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixels", frozen(self.pixels))
         object.__setattr__(self, "hole", frozen(self.hole, np.bool_))
+        if self.painted is not None:
+            object.__setattr__(self, "painted", frozen(self.painted, np.bool_))
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -358,6 +365,7 @@ class Document:
     plate: Plate | None = None  # None: not made yet for these masks
     backends: tuple[tuple[str, str], ...] = ()  # stage -> backend used
     seed: int = 0
+    feather: float = 1.0  # x the usual width over which the edit is blended into the photo
 
     def with_object(self, k: int, changed: EditObject) -> Document:
         """Object `k` replaced; the plate stays only where the mask did."""
