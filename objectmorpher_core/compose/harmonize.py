@@ -51,8 +51,8 @@ def light_map(document: Document) -> F32:
         np.copyto(part, plate.pixels[every], where=hole[..., None])
     shrink = min(MAP / max(pixels.shape[:2]), 1.0)
     size = (max(round(pixels.shape[1] * shrink), 1), max(round(pixels.shape[0] * shrink), 1))
-    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    return unit_pixels(small.astype(pixels.dtype)) ** np.float32(GAMMA)
+    small = cv2.resize(unit_pixels(pixels), size, interpolation=cv2.INTER_AREA)
+    return np.asarray(small ** np.float32(GAMMA), np.float32)
 
 
 def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> Gain:

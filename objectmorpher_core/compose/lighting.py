@@ -12,7 +12,7 @@ from ..raster.posed import PosedSplats
 from ..raster.texture import TextureLevels, build_levels
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .shadow import Shade, cast
-from .silhouette import COARSE, FINE, silhouette
+from .silhouette import silhouette, sketch
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +48,26 @@ class Lighting:
         splats: PosedSplats,
         rest: Callable[[], PosedSplats],
         texture: TextureLevels | None = None,
-        side: int = FINE,
+        is_sketch: bool = False,
     ) -> Lit:
         """Of a moved object whose Gaussians are `splats` now and were at `rest`.
 
-        `side`: px, the silhouette that the shadow is made of; the gain is always of a coarse one.
+        `is_sketch`: the shadow is a coarse one, in the time that a frame of a drag has.
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
         if not item.is_visible or not (has_shadow or has_light):
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
-        texture = texture or object_texture(item.matte)
         camera = self._document.photo.camera
         shade, gain = None, NEUTRAL
-        if has_shadow and (shape := silhouette(splats, texture, camera, side)) is not None:
-            shade = cast(item.shadow, shape)
+        if has_shadow:
+            if is_sketch:
+                shape = sketch(splats, camera)
+            else:
+                shape = silhouette(splats, texture or object_texture(item.matte), camera)
+            shade = None if shape is None else cast(item.shadow, shape)
         if has_light:
-            before = silhouette(rest(), texture, camera, COARSE)
-            now = silhouette(splats, texture, camera, COARSE)
+            before, now = sketch(rest(), camera), sketch(splats, camera)
             if before is not None and now is not None:
                 gain = at_strength(light_gain(self.light, camera.width, before, now), item.harmony)
         return Lit(gain, shade)

@@ -1,9 +1,10 @@
 """The soft shadow of a moved object on the ground: a layer between plate and objects.
 
-It follows from the object's silhouette. Its lowest row is the ground: a point at height h above
-it throws its shadow to h x length x (cos, sin) of the direction, the sine shortened as the ground
-is; the farther from the ground, the more blurred and the weaker. Right below the object lies a
-dark band, the contact. Nothing is known of the light or the ground: the artist says both.
+It follows from the object's silhouette. The lower edge of each column, where it is not far above
+the lowest of all, stands on the ground; what is h above it throws its shadow h x length x (cos,
+sin) of the direction from there, the sine shortened as the ground is. The farther from the
+ground, the more blurred and the weaker. Right below the edge lies a dark band, the contact.
+Nothing is known of the light or the ground: the artist says both.
 
 A shadow multiplies the light that is left. A power of 2.2 stands for sRGB's curve here, for then
 it multiplies the encoded values, too, and a window that blends them shows what is exported.
@@ -17,20 +18,22 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, F64
-from ..document import Shadow
+from ..joining import Shadow
 from .blend import Box
 from .silhouette import Silhouette, sampled
 
 GAMMA = 2.2  # of the encoded values
 GROUND = 0.5  # x, lengths on the ground towards the viewer look so much shorter
-FLATTEST = 0.06  # x the height: a shadow to the side is not thinner than that
-BLURS = (0.015, 0.09, 0.28)  # x height, at softness 1: near the ground, half up, at the top
-HARDEST = 0.004  # x height, of the least blur
+LIFT = 0.4  # x height: a lower edge that is farther above the lowest does not stand on the ground
+LEVEL = 0.03  # x width, over which the ground's line is smooth
+BLURS = (0.012, 0.07, 0.2)  # x height, at softness 1: near the ground, half up, at the top
+HARDEST = 0.006  # x height, of the least blur
 FADE = 0.5  # of the strength is lost from the ground to the top
-BAND = 0.12  # x height, rows of the silhouette that touch the ground
-BAND_BLUR = 0.035  # x height
-BAND_DROP = 0.012  # x height that the contact lies below the object
-SOLID = 0.5  # alpha from which on a row belongs to the object
+LAST_BLURS = (0.008, 0.035)  # x height, of all of it, at softness 0 and 1
+BAND = 0.07  # x height, of the silhouette that touches the ground
+BAND_BLUR = 0.03  # x height
+BAND_DROP = 0.015  # x height that the contact lies below the object
+SOLID = 0.5  # alpha from which on a pixel belongs to the object
 DARKEST = 0.97  # of the light, at strength 1
 FAINTEST = 1 / 255  # what is weaker is none: the footprint ends somewhere
 
@@ -57,58 +60,110 @@ class Shade:
         return sampled(self.alpha, (self.left, self.top), self.pitch, box)
 
 
+@dataclass(frozen=True, eq=False)
+class _Standing:
+    """A silhouette, and where it stands; all in px of its grid."""
+
+    alpha: F32  # (h, w)
+    ground: F64  # (w,) of each column, from the top
+    share: F32  # (w,) 1 where it touches the ground there, 0 where it hangs above it
+    height: float
+
+
 def cast(shadow: Shadow, shape: Silhouette) -> Shade | None:
     """The shadow of what has that silhouette; None where there is none."""
-    solid = np.flatnonzero((shape.alpha > SOLID).any(1))
-    if shadow.strength <= 0 or not len(solid):
+    if shadow.strength <= 0 or not (shape.alpha > SOLID).any():
         return None
-    ground, height = float(solid[-1] + 1), float(solid[-1] + 1 - solid[0])
-    blurred, pad = _blurred(shadow, shape.alpha, ground, height)
-    shear = _shear(shadow, ground)
-    near = _contact(shape.alpha, ground, height)
-    drop = BAND_DROP * height
-    low, high = _bounds(shear, blurred.shape, pad, near.shape, drop)
-    size = (int(high[0] - low[0]), int(high[1] - low[1]))
-    far = _warped(blurred, shear @ _shift(-pad, -pad), low, size)
-    middle = (near.shape[0] - shape.alpha.shape[0]) / 2
-    near = _warped(near, _shift(-middle, drop - middle), low, size)
-    taken = DARKEST * shadow.strength * (1 - (1 - far) * (1 - shadow.contact * near))
-    alpha = 1 - (1 - taken) ** (1 / GAMMA)
+    widest = max(BLURS[-1] * shadow.softness, BAND_BLUR)
+    pad = int(np.ceil(3 * widest * max(shape.alpha.shape))) + 4
+    standing = _stood(np.pad(shape.alpha, pad))
+    near, drop = _contact(standing), round(BAND_DROP * standing.height)
+    far, left, top = _thrown(shadow, standing, _blurred(shadow, standing))
+    x0, y0 = min(left, 0), min(top, drop)
+    x1 = max(left + far.shape[1], near.shape[1])
+    y1 = max(top + far.shape[0], drop + near.shape[0])
+    light = np.ones((y1 - y0 + 2, x1 - x0 + 2), np.float32)  # that is left
+    for part, x, y, weight in ((far, left, top, 1.0), (near, 0, drop, shadow.contact)):
+        row, column = y - y0 + 1, x - x0 + 1
+        light[row : row + part.shape[0], column : column + part.shape[1]] *= 1 - weight * part
+    alpha = 1 - (1 - DARKEST * shadow.strength * (1 - light)) ** (1 / GAMMA)
     alpha = np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)
-    left, top = shape.left + low[0] * shape.pitch, shape.top + low[1] * shape.pitch
-    return Shade(alpha, float(left), float(top), shape.pitch, shadow.colour)
+    rows, columns = np.flatnonzero(alpha.any(1)), np.flatnonzero(alpha.any(0))
+    if not len(rows):
+        return None
+    box = (columns[0] - 1, rows[0] - 1, columns[-1] + 2, rows[-1] + 2)
+    alpha = np.pad(alpha[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
+    corner = np.array([x0 - 1 + box[0] - pad, y0 - 1 + box[1] - pad]) * shape.pitch
+    left_px, top_px = float(shape.left + corner[0]), float(shape.top + corner[1])
+    return Shade(alpha, left_px, top_px, shape.pitch, shadow.colour)
 
 
-def _shear(shadow: Shadow, ground: float) -> F64:
-    """(3, 3) from the silhouette's grid to where its points throw their shadow."""
+def _stood(alpha: F32) -> _Standing:
+    solid = alpha > SOLID
+    rows = np.arange(1, alpha.shape[0] + 1, dtype=np.float64)[:, None]
+    lower = (solid * rows).max(0)  # of each column; 0 where there is none
+    ground, height = float(lower.max()), float(lower.max() - rows[solid.any(1)].min() + 1)
+    share = np.clip((lower - ground) / (LIFT * height) * 2 + 2, 0, 1)  # full for half of LIFT
+    held = np.maximum(lower, ground - LIFT * height)
+    columns = np.arange(alpha.shape[1])
+    there = columns[lower > 0]
+    held = np.interp(columns, there, held[there])
+    level = cv2.GaussianBlur(held[None], (0, 0), max(LEVEL * np.ptp(there), 0.5))[0]
+    return _Standing(alpha, np.asarray(level, np.float64), share.astype(np.float32), height)
+
+
+def _blurred(shadow: Shadow, standing: _Standing) -> F32:
+    """The silhouette, more blurred and weaker the higher above the ground."""
+    share = _above(standing) / np.float32(standing.height)
+    mixed = np.zeros_like(standing.alpha)
+    for k, blur in enumerate(BLURS):
+        weight = np.clip(1 - np.abs(np.clip(share, 0, 1) * (len(BLURS) - 1) - k), 0, 1)
+        sigma = max(HARDEST, blur * shadow.softness) * standing.height
+        mixed += weight * smooth(standing.alpha, sigma)
+    return np.asarray(mixed * (1 - FADE * np.clip(share, 0, 1)), np.float32)
+
+
+def _above(standing: _Standing) -> F32:
+    """(h, w) px above the ground of each pixel's middle."""
+    rows = np.arange(standing.alpha.shape[0], dtype=np.float32)[:, None] + np.float32(0.5)
+    return np.asarray(standing.ground.astype(np.float32) - rows, np.float32)
+
+
+def _contact(standing: _Standing) -> F32:
+    """What touches the ground, blurred, 1 at its darkest."""
+    band = np.clip(1 - np.abs(_above(standing)) / (BAND * standing.height), 0, 1)
+    touching = np.asarray(standing.alpha * band * standing.share, np.float32)
+    near = smooth(touching, BAND_BLUR * standing.height)
+    return near / max(float(near.max()), 1e-6)
+
+
+def _thrown(shadow: Shadow, standing: _Standing, values: F32) -> tuple[F32, int, int]:
+    """Each pixel of `values` where its shadow falls; the picture's corner on the grid.
+
+    Pixels that fall on one another are averaged, each weighing what it is: clear ones nothing.
+    """
     angle = np.radians(shadow.direction)
     across, down = np.cos(angle) * shadow.length, np.sin(angle) * shadow.length * GROUND
-    down = np.copysign(max(abs(down), FLATTEST), down)
-    return np.array([[1, -across, across * ground], [0, -down, ground + down * ground], [0, 0, 1]])
-
-
-def _blurred(shadow: Shadow, alpha: F32, ground: float, height: float) -> tuple[F32, int]:
-    """The silhouette, more blurred and weaker towards its top, and the px added around it."""
-    sigmas = [max(HARDEST, blur * shadow.softness) * height for blur in BLURS]
-    pad = int(np.ceil(3 * sigmas[-1])) + 2
-    padded = np.pad(alpha, pad)
-    rows = np.arange(padded.shape[0], dtype=np.float32)[:, None] + np.float32(0.5 - pad)
-    share = np.clip((ground - rows) / height, 0, 1)  # of the height
-    mixed = np.zeros_like(padded)
-    for k, sigma in enumerate(sigmas):
-        weight = np.clip(1 - np.abs(share * (len(sigmas) - 1) - k), 0, 1)
-        mixed += weight * smooth(padded, sigma)
-    return np.asarray(mixed * (1 - FADE * share), np.float32), pad
-
-
-def _contact(alpha: F32, ground: float, height: float) -> F32:
-    """What touches the ground, blurred, 1 at its darkest; with px added around it."""
-    sigma = BAND_BLUR * height
-    pad = int(np.ceil(3 * sigma)) + 2
-    rows = np.arange(alpha.shape[0], dtype=np.float32)[:, None] + np.float32(0.5)
-    band = alpha * np.clip(1 - (ground - rows) / (BAND * height), 0, 1)
-    near = smooth(np.pad(band, pad).astype(np.float32), sigma)
-    return near / max(float(near.max()), 1e-6)
+    fine = int(np.ceil(max(1.0, abs(across), abs(down))))  # so that no gaps are left
+    large = cv2.resize(values, None, fx=1, fy=2 * fine, interpolation=cv2.INTER_LINEAR)
+    rows, columns = np.nonzero(large > FAINTEST / 2)
+    level = standing.ground[columns]
+    height = level - (rows + 0.5) / (2 * fine)
+    x = np.rint(columns + height * across).astype(np.int64)
+    y = np.floor(level + height * down).astype(np.int64)
+    hard, soft = LAST_BLURS
+    sigma = (hard + (soft - hard) * shadow.softness) * standing.height
+    rim = int(np.ceil(3 * sigma)) + 4
+    left, top = int(x.min()) - rim, int(y.min()) - rim
+    size = (int(y.max()) - top + rim + 1, int(x.max()) - left + rim + 1)
+    index, weight = (y - top) * size[1] + x - left, large[rows, columns]
+    sums = [
+        np.bincount(index, weight**power, size[0] * size[1]).reshape(size).astype(np.float32)
+        for power in (1, 2)
+    ]
+    total, squares = (cv2.blur(s, (3, 3), borderType=cv2.BORDER_CONSTANT) for s in sums)
+    mean = squares / np.maximum(total, 1e-6)
+    return smooth(np.asarray(mean, np.float32), sigma), left, top
 
 
 def smooth(values: F32, sigma: float) -> F32:
@@ -118,27 +173,3 @@ def smooth(values: F32, sigma: float) -> F32:
         blurred = cv2.blur(values, (width, width), borderType=cv2.BORDER_CONSTANT)
         values = np.asarray(blurred, np.float32)
     return values
-
-
-def _bounds(
-    shear: F64, far: tuple[int, ...], pad: int, near: tuple[int, ...], drop: float
-) -> tuple[F64, F64]:
-    """Whole px of the silhouette's grid around both parts, and a clear one more."""
-    height, width = far[0] - 2 * pad, far[1] - 2 * pad
-    corners = np.array([[x, y, 1] for x in (-pad, width + pad) for y in (-pad, height + pad)])
-    thrown = (corners @ shear.T)[:, :2]
-    more = (near[0] - height) / 2
-    band = np.array([[-more, drop - more], [width + more, height + drop + more]])
-    both = np.concatenate([thrown, band])
-    return np.floor(both.min(0)) - 1, np.ceil(both.max(0)) + 1
-
-
-def _warped(values: F32, matrix: F64, low: F64, size: tuple[int, int]) -> F32:
-    """`values` moved by `matrix` (3, 3) into a picture of `size` whose corner is `low`."""
-    half = 0.5  # OpenCV counts from the middle of the first pixel
-    whole = _shift(-half - low[0], -half - low[1]) @ matrix @ _shift(half, half)
-    return np.asarray(cv2.warpAffine(values, whole[:2], size, flags=cv2.INTER_LINEAR), np.float32)
-
-
-def _shift(x: float, y: float) -> F64:
-    return np.array([[1, 0, x], [0, 1, y], [0, 0, 1.0]])
