@@ -134,6 +134,7 @@ class Editor:
         self.hand.abort(self)
         self.jobs.cancel()
         self.tasks.forget()
+        self.composing.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
         self.hover, self.rubber, self.message = Hover(), None, None
@@ -209,7 +210,7 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
-        return self.tasks.ensure_plate() or is_changed
+        return self.tasks.ensure_plate() or self.composing.deliver() or is_changed
 
     def set_theme(self, theme: str) -> None:
         """ "dark" or "light"."""

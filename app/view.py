@@ -42,6 +42,13 @@ class Shown(Enum):
 
 
 @dataclass(eq=False)
+class ComposeView:
+    """What the Compose tool shows."""
+
+    is_bare: bool = False  # the background alone, without the objects
+
+
+@dataclass(eq=False)
 class View:
     """Mutable: the tools and panels write it, the window reads it each frame."""
 
@@ -58,6 +65,7 @@ class View:
     has_points: bool = False  # control points and links are shown
     shown: Shown = Shown.COMPOSITE
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
+    compose: ComposeView = field(default_factory=ComposeView)
 
     @property
     def place(self) -> tuple[float, ...]:

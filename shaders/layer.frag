@@ -12,15 +12,18 @@ uniform float marked;     // 1: hatches that
 uniform float opacity;
 uniform float blended;    // 1: the blend counts
 
+uniform vec3 gain;        // of the light at the new place
+
 in vec2 xy;
 out vec4 color;
 
 #include "hatch.glsl"
+#include "light.glsl"
 
 void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
     vec2 at = (xy - box.xy) / (box.zw - box.xy);
-    color = texture(layer, at);
+    color = lit(texture(layer, at), gain);
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel
     float share = color.a - texture(marks, at).g;
 #else

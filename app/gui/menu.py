@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ..commands import COMMANDS, run
 from ..editor import Editor
 from ..painter import shown_now
-from ..view import Shown
+from ..view import Shown, ToolName
 from .layout import Rect
 from .theme import Icon, theme
 from .widgets import icon_button, tooltip
@@ -17,7 +17,8 @@ from .widgets import icon_button, tooltip
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
-    "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
+    "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place", "compose", "-",
+               "bare", "fill_again", "shadow"),
     "View": (
         "zoom_in", "zoom_out", "fit", "actual", "-", *(f"show_{s.name.lower()}" for s in Shown),
         "-", "split", "points", "-", "theme",
@@ -80,6 +81,7 @@ def _switched_on(editor: Editor) -> set[str]:
     view = editor.view
     names = {f"show_{shown_now(editor.document, view).name.lower()}"}
     names |= {"split"} if view.split is not None else set()
+    names |= {"bare"} if view.compose.is_bare and view.tool is ToolName.COMPOSE else set()
     return names | ({"points"} if view.has_points else set())
 
 

@@ -31,6 +31,7 @@ from .inspector import draw_inspector
 from .layout import Rect, lay_out
 from .menu import draw_menu
 from .overlays import draw_overlays
+from .pictures import pictures
 from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
@@ -98,6 +99,7 @@ class Window:
         self._input = Input()
         self._start_imgui()
         self._start = StartScreen(self._renderer)
+        pictures.use(self._renderer)
         self._dialogs = Dialogs()
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None

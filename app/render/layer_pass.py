@@ -42,8 +42,8 @@ class LayerPass:
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
-        self._forget(scene.layers)
-        for layer in scene.layers:
+        self._forget(scene.shades + scene.layers)
+        for layer in scene.shades + scene.layers:
             self._nothing.use(MARKS)
             for unit, texture in self._textures(layer).items():
                 texture.use(unit)
@@ -53,7 +53,7 @@ class LayerPass:
             )
             if layer.draft is not None:
                 self._use_draft(layer.draft, view)
-            set_uniforms(program, box=layer.box, **_appearance(layer.is_tint))
+            set_uniforms(program, box=layer.box, gain=layer.gain, **_appearance(layer))
             set_uniforms(program, marked=0.0 if layer.invented is None else 1.0)
             self._render(program, quad, scene, view)
 
@@ -64,7 +64,7 @@ class LayerPass:
         picture.color.use(LAYER)
         (picture.detail or self._nothing).use(MARKS)
         box = (0, 0, view.width, view.height)
-        set_uniforms(self._drawn, box=box, **_appearance(item.is_tint))
+        set_uniforms(self._drawn, box=box, gain=item.gain, **_appearance(item))
         set_uniforms(self._drawn, marked=1.0 if item.is_marked else 0.0)
         self._render(self._drawn, self._drawn_quad, scene, view)
 
@@ -98,14 +98,15 @@ class LayerPass:
 
     def _forget(self, layers: tuple[Layer, ...]) -> None:
         """Releases what is not shown any more."""
-        kept = {id(layer) for layer in layers}
+        kept = {id(layer.rgba) for layer in layers}
         for key in [key for key in self._uploaded if key not in kept]:
             for texture in self._uploaded.pop(key)[1].values():
                 texture.release()
 
     def _textures(self, layer: Layer) -> dict[int, moderngl.Texture]:
         """The layer's textures by their unit."""
-        if id(layer) not in self._uploaded:
+        key = id(layer.rgba)  # it stays the same where the light changes
+        if key not in self._uploaded:
             textures = {LAYER: self._upload(_as_u8(layer.rgba))}
             if layer.invented is not None:
                 textures[MARKS] = self._upload(layer.invented[..., None])
@@ -115,8 +116,8 @@ class LayerPass:
             for texture in textures.values():
                 texture.filter = near, near
                 texture.repeat_x = texture.repeat_y = False
-            self._uploaded[id(layer)] = (layer, textures)
-        return self._uploaded[id(layer)][1]
+            self._uploaded[key] = (layer, textures)
+        return self._uploaded[key][1]
 
     def _upload(self, pixels: np.ndarray) -> moderngl.Texture:
         height, width, channels = pixels.shape
@@ -124,8 +125,8 @@ class LayerPass:
         return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
 
 
-def _appearance(is_tint: bool) -> dict[str, float]:
-    return {"opacity": TINT if is_tint else 1.0, "blended": 0.0 if is_tint else 1.0}
+def _appearance(thing: Layer | SplatObject) -> dict[str, float]:
+    return {"opacity": TINT if thing.is_tint else 1.0, "blended": 0.0 if thing.is_tint else 1.0}
 
 
 def _photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:

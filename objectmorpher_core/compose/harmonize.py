@@ -23,7 +23,7 @@ from .silhouette import Silhouette, sampled
 Gain = tuple[float, float, float]  # of encoded red, green and blue
 
 NEUTRAL: Gain = (1.0, 1.0, 1.0)
-MAP = 256  # px, longer side of the small picture of the background
+MAP = 96  # px, longer side of the small picture of the background
 RING = 0.15  # x the silhouette's longer side, how far around the object one looks
 LEAST, MOST = 0.6, 1.6  # gain in linear light
 DEAD = 0.04  # in logarithms of linear light: less is no difference of light
@@ -41,7 +41,7 @@ def light_map(document: Document) -> F32:
     Of a large photo every so many pixels are looked at.
     """
     width, height = document.photo.size
-    step = max(max(width, height) // (4 * MAP), 1)
+    step = max(max(width, height) // (8 * MAP), 1)
     pixels = document.photo.pixels[::step, ::step].copy()
     if (plate := document.plate) is not None:
         row, column = -(-plate.top // step), -(-plate.left // step)

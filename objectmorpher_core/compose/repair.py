@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..arrays import F32, Mask, Pixels
+from ..arrays import F32, RGB, Mask, Pixels
 from ..document import Document, Plate
+from ..image import to_u8
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
 from . import Inpainter
@@ -22,6 +23,8 @@ from .plate import Box, correction, cut, hole_margin, plate_crop
 RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
 CONTEXT = 0.8  # x the painted box's longer side, kept around it for the inpainter to copy from
 LEAST_CONTEXT = 48  # px
+THUMB = (168, 126)  # px, width and height of a thumbnail
+AROUND = 1.15  # x what is filled in, that a thumbnail shows
 WHOLLY = 0.999  # painted: nothing of what was there is left
 
 
@@ -114,6 +117,20 @@ def restored(document: Document, patch: Patch) -> Plate:
     cut(grown.painted, grown.box, inner)[is_own] = False
     return Plate(grown.left, grown.top, grown.pixels, grown.hole, plate.backend, plate.seed,
                  grown.painted)  # fmt: skip
+
+
+def thumbnail(photo: Pixels, plate: Plate) -> RGB:
+    """(h, w, 3) what is filled in, with some of the photo around it, in the shape of `THUMB`."""
+    height, width = photo.shape[:2]
+    x0, y0, x1, y1 = plate.box
+    across, down = THUMB
+    scale = max((x1 - x0) / across, (y1 - y0) / down) * AROUND
+    scale = min(scale, width / across, height / down)
+    left = int(np.clip((x0 + x1 - scale * across) / 2, 0, width - scale * across))
+    top = int(np.clip((y0 + y1 - scale * down) / 2, 0, height - scale * down))
+    box = (left, top, left + max(int(scale * across), 1), top + max(int(scale * down), 1))
+    small = cv2.resize(plate_crop(photo, plate, box), THUMB, interpolation=cv2.INTER_AREA)
+    return to_u8(small.astype(photo.dtype))
 
 
 def margin_of(document: Document) -> float:
