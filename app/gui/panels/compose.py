@@ -18,14 +18,13 @@ from ...texts import t
 from ..dial import SIDE, dial
 from ..pictures import pictures
 from ..segments import segments
-from ..theme import RADIUS, Icon, theme
+from ..theme import RADIUS, theme
 from ..widgets import (
     LABEL_WIDTH,
     Change,
     Number,
     button,
     checkbox,
-    gap,
     heading,
     note,
     number_field,
