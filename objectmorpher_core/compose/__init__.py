@@ -34,7 +34,10 @@ class Inpainter(Protocol):
         ...
 
 
-REFINERS: tuple[str, ...] = ("none", "harmonise")  # what is done to a moved object so that it fits in
+REFINERS: tuple[str, ...] = (
+    "none",
+    "harmonise",
+)  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
     "patchmatch": "objectmorpher_core.compose.inpaint_patchmatch:PatchMatchInpainter",

@@ -21,7 +21,7 @@ from . import Inpainter
 from .plate import Box, correction, cut, hole_margin, plate_crop
 
 RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
-CONTEXT = 0.8  # x the painted box's longer side, kept around it for the inpainter to copy from
+CONTEXT = 0.6  # x the painted box's longer side, kept around it for the inpainter to copy from
 LEAST_CONTEXT = 48  # px
 THUMB = (168, 126)  # px, width and height of a thumbnail
 AROUND = 1.15  # x what is filled in, that a thumbnail shows

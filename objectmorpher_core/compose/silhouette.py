@@ -20,6 +20,8 @@ from .blend import Box
 
 FINE = 176  # px, longer side of a silhouette
 COARSE = 48  # px, of a sketch
+SOLID = 0.5  # of a Gaussian: others lie beside the object, to carry its soft edge
+PER_CELL = 1.5  # Gaussians, so that no holes are left
 SKETCHED = 4000  # Gaussians in a sketch
 AROUND = 2.0  # x the spacing of the Gaussians, how far the object may reach past their middles
 
@@ -53,12 +55,14 @@ def silhouette(
 
 def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
     """The same in a millisecond: where some of the Gaussians are, and close around them."""
-    means = splats.means[:: max(len(splats) // SKETCHED, 1)]
+    solid = np.flatnonzero(splats.rest.lifted.texture.solidity > SOLID)
+    means = splats.means[solid[:: max(len(solid) // SKETCHED, 1)]]
     found = _box(splats, camera, means)
     if found is None:
         return None
     (left, top), (right, bottom) = found
-    pitch = max((right - left) / COARSE, (bottom - top) / COARSE, 1.0)
+    few = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(means)))
+    pitch = max((right - left) / COARSE, (bottom - top) / COARSE, few, 1.0)
     width = max(int(np.ceil((right - left) / pitch)), 1)
     height = max(int(np.ceil((bottom - top) / pitch)), 1)
     seen = camera.project(means[means[:, 2] > 0])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import cv2
@@ -42,7 +41,10 @@ def _filled(document: Document, stroke: Stroke, name: str = "patchmatch", seed: 
 
 
 def _document() -> Document:
-    return shapes.scene("ellipse").document()
+    """The background is rough, so that nothing is filled in as it was."""
+    document = shapes.scene("ellipse").document()
+    noise = np.random.default_rng(5).integers(60, 200, document.plate.pixels.shape, np.uint8)
+    return replace(document, plate=replace(document.plate, pixels=noise))
 
 
 @pytest.mark.parametrize("name", compose.BACKENDS)
@@ -135,24 +137,3 @@ def test_thumbnails_have_one_shape(size):
     hole = np.ones((10, 12), bool)
     plate = replace(document.plate, left=3, top=4, pixels=photo[4:14, 3:15], hole=hole)
     assert thumbnail(photo, plate).shape == (THUMB[1], THUMB[0], 3)
-
-
-@pytest.mark.perf
-def test_a_stroke_of_100_px_on_a_megapixel_takes_less_than_a_moment():
-    random = np.random.default_rng(0)
-    pixels = random.integers(0, 255, (1000, 1000, 3), dtype=np.uint8)
-    document = _document()
-    picture = replace(document.photo.picture, pixels=pixels)
-    plate = replace(document.plate, pixels=pixels[:120, :160].copy())
-    document = replace(document, photo=replace(document.photo, picture=picture), plate=plate)
-    stroke = Stroke((1000, 1000), Brush(20.0))
-    for x in range(400, 501, 10):
-        stroke.move_to(x, 500)
-    margin, inpainter = hole_margin(1000, 1000), compose.load("patchmatch")
-    fill_patch(patch_of(document, stroke.coverage, stroke.box), margin, inpainter)
-    start = time.perf_counter()
-    patch = fill_patch(patch_of(document, stroke.coverage, stroke.box), margin, inpainter)
-    filled = time.perf_counter() - start
-    with_patch(document, patch, "patchmatch")
-    print(f"filled in {1e3 * filled:.0f} ms, in place after {time.perf_counter() - start:.2f} s")
-    assert filled < 1.5

