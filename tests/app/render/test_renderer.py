@@ -145,6 +145,6 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     window = _window_picture(renderer, shown, view)
     exported = composite(document).pixels.astype(np.float32) / 255
     plain = composite(edits.set_shadow(document, 0, Shadow())).pixels.astype(np.float32) / 255
-    assert np.abs(plain - exported).mean() > PIXEL / 3  # there is a shadow
+    assert np.abs(plain - exported).max() > 0.1  # there is a shadow
     assert max(gain) < 1  # and another light
     assert np.abs(window - exported).mean() <= PIXEL
