@@ -46,9 +46,10 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
         reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
         if len(points):
             distance = np.minimum(distance, _distance(points, view, (height, width)) - reach)
-    margin = hole_margin(*document.photo.size)
+    margin = document.feather * hole_margin(*document.photo.size)
     ramp = (1 - composite.FEATHER_START) * margin
-    return np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
+    blend = np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
+    return np.maximum(blend, derived.lights.touched(document, view, CELL))
 
 
 def _moved_points(rest: F64, now: F64 | None, tolerance: float) -> F64:

@@ -18,6 +18,7 @@ from objectmorpher_core.document import Document, EditObject, Photo, Plate, Pose
 
 from .blend import build_blend
 from .layers import Layers
+from .lights import Lights
 from .memo import Memo
 from .painter import Painter
 from .surface_facts import SurfaceFacts
@@ -75,6 +76,7 @@ class Derived:
         self.layers = Layers(self)
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
+        self.lights = Lights(self)
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
@@ -159,7 +161,7 @@ class Derived:
 
     def blend(self, document: Document, view: View) -> F32:
         """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
-        key = view.place
+        key = (*view.place, *self.lights.state(document))
         if self._blend is None or self._blend[0] is not document or self._blend[1] != key:
             self._blend = (document, key, build_blend(self, document, view))
         return self._blend[2]

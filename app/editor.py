@@ -155,6 +155,7 @@ class Editor:
         self.jobs.cancel()
         self.background.cancel(OPEN)
         self.tasks.forget()
+        self.composing.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
         self.hover, self.rubber, self.message = Hover(), None, None
@@ -239,6 +240,7 @@ class Editor:
         is_changed = self.jobs.poll()
         is_changed = self.background.poll() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
+        is_changed = self.composing.deliver() or is_changed
         self.autosave.poll()
         self.candidates.poll(time.monotonic())
         return is_changed

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.arrays import U8, Mask, Pixels, Selection
+from objectmorpher_core.arrays import RGB, U8, Mask, Pixels, Selection
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     Document,
@@ -28,6 +28,7 @@ from objectmorpher_core.progress import Progress, part
 from .layers import Rendered, Request, render
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.repair import Patch
     from objectmorpher_core.pipeline import Reading
     from objectmorpher_core.segment import Segmenter
 
@@ -182,6 +183,39 @@ def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -
     from objectmorpher_core.pipeline import make_plate
 
     return make_plate(pixels, covered, choice.backend, progress=progress, seed=choice.seed)
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A background among others to choose from."""
+
+    plate: Plate
+    thumb: RGB  # (h, w, 3) a small picture of what is filled in, and around it
+
+
+def fill_variants(
+    pixels: Pixels, covered: Mask, choice: Choice, count: int, progress: Progress
+) -> tuple[Variant, ...]:
+    """The photo without its objects, `count` times, each with another seed."""
+    from objectmorpher_core.compose.repair import thumbnail
+    from objectmorpher_core.pipeline import make_plate
+
+    found = []
+    for n in range(count):
+        step = part(progress, n / count, (n + 1) / count)
+        seed = choice.seed + n
+        plate = make_plate(pixels, covered, choice.backend, progress=step, seed=seed)
+        found.append(Variant(plate, thumbnail(pixels, plate)))
+    return tuple(found)
+
+
+def repair(patch: Patch, margin: float, choice: Choice, progress: Progress) -> tuple[Patch, str]:
+    """A part of the background filled in anew where it is painted, and by which backend."""
+    from objectmorpher_core import compose
+    from objectmorpher_core.compose.repair import fill_patch
+
+    inpainter = compose.load(choice.backend)
+    return fill_patch(patch, margin, inpainter, progress, choice.seed), inpainter.name
 
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:

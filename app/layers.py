@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -59,6 +59,7 @@ class Layer:
     draft: Draft | None = None  # makes a coarse layer of the photo sharp
     is_coarse: bool = False  # else it is exact, px for px
     is_tint: bool = False  # lies over everything, translucent
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +128,8 @@ class Layers:
     @property
     def is_waiting(self) -> bool:
         """Whether an exact picture is still to be asked for."""
+        if self._derived.lights.is_waiting:
+            return True
         return any(w.shown.is_coarse and not w.is_asked for w in self._drawn)
 
     def draw(
@@ -141,7 +144,15 @@ class Layers:
         self._drawn = [self._works[part] for part in parts if part in self._works]
         for work in self._drawn:
             self._want_exact(work)
-        return tuple(work.shown for work in self._drawn)
+        return tuple(self._lit(document, work) for work in self._drawn)
+
+    def _lit(self, document: Document, work: _Work) -> Layer:
+        """Its picture in the light of where it is."""
+        part = work.request.part
+        if part.is_painted:
+            return work.shown
+        gain = self._derived.lights.of(document, part.k).gain
+        return work.shown if gain == work.shown.gain else replace(work.shown, gain=gain)
 
     def parts(self, document: Document, shown: Shown) -> list[Part]:
         """What a view is put together from, back to front."""

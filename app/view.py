@@ -84,6 +84,13 @@ class Orbit:
 
 
 @dataclass(eq=False)
+class ComposeView:
+    """What the Compose tool shows."""
+
+    is_bare: bool = False  # the background alone, without the objects
+
+
+@dataclass(eq=False)
 class View:
     """Mutable: the tools and panels write it, the window reads it each frame."""
 
@@ -107,6 +114,7 @@ class View:
     brush: Brush = field(default_factory=Brush)  # of every tool that paints
     pose: PoseView = field(default_factory=PoseView)
     selecting: Selecting = field(default_factory=Selecting)
+    compose: ComposeView = field(default_factory=ComposeView)
 
     @property
     def is_at_pixels(self) -> bool:

@@ -16,6 +16,7 @@ from .arrays import F32, F64, I32, U8, Mask, Pixels, Selection, frozen
 from .camera import Camera
 from .gaussians import Gaussians
 from .image import Picture
+from .joining import Shadow
 from .rotations import turn_matrix
 
 
@@ -322,6 +323,8 @@ class EditObject:
     layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
     coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
     found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
+    shadow: Shadow = field(default_factory=Shadow)
+    harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
 
     @property
     def is_moved(self) -> bool:
@@ -365,10 +368,14 @@ class Plate:
     pixels: Pixels  # (h, w, 3) the photo's bit depth
     hole: Mask  # (h, w) True where `pixels` are invented; elsewhere they are the photo's
     backend: str
+    seed: int = 0  # of the last fill; each new one takes the next
+    painted: Mask | None = None  # (h, w) repaired by hand: shown wherever something has moved
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixels", frozen(self.pixels))
         object.__setattr__(self, "hole", frozen(self.hole, np.bool_))
+        if self.painted is not None:
+            object.__setattr__(self, "painted", frozen(self.painted, np.bool_))
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -387,6 +394,7 @@ class Document:
     backends: tuple[tuple[str, str], ...] = ()  # stage -> backend used
     seed: int = 0
     horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
+    feather: float = 1.0  # x the usual width over which the edit is blended into the photo
 
     def with_object(self, k: int, changed: EditObject) -> Document:
         """Object `k` replaced; the plate stays only where the mask did."""

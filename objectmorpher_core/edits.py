@@ -21,6 +21,7 @@ from .document import (
     Rig,
     Seam,
 )
+from .joining import LEAST_FEATHER, MOST_FEATHER, Shadow
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 
@@ -299,3 +300,26 @@ def _free_name(name: str, taken: set[str]) -> str:
     stem = stem if stem and last.isdigit() else name
     numbers = (n for n in range(2, len(taken) + 3) if f"{stem} {n}" not in taken)
     return f"{stem} {next(numbers)}"
+
+
+def set_shadow(document: Document, k: int, shadow: Shadow) -> Document:
+    """The shadow that object `k` casts once it has moved. Raises EditError for nonsense."""
+    try:
+        shadow.check()
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    return document.with_object(k, replace(document.objects[k], shadow=shadow))
+
+
+def set_harmony(document: Document, k: int, harmony: float) -> Document:
+    """How far object `k` takes on the light of where it is now, in [0, 1]."""
+    if not 0 <= harmony <= 1:
+        raise EditError(f"a harmony of {harmony:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], harmony=float(harmony)))
+
+
+def set_feather(document: Document, feather: float) -> Document:
+    """Over how wide an edge the edit is blended into the photo, x the usual."""
+    if not LEAST_FEATHER <= feather <= MOST_FEATHER:
+        raise EditError(f"a blend of {feather:g} x is not {LEAST_FEATHER:g} to {MOST_FEATHER:g}")
+    return replace(document, feather=float(feather))

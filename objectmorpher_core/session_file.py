@@ -27,6 +27,7 @@ from .camera import Camera
 from .document import SELECTED, Document, EditObject, Photo
 from .files import write_all
 from .image import ImageError, encode_picture, read_picture
+from .joining import LEAST_FEATHER, MOST_FEATHER
 from .session_tree import Reader, SessionError, Writer
 from .splat_files.ply import encode_ply
 
@@ -239,6 +240,19 @@ def _check(document: Document) -> None:
         _inside("plate", plate.box, (width, height))
         if plate.pixels.dtype != document.photo.pixels.dtype:
             raise ValueError("the plate has another bit depth than the photo")
+        if plate.painted is not None:
+            _same("the plate's repairs", plate.painted.shape, plate.hole.shape)
+    _check_joining(document)
+
+
+def _check_joining(document: Document) -> None:
+    """Shadows, light and edges."""
+    if not LEAST_FEATHER <= document.feather <= MOST_FEATHER:
+        raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
+    for item in document.objects:
+        item.shadow.check()
+        if not 0 <= item.harmony <= 1:
+            raise ValueError(f"an object's harmony is {item.harmony:g}, not between 0 and 1")
 
 
 def _check_coverage(item: EditObject) -> None:

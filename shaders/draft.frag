@@ -15,10 +15,13 @@ uniform vec4 photo_box;   // x0, y0, x1, y1 canvas px; nothing is drawn outside
 uniform float split;      // canvas px, left of which the photo is shown as it was
 uniform sampler2D marks;  // share that shows the object but nothing of the photo
 
+uniform vec3 gain;        // of the light at the new place
+
 in vec2 xy;
 out vec4 color;
 
 #include "hatch.glsl"
+#include "light.glsl"
 
 void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
@@ -29,7 +32,7 @@ void main() {
     vec4 texel = texture(crop, (point - crop_box.xy) / (crop_box.zw - crop_box.xy));
     float covered = clamp(2.0 * coarse.a, 0.0, 1.0);
     vec4 sharp = vec4(texel.rgb * texel.a, texel.a) * covered;
-    color = mix(coarse, sharp, look.z);
+    color = lit(mix(coarse, sharp, look.z), gain);
 #ifdef HAS_MARKS
     float share = clamp(texture(marks, at).r / max(coarse.a, 1e-3), 0, 1);
     color.rgb = hatched(color.rgb, color.a, share, xy);

@@ -10,15 +10,18 @@ uniform float split;      // canvas px, left of which the photo is shown as it w
 uniform sampler2D marks;  // share that shows the object but nothing of the photo
 uniform float opacity;
 
+uniform vec3 gain;        // of the light at the new place
+
 in vec2 xy;
 out vec4 color;
 
 #include "hatch.glsl"
+#include "light.glsl"
 
 void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
     vec2 at = (xy - box.xy) / (box.zw - box.xy);
-    color = texture(layer, at);
+    color = lit(texture(layer, at), gain);
 #ifdef HAS_MARKS
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel
     float share = color.a - texture(marks, at).g;

@@ -2,6 +2,72 @@
 
 from __future__ import annotations
 
-from .command import Command
+from objectmorpher_core import compose
 
-COMMANDS: dict[str, Command] = {}
+from ..editing.composing import PLATE, VARIANTS
+from ..editor import Editor
+from ..texts import t
+from ..view import ToolName
+from .command import Command, no_lift, nothing_lifted
+
+
+def _toggle_bare(editor: Editor) -> None:
+    if editor.view.tool is not ToolName.COMPOSE:
+        editor.choose_tool(ToolName.COMPOSE)
+        editor.view.compose.is_bare = False
+    editor.composing.toggle_bare()
+
+
+def _is_bare(editor: Editor) -> bool:
+    return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_bare
+
+
+def _cannot_fill(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(PLATE):
+        return t("The background is being filled in…")
+    document, name = editor.document, editor.composing.inpainter
+    if (reason := compose.missing(name)) is not None:
+        return sentence(reason)
+    if document is not None and document.plate is not None:
+        is_same = not compose.is_random(name) and document.plate.backend == name
+        if is_same and document.plate.painted is None:
+            return t("This way of filling gives the same every time")
+    return nothing_lifted(editor)
+
+
+def _cannot_vary(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(VARIANTS):
+        return t("The variants are being made")
+    if (trouble := editor.composing.trouble) is not None:
+        return nothing_lifted(editor) or trouble
+    name = editor.composing.inpainter
+    if (reason := compose.missing(name)) is not None:
+        return sentence(reason)
+    if not compose.is_random(name):
+        return t("This way of filling gives the same every time")
+    return nothing_lifted(editor)
+
+
+def sentence(text: str) -> str:
+    """With a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def not_moved(editor: Editor) -> str | None:
+    """Shadow and light are of objects that have moved: the photo has those of the others."""
+    if (reason := no_lift(editor)) is not None:
+        return reason
+    is_moved = editor.object is not None and editor.object.is_moved
+    return None if is_moved else t("Move the object first")
+
+
+COMMANDS: dict[str, Command] = {
+    "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
+    "fill_again": Command(
+        "Fill in again", "", lambda e: e.composing.fill_again(), _cannot_fill
+    ),
+    "variants": Command(
+        "Try 3 variants", "", lambda e: e.composing.try_variants(), _cannot_vary
+    ),
+    "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
+}  # fmt: skip

@@ -2,10 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import cv2
+import numpy as np
+
+from objectmorpher_core import compose, edits
+from objectmorpher_core.arrays import Mask
+from objectmorpher_core.brush import Stroke
+from objectmorpher_core.document import Document, EditObject, Plate
+from objectmorpher_core.joining import Shadow
+
+from .. import job_functions
+from ..job_functions import Choice, Variant
+from ..layers import Layer
+from ..texts import t
+
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.repair import Patch
+
     from ..editor import Editor
+
+PLATE, VARIANTS, REPAIR = "plate", "variants", "repair"  # kinds of jobs
+COUNT = 3  # variants
+USUAL_HARMONY = 0.8  # strength, when it is turned on
+USUAL_SHADOW = 0.55
+GRAIN = 2  # canvas px per px of the picture of a stroke
+FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
 class Composing:
@@ -13,3 +38,264 @@ class Composing:
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
+        self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
+        self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
+        self._stroke: Stroke | None = None  # being painted
+        self._is_restoring = False
+        self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
+
+    def forget(self) -> None:
+        """Another document is opened."""
+        self._variants, self._ready = ((), ()), []
+        self._stroke, self._waiting = None, []
+
+    def deliver(self) -> bool:
+        """Takes in what the worker has made, between strokes; once a frame."""
+        if not self._ready or self._editor.hand.is_busy:
+            return False
+        ready, self._ready = self._ready, []
+        for take in ready:
+            take()
+        return True
+
+    # The background
+
+    @property
+    def trouble(self) -> str | None:
+        """What is said in place of the background; None where it is there."""
+        editor = self._editor
+        if editor.jobs.is_busy(PLATE):
+            return t("The background is being filled in…")
+        if editor.document is not None and editor.document.plate is None:
+            return t("The background is not filled in")
+        return None
+
+    @property
+    def is_repairing(self) -> bool:
+        return bool(self._waiting)
+
+    def toggle_bare(self) -> None:
+        """Shows the background alone, or the whole picture."""
+        view = self._editor.view
+        view.compose.is_bare = not view.compose.is_bare
+
+    def choose_inpainter(self, name: str) -> None:
+        """Who fills in the background from now on: one of `compose.BACKENDS`, or "auto"."""
+        editor = self._editor
+        backends = replace(editor.settings.backends, inpaint=name)
+        editor.settings = replace(editor.settings, backends=backends)
+
+    @property
+    def inpainter(self) -> str:
+        """The one that was chosen; "auto" where that one is not known."""
+        name = self._editor.settings.backends.inpaint
+        return name if name in compose.BACKENDS else "auto"
+
+    def fill_again(self) -> None:
+        """A new background with another seed: a step of its own."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        if document.plate is None:
+            editor.tasks.fill_background()
+            return
+        masks = _masks(document)
+
+        def accept(plate: Plate) -> None:
+            self._ready.append(lambda: self._take_plate(masks, plate, t("Fill in again")))
+
+        editor.jobs.start(
+            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
+            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1),
+            done=accept, failed=editor.complain_of, kind=PLATE,
+        )  # fmt: skip
+
+    def try_variants(self) -> None:
+        """Asks for some backgrounds to choose from."""
+        editor, document = self._editor, self._editor.document
+        if document is None or document.plate is None:
+            return
+        masks = _masks(document)
+
+        def accept(variants: tuple[Variant, ...]) -> None:
+            self._variants = (masks, variants)
+
+        editor.jobs.start(
+            t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
+            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1), COUNT,
+            done=accept, failed=editor.complain_of, kind=VARIANTS,
+        )  # fmt: skip
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """The backgrounds to choose from, as long as the masks are the same."""
+        document = self._editor.document
+        masks, variants = self._variants
+        return variants if document is not None and _same(masks, _masks(document)) else ()
+
+    def choose_variant(self, variant: Variant) -> None:
+        document = self._editor.document
+        if document is not None and document.plate is not variant.plate:
+            self._take_plate(_masks(document), variant.plate, t("Choose background"))
+
+    def _take_plate(self, masks: tuple[Mask | None, ...], plate: Plate, label: str) -> None:
+        editor = self._editor
+        document = editor.committed
+        if document is not None and _same(masks, _masks(document)):
+            editor.apply(label, edits.set_plate(document, plate))
+
+    def _choice(self, seed: int) -> Choice:
+        return Choice(self.inpainter, seed)
+
+    # Repairing it
+
+    def start_stroke(self, is_restoring: bool) -> bool:
+        """The brush is put down; False where there is nothing to paint on."""
+        editor = self._editor
+        if editor.document is None or editor.document.plate is None:
+            editor.say(self.trouble or t("Open a photo first"))
+            return False
+        self._stroke = Stroke(editor.document.photo.size, editor.view.brush)
+        self._is_restoring = is_restoring
+        return True
+
+    def paint(self, canvas_xy: np.ndarray) -> None:
+        if self._stroke is not None:
+            x, y = self._editor.view.image_from_canvas(canvas_xy)
+            self._stroke.move_to(float(x), float(y))
+
+    def drop_stroke(self) -> None:
+        self._stroke = None
+
+    def end_stroke(self) -> None:
+        """What was painted is filled in anew, or is the photo's again: one step."""
+        from objectmorpher_core.compose.repair import patch_of, restored
+
+        editor, stroke, self._stroke = self._editor, self._stroke, None
+        document = editor.committed
+        if stroke is None or stroke.box is None or document is None or document.plate is None:
+            return
+        x0, y0, x1, y1 = stroke.box
+        if not stroke.coverage[y0:y1, x0:x1].any():
+            return
+        if not self._is_restoring:
+            self._waiting.append(stroke)
+            if len(self._waiting) == 1:
+                self._ask_repair()
+            return
+        plate = restored(document, patch_of(document, stroke.coverage, stroke.box))
+        if plate is not document.plate:
+            editor.apply(t("Restore background"), edits.set_plate(document, plate))
+
+    def _ask_repair(self) -> None:
+        """For the first stroke that waits, on the background as it is now."""
+        from objectmorpher_core.compose.repair import margin_of, patch_of
+
+        editor, document = self._editor, self._editor.committed
+        if document is None or document.plate is None or not self._waiting:
+            self._waiting = []
+            return
+        stroke, asked = self._waiting[0], document.plate
+        assert stroke.box is not None
+        patch = patch_of(document, stroke.coverage, stroke.box)
+
+        def accept(answer: tuple[Patch, str]) -> None:
+            self._ready.append(lambda: self._take_repair(asked, *answer))
+
+        def fail(error: object) -> None:
+            editor.complain_of(error)  # type: ignore[arg-type]
+            self._waiting = []
+
+        def drop() -> None:
+            self._waiting = []
+
+        editor.jobs.start(
+            t("Repairing the background"), job_functions.repair, patch, margin_of(document),
+            self._choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
+        )  # fmt: skip
+
+    def _take_repair(self, asked: Plate, patch: Patch, backend: str) -> None:
+        """A repaired part; it is dropped where the background is another one by now."""
+        from objectmorpher_core.compose.repair import with_patch
+
+        editor, document = self._editor, self._editor.committed
+        self._waiting = self._waiting[1:]
+        if document is not None and document.plate is asked:
+            plate = with_patch(document, patch, backend)
+            editor.apply(t("Repair background"), edits.set_plate(document, plate))
+        if self._waiting:
+            self._ask_repair()
+
+    def painted_layer(self) -> Layer | None:
+        """What is painted and not filled in yet, as a tint over the canvas."""
+        view = self._editor.view
+        strokes = [s for s in (self._stroke, *self._waiting) if s is not None]
+        if not strokes:
+            return None
+        size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
+        step = GRAIN / view.zoom  # photo px per px of the tint
+        start = (view.left + step / 2 - 0.5, view.top + step / 2 - 0.5)
+        matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        covered = np.zeros(size[::-1], np.float32)
+        for stroke in strokes:
+            shown = cv2.warpAffine(stroke.coverage, matrix, size, flags=flags)
+            np.maximum(covered, shown, out=covered)
+        is_white = self._is_restoring and self._stroke is not None
+        ink = np.array(RESTORING if is_white else FILLING, np.float32)
+        rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
+        box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
+        return Layer(box, rgba, is_coarse=True, is_tint=True)
+
+    # Joining the object to it
+
+    def preview_shadow(self, shadow: Shadow) -> None:
+        """Previews another shadow of the current object; `Editor.commit` makes it a step."""
+        self._preview(lambda document, k: edits.set_shadow(document, k, shadow))
+
+    def preview_harmony(self, harmony: float) -> None:
+        self._preview(lambda document, k: edits.set_harmony(document, k, harmony))
+
+    def preview_feather(self, feather: float) -> None:
+        self._preview(lambda document, _: edits.set_feather(document, feather))
+
+    def toggle_shadow(self) -> None:
+        """Gives the current object a shadow, or takes it."""
+        item = self._item
+        if item is not None:
+            is_new = item.shadow.strength == 0
+            self.preview_shadow(replace(item.shadow, strength=USUAL_SHADOW if is_new else 0.0))
+            self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
+
+    def choose_refiner(self, name: str) -> None:
+        """One of `compose.REFINERS`."""
+        item = self._item
+        if item is not None and name != self.refiner:
+            self.preview_harmony(USUAL_HARMONY if name == "harmonise" else 0.0)
+            self._editor.commit(t("Adjust light"))
+
+    @property
+    def refiner(self) -> str:
+        item = self._item
+        return "harmonise" if item is not None and item.harmony > 0 else "none"
+
+    @property
+    def _item(self) -> EditObject | None:
+        return self._editor.object if self._editor.is_lifted else None
+
+    def _preview(self, change: Callable[[Document, int], Document]) -> None:
+        editor = self._editor
+        if editor.committed is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        try:
+            editor.preview = change(editor.committed, editor.current)
+        except ValueError as error:
+            editor.complain(str(error))
+
+
+def _masks(document: Document) -> tuple[Mask | None, ...]:
+    return tuple(o.mask for o in document.objects)
+
+
+def _same(a: tuple[Mask | None, ...], b: tuple[Mask | None, ...]) -> bool:
+    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))

@@ -24,7 +24,8 @@ MENUS: dict[str, tuple[str, ...]] = {
     ),
     "Object": (
         "lift", "-", "rename", "duplicate", "remove_object", "-",
-        "forward", "backward", "to_front", "to_back", "-", "ground",
+        "forward", "backward", "to_front", "to_back", "-", "ground", "-",
+        "bare", "fill_again", "shadow",
     ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),
     "View": (

@@ -15,6 +15,7 @@ MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that 
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
 OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
+NEUTRAL = (1.0, 1.0, 1.0)
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
@@ -25,6 +26,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
         return None
     photo, surround = document.photo.pixels, theme.rgb("surround")
     shown = shown_now(document, view)
+    if view.tool is ToolName.COMPOSE and view.compose.is_bare and not view.is_before:
+        return _bare_scene(editor, document)
     if shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO:
         return _selecting(editor, document)
     if editor.looking.orbit is not None and not view.is_before:
@@ -46,8 +49,9 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
         mask, hatch = editor.derived.moved_mask(document), MISSING
     elif shown is Shown.PROVENANCE:
         mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
+    shades = editor.derived.lights.layers(document, view)
     return Scene(
-        photo, surround, plate, layers, objects, mask,
+        photo, surround, plate, shades, layers, objects, mask,
         hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
     )  # fmt: skip
 
@@ -74,6 +78,16 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     )  # fmt: skip
 
 
+def _bare_scene(editor: Editor, document: Document) -> Scene:
+    """The background alone, and what of it is being repaired."""
+    photo, surround, split = document.photo.pixels, theme.rgb("surround"), editor.view.split or 0.0
+    mask = editor.derived.lights.hidden(document) if document.plate is None else None
+    painted = editor.composing.painted_layer()
+    layers = () if painted is None else (painted,)
+    hatch = None if mask is None else MISSING
+    return Scene(photo, surround, document.plate, (), layers, (), mask, hatch=hatch, split=split)
+
+
 def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """A checker says that nothing is there; under colours that mean something it would disturb."""
     panel = theme.rgb("panel")
@@ -90,6 +104,7 @@ def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObj
             camera,
             is_marked=part.is_marked,
             is_tint=part.look is Shown.STRAIN,
+            gain=NEUTRAL if part.is_painted else derived.lights.of(document, part.k).gain,
         )
         for part in derived.layers.parts(document, shown)
     )

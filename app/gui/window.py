@@ -35,6 +35,7 @@ from .inspector import draw_inspector
 from .layout import Rect, lay_out
 from .menu import draw_menu
 from .overlays import draw_overlays
+from .pictures import pictures
 from .popups import Popups
 from .scenes import build_scene
 from .start import StartScreen
@@ -113,6 +114,7 @@ class Window:
         self._input = Input(self._shortcuts)
         self._start_imgui()
         self._start = StartScreen(self._renderer)
+        pictures.use(self._renderer)
         self._dialogs = Dialogs()
         self._popups = Popups(self._shortcuts)
         self._cursors: dict[int, Any] = {}

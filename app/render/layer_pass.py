@@ -36,8 +36,8 @@ class LayerPass:
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
-        self._forget(scene.layers)
-        for layer in scene.layers:
+        self._forget(scene.shades + scene.layers)
+        for layer in scene.shades + scene.layers:
             for unit, texture in self._textures(layer).items():
                 texture.use(unit)
             programs = self._exact if layer.draft is None else self._draft
@@ -45,7 +45,7 @@ class LayerPass:
             program, quad = programs(*defines)
             if layer.draft is not None:
                 set_uniforms(program, **self._use_draft(layer.draft, view))
-            set_uniforms(program, box=layer.box, opacity=TINT if layer.is_tint else 1.0)
+            set_uniforms(program, box=layer.box, **_appearance(layer))
             self._render(program, quad, scene, view)
 
     def draw_picture(
@@ -57,8 +57,7 @@ class LayerPass:
         if picture.detail is not None:
             picture.detail.use(MARKS)
         program, quad = self._exact("DETAIL", *_defines(scene, is_marked, item.is_tint))
-        box, opacity = (0, 0, view.width, view.height), TINT if item.is_tint else 1.0
-        set_uniforms(program, box=box, opacity=opacity)
+        set_uniforms(program, box=(0, 0, view.width, view.height), **_appearance(item))
         self._render(program, quad, scene, view)
 
     def _render(
@@ -92,14 +91,15 @@ class LayerPass:
 
     def _forget(self, layers: tuple[Layer, ...]) -> None:
         """Releases what is not shown any more."""
-        kept = {id(layer) for layer in layers}
+        kept = {id(layer.rgba) for layer in layers}
         for key in [key for key in self._uploaded if key not in kept]:
             for texture in self._uploaded.pop(key)[1].values():
                 texture.release()
 
     def _textures(self, layer: Layer) -> dict[int, moderngl.Texture]:
         """The layer's textures by their unit."""
-        if id(layer) not in self._uploaded:
+        key = id(layer.rgba)  # it stays the same where the light changes
+        if key not in self._uploaded:
             textures = {LAYER: self._upload(_as_u8(layer.rgba))}
             if layer.invented is not None:
                 textures[MARKS] = self._upload(layer.invented[..., None])
@@ -109,13 +109,17 @@ class LayerPass:
             for texture in textures.values():
                 texture.filter = near, near
                 texture.repeat_x = texture.repeat_y = False
-            self._uploaded[id(layer)] = (layer, textures)
-        return self._uploaded[id(layer)][1]
+            self._uploaded[key] = (layer, textures)
+        return self._uploaded[key][1]
 
     def _upload(self, pixels: np.ndarray) -> moderngl.Texture:
         height, width, channels = pixels.shape
         kind, data = "f1" if pixels.dtype == np.uint8 else "f4", np.ascontiguousarray(pixels)
         return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
+
+
+def _appearance(thing: Layer | SplatObject) -> dict[str, Any]:
+    return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
 
 
 def _defines(scene: Scene, is_marked: bool, is_tint: bool) -> list[str]:

@@ -39,6 +39,7 @@ class SplatObject:
     camera: Camera  # the photo's
     is_marked: bool = False  # hatched where it shows nothing of the photo
     is_tint: bool = False  # lies over everything, translucent
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,7 @@ class Scene:
     photo: Pixels
     surround: Colour
     plate: Plate | None = None  # shown where there is one
+    shades: tuple[Layer, ...] = ()  # shadows, below all objects
     layers: tuple[Layer, ...] = ()  # objects that are rendered already, back to front
     objects: tuple[SplatObject, ...] = ()  # objects to render, back to front
     mask: Selection | None = None  # what `veil` and `hatch` refer to

@@ -1,24 +1,49 @@
-"""The Compose tool."""
+"""Painting on the background: what is wrong is filled in anew, or is the photo's again."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .pointer import Pointer, Shape, Stroke
+from ..texts import t
+from .pointer import Button, Pointer, Shape, Stroke
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
 
 class ComposeTool:
-    """Not there yet."""
+    """While the background is shown alone: left repairs it, right or Alt restores the photo."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        while (yield).is_down:
-            pass
+        is_restoring = pointer.alt or pointer.button is Button.RIGHT
+        if not editor.view.compose.is_bare:
+            editor.say(t("Show the background alone to paint on it"))
+            return _ignore()
+        if not editor.composing.start_stroke(is_restoring):
+            return _ignore()
+        return self._paint(editor, pointer)
+
+    def _paint(self, editor: Editor, pointer: Pointer) -> Stroke:
+        try:
+            editor.composing.paint(pointer.xy)
+            while (pointer := (yield)).is_down:
+                editor.composing.paint(pointer.xy)
+            editor.composing.end_stroke()
+        finally:  # Esc closes the stroke where it waits
+            editor.composing.drop_stroke()
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.ARROW
+        is_painting = editor.view.compose.is_bare and editor.is_on_photo(pointer.xy)
+        return Shape.CROSS if is_painting else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:
-        return ""
+        if not editor.view.compose.is_bare:
+            return t("B shows the background alone, to repair it by painting")
+        if editor.hand.is_busy:
+            return t("Let go to fill in what is painted · Esc takes it back")
+        return t("Paint what to fill in again · Alt-paint brings the photo back · [ ] brush size")
+
+
+def _ignore() -> Stroke:
+    while (yield).is_down:
+        pass

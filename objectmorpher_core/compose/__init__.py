@@ -20,6 +20,7 @@ class Inpainter(Protocol):
     """Invents what the photo shows where an object was."""
 
     name: str
+    is_random: bool  # whether another seed gives another fill
 
     def missing(self) -> str | None:
         """Why this backend cannot run here, as a sentence for the user; None where it can."""
@@ -32,6 +33,11 @@ class Inpainter(Protocol):
         """
         ...
 
+
+REFINERS: tuple[str, ...] = (
+    "none",
+    "harmonise",
+)  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
     "patchmatch": "objectmorpher_core.compose.inpaint_patchmatch:PatchMatchInpainter",
@@ -52,6 +58,16 @@ def load(name: str = "auto") -> Inpainter:
     if (sentence := inpainter.missing()) is not None:
         raise InpaintError(sentence)
     return inpainter
+
+
+def missing(name: str) -> str | None:
+    """Why the inpainter called `name` cannot run here; None where it can, as "auto" always can."""
+    return None if name == "auto" else _create(name).missing()
+
+
+def is_random(name: str = "auto") -> bool:
+    """Whether another seed gives another fill."""
+    return load(name).is_random
 
 
 def _create(name: str) -> Inpainter:

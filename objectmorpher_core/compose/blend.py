@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import cv2
@@ -25,6 +25,7 @@ STILL_ALPHA = 1.5 / 255  # likewise for its alpha
 NEAR = 7  # px, window in which a left pixel looks for the object's new edge
 FEATHER_START = 0.6  # x hole margin: the edit is blended into the photo from here outwards
 FEATHERS = ((STILL, 1.5), (0.5, 3.0), (2.0, 6.0), (6.0, math.inf))  # px moved -> px, at most
+SEEN = 1 / 1024  # of a pixel, of a shadow or a repair: with less it is as it was
 AT_A_TIME = 3  # x the rows that are looked at around them: how many rows are blended together
 
 Item = TypeVar("Item")
@@ -44,6 +45,7 @@ class Rows:
     from_inpainter: F32
     moved: F32  # px, see `displacement`
     is_covered: Mask  # by an object, now or before
+    touched: F32 | None = None  # in [0, 1], what is seen of shadows and repairs; None: of none
 
     @property
     def box(self) -> Box:
@@ -88,26 +90,35 @@ def displacement(picture: Picture3D, rest_alpha: F32) -> F32:
     return np.where(is_still, 0, shift).astype(np.float32)
 
 
-def blend_weights(moved: F32, margin: float) -> F32:
+def with_touched(rows: Rows) -> Rows:
+    """`rows` in which shadows and repairs count as moved, by the least that counts."""
+    if rows.touched is None:
+        return rows
+    is_touched = rows.touched > SEEN
+    moved = np.where(is_touched, np.maximum(rows.moved, np.float32(STILL)), rows.moved)
+    return replace(rows, moved=moved, is_covered=rows.is_covered | is_touched)
+
+
+def blend_weights(moved: F32, margin: float, feather: float = 1.0) -> F32:
     """(h, w) in [0, 1]: how much of the edit to show, where its `displacement` is `moved`.
 
     1 where something moved, and falling to 0 around it over a distance that grows with the
     move: the plate's invented ring is not shown around what has hardly moved. From `margin` px
-    on it is 0.
+    on it is 0. `feather` widens those distances.
     """
 
-    def feather(step: tuple[float, float]) -> F32 | None:
+    def ramp_of(step: tuple[float, float]) -> F32 | None:
         is_moved = moved >= step[0]
         if not is_moved.any():
             return None
-        reach = min(step[1], margin)
+        reach = min(step[1] * feather, margin)
         ramp = distance(is_moved)  # and in place from here on: several are held at once
         np.subtract(reach, ramp, out=ramp)
         ramp /= (1 - FEATHER_START) * reach
         return np.clip(ramp, 0, 1, out=ramp)
 
     blend = np.zeros(moved.shape, np.float32)
-    for weights in map_in_threads(feather, FEATHERS):
+    for weights in map_in_threads(ramp_of, FEATHERS):
         if weights is not None:
             np.maximum(blend, weights, out=blend)
     return blend
@@ -132,11 +143,14 @@ def differ(one: Pixels, other: Pixels) -> Mask:
 class Blend:
     """The photo with the edit blended in, as far as its rows have come."""
 
-    def __init__(self, photo: Pixels, margin: float, box: Box, rows: int | None = None) -> None:
+    def __init__(
+        self, photo: Pixels, margin: float, box: Box, rows: int | None = None, feather: float = 1.0
+    ) -> None:
         """The edit is in `box`, and shows `margin` px around what it disturbs.
 
-        At least `rows` are blended at a time.
+        At least `rows` are blended at a time. `feather`: see `blend_weights`.
         """
+        self._feather = feather
         self.pixels = photo.copy()
         self.footprint = np.zeros(photo.shape[:2], bool)
         self._photo, self._margin = photo, margin
@@ -154,7 +168,9 @@ class Blend:
         ready = [r for r in self._rows if r.top >= self._blended and r.bottom <= known]
         if not ready or (ready[-1].bottom - self._blended < self._least and not is_last):
             return
-        weights = blend_weights(np.concatenate([r.moved for r in self._rows]), self._margin)
+        weights = blend_weights(
+            np.concatenate([r.moved for r in self._rows]), self._margin, self._feather
+        )
         away = distance(np.concatenate([r.is_covered for r in self._rows]))
         top = self._rows[0].top
 

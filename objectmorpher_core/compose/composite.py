@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..camera import Camera
-from ..document import Document, EditObject, Matte
+from ..document import Document, EditObject, Matte, Placement, Plate
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
@@ -23,12 +23,25 @@ from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
 from ..raster.reference import Picture3D
-from ..raster.texture import TextureLevels, build_levels
 from .blend import FEATHER_START as FEATHER_START  # the view looks here for these two
-from .blend import NEAR, STILL_ALPHA, Blend, Box, Rows, differ, displacement, map_in_threads
+from .blend import (
+    NEAR,
+    STILL_ALPHA,
+    Blend,
+    Box,
+    Rows,
+    differ,
+    displacement,
+    map_in_threads,
+    with_touched,
+)
 from .blend import STILL as STILL
+from .harmonize import NEUTRAL, Gain, lit
+from .lighting import NOTHING, Lighting
+from .lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .plate import hole_margin, plate_crop, plate_of_holes
+from .shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
 OPAQUE = 1 - STILL_ALPHA
@@ -52,6 +65,8 @@ class Moved:
     item: EditObject
     splats: PosedSplats
     has_hole: bool = True  # nothing stands where it was
+    gain: Gain = NEUTRAL  # of its colours
+    shade: Shade | None = None  # that it throws
 
     @property
     def matte(self) -> Matte:
@@ -73,11 +88,6 @@ class Composite:
     moved: tuple[Moved, ...]  # back to front
 
 
-def object_texture(matte: Matte) -> TextureLevels:
-    """What the object's Gaussians carry: straight colour and alpha on the matte's crop."""
-    return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
-
-
 def composite(
     document: Document,
     puppets: dict[int, Puppet] | None = None,
@@ -95,13 +105,14 @@ def composite(
     if not moved:
         nothing = np.zeros(photo.shape[:2], bool)
         return Composite(photo, nothing, 0, 0, Shares(), camera, ())
-    document = replace(document, plate=plate_of_holes(document, holes(document)))
-    drawing = _Drawing(things, camera)
+    margin = document.feather * hole_margin(camera.width, camera.height)
+    plate = plate_of_holes(document, holes(document))
+    drawing = _Drawing(things, camera, margin, plate)
     _, y0, _, y1 = drawing.box
-    blend = Blend(photo, hole_margin(camera.width, camera.height), drawing.box, rows)
+    blend = Blend(photo, margin, drawing.box, rows, document.feather)
     for top, bottom in drawing.strips():
         progress((top - y0) / (y1 - y0), "Drawing the object")
-        for drawn in drawing.over_plate(document, top, bottom):
+        for drawn in drawing.over_plate(photo, top, bottom):
             blend.add(drawn)
     pixels, footprint = blend.pixels, blend.footprint
     changed, outside = _count_changes(photo, pixels, footprint)
@@ -113,19 +124,32 @@ def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
     """What is drawn over the plate, back to front."""
     objects, camera = document.objects, document.photo.camera
 
-    def posed(k: int) -> PosedSplats:
-        puppet = puppets.get(k) or puppet_of(objects[k], camera)
-        return puppet.posed(objects[k].pose, objects[k].placement)
+    own: dict[int, Puppet] = {}
 
-    drawn = stack(document, posed).items()
-    return tuple(Moved(objects[k], splats, leaves_a_hole(objects, k)) for k, splats in drawn)
+    def posed(k: int) -> PosedSplats:
+        own[k] = puppets.get(k) or puppet_of(objects[k], camera)
+        return own[k].posed(objects[k].pose, objects[k].placement)
+
+    lighting, things = Lighting(document), []
+    for k, splats in stack(document, posed).items():
+        item, puppet = objects[k], own[k]
+        look = NOTHING
+        if item.is_moved:
+            look = lighting.of(item, splats, partial(puppet.posed, None, Placement()))
+        has_hole = leaves_a_hole(objects, k)
+        things.append(Moved(item, splats, has_hole, look.gain, look.shade))
+    return tuple(things)
 
 
 class _Drawing:
     """The objects of an edit as the photo's camera sees them."""
 
-    def __init__(self, things: tuple[Moved, ...], camera: Camera) -> None:
-        self._things = things
+    def __init__(
+        self, things: tuple[Moved, ...], camera: Camera, margin: float, plate: Plate | None = None
+    ) -> None:
+        """`margin`: px of the photo around what is disturbed."""
+        self._things, self._plate, self._margin = things, plate, margin
+        self._shades = [thing.shade for thing in things if thing.shade is not None]
         shown = [k for k, t in enumerate(things) if t.item.is_moved and t.item.is_visible]
         self._drawables = {k: tiles.prepare(things[k].splats, camera, camera) for k in shown}
         self._textures = {k: object_texture(things[k].matte) for k in shown}
@@ -133,9 +157,12 @@ class _Drawing:
 
     def _region(self, camera: Camera) -> Box:
         """Everything the edit can touch."""
-        margin = int(np.ceil(hole_margin(camera.width, camera.height))) + 2
+        margin = int(np.ceil(self._margin)) + 2
         boxes = [thing.matte.box for thing in self._things if thing.item.is_moved]
         boxes += [box for shown in self._drawables.values() if (box := shown.box()) is not None]
+        boxes += [_whole(shade.bounds) for shade in self._shades]
+        if self._plate is not None and self._plate.painted is not None:
+            boxes.append(self._plate.box)
         x0, y0 = (int(low) - margin for low in np.min(boxes, axis=0)[:2])
         x1, y1 = (int(high) + margin for high in np.max(boxes, axis=0)[2:])
         return max(x0, 0), max(y0, 0), min(x1, camera.width), min(y1, camera.height)
@@ -151,11 +178,13 @@ class _Drawing:
         for top in range(y0, y1, rows):
             yield top, min(top + rows, y1)
 
-    def over_plate(self, document: Document, top: int, bottom: int) -> list[Rows]:
+    def over_plate(self, photo: Pixels, top: int, bottom: int) -> list[Rows]:
         """The edit on the rows `top`..`bottom` of the box, a piece for each thread."""
         x0, y0, x1, y1 = self.box
         pieces = [(x0, a, x1, b) for a, b in _pieces(top, bottom)]
-        rows = map_in_threads(partial(_plate_rows, document), pieces)
+        rows = map_in_threads(partial(_plate_rows, photo, self._plate), pieces)
+        for shade in self._shades:
+            rows = map_in_threads(partial(_shaded, shade), rows)
         # `displacement` looks around each pixel. A whole row of tiles more above, and the tiles
         # stay where they are: what the rasteriser rounds, it rounds tile by tile.
         above, below = max(top - TILE, y0), min(bottom + NEAR // 2, y1)
@@ -167,7 +196,7 @@ class _Drawing:
                 rows = map_in_threads(partial(_at_rest, thing.matte), rows)
             elif thing.has_hole:
                 rows = map_in_threads(partial(_without, thing.matte), rows)
-        return rows
+        return map_in_threads(with_touched, rows)
 
     def alone(self, top: int, bottom: int) -> F32:
         """The moved objects on nothing (bottom - top, w, 4), premultiplied."""
@@ -186,7 +215,11 @@ class _Drawing:
         if k not in self._drawables:
             return None
         part = (self.box[0], top, self.box[2], bottom)
-        return tiles.draw(self._drawables[k], self._textures[k], part)
+        picture = tiles.draw(self._drawables[k], self._textures[k], part)
+        gain = self._things[k].gain
+        if gain == NEUTRAL:
+            return picture
+        return replace(picture, color=lit(picture.color, picture.alpha, gain))
 
 
 def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:
@@ -199,17 +232,36 @@ def _part(picture: Picture3D, first: int, last: int) -> Picture3D:
     return replace(part, alpha=np.minimum(part.alpha, 1.0))
 
 
-def _plate_rows(document: Document, box: Box) -> Rows:
+def _whole(bounds: tuple[float, float, float, float]) -> Box:
+    """The pixels that a box touches."""
+    x0, y0, x1, y1 = bounds
+    return int(np.floor(x0)), int(np.floor(y0)), int(np.ceil(x1)), int(np.ceil(y1))
+
+
+def _plate_rows(photo: Pixels, plate: Plate | None, box: Box) -> Rows:
     """What is seen in `box` without the objects that were moved."""
     x0, y0, x1, y1 = box
-    photo, plate = document.photo.pixels, document.plate
+    touched = None
     nothing = np.zeros((y1 - y0, x1 - x0), np.float32)
     if plate is None:
         colour, invented = unit_pixels(photo[y0:y1, x0:x1]), nothing
     else:
         colour = unit_pixels(plate_crop(photo, plate, box))
         invented = crop(plate.hole, plate.box, box).astype(np.float32)
-    return Rows(x0, y0, colour, 1 - invented, nothing, invented, nothing, nothing > 0)
+        if plate.painted is not None:
+            touched = crop(plate.painted, plate.box, box).astype(np.float32)
+    return Rows(x0, y0, colour, 1 - invented, nothing, invented, nothing, nothing > 0, touched)
+
+
+def _shaded(shade: Shade, rows: Rows) -> Rows:
+    """`rows` under a shadow."""
+    there = shade.at(rows.box)
+    if not there.any():
+        return rows
+    ink = np.array(shade.colour, np.float32)
+    colour = rows.colour + there[..., None] * (ink - rows.colour)
+    touched = there if rows.touched is None else np.maximum(rows.touched, there)
+    return replace(rows, colour=colour, touched=touched)
 
 
 def _without(matte: Matte, rows: Rows) -> Rows:
@@ -230,6 +282,7 @@ def _at_rest(matte: Matte, rows: Rows) -> Rows:
         from_lifter=through * rows.from_lifter,
         from_inpainter=through * rows.from_inpainter,
         moved=np.where(alpha >= OPAQUE, np.float32(0), rows.moved),
+        touched=None if rows.touched is None else rows.touched * through,
     )
 
 
@@ -254,6 +307,7 @@ def _with(thing: Moved, drawn: Picture3D, above: int, rows: Rows) -> Rows:
         from_inpainter=through * rows.from_inpainter,
         moved=np.maximum(rows.moved, moved),
         is_covered=rows.is_covered | (rest[inner] > 0) | (picture.alpha > 0),
+        touched=None if rows.touched is None else rows.touched * through,
     )
 
 
@@ -278,7 +332,8 @@ def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -
     cutout = np.zeros((height, width, 4), dtype)
     if not result.moved:
         return cutout
-    drawing = _Drawing(result.moved, result.camera)
+    camera = result.camera
+    drawing = _Drawing(result.moved, camera, hole_margin(camera.width, camera.height))
     x0, _, x1, _ = drawing.box
     for top, bottom in drawing.strips():
         drawn = drawing.alone(top, bottom)

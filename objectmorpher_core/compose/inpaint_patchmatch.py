@@ -32,6 +32,7 @@ class PatchMatchInpainter:
     """The default inpainter: textures and straight edges go on, nothing is understood."""
 
     name = "patchmatch"
+    is_random = True
 
     def missing(self) -> str | None:
         """Why this backend cannot run here, one sentence; None where it can."""

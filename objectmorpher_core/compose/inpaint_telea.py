@@ -17,6 +17,7 @@ class TeleaInpainter:
     """The last resort, where no other inpainter runs."""
 
     name = "telea"
+    is_random = False
 
     def missing(self) -> str | None:
         return None

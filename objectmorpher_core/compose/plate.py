@@ -19,6 +19,8 @@ from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
 from . import Inpainter
 
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
+
 HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
 MIN_HOLE_MARGIN = 4.0  # px
 SEAM = 0.45  # x hole margin, width of the seam around the object
@@ -74,13 +76,13 @@ def build_plate(
     weight = np.clip((SEAM * margin - away) / (0.6 * SEAM * margin), 0, 1)  # of the fill
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
-    fill = np.clip(fill + _correction(photo - fill, ring, margin), 0, 1)
+    fill = np.clip(fill + correction(photo - fill, ring, margin), 0, 1)
     mixed = photo + weight[..., None] * (fill - photo)
     joined = np.where(is_invented[..., None], pixels_from_unit(mixed, pixels.dtype), pixels[inner])
-    return Plate(int(x0), int(y0), joined, is_invented, inpainter.name)
+    return Plate(int(x0), int(y0), joined, is_invented, inpainter.name, seed)
 
 
-def _correction(difference: F32, ring: Mask, margin: float) -> F32:
+def correction(difference: F32, ring: Mask, margin: float) -> F32:
     """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards.
 
     Shepard's interpolation with a heavy-tailed kernel, on a grid as coarse as the margin allows.
@@ -106,7 +108,7 @@ def _correction(difference: F32, ring: Mask, margin: float) -> F32:
 def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None:
     """The document's plate, invented only where what stood in these `holes` is gone.
 
-    Around objects that are still there it is the photo.
+    Around objects that are still there it is the photo, except where it was repaired by hand.
     """
     plate = document.plate
     rest = [o for o in document.objects if o.mask is not None and o.matte not in holes]
@@ -116,10 +118,17 @@ def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None
     for matte in holes:
         covered |= crop(matte.alpha, matte.box, plate.box) > 0
     away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
-    hole = plate.hole & (away < SEAM * hole_margin(*document.photo.size))
+    is_shown, painted = away < SEAM * hole_margin(*document.photo.size), plate.painted
+    if painted is not None:
+        painted = painted.copy()
+        for item in rest:
+            if item.matte is not None:
+                painted &= (crop(item.matte.alpha, item.matte.box, plate.box) <= 0) | covered
+        is_shown |= painted
+    hole = plate.hole & is_shown
     x0, y0, x1, y1 = plate.box
     pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
-    return replace(plate, pixels=pixels, hole=hole)
+    return replace(plate, pixels=pixels, hole=hole, painted=painted)
 
 
 def plate_picture(document: Document) -> Pixels:
@@ -129,8 +138,24 @@ def plate_picture(document: Document) -> Pixels:
     return plate_crop(document.photo.pixels, document.plate, (0, 0, width, height))
 
 
-def plate_crop(photo: Pixels, plate: Plate, box: tuple[int, int, int, int]) -> Pixels:
+def plate_crop(photo: Pixels, plate: Plate, box: Box) -> Pixels:
     """The photo in `box` with its objects painted out."""
     x0, y0, x1, y1 = box
-    hole = crop(plate.hole, plate.box, box)
-    return np.where(hole[..., None], crop(plate.pixels, plate.box, box), photo[y0:y1, x0:x1])
+    result = photo[y0:y1, x0:x1].copy()
+    inner = overlap(plate.box, box)
+    if inner is not None:
+        hole, pixels = (cut(part, plate.box, inner) for part in (plate.hole, plate.pixels))
+        np.copyto(cut(result, box, inner), pixels, where=hole[..., None])
+    return result
+
+
+def overlap(one: Box, other: Box) -> Box | None:
+    """The box that two boxes share; None where they share nothing."""
+    x0, y0 = max(one[0], other[0]), max(one[1], other[1])
+    x1, y1 = min(one[2], other[2]), min(one[3], other[3])
+    return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+
+
+def cut(image: np.ndarray, own: Box, box: Box) -> np.ndarray:
+    """The part `box` of an image that covers the box `own` around it; not a copy."""
+    return image[box[1] - own[1] : box[3] - own[1], box[0] - own[0] : box[2] - own[0]]

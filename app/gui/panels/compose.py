@@ -1,9 +1,208 @@
-"""The Compose tool's settings."""
+"""The Compose tool's settings: background, shadow, light, edge."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+
+from objectmorpher_core import compose
+from objectmorpher_core.joining import LEAST_FEATHER, MOST_FEATHER, MOST_SHADOW
+
+from ...commands import COMMANDS, run, why_not
+from ...commands.compose import not_moved, sentence
 from ...editor import Editor
+from ...job_functions import Variant
+from ...texts import t
+from ..dial import SIDE, dial
+from ..pictures import pictures
+from ..segments import segments
+from ..theme import RADIUS, theme
+from ..widgets import (
+    LABEL_WIDTH,
+    Change,
+    Number,
+    button,
+    checkbox,
+    heading,
+    note,
+    number_field,
+    rule,
+    tooltip,
+)
+
+INPAINTERS = {"auto": "Automatic", "patchmatch": "Patches", "telea": "Smooth"}
+REFINERS = {"none": "None", "harmonise": "Harmonise"}
+THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
+GAP = 8.0  # points
 
 
 def draw_compose(editor: Editor) -> None:
-    """In the inspector."""
+    if not editor.is_lifted:
+        note(t("Lift an object first."))
+        return
+    _draw_background(editor)
+    rule()
+    _draw_shadow(editor)
+    rule()
+    _draw_light(editor)
+    rule()
+    _draw_edge(editor)
+
+
+def _draw_background(editor: Editor) -> None:
+    heading(t("Background"))
+    is_bare = checkbox(t("Show it alone"), editor.view.compose.is_bare)
+    tooltip(t("Without the objects, to repair it by painting (B)"))
+    if is_bare != editor.view.compose.is_bare:
+        run(editor, "bare")
+    if (trouble := editor.composing.trouble) is not None:
+        note(trouble)
+    names = ["auto", *compose.BACKENDS]
+    labels = [t(INPAINTERS.get(name, name)) for name in names]
+    missing = [compose.missing(name) for name in names]
+    reasons = [None if m is None else sentence(m) for m in missing]
+    chosen = segments("inpainter", labels, names.index(editor.composing.inpainter), reasons)
+    if names[chosen] != editor.composing.inpainter:
+        editor.composing.choose_inpainter(names[chosen])
+    half = (imgui.get_content_region_avail().x / theme.scale - GAP) / 2
+    _command_button(editor, "fill_again", half)
+    imgui.same_line(0, theme.pt(GAP))
+    _command_button(editor, "variants", half)
+    _draw_variants(editor)
+    if is_bare and editor.document is not None and editor.document.plate is not None:
+        _draw_brush(editor)
+
+
+def _command_button(editor: Editor, name: str, width: float) -> None:
+    if button(t(COMMANDS[name].label), why_not=why_not(editor, name), width=width):
+        run(editor, name)
+
+
+def _draw_variants(editor: Editor) -> None:
+    """Thumbnails; the one that is shown has the accent's edge."""
+    variants = editor.composing.variants
+    if not variants:
+        return
+    room = imgui.get_content_region_avail().x
+    width = (room - (len(variants) - 1) * theme.pt(GAP)) / len(variants)
+    for k, variant in enumerate(variants):
+        if k:
+            imgui.same_line(0, theme.pt(GAP))
+        _draw_variant(editor, k, variant, ImVec2(width, width * THUMB_SHAPE))
+
+
+def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> None:
+    start, draw = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
+    end = ImVec2(start.x + size.x, start.y + size.y)
+    if imgui.invisible_button(f"##variant{k}", size):
+        editor.composing.choose_variant(variant)
+    is_hovered = imgui.is_item_hovered()
+    tooltip(t("Variant {number}", number=k + 1))
+    texture, zero, one = pictures.texture(variant.thumb), ImVec2(0, 0), ImVec2(1, 1)
+    white, corner = theme.u32("#FFFFFF"), theme.pt(RADIUS - 2)
+    draw.add_image_rounded(texture, start, end, zero, one, white, corner)
+    is_chosen = editor.document is not None and editor.document.plate is variant.plate
+    if is_chosen or is_hovered:
+        role = "accent" if is_chosen else "secondary"
+        draw.add_rect(start, end, theme.u32(role), corner, theme.pt(2))
+
+
+def _draw_brush(editor: Editor) -> None:
+    brush = editor.view.brush
+    size = Number(t("Brush"), "%.0f px", 0.5, 4.0, rest=40.0, low=1.0, high=4000.0)
+    change = number_field(size, 2 * brush.radius)
+    if change.is_changed:
+        editor.view.brush = replace(brush, radius=change.value / 2)
+    hardness = Number(t("Hardness"), "%.0f %%", 0.5, 10.0, rest=80.0, low=0.0, high=100.0)
+    change = number_field(hardness, 100 * brush.hardness)
+    if change.is_changed:
+        editor.view.brush = replace(editor.view.brush, hardness=change.value / 100)
+    note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
+
+
+def _draw_shadow(editor: Editor) -> None:
+    heading(t("Shadow"))
+    if (reason := not_moved(editor)) is not None:
+        note(f"{reason}.")
+        return
+    assert editor.object is not None
+    shadow, preview = editor.object.shadow, editor.composing.preview_shadow
+    number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
+    change = number_field(number, 100 * shadow.strength)
+    changed = replace(shadow, strength=change.value / 100)
+    _take(editor, change, lambda: preview(changed), t("Shadow's strength"))
+    if shadow.strength == 0 and not change.is_changed:
+        note(t("Strength adds a shadow on the ground."))
+        return
+    shares = (
+        (Number(t("Length"), "%.2f x", 0.005, 0.1, 0.6, 0.0, MOST_SHADOW), "length", 1.0),
+        (Number(t("Softness"), "%.0f %%", 0.5, 5.0, 40.0, 0.0, 100.0), "softness", 100.0),
+        (Number(t("Contact"), "%.0f %%", 0.5, 5.0, 70.0, 0.0, 100.0), "contact", 100.0),
+    )
+    for number, name, unit in shares:
+        change = number_field(number, unit * getattr(shadow, name))
+        changed = replace(shadow, **{name: change.value / unit})
+        _take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
+    _draw_direction(editor)
+
+
+def _draw_direction(editor: Editor) -> None:
+    """Name, dial, and the number beside it."""
+    assert editor.object is not None
+    shadow, top = editor.object.shadow, imgui.get_cursor_pos_y()
+    drop = theme.pt((SIDE - 28) / 2)
+    imgui.set_cursor_pos_y(top + drop)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), t("Falls to"))
+    imgui.same_line(theme.pt(LABEL_WIDTH))
+    imgui.set_cursor_pos_y(top)
+    change = dial("direction", shadow.direction, t("Where the shadow falls; Shift: steps of 15°"))
+    changed = replace(shadow, direction=change.value)
+    _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
+    imgui.same_line(0, theme.pt(12))
+    imgui.set_cursor_pos_y(top + drop)
+    imgui.align_text_to_frame_padding()
+    imgui.text_unformatted(f"{change.value:.0f}°")
+    imgui.set_cursor_pos_y(top + theme.pt(SIDE + 4))
+    imgui.dummy(ImVec2(0, 0))
+
+
+def _draw_light(editor: Editor) -> None:
+    heading(t("Light"))
+    if (reason := not_moved(editor)) is not None:
+        note(f"{reason}.")
+        return
+    assert editor.object is not None
+    names = list(compose.REFINERS)
+    labels = [t(REFINERS.get(name, name)) for name in names]
+    chosen = segments("refiner", labels, names.index(editor.composing.refiner))
+    editor.composing.choose_refiner(names[chosen])
+    harmony = editor.object.harmony
+    if harmony == 0:
+        note(t("Harmonise gives the object the light of its new place."))
+        return
+    number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, 80.0, 1.0, 100.0)
+    change = number_field(number, 100 * harmony)
+    strength = change.value / 100
+    preview = editor.composing.preview_harmony
+    _take(editor, change, lambda: preview(strength), t("Adjust light"))
+
+
+def _draw_edge(editor: Editor) -> None:
+    heading(t("Edge"))
+    assert editor.document is not None
+    number = Number(t("Blend"), "%.2f x", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
+    change = number_field(number, editor.document.feather)
+    preview = editor.composing.preview_feather
+    _take(editor, change, lambda: preview(change.value), t("Blend of edge"))
+    note(t("How wide the edit fades into the photo."))
+
+
+def _take(editor: Editor, change: Change, preview: Callable[[], None], label: str) -> None:
+    """Shows a change, and makes it a step when it is complete."""
+    if change.is_changed:
+        preview()
+    if change.is_done:
+        editor.commit(label)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from app.derived import Derived
 from app.render.scene import Scene, SplatObject
 from app.view import View
+from objectmorpher_core import edits
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.plate import plate_cover
 from objectmorpher_core.document import Placement
+from objectmorpher_core.joining import Shadow
+from objectmorpher_core.pipeline import make_plate
 from tests import shapes
 from tests.app.render.pictures import specified
 
@@ -108,3 +116,35 @@ def test_a_canvas_without_pixels_is_no_error(renderer):
     view.width = 0
     renderer.draw(_scene(_object((10.0, 20.0, 0.0))), view, (0, 0, 0, SIZE[1]))
     assert renderer.kind == "gl"
+
+
+@pytest.mark.parametrize("kind", ["tiles", "gl"])
+def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
+    scene = shapes.scene("ellipse", 800)
+    document = scene.document()
+    dark = document.photo.pixels.copy()
+    dark[:, 95:] //= 2
+    picture = replace(document.photo.picture, pixels=dark)
+    document = replace(document, photo=replace(document.photo, picture=picture))
+    document = edits.set_plate(document, make_plate(dark, plate_cover(document), "telea"))
+    document = edits.set_placement(document, 0, Placement(move=(30.0, -8.0), scale=0.8))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
+    document = edits.set_feather(edits.set_harmony(document, 0, 1.0), 1.5)
+    derived, view = Derived(), _view()
+    derived.layers.frame_time = np.inf
+    view.set_zoom(1.0, (80, 60), SIZE)
+    view.left = view.top = 0.0
+    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
+    splats, gain = derived.posed(document, 0), derived.lights.of(document, 0).gain
+    item = SplatObject(splats, scene.texture, scene.camera, gain=gain)
+    objects = (item,) if kind == "gl" else ()
+    shown = Scene(
+        document.photo.pixels, (0.0, 0.0, 0.0), document.plate,
+        derived.lights.layers(document, view), layers, objects, blend=derived.blend(document, view),
+    )  # fmt: skip
+    window = _window_picture(renderer, shown, view)
+    exported = composite(document).pixels.astype(np.float32) / 255
+    plain = composite(edits.set_shadow(document, 0, Shadow())).pixels.astype(np.float32) / 255
+    assert np.abs(plain - exported).max() > 0.1  # there is a shadow
+    assert max(gain) < 1  # and another light
+    assert np.abs(window - exported).mean() <= PIXEL

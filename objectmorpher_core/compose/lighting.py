@@ -1,0 +1,73 @@
+"""Shadow and light of a moved object, from the document alone: the same for window and export."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..arrays import F32
+from ..document import Document, EditObject, Matte
+from ..raster.posed import PosedSplats
+from ..raster.texture import TextureLevels, build_levels
+from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
+from .shadow import Shade, cast
+from .silhouette import silhouette, sketch
+
+
+@dataclass(frozen=True, eq=False)
+class Lit:
+    """What is done to an object's colours, and the shadow that it throws."""
+
+    gain: Gain = NEUTRAL
+    shade: Shade | None = None
+
+
+NOTHING = Lit()
+
+
+def object_texture(matte: Matte) -> TextureLevels:
+    """What the object's Gaussians carry: straight colour and alpha on the matte's crop."""
+    return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+
+
+class Lighting:
+    """Of one photo with its plate; what several objects share is computed once."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+
+    @cached_property
+    def light(self) -> F32:
+        """The background's light, see `harmonize.light_map`."""
+        return light_map(self._document)
+
+    def of(
+        self,
+        item: EditObject,
+        splats: PosedSplats,
+        rest: Callable[[], PosedSplats],
+        texture: TextureLevels | None = None,
+        is_sketch: bool = False,
+    ) -> Lit:
+        """Of a moved object whose Gaussians are `splats` now and were at `rest`.
+
+        `is_sketch`: the shadow is a coarse one, in the time that a frame of a drag has.
+        """
+        has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
+        if not item.is_visible or not (has_shadow or has_light):
+            return NOTHING
+        assert item.matte is not None, "a lifted object has a matte"
+        camera = self._document.photo.camera
+        shade, gain = None, NEUTRAL
+        if has_shadow:
+            if is_sketch:
+                shape = sketch(splats, camera)
+            else:
+                shape = silhouette(splats, texture or object_texture(item.matte), camera)
+            shade = None if shape is None else cast(item.shadow, shape)
+        if has_light:
+            before, now = sketch(rest(), camera), sketch(splats, camera)
+            if before is not None and now is not None:
+                gain = at_strength(light_gain(self.light, camera.width, before, now), item.harmony)
+        return Lit(gain, shade)

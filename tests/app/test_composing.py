@@ -1,0 +1,172 @@
+"""The Compose tool's intentions: backgrounds, repairs, shadow, light, edge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import wait_for_jobs, wait_until
+
+from app.commands import COMMANDS, run
+from app.editor import Editor
+from app.tools.compose_tool import ComposeTool
+from app.tools.pointer import Button, Pointer
+from app.view import ToolName
+from objectmorpher_core import edits
+from objectmorpher_core.compose.plate import plate_picture
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.joining import Shadow
+
+
+@pytest.fixture
+def bare(editor: Editor, ball: Document) -> Editor:
+    """The ball's background, shown alone."""
+    editor.start(ball)
+    editor.view.tool = ToolName.COMPOSE
+    editor.view.compose.is_bare = True
+    return editor
+
+
+@pytest.fixture(autouse=True)
+def clean(shared_editor: Editor):
+    yield
+    shared_editor.view.compose.is_bare = False
+
+
+def paint(editor: Editor, *places: tuple[float, float], alt: bool = False) -> None:
+    """A stroke of the Compose tool, image px."""
+    at = [editor.view.canvas_from_image(np.array(p)) for p in places]
+    pointer = Pointer(*at[0], button=Button.LEFT, is_down=True, alt=alt)
+    editor.hand.press(ComposeTool().press(editor, pointer), Button.LEFT)
+    for xy in at:
+        editor.hand.move(Pointer(*xy, is_down=True, alt=alt))
+    editor.hand.move(Pointer(*at[-1], is_down=False, alt=alt))
+
+
+def wait_for_repairs(editor: Editor) -> None:
+    wait_until(editor, lambda: not editor.composing.is_repairing)
+
+
+def test_a_stroke_is_one_step_and_undone_as_one(bare: Editor, ball: Document) -> None:
+    before = plate_picture(ball)
+    paint(bare, (20, 20), (60, 24))
+    assert bare.composing.painted_layer() is not None  # until the answer comes
+    wait_for_repairs(bare)
+    assert bare.history is not None and bare.document is not None
+    assert bare.history.undo_label == "Repair background"
+    assert bare.composing.painted_layer() is None
+    assert (plate_picture(bare.document) != before).any()
+    bare.undo()
+    assert bare.document is ball
+
+
+def test_strokes_in_a_row_are_all_filled_in(bare: Editor, ball: Document) -> None:
+    for y in (15, 40, 120):
+        paint(bare, (12, y), (30, y))
+    wait_for_repairs(bare)
+    assert bare.document is not None and bare.document.plate is not None
+    plate, (left, top) = bare.document.plate, (0, 0)
+    left, top = plate.left, plate.top
+    assert plate.painted is not None
+    for y in (15, 40, 120):
+        assert plate.painted[y - top, 20 - left]
+    for _ in range(3):
+        bare.undo()
+    assert bare.document is ball
+
+
+def test_alt_brings_the_photo_back_at_once(bare: Editor, ball: Document) -> None:
+    paint(bare, (20, 20), (40, 20))
+    wait_for_repairs(bare)
+    paint(bare, (20, 20), (40, 20), alt=True)
+    assert bare.history is not None and bare.document is not None
+    assert bare.history.undo_label == "Restore background"
+    photo = bare.document.photo.pixels
+    assert np.array_equal(plate_picture(bare.document)[20, 20:40], photo[20, 20:40])
+
+
+def test_escape_takes_a_stroke_back(bare: Editor, ball: Document) -> None:
+    pointer = Pointer(*bare.view.canvas_from_image(np.array([20, 20])), button=Button.LEFT)
+    bare.hand.press(ComposeTool().press(bare, pointer), Button.LEFT)
+    assert bare.composing.painted_layer() is not None
+    bare.escape()
+    assert bare.composing.painted_layer() is None
+    assert bare.document is ball and not bare.jobs.is_busy("repair")
+
+
+def test_an_answer_for_another_background_is_dropped(bare: Editor, ball: Document) -> None:
+    paint(bare, (20, 20), (60, 24))
+    other = edits.set_plate(ball, None)
+    assert bare.history is not None
+    bare.apply("Other", other)
+    wait_for_repairs(bare)
+    assert bare.history.undo_label == "Other"
+
+
+def test_painting_needs_the_background(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.COMPOSE
+    paint(editor, (20, 20), (60, 24))
+    assert editor.document is ball
+    assert editor.message is not None and "alone" in editor.message.text
+
+
+def test_filling_again_is_a_step_of_its_own(bare: Editor, ball: Document) -> None:
+    assert ball.plate is not None
+    run(bare, "fill_again")
+    wait_until(bare, lambda: bare.document is not ball)
+    assert bare.document is not None and bare.document.plate is not None
+    assert bare.document.plate.seed == ball.plate.seed + 1
+    bare.undo()
+    assert bare.document is ball
+    wait_for_jobs(bare)
+
+
+def test_variants_can_be_looked_at_and_chosen(bare: Editor, ball: Document) -> None:
+    run(bare, "variants")
+    wait_until(bare, lambda: bool(bare.composing.variants))
+    variants = bare.composing.variants
+    assert len({v.plate.seed for v in variants}) == len(variants) == 3
+    bare.composing.choose_variant(variants[1])
+    assert bare.document is not None and bare.document.plate is variants[1].plate
+    bare.undo()
+    assert bare.document is ball
+
+
+def test_a_way_of_filling_without_chance_offers_no_variants(bare: Editor) -> None:
+    bare.composing.choose_inpainter("telea")
+    reason = COMMANDS["variants"].why_not(bare)
+    bare.composing.choose_inpainter("auto")
+    assert reason == "This way of filling gives the same every time"
+    assert COMMANDS["variants"].why_not(bare) is None
+
+
+def test_shadow_and_light_are_for_what_has_moved(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    assert COMMANDS["shadow"].why_not(editor) == "Move the object first"
+    editor.start(edits.set_placement(ball, 0, Placement(move=(20.0, 5.0))))
+    run(editor, "shadow")
+    assert editor.object is not None and editor.object.shadow.strength > 0
+    editor.composing.choose_refiner("harmonise")
+    assert editor.object.harmony > 0
+    editor.composing.preview_feather(2.0)
+    editor.composing.preview_feather(2.5)
+    editor.commit("Blend of edge")
+    assert editor.document is not None and editor.document.feather == 2.5
+    for _ in range(3):
+        editor.undo()
+    assert editor.object.shadow == Shadow() and editor.object.harmony == 0
+
+
+def test_a_dragged_shadow_is_coarse_until_the_pointer_rests(editor: Editor, ball: Document) -> None:
+    lights = editor.derived.lights
+    document = edits.set_placement(ball, 0, Placement(move=(20.0, 5.0)))
+    document = edits.set_shadow(document, 0, Shadow(strength=0.6))
+    sketched = lights.of(document, 0).shade
+    assert lights.is_waiting and editor.derived.layers.is_waiting
+    wait_until(editor, lambda: lights.of(document, 0).shade is not sketched)
+    assert not lights.is_waiting
+    exact = lights.of(document, 0).shade
+    assert exact is not None and sketched is not None
+    assert exact.pitch < sketched.pitch
+    for a, b in zip(exact.bounds, sketched.bounds, strict=True):
+        assert abs(a - b) < 20
