@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,17 +15,31 @@ from conftest import CENTRE, open_file, wait_for_jobs, wait_until
 
 from app.editor import Editor
 from app.jobs import Jobs
+from app.settings import Backends
 
 FRAME = 0.05  # s that a look at what has come in may take, while a large photo is opened
 MEGAPIXELS = (6000, 4000)
+
+
+@pytest.fixture
+def editor(shared_editor: Editor, photo_path: Path) -> Iterator[Editor]:
+    """With the made photo open, and the segmenter that reads a photo at once."""
+    settings = shared_editor.settings
+    shared_editor.close_document()
+    shared_editor.settings = replace(settings, backends=Backends(segment="grabcut"))
+    open_file(shared_editor, photo_path)
+    yield shared_editor
+    shared_editor.settings = replace(shared_editor.settings, backends=settings.backends)
+
+
+def wait_for_file(editor: Editor) -> None:
+    wait_until(editor, lambda: editor.background.is_idle)
 
 
 def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_path: Path) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (500, 750, 3), dtype=np.uint8)
     path = tmp_path / "large.jpg"
     cv2.imwrite(str(path), cv2.resize(noise, MEGAPIXELS, interpolation=cv2.INTER_NEAREST))
-    editor.jobs.cancel()
-    wait_until(editor, lambda: editor.jobs.is_idle)
     editor.filing.open(path)
     longest = count = 0.0
     while editor.background.is_busy("open"):
@@ -43,7 +59,7 @@ def test_what_was_asked_last_is_opened(editor: Editor, tmp_path: Path, photo_byt
     other.write_bytes(photo_bytes)
     for path in (tmp_path / "ball.png", other, tmp_path / "ball.png", other):
         editor.filing.open(path)
-    wait_for_jobs(editor)
+    wait_for_file(editor)
     assert editor.source == other
 
 
@@ -69,7 +85,7 @@ def test_what_is_done_while_a_file_is_read_is_asked_about(
 def test_closing_forgets_the_file_that_is_read(editor: Editor, photo_path: Path) -> None:
     editor.filing.open(photo_path)
     editor.close_document()
-    wait_for_jobs(editor)
+    wait_for_file(editor)
     assert editor.document is None
 
 
@@ -80,7 +96,7 @@ def test_of_several_dropped_files_the_first_photo_is_opened(
     for name in names:
         (tmp_path / name).write_bytes(photo_bytes)
     editor.filing.drop([tmp_path / name for name in names])
-    wait_for_jobs(editor)
+    wait_for_file(editor)
     assert editor.source == tmp_path / "second.png"
     assert editor.message is not None
     assert editor.message.text == "Opened second.png; not opened: notes.txt, cat.ply, third.png"
@@ -109,7 +125,7 @@ def test_what_cannot_be_opened_is_one_sentence(editor: Editor, tmp_path: Path, n
     make(tmp_path / name)
     document = editor.document
     editor.filing.drop([tmp_path / name])
-    wait_for_jobs(editor)
+    wait_for_file(editor)
     assert editor.document is document
     assert editor.message is not None and editor.message.is_error
     assert name in editor.message.text.lower()
@@ -151,7 +167,7 @@ def kill_worker(jobs: Jobs) -> None:
 def test_a_sample_is_nobodys_file(editor: Editor, photo_path: Path) -> None:
     settings = editor.settings
     editor.filing.open_sample(photo_path)
-    wait_for_jobs(editor)
+    wait_for_file(editor)
     assert editor.source is None
     assert editor.settings is settings
     open_file(editor, photo_path)
