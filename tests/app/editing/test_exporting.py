@@ -192,6 +192,20 @@ def test_the_last_choice_is_remembered(moved: Editor) -> None:
     moved.exporting.close()
 
 
+@pytest.mark.parametrize("name", ["/", "..", "~", "~nobody/x", "x" * 300, "a/b", ".", "\0"])
+def test_no_name_that_is_typed_breaks_anything(editor: Editor, name: str) -> None:
+    exporting = editor.exporting
+    exporting.open()
+    for what in (What.PHOTO, What.LAYERS):
+        exporting.choose_what(what)
+        exporting.set_name(name)
+        assert exporting.label
+        assert exporting.problem is None or "\n" not in exporting.problem
+        exporting.choose_format(exporting.formats[-1])
+        assert exporting.draft is not None
+    exporting.close()
+
+
 def test_what_is_not_there_cannot_be_chosen(editor: Editor) -> None:
     editor.exporting.open()
     assert editor.exporting.why_not(What.PHOTO) is None
