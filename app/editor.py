@@ -144,6 +144,7 @@ class Editor:
         self.hand.abort(self)
         self.jobs.cancel(patience=RELUCTANCE)
         self.background.cancel(OPEN)
+        self.exporting.close()
         self.tasks.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
