@@ -77,6 +77,7 @@ class Autosave:
         self._editor = editor
         self._asked: Document | None = None  # last one given to the thread
         self._asked_at = -INTERVAL  # s, monotonic
+        self._is_kept = False  # the folder holds something, or soon will
         self._held: Held | None = None  # the thread's own
         self._orders: queue.SimpleQueue[tuple[Document, About] | Held | str | None]
         self._orders = queue.SimpleQueue()
@@ -91,25 +92,28 @@ class Autosave:
         if self._problem is not None:
             self._tell(self._problem)
         if document is None or editor.is_saved:
-            if self._asked is not None:
-                self._asked = None
+            if self._is_kept:
+                self._asked, self._is_kept = None, False
                 self._order(None)
             return
         now = time.monotonic()
         is_early = now - self._asked_at < INTERVAL
         if document is self._asked or self._given > self._done or is_early:
             return
-        self._asked, self._asked_at = document, now
+        self._asked, self._asked_at, self._is_kept = document, now, True
         self._order((document, self._about(document)))
 
     @property
     def is_up_to_date(self) -> bool:
         """Whether the disk holds what is unsaved, and nothing else of this editor."""
-        wanted = None if self._editor.is_saved else self._editor.committed
-        return self._asked is wanted and self._given == self._done
+        is_asked = (
+            not self._is_kept if self._editor.is_saved else self._asked is self._editor.committed
+        )
+        return is_asked and self._given == self._done
 
     def adopt(self, held: Held) -> None:
         """Goes on in the folder of an editor that crashed, whose document is open now."""
+        self._is_kept = True
         self._order(held)
 
     def close(self) -> None:

@@ -37,7 +37,7 @@ from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
 from .history import History
 from .job_functions import WARM
-from .jobs import JobError, Jobs
+from .jobs import RELUCTANCE, JobError, Jobs
 from .recovery import Recovery
 from .settings import Settings
 from .tasks import SELECT, Tasks
@@ -152,8 +152,9 @@ class Editor:
 
     def close_document(self) -> None:
         self.hand.abort(self)
-        self.jobs.cancel()
+        self.jobs.cancel(patience=RELUCTANCE)
         self.background.cancel(OPEN)
+        self.exporting.close()
         self.tasks.forget()
         self.composing.forget()
         self.history = self.preview = self.path = self.source = None

@@ -2,13 +2,14 @@
 
 The window starts a job and goes on; `poll` delivers the answer on the main thread. A job function
 takes plain values and a keyword `progress`, and knows nothing of this module. Of one kind only the
-newest request counts. Cancelling asks first and ends the process after `PATIENCE`.
+newest request counts. Cancelling asks first and ends the process a little later.
 """
 
 from __future__ import annotations
 
 import importlib
 import logging
+import math
 import multiprocessing
 import os
 import queue
@@ -26,7 +27,8 @@ from .wire import Reader, Writer
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 0.35  # s between asking a job to stop and ending its process
+PATIENCE = 0.35  # s between asking a job to stop and ending its process: the user waits
+RELUCTANCE = 2.0  # s, where nobody waits: a new process has to read the photo again
 TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
 
@@ -62,6 +64,7 @@ class Job:
     note: str = ""
     started: float = 0.0  # s, monotonic
     stop_asked: float | None = None  # s, monotonic
+    ends_at: float = math.inf  # s, monotonic; not stopped by then, its process is ended
     number: int = 0
     is_quiet: bool = False
     is_spare: bool = False
@@ -164,7 +167,7 @@ class Jobs:
         if current is not None and (
             current.kind == job.kind or (current.is_spare and not job.is_spare)
         ):
-            self._ask_to_stop(current)
+            self._ask_to_stop(current, RELUCTANCE)
         self._send_next()
 
     def promote(self, kind: str, wanted: str) -> bool:
@@ -181,7 +184,7 @@ class Jobs:
     def _again(self, job: Job) -> None:
         """The request of a job that failed, once more."""
         self._count += 1
-        self._wait_for(replace(job, number=self._count, fraction=0.0, note="", stop_asked=None))
+        self._wait_for(replace(job, number=self._count, fraction=0.0, note=""))
 
     def is_busy(self, kind: str) -> bool:
         """Whether a request of this kind waits or runs."""
@@ -193,13 +196,13 @@ class Jobs:
     def is_idle(self) -> bool:
         return self.current is None and not self._waiting
 
-    def cancel(self, kind: str | None = None) -> None:
-        """Stops the running and waiting requests of a kind, or all."""
+    def cancel(self, kind: str | None = None, patience: float = PATIENCE) -> None:
+        """Stops the running and waiting requests of a kind, or all, within `patience` s."""
         for job in [j for j in self._waiting.values() if kind in (None, j.kind)]:
             del self._waiting[job.kind]
             job.cancelled()
         if self.current is not None and kind in (None, self.current.kind):
-            self._ask_to_stop(self.current)
+            self._ask_to_stop(self.current, patience)
 
     def poll(self) -> bool:
         """Delivers answers; once a frame, on the main thread. Whether anything changed."""
@@ -208,7 +211,7 @@ class Jobs:
             self._take(*self._worker.answers.get())
             is_changed = True
         job = self.current
-        if job and job.stop_asked is not None and time.monotonic() - job.stop_asked > PATIENCE:
+        if job and time.monotonic() > job.ends_at:
             log.info("%s did not stop when asked; restarting the worker", job.title)
             self._restart()
             self._finish(job, job.cancelled)
@@ -221,9 +224,11 @@ class Jobs:
         if self._worker is not None:
             self._worker.close()
 
-    def _ask_to_stop(self, job: Job) -> None:
+    def _ask_to_stop(self, job: Job, patience: float) -> None:
+        now = time.monotonic()
+        job.ends_at = min(job.ends_at, now + patience)
         if job.stop_asked is None and self._worker is not None:
-            job.stop_asked = time.monotonic()
+            job.stop_asked = now
             self._worker.stop.value = 1
 
     def _send_next(self) -> None:

@@ -132,7 +132,7 @@ def _left_in(folder: Path) -> Left | None:
         )  # fmt: skip
     except (SessionError, KeyError, TypeError, ValueError) as error:
         log.warning("%s cannot be recovered: %s", folder, error)
-        return Left(folder, problem=t("An unsaved edit is there but too damaged to be recovered"))
+        return Left(folder, problem=t("It is damaged and cannot be recovered"))
 
 
 def when(edited: datetime | None) -> str:

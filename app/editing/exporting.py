@@ -75,7 +75,8 @@ class Exporting:
 
     def choose_format(self, format: Format) -> None:
         draft = self._draft
-        name = str(Path(draft.name).with_suffix(format.endings[0])) if draft.name else ""
+        typed = Path(draft.name)
+        name = str(typed.with_suffix(format.endings[0])) if typed.name else draft.name
         self._change(replace(draft, format=format, name=name))
 
     def choose_bits(self, bits: int) -> None:
@@ -136,8 +137,9 @@ class Exporting:
     def path(self) -> Path:
         """The file, or the layers' folder."""
         draft = self._draft
-        typed = draft.folder / Path(draft.name.strip()).expanduser()
-        if draft.what is What.LAYERS or format_of(typed.suffix) is not None:
+        name = Path(draft.name.strip())
+        typed = draft.folder / (name.expanduser() if name.parts[:1] == ("~",) else name)
+        if draft.what is What.LAYERS or not typed.name or format_of(typed.suffix) is not None:
             return typed
         return typed.with_name(typed.name + draft.format.endings[0])
 
@@ -166,13 +168,10 @@ class Exporting:
         if draft.what is not What.LAYERS and _is_other_kind(ending, FORMATS[draft.what]):
             known = ", ".join(f.value for f in FORMATS[draft.what])
             return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
-        if not path.parent.is_dir():
-            return t("There is no folder {folder}", folder=path.parent)
-        if self._is_opened(path):
-            return t("The export would overwrite the opened photo; choose another name")
-        if draft.what is not What.LAYERS and path.is_dir():
-            return t("{name} is a folder", name=path.name)
-        return None
+        try:
+            return self._cannot_be_there(path)
+        except (OSError, RuntimeError, ValueError):  # a name that no disk can hold
+            return t("This is no name for a file")
 
     def confirm(self) -> None:
         """Exports; asks once more where that replaces a file."""
@@ -224,6 +223,15 @@ class Exporting:
         stem = Path(document.photo.name).stem if document is not None else "photo"
         ending = "" if draft.what is What.LAYERS else draft.format.endings[0]
         return replace(draft, name=f"{stem}-{NAMES[draft.what]}{ending}")
+
+    def _cannot_be_there(self, path: Path) -> str | None:
+        """Why nothing can be written to `path`, or None."""
+        if not path.parent.is_dir():
+            return t("There is no folder {folder}", folder=path.parent)
+        if self._is_opened(path):
+            return t("The export would overwrite the opened photo; choose another name")
+        is_folder = path.is_dir() and (not path.name or self._draft.what is not What.LAYERS)
+        return t("{name} is a folder", name=path.name or path) if is_folder else None
 
     def _is_opened(self, path: Path) -> bool:
         source = self._editor.source

@@ -33,17 +33,20 @@ ABOUT = {
 
 def draw_export(editor: Editor) -> None:
     """While the editor has an export to decide on."""
-    exporting = editor.exporting
-    if exporting.draft is None:
+    exporting, title = editor.exporting, t("Export")
+    if exporting.draft is None and not imgui.is_popup_open(title):
         return
-    with popup(t("Export"), WIDTH) as is_shown:
-        if is_shown:
+    with popup(title, WIDTH) as is_shown:
+        if not is_shown:
+            return
+        if exporting.draft is not None:
             _draw_what(exporting)
             _draw_how(exporting)
             is_entered = _draw_where(editor)
             _draw_foot(exporting, is_entered)
-            if exporting.draft is None or editor.filing.wanted is not None:
-                imgui.close_current_popup()
+        # Its document may also have been closed, by a file that was dropped on the window.
+        if exporting.draft is None or editor.filing.wanted is not None:
+            imgui.close_current_popup()
 
 
 def _draw_what(exporting: Exporting) -> None:

@@ -8,10 +8,11 @@ from ..editor import Editor
 from ..recovery import Left, when
 from ..texts import t
 from .theme import FIELD, Icon, theme
-from .widgets import button
+from .widgets import button, small_text
 
-ROW = 48.0  # points
+ROW = 56.0  # points
 MOST = 3  # shown at a time
+LONGEST = 40  # letters of a name
 GAP = 12.0
 RECOVER, DISCARD = 96.0, 88.0  # widths of the buttons
 
@@ -39,7 +40,13 @@ def _draw_left(editor: Editor, left: Left, width: float) -> None:
     draw.add_rect(low, high, theme.u32("line"), theme.pt(8))
     middle = low.y + (theme.pt(ROW) - imgui.get_font_size()) / 2
     draw.add_text(ImVec2(low.x + theme.pt(16), middle), theme.u32("warning"), Icon.WARNING)
-    draw.add_text(ImVec2(low.x + theme.pt(44), middle), theme.u32("text"), _sentence(left))
+    end = ImVec2(high.x - theme.pt(RECOVER + DISCARD + 28), high.y)
+    draw.push_clip_rect(low, end, True)
+    draw.add_text(ImVec2(low.x + theme.pt(44), low.y + theme.pt(9)), theme.u32("text"), _name(left))
+    with small_text():
+        at = ImVec2(low.x + theme.pt(44), low.y + theme.pt(30))
+        draw.add_text(at, theme.u32("secondary"), _facts(left))
+    draw.pop_clip_rect()
     imgui.push_id(str(left.folder))
     top = low.y + theme.pt((ROW - FIELD) / 2)
     imgui.set_cursor_screen_pos(ImVec2(high.x - theme.pt(DISCARD + 12), top))
@@ -54,9 +61,17 @@ def _draw_left(editor: Editor, left: Left, width: float) -> None:
     imgui.dummy(ImVec2(width, 0))
 
 
-def _sentence(left: Left) -> str:
+def _name(left: Left) -> str:
+    """Which photo's."""
+    if not left.name:
+        return t("Unsaved work")
+    name = left.name if len(left.name) <= LONGEST else f"{left.name[: LONGEST - 1]}…"
+    return t("Unsaved work on {name}", name=name)
+
+
+def _facts(left: Left) -> str:
+    """When it was edited and what is in it, or why it is lost."""
     if left.problem:
         return left.problem
     count = t("1 object") if left.objects == 1 else t("{count} objects", count=left.objects)
-    return t("Unsaved work on {name}, edited {time} ({objects})", name=left.name,
-             time=when(left.edited), objects=count)  # fmt: skip
+    return t("Edited {time}, {objects}", time=when(left.edited), objects=count)

@@ -163,13 +163,16 @@ class Window:
         return self.editor.is_over
 
     def _open_first(self) -> None:
-        """What takes a second to import waits until the window has been drawn."""
+        """What takes a second to import waits until the window has been drawn, and not for it."""
         if self._options.file is not None:
             self.editor.filing.open(self._options.file)
         if self._options.frames is None:
             self.editor.recovery.look()
             self.editor.models.look()
-            warm_up()
+            self.editor.background.start(
+                "Getting ready", lambda progress: warm_up(), kind="warm up",
+                done=lambda _: None, failed=self.editor.complain_of, is_quiet=True,
+            )  # fmt: skip
         while self._options.frames is not None and not self.editor.background.is_idle:
             self.editor.poll()
             time.sleep(SOON)

@@ -132,7 +132,16 @@ def display() -> Iterator[str]:
     for number in range(90, 140):
         if Path(f"/tmp/.X11-unix/X{number}").exists() or Path(f"/tmp/.X{number}-lock").exists():
             continue
-        command = ["Xvfb", f":{number}", "-screen", "0", "1440x900x24", "-nolisten", "tcp"]
+        command = [
+            "Xvfb",
+            f":{number}",
+            "-screen",
+            "0",
+            "1440x900x24",
+            "-nolisten",
+            "tcp",
+            "-noreset",
+        ]
         server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
         for _ in range(100):
             time.sleep(0.05)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app import history
 from app.history import History
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, Photo
+from objectmorpher_core.document import Document, EditObject, Matte, Photo
 from objectmorpher_core.image import Picture
 
 
@@ -92,3 +94,72 @@ def test_the_list_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in range(9):
         past.undo()
     assert past.document is documents[2]
+
+
+def heavy(base: Document, megabytes: int) -> Document:
+    """A document with an array of its own."""
+    alpha = np.zeros((1024 * megabytes, 256), np.float32)
+    matte = Matte(0, 0, alpha, np.zeros((0, 0, 3), np.float32))
+    return replace(base, objects=(EditObject("Object 1", matte=matte),))
+
+
+def test_old_steps_go_when_what_they_alone_hold_is_too_large() -> None:
+    base = document()
+    past = History(base, limit=10 << 20)
+    for n in range(8):
+        past.apply(f"Step {n}", heavy(base, 3))
+    assert past.old_bytes <= 10 << 20
+    assert past.steps == tuple(f"Step {n}" for n in range(4, 8))
+    shown = past.document
+    for _ in range(9):
+        past.undo()
+    assert (past.cursor, past.undo_label) == (0, None)
+    for _ in range(9):
+        past.redo()
+    assert past.document is shown
+
+
+def test_what_documents_share_counts_once() -> None:
+    base = heavy(document(), 8)
+    past = History(base, limit=1 << 20)
+    for n in range(50):
+        past.apply(f"Step {n}", replace(base, seed=n + 1))
+    assert len(past.steps) == 51
+    assert past.old_bytes == 0
+
+
+def test_the_shown_step_stays_however_large() -> None:
+    base = document()
+    past = History(base, limit=0)
+    past.apply("One", heavy(base, 2))
+    past.apply("Two", heavy(base, 3))
+    assert past.steps == ("Two",)
+    past.amend(heavy(base, 4))
+    assert past.steps == ("Two",)
+
+
+def test_forgotten_steps_free_their_memory() -> None:
+    past = History(heavy(document(), 1))
+    past.apply("One", heavy(document(), 2))
+    past.undo()
+    past.apply("Other", document())
+    assert (2 << 20) not in past._memory.values()
+    assert past.old_bytes < 2 << 20
+
+
+def test_jumping_shows_any_step_and_stops_at_the_ends() -> None:
+    steps = [document() for _ in range(4)]
+    past = History(steps[0])
+    for n, step in enumerate(steps[1:]):
+        past.apply(str(n), step)
+    assert past.steps == ("Open", "0", "1", "2")
+    for index, expected in ((1, 1), (3, 3), (-5, 0), (99, 3)):
+        past.jump(index)
+        assert past.document is steps[expected]
+        assert past.cursor == expected
+
+
+def test_what_no_file_holds_is_unsaved() -> None:
+    past = History(document())
+    past.mark_unsaved()
+    assert not past.is_saved

@@ -123,14 +123,49 @@ def test_a_crash_is_a_failure_and_the_next_job_runs() -> None:
     jobs.close()
 
 
-def test_a_job_that_does_not_listen_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.jobs.PATIENCE", 0.2)
+def test_what_crashed_can_be_asked_for_again() -> None:
     jobs = Jobs()
     log = Log()
+    start(jobs, log, job_functions.wait, 0.3)
+    run_until(jobs, lambda: jobs.current is not None and jobs.current.fraction > 0)
+    assert jobs._worker is not None
+    jobs._worker.process.kill()
+    run_until(jobs, lambda: bool(log.errors))
+    retry = log.errors[0].retry
+    assert retry is not None
+    retry()
+    run_until(jobs, lambda: bool(log.answers))
+    assert log.answers == ["waited"]
+    jobs.close()
+
+
+def test_a_worker_that_cannot_live_is_not_started_without_end() -> None:
+    restarts: list[int] = []
+    jobs = Jobs(warm=("no_such_module",))
+    jobs.restarted = lambda: restarts.append(1)
+    run_until(jobs, lambda: jobs._worker is None, seconds=60)
+    assert len(restarts) < 3
+    log = Log()
+    start(jobs, log, job_functions.double, np.ones(1))
+    run_until(jobs, lambda: bool(log.errors), seconds=60)
+    assert log.errors[0].name == "Crash"
+    jobs.close()
+
+
+def test_a_job_that_does_not_listen_is_ended_within_half_a_second() -> None:
+    jobs = Jobs()
+    restarts: list[int] = []
+    jobs.restarted = lambda: restarts.append(1)
+    log = Log()
+    start(jobs, log, job_functions.double, np.ones(1))
+    run_until(jobs, lambda: bool(log.answers))
+    log.answers.clear()
     start(jobs, log, job_functions.hang, 60.0)
+    asked = time.monotonic()
     jobs.cancel()
     run_until(jobs, lambda: jobs.is_idle, seconds=3)
-    assert log.cancels == 1
+    assert time.monotonic() - asked < 0.5
+    assert (log.cancels, restarts) == (1, [1])
     start(jobs, log, job_functions.double, np.ones(1))
     run_until(jobs, lambda: bool(log.answers))
     jobs.close()

@@ -66,6 +66,15 @@ def test_what_is_recovered_is_unsaved_and_stays_safe(editor: Editor) -> None:
     assert folders(recovery_root()) == []
 
 
+def test_what_is_recovered_and_closed_at_once_is_not_offered_again(editor: Editor) -> None:
+    folder = leave("cat", 9)
+    editor.recovery.look()
+    recover(editor, "cat")
+    editor.close_document()
+    settle(editor)
+    assert not folder.exists()
+
+
 def test_discarding_deletes_it(editor: Editor) -> None:
     folder = leave("cat", 9)
     editor.recovery.look()

@@ -1,0 +1,214 @@
+"""The export dialog's choices, and the files that come of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from PIL import Image
+
+from app.commands import run
+from app.editor import Editor
+from app.exporting import Format, What
+from app.settings import Settings
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.image import read_picture
+
+
+@pytest.fixture
+def moved(editor: Editor, ball: Document, tmp_path: Path) -> Editor:
+    """The ball is lifted and moved; nothing was exported before."""
+    editor.settings = Settings(gaussians=3000)
+    editor.start(ball)
+    editor.source = tmp_path / "ball.png"
+    editor.apply("Move object", edits.set_placement(ball, 0, Placement(move=(25.0, -4.0))))
+    return editor
+
+
+def export(editor: Editor, what: What, format: Format) -> Path:
+    exporting = editor.exporting
+    exporting.open()
+    exporting.choose_what(what)
+    exporting.choose_format(format)
+    path = exporting.path
+    assert exporting.problem is None
+    exporting.confirm()
+    wait_for_jobs(editor)
+    assert editor.message is not None and not editor.message.is_error, editor.message
+    return path
+
+
+def test_two_steps_export_the_photo(moved: Editor, tmp_path: Path) -> None:
+    run(moved, "export")
+    assert moved.exporting.label == "Export ball-edited.png"
+    moved.exporting.confirm()
+    assert moved.exporting.draft is None
+    wait_for_jobs(moved)
+    assert Image.open(tmp_path / "ball-edited.png").size == (WIDTH, HEIGHT)
+
+
+@pytest.mark.parametrize("format", list(Format))
+def test_the_photo_in_every_format(moved: Editor, format: Format) -> None:
+    path = export(moved, What.PHOTO, format)
+    with Image.open(path) as image:
+        assert image.format == format.value.upper()
+        assert image.size == (WIDTH, HEIGHT)
+
+
+def test_the_cut_out_is_the_object_alone_where_it_is_now(moved: Editor) -> None:
+    path = export(moved, What.CUTOUT, Format.PNG)
+    cutout = np.asarray(Image.open(path))
+    assert cutout.shape == (HEIGHT, WIDTH, 4)
+    alpha, (x, y) = cutout[..., 3], (round(CENTRE[0]), round(CENTRE[1]))
+    assert alpha[y - 4, x + 25] == 255
+    assert alpha[y, x - 30] == 0  # the ball was there
+    assert (alpha[:, :20] == 0).all()
+
+
+def test_an_object_that_was_not_moved_is_cut_out_of_the_photo(
+    editor: Editor, ball: Document
+) -> None:
+    editor.settings = Settings()
+    editor.start(ball)
+    editor.source = None
+    editor.exporting.open()
+    editor.exporting.choose_what(What.CUTOUT)
+    assert ball.objects[0].mask is not None
+    editor.exporting.close()
+    from app.export_functions import _unmoved
+
+    cutout = _unmoved(ball, ball.objects[0])
+    inside = cutout[..., 3] == 255
+    assert (inside & ~ball.objects[0].mask).mean() < 0.01
+    difference = cutout[..., :3][inside].astype(int) - ball.photo.pixels[inside]
+    assert np.abs(difference).max() <= 1  # 8-bit rounding
+
+
+def test_mask_and_background(moved: Editor, ball: Document) -> None:
+    mask = np.asarray(Image.open(export(moved, What.MASK, Format.PNG)))
+    np.testing.assert_array_equal(mask > 127, ball.objects[0].mask)
+    background = np.asarray(Image.open(export(moved, What.BACKGROUND, Format.PNG)))
+    x, y = (round(v) for v in CENTRE)
+    assert ball.plate is not None
+    assert background[y, x, 0] < background[y, x, 2]  # the wall, not the red ball
+
+
+def test_layers_over_each_other_are_the_photo(moved: Editor) -> None:
+    folder = export(moved, What.LAYERS, Format.PNG)
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["ball-0-background.png", "ball-1-object-1.png", "ball-2-composite.png"]
+    back, thing, whole = (np.asarray(Image.open(folder / n)).astype(float) for n in names)
+    alpha = thing[..., 3:] / 255
+    stacked = back * (1 - alpha) + thing[..., :3] * alpha
+    assert np.abs(stacked - whole).mean() < 2.0  # the edit joins them more softly
+
+
+def test_bit_depth_is_the_photos_own_until_another_is_chosen(moved: Editor) -> None:
+    exporting = moved.exporting
+    exporting.open()
+    assert exporting.bits == 8
+    exporting.choose_bits(16)
+    path = exporting.path
+    exporting.confirm()
+    wait_for_jobs(moved)
+    wide = read_picture(path.read_bytes()).pixels
+    assert wide.dtype == np.uint16
+    narrow = read_picture(export(moved, What.PHOTO, Format.WEBP).read_bytes()).pixels
+    np.testing.assert_array_equal(wide, narrow.astype(np.uint16) * 257)
+
+
+def test_quality_makes_files_smaller(moved: Editor) -> None:
+    sizes = []
+    for quality in (100, 60):
+        moved.exporting.open()
+        moved.exporting.choose_format(Format.WEBP)
+        moved.exporting.choose_quality(quality)
+        moved.exporting.set_name(f"{quality}.webp")
+        path = moved.exporting.path
+        moved.exporting.confirm()
+        wait_for_jobs(moved)
+        sizes.append(path.stat().st_size)
+    assert sizes[1] < sizes[0]
+    assert (moved.settings.webp_quality, moved.settings.quality) == (60, 95)
+
+
+def test_name_and_format_follow_each_other(moved: Editor, tmp_path: Path) -> None:
+    exporting = moved.exporting
+    exporting.open()
+    exporting.choose_format(Format.JPEG)
+    assert exporting.path == tmp_path / "ball-edited.jpg"
+    exporting.set_name("other.tif")
+    assert exporting.draft is not None and exporting.draft.format is Format.TIFF
+    exporting.set_name("no ending")
+    assert exporting.path == tmp_path / "no ending.tif"
+    exporting.set_name(str(tmp_path / "folder" / "x.png"))
+    assert exporting.problem is not None  # no such folder
+    exporting.set_name("x.gif")
+    assert exporting.problem is not None and "gif" in exporting.problem
+    exporting.set_name("  ")
+    assert exporting.problem == "Type a file name"
+
+
+def test_a_file_that_exists_is_replaced_only_after_asking(moved: Editor, tmp_path: Path) -> None:
+    there = tmp_path / "ball-edited.png"
+    there.write_bytes(b"mine")
+    exporting = moved.exporting
+    exporting.open()
+    exporting.confirm()
+    assert exporting.label == "Replace ball-edited.png"
+    assert there.read_bytes() == b"mine"
+    exporting.set_name("ball-edite.png")
+    assert not exporting.is_replacing
+    exporting.set_name("ball-edited.png")
+    exporting.confirm()
+    exporting.confirm()
+    wait_for_jobs(moved)
+    assert there.read_bytes() != b"mine"
+
+
+def test_the_opened_photo_is_no_target(moved: Editor, tmp_path: Path) -> None:
+    moved.exporting.open()
+    moved.exporting.set_name("ball.png")
+    assert moved.exporting.problem is not None
+    link = tmp_path / "link.png"
+    link.symlink_to(tmp_path / "ball.png")
+    moved.exporting.set_name("link.png")
+    assert moved.exporting.problem is not None
+
+
+def test_the_last_choice_is_remembered(moved: Editor) -> None:
+    export(moved, What.CUTOUT, Format.WEBP)
+    moved.exporting.open()
+    assert moved.exporting.draft is not None
+    assert moved.exporting.draft.what is What.CUTOUT
+    assert moved.exporting.draft.format is Format.WEBP
+    moved.settings = replace(moved.settings, export_what="nonsense", export_format="GIF")
+    moved.exporting.open()
+    assert (moved.exporting.draft.what, moved.exporting.draft.format) == (What.PHOTO, Format.PNG)
+    moved.exporting.close()
+
+
+@pytest.mark.parametrize("name", ["/", "..", "~", "~nobody/x", "x" * 300, "a/b", ".", "\0"])
+def test_no_name_that_is_typed_breaks_anything(editor: Editor, name: str) -> None:
+    exporting = editor.exporting
+    exporting.open()
+    for what in (What.PHOTO, What.LAYERS):
+        exporting.choose_what(what)
+        exporting.set_name(name)
+        assert exporting.label
+        assert exporting.problem is None or "\n" not in exporting.problem
+        exporting.choose_format(exporting.formats[-1])
+        assert exporting.draft is not None
+    exporting.close()
+
+
+def test_what_is_not_there_cannot_be_chosen(editor: Editor) -> None:
+    editor.exporting.open()
+    assert editor.exporting.why_not(What.PHOTO) is None
+    for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS):
+        assert editor.exporting.why_not(what)
+    editor.exporting.close()

@@ -1,0 +1,174 @@
+"""Files are read beside the window, whatever is in them; nothing unsaved is lost on the way."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from conftest import CENTRE, open_file, wait_for_jobs, wait_until
+
+from app.editor import Editor
+from app.jobs import Jobs
+from app.settings import Backends
+
+FRAME = 0.05  # s that a look at what has come in may take, while a large photo is opened
+MEGAPIXELS = (6000, 4000)
+
+
+@pytest.fixture
+def editor(shared_editor: Editor, photo_path: Path) -> Iterator[Editor]:
+    """With the made photo open, and the segmenter that reads a photo at once."""
+    settings = shared_editor.settings
+    shared_editor.close_document()
+    shared_editor.settings = replace(settings, backends=Backends(segment="grabcut"))
+    open_file(shared_editor, photo_path)
+    yield shared_editor
+    shared_editor.settings = replace(shared_editor.settings, backends=settings.backends)
+
+
+def wait_for_file(editor: Editor) -> None:
+    wait_until(editor, lambda: editor.background.is_idle)
+
+
+def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (500, 750, 3), dtype=np.uint8)
+    path = tmp_path / "large.jpg"
+    cv2.imwrite(str(path), cv2.resize(noise, MEGAPIXELS, interpolation=cv2.INTER_NEAREST))
+    editor.filing.open(path)
+    longest = count = 0.0
+    while editor.background.is_busy("open"):
+        started = time.perf_counter()
+        editor.poll()
+        longest = max(longest, time.perf_counter() - started)
+        count += 1
+        time.sleep(0.005)
+    assert editor.photo_size == MEGAPIXELS
+    assert count > 10
+    assert longest < FRAME
+    editor.close_document()
+
+
+def test_what_was_asked_last_is_opened(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> None:
+    other = tmp_path / "other.png"
+    other.write_bytes(photo_bytes)
+    for path in (tmp_path / "ball.png", other, tmp_path / "ball.png", other):
+        editor.filing.open(path)
+    wait_for_file(editor)
+    assert editor.source == other
+
+
+def test_what_is_done_while_a_file_is_read_is_asked_about(
+    editor: Editor, tmp_path: Path, photo_bytes: bytes
+) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    edited = editor.committed
+    assert edited is not None
+    editor.undo()
+    other = tmp_path / "other.png"
+    other.write_bytes(photo_bytes)
+    editor.filing.open(other)
+    editor.redo()
+    wait_until(editor, lambda: editor.background.is_idle)
+    assert editor.committed is edited
+    assert editor.filing.question is not None
+    editor.filing.answer_discard()
+    assert editor.source == other
+
+
+def test_closing_forgets_the_file_that_is_read(editor: Editor, photo_path: Path) -> None:
+    editor.filing.open(photo_path)
+    editor.close_document()
+    wait_for_file(editor)
+    assert editor.document is None
+
+
+def test_of_several_dropped_files_the_first_photo_is_opened(
+    editor: Editor, tmp_path: Path, photo_bytes: bytes
+) -> None:
+    names = ("notes.txt", "cat.ply", "second.png", "third.png")
+    for name in names:
+        (tmp_path / name).write_bytes(photo_bytes)
+    editor.filing.drop([tmp_path / name for name in names])
+    wait_for_file(editor)
+    assert editor.source == tmp_path / "second.png"
+    assert editor.message is not None
+    assert editor.message.text == "Opened second.png; not opened: notes.txt, cat.ply, third.png"
+
+
+def make(path: Path) -> None:
+    """A file of the kind that its name says."""
+    if path.name == "folder":
+        path.mkdir()
+    elif path.name == "huge.png":
+        with path.open("wb") as file:
+            file.truncate(5 << 30)  # takes no room on the disk
+    elif path.name == "pipe.png":
+        os.mkfifo(path)
+    elif path.name == "zip.omorph":
+        path.write_bytes(b"PK\x03\x04 and no more")
+    elif path.name != "missing.png":
+        path.write_bytes(b"" if path.name == "empty.png" else b"ply\nformat ascii 1.0\n")
+
+
+@pytest.mark.parametrize("name", [
+    "folder", "huge.png", "pipe.png", "zip.omorph", "missing.png", "empty.png", "text.txt",
+    "cat.ply", "cat.glb", "broken.jpg",
+])  # fmt: skip
+def test_what_cannot_be_opened_is_one_sentence(editor: Editor, tmp_path: Path, name: str) -> None:
+    make(tmp_path / name)
+    document = editor.document
+    editor.filing.drop([tmp_path / name])
+    wait_for_file(editor)
+    assert editor.document is document
+    assert editor.message is not None and editor.message.is_error
+    assert name in editor.message.text.lower()
+    assert "\n" not in editor.message.text and not editor.message.details
+
+
+def test_dropping_asks_about_unsaved_changes(editor: Editor, photo_path: Path) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    edited = editor.committed
+    editor.filing.drop([photo_path])
+    assert editor.filing.question is not None
+    editor.filing.answer_cancel()
+    wait_for_jobs(editor)
+    assert editor.committed is edited
+
+
+def test_a_killed_worker_is_a_sentence_with_retry_and_all_goes_on(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    kill_worker(editor.jobs)
+    wait_until(editor, lambda: editor.jobs.is_busy("read"))  # the photo is read again, quietly
+    wait_for_jobs(editor)
+    assert editor.message is None
+    editor.selection.add_click(*CENTRE, True)
+    kill_worker(editor.jobs)
+    wait_until(editor, lambda: editor.message is not None)
+    assert editor.message is not None and editor.message.is_error
+    assert editor.message.action is not None and editor.message.action.label == "Retry"
+    editor.message.action.run()
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+
+
+def kill_worker(jobs: Jobs) -> None:
+    assert jobs._worker is not None
+    jobs._worker.process.kill()
+
+
+def test_a_sample_is_nobodys_file(editor: Editor, photo_path: Path) -> None:
+    settings = editor.settings
+    editor.filing.open_sample(photo_path)
+    wait_for_file(editor)
+    assert editor.source is None
+    assert editor.settings is settings
+    open_file(editor, photo_path)
+    assert editor.source == photo_path
