@@ -15,7 +15,7 @@ from .hatching import hatch
 
 YELLOW = "#F2B84B"
 STEP = 7.0  # points between hatch lines
-SPREAD = 0.8  # x the spacing of control points: the disc of each
+SPREAD = 0.9  # x the spacing of control points: the disc of each
 LEAST = 5.0  # points, of that disc
 HATCHES: dict[PoseMode, tuple[tuple[float, ...], str]] = {  # angles of the lines, colour
     PoseMode.FREEZE: ((45.0, -45.0), WHITE),
