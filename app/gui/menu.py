@@ -16,8 +16,9 @@ from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
-    "Edit": ("undo", "redo", "-", "select_handles", "remove_handle", "reset_handle", "reset_handles", "-",
-        "reset_pose", "reset_place",
+    "Edit": (
+        "undo", "redo", "-", "select_handles", "remove_handle", "reset_handle", "reset_handles",
+        "-", "reset_pose", "reset_place",
     ),
     "Object": ("subject", "clear", "-", "lift", "-", "select", "pose", "place"),
     "View": (
