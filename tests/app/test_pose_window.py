@@ -7,11 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import lift_ball
 from hands import Hands, opened
 from test_window import is_red, screen_xy
 
-from app.editor import Editor
 from objectmorpher_core.document import Document
 from objectmorpher_core.session_file import decode_session, save_session
 
@@ -28,16 +26,15 @@ def _saved(hands: Hands, path: Path, name: str) -> Document:
 
 
 def test_handles_are_turned_chosen_and_removed_by_hand(
-    editor: Editor, window_environment: dict[str, str], tmp_path: Path
+    ball: Document, window_environment: dict[str, str], tmp_path: Path
 ) -> None:
     path = tmp_path / "ball.omorph"
-    save_session(lift_ball(editor), path)
+    save_session(ball, path)
     first, second = screen_xy(80, 60), screen_xy(102, 80)
     with opened(window_environment, path) as hands:
         hands.wait(lambda: is_red(hands, 90, 100), "showing the ball")
         hands.click(*first)
         hands.wait(lambda: "edited" in hands.title(), "adding a handle")
-        _saved(hands, path, "a handle")
         hands.xdotool("keydown", "ctrl")
         hands.xdotool("mousemove", *map(round, second), "mousedown", 1)
         for angle in np.radians([0, 25, 50, 75, 75]):
@@ -46,7 +43,6 @@ def test_handles_are_turned_chosen_and_removed_by_hand(
             time.sleep(0.4)  # a frame between two of them, however slow
         hands.xdotool("mouseup", 1)
         hands.xdotool("keyup", "ctrl")
-        hands.wait(lambda: "edited" in hands.title(), "turning")
         (thing,) = _saved(hands, path, "a turn").objects
         assert len(thing.handles) == 2
         assert thing.handles[0].turn is None
