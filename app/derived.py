@@ -14,7 +14,15 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F32, F64, I32, Mask, Sparse
-from objectmorpher_core.document import Document, EditObject, Photo, Plate, Pose
+from objectmorpher_core.document import (
+    DeformSettings,
+    Document,
+    EditObject,
+    LiftedObject,
+    Photo,
+    Plate,
+    Pose,
+)
 
 from .blend import build_blend
 from .layers import Layers
@@ -77,6 +85,7 @@ class Derived:
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
         self.lights = Lights(self)
+        self._latest: tuple[LiftedObject | None, DeformSettings, Shape] | None = None
         self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
@@ -114,8 +123,18 @@ class Derived:
     def shape(self, photo: Photo, thing: EditObject) -> Shape:
         """Solver, poser and texture; a fraction of a second the first time."""
         return self._shapes(
-            lambda: _build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
+            lambda: self._build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
         )
+
+    def _build_shape(self, photo: Photo, thing: EditObject) -> Shape:
+        """Of a rig that changed, only what depends on it."""
+        similar = self._latest
+        if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
+            shape = replace(similar[2], puppet=similar[2].puppet.with_rig(thing.rig))
+        else:
+            shape = _build_shape(photo, thing)
+        self._latest = (thing.lifted, thing.deform, shape)
+        return shape
 
     def prepare(self, document: Document, k: int) -> None:
         """Makes ready what the first drag of object `k` needs."""

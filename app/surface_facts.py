@@ -122,8 +122,8 @@ def _find_mirror(document: Document, k: int) -> MirrorPlane:
     lifted = document.objects[k].lifted
     assert lifted is not None
     sight = lifted.world_from_object[:3, :3].T @ lifted.centre
-    found = find_mirror(lifted.body.means, sight)
+    across = lifted.world_from_object[:3, :3].T @ np.array([1.0, 0.0, 0.0])
+    found = find_mirror(lifted.body.means, sight, across)
     if found is not None:
         return found
-    across = lifted.world_from_object[:3, :3].T @ np.array([1.0, 0.0, 0.0])
     return plane_through(lifted.object_points(lifted.centre), across)

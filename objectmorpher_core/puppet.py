@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -54,6 +55,14 @@ class Puppet:
     def deformer(self) -> Deformer:
         """The object's graph and solver; made when the object is first deformed."""
         return Deformer(self.lifted, self._settings, self._rig)
+
+    def with_rig(self, rig: Rig) -> Puppet:
+        """The same object with another rig; what does not depend on it is kept."""
+        other = copy.copy(self)
+        other._rig = rig
+        if "deformer" in self.__dict__:
+            other.deformer = self.deformer.with_rig(rig)
+        return other
 
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The object's Gaussians in the world after `pose`, then `placement`."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 ON_PLANE = 0.04  # x diameter: a handle so near to the plane is its own partner, and free
+PIECES = 16  # of the line that shows the plane
 PARTNER = 0.06  # x diameter: a handle so near to the mirrored point is the partner
 
 
@@ -64,7 +65,8 @@ class Mirroring:
         if thing.pose is not None:
             on_plane = deformer.skin_points(on_plane, thing.pose).points
         order = np.argsort((rest[near] - rest[near].mean(0)) @ up, kind="stable")
-        return editor.derived.project(document, k, on_plane)[order]
+        pieces = np.array_split(on_plane[order], min(PIECES, len(order)))
+        return editor.derived.project(document, k, np.array([p.mean(0) for p in pieces]))
 
     def followed(self, document: Document, moved: tuple[int, ...]) -> Document:
         """`document` with the partners of its handles `moved` where these take them."""

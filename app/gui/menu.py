@@ -17,7 +17,10 @@ from .widgets import icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
-    "Edit": ("undo", "redo", "-", "remove_handle", "reset_pose", "reset_place"),
+    "Edit": (
+        "undo", "redo", "-", "select_handles", "remove_handle", "reset_handle", "reset_handles",
+        "-", "reset_pose", "reset_place",
+    ),
     "Select": (
         "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",
         "-", "import_mask", "export_mask",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
 from ..arrays import F64, I32, frozen
 from ..document import DeformSettings, Handle, LiftedObject, Pose, Rig
@@ -58,6 +59,18 @@ class Deformer:
         self.graph: Graph = build_graph(self.points, settings, _surface(lifted), self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
         self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
+        self._prepare_solver()
+
+    def with_rig(self, rig: Rig) -> Deformer:
+        """The same object with another rig. Only other seams need another graph and binding."""
+        if rig.seams != self.rig.seams:
+            return Deformer(self.lifted, self.settings, rig)
+        other = copy.copy(self)
+        other.rig = rig
+        other._prepare_solver()
+        return other
+
+    def _prepare_solver(self) -> None:
         weights = _weighed(self.graph.weights, self.rig.stiffness)
         self._solver = ArapSolver(self.points, weights, self.rig.bodies)
         self._constrained: tuple[object, ...] = ()  # what the solver is prepared for
@@ -314,5 +327,6 @@ def _weighed(weights: csr_array, stiffness: F64 | None) -> csr_array:
     """Links (M, M) as stiff as the control points at their ends, (M,) 1 = usual."""
     if stiffness is None:
         return weights
-    root = diags_array(np.sqrt(stiffness))
-    return csr_array(root @ weights @ root)
+    root, own = np.sqrt(stiffness), np.repeat(np.arange(len(stiffness)), np.diff(weights.indptr))
+    both = root[own] * root[weights.indices]  # the product first: rounded alike from both ends
+    return csr_array((weights.data * both, weights.indices, weights.indptr), weights.shape)

@@ -6,9 +6,9 @@ others (`DeformSettings.stiffness`, x the usual reach). What that does, measured
 ball pulled at one point by a fifth of its diameter:
 
     material   reach   bar's end turns   ball: largest stretch   ball: mean share that follows
-    soft       0.35    41 degrees        25 %                    0.23
-    normal     1       36 degrees        13 %                    0.25
-    rigid      2       20 degrees         5 %                    0.30
+    soft       0.35    45 degrees        25 %                    0.23
+    normal     1       42 degrees        13 %                    0.25
+    rigid      2       34 degrees         5 %                    0.30
 
 A soft object gives way where it is pulled; a rigid one passes the pull on, and bends less.
 """

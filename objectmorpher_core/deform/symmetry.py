@@ -20,6 +20,7 @@ FITTED = 5  # of them, the best
 STEPS = 12  # of a fit, at most
 SAMPLES, DENSE = 256, 3000  # points that are mirrored, and those they are compared with
 SYMMETRIC = 0.03  # x diameter, mean gap of a mirrored object to itself: more is no symmetry
+LEANING = 2.0  # how much worse a plane counts that is not upright at all
 FACING = 0.75  # largest cosine of the normal with the line of sight: front and back look alike
 
 
@@ -48,11 +49,14 @@ class MirrorPlane:
         return abs(float(point @ self.normal) - self.offset)
 
 
-def find_mirror(points: np.ndarray, sight: np.ndarray | None = None) -> MirrorPlane | None:
+def find_mirror(
+    points: np.ndarray, sight: np.ndarray | None = None, across: np.ndarray | None = None
+) -> MirrorPlane | None:
     """The mirror plane of points (N, 3) spread evenly over an object; None where it has none.
 
     With a line of `sight` (3,), planes that part the front from the back are left out: a lifter
-    makes the back in the image of the front.
+    makes the back in the image of the front. With a direction `across` (3,), of planes that are
+    about as good the one is taken whose normal lies along it: most things are upright.
     """
     every = max(len(points) // DENSE, 1)
     dense = np.asarray(points[::every], np.float64)
@@ -68,11 +72,11 @@ def find_mirror(points: np.ndarray, sight: np.ndarray | None = None) -> MirrorPl
     images = rough[None] - 2 * (rough @ normals.T).T[..., None] * normals[:, None]
     gaps = tree.query((images + centre).reshape(-1, 3))[0].reshape(len(normals), -1).mean(1)
     best: MirrorPlane | None = None
-    for k in np.argsort(gaps, kind="stable")[:FITTED]:
+    for k in np.argsort(gaps * _strangeness(normals, across), kind="stable")[:FITTED]:
         plane = _fitted(tree, few, normals[k], float(normals[k] @ centre))
         if sight is not None and abs(plane.normal @ _unit(sight)) > FACING:
             continue
-        if best is None or plane.gap < best.gap:
+        if best is None or _cost(plane, across) < _cost(best, across):
             best = plane
     if best is None or best.gap > SYMMETRIC * diameter:
         return None
@@ -102,6 +106,17 @@ def _fitted(tree: KDTree, points: F64, normal: F64, offset: float) -> MirrorPlan
         normal = np.linalg.eigh(product + product.T)[1][:, 0]
         offset = float(normal @ (p0 + q0) / 2)
     return best
+
+
+def _strangeness(normals: F64, across: np.ndarray | None) -> F64:
+    """(...) what the gap of a plane with a normal (..., 3) is multiplied by: 1 or more."""
+    if across is None:
+        return np.ones(normals.shape[:-1])
+    return 1 + LEANING * (1 - np.abs(normals @ _unit(across)))
+
+
+def _cost(plane: MirrorPlane, across: np.ndarray | None) -> float:
+    return plane.gap * float(_strangeness(plane.normal, across))
 
 
 def _half_sphere(count: int) -> F64:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
+from objectmorpher_core.rotations import (
+    matrices_from_quats,
+    matrix_from_vector,
+    quats_from_matrices,
+    turn_about,
+    turn_matrix,
+    turned_by,
+    vector_from_matrix,
+)
 from tests import shapes
 
 F64 = 1e-12  # a handful of products of numbers below 1
@@ -63,3 +71,32 @@ def test_yaw_comes_first_then_pitch_then_roll():
 
 def test_no_turn_is_exactly_nothing():
     assert np.array_equal(turn_matrix(0, 0, 0), np.eye(3))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-7, 1.0, 3.0, np.pi, 5.0, 20.0])
+def test_a_rotation_vector_is_found_again_near_itself(angle):
+    for axis in np.random.default_rng(1).normal(size=(20, 3)):
+        vector = angle * axis / np.linalg.norm(axis)
+        found = vector_from_matrix(matrix_from_vector(vector), vector)
+        np.testing.assert_allclose(found, vector, atol=1e-7)
+        short = vector_from_matrix(matrix_from_vector(vector))
+        assert np.linalg.norm(short) <= np.pi + 1e-9
+        matrices = matrix_from_vector(short), matrix_from_vector(vector)
+        np.testing.assert_allclose(*matrices, atol=1e-7)
+
+
+def test_turning_on_about_an_axis_adds_to_the_turn_about_it():
+    axis = np.array([0.0, 0.0, 1.0])
+    for start in np.random.default_rng(2).normal(size=(20, 3)):
+        before = turn_about(start, axis)
+        after = turned_by(start, 0.3 * axis)
+        assert turn_about(after, axis) == pytest.approx(before + 0.3, abs=1e-9)
+        matrices = matrix_from_vector(after), matrix_from_vector(0.3 * axis)
+        np.testing.assert_allclose(matrices[0], matrices[1] @ matrix_from_vector(start), atol=1e-9)
+
+
+def test_many_small_turns_add_up_to_more_than_a_whole_one():
+    vector = np.zeros(3)
+    for _ in range(100):
+        vector = turned_by(vector, np.array([0.0, 0.0, 0.1]))
+    np.testing.assert_allclose(vector, [0, 0, 10.0], atol=1e-9)

@@ -79,10 +79,11 @@ def _draw_influence(canvas: Canvas, handle: int) -> None:
     editor = canvas.editor
     assert editor.document is not None
     shares = editor.derived.facts.influence(editor.document, editor.current, handle)
-    places = canvas.at(editor.derived.control_points(editor.document, editor.current))
-    for at, share in zip(places, np.clip(shares, 0, 1).tolist(), strict=True):
-        if share < MOVES:
-            continue
+    shown = editor.derived.facts.seen(editor.document, editor.current) & (shares >= MOVES)
+    picture = editor.derived.control_points(editor.document, editor.current)
+    shown &= ((picture >= 0) & (picture <= editor.document.photo.size)).all(1)
+    places = canvas.at(picture[shown])
+    for at, share in zip(places, np.clip(shares[shown], 0, 1).tolist(), strict=True):
         r, g, b = ((1 - share) * COLD + share * HOT).tolist()
         color = imgui.color_convert_float4_to_u32(ImVec4(r, g, b, 0.85))
         radius = theme.scale * (1.2 + 3.0 * share)

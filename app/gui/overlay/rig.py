@@ -15,7 +15,7 @@ from .hatching import hatch
 
 YELLOW = "#F2B84B"
 STEP = 7.0  # points between hatch lines
-SPREAD = 0.8  # x the spacing of control points: the disc of each
+SPREAD = 0.9  # x the spacing of control points: the disc of each
 LEAST = 5.0  # points, of that disc
 HATCHES: dict[PoseMode, tuple[tuple[float, ...], str]] = {  # angles of the lines, colour
     PoseMode.FREEZE: ((45.0, -45.0), WHITE),
@@ -81,7 +81,7 @@ def _draw_hatched(canvas: Canvas, kind: PoseMode, nodes: I32) -> None:
 
 
 def _draw_seam(canvas: Canvas, region: Region) -> None:
-    """A cut: crosses on one side, dots on the other; glue: lines from side to side."""
+    """A cut: crosses along it; glue: lines from side to side."""
     rigging = canvas.editor.rigging
     seam = rigging.rig.seams[region.seam]
     first, second = _visible(canvas, seam.first), _visible(canvas, seam.second)
@@ -92,9 +92,10 @@ def _draw_seam(canvas: Canvas, region: Region) -> None:
         for a, b in zip(first, second[gaps.argmin(1)], strict=True):
             canvas.line(ImVec2(*a), ImVec2(*b), ACCENT, width=1.2)
         return
-    # The cut itself runs midway between each point beside it and the nearest of the other side.
-    middles = 0.5 * (first + second[gaps.argmin(1)])
-    near = gaps.min(1) <= 1.6 * np.median(gaps.min(1))
+    # The cut itself runs midway between two points that are nearest to each other across it.
+    there, back = gaps.argmin(1), gaps.argmin(0)
+    middles = 0.5 * (first + second[there])
+    near = back[there] == np.arange(len(first))
     arm = theme.pt(3)
     for x, y in middles[near].tolist():
         canvas.line(ImVec2(x - arm, y - arm), ImVec2(x + arm, y + arm), WARM)

@@ -13,6 +13,7 @@ from .canvas import ACCENT, DARK, WHITE, Canvas
 
 SCALE = 60.0  # points that the tick goes per object diameter of depth
 FARTHEST = 0.4  # diameters that the scale shows
+LEAST_DEPTH = 0.015  # diameters: less shows no scale
 TICK = 5.0  # points, half the tick's width
 
 
@@ -28,7 +29,7 @@ def draw_ring(canvas: Canvas, at: ImVec2) -> None:
     role = ACCENT if is_taken else WHITE
     canvas.draw.add_circle(at, radius, theme.u32(role, 0.9), 64, theme.pt(1.5))
     _draw_arc(canvas, at, numbers.turn)
-    if abs(numbers.depth) > 1e-3:
+    if abs(numbers.depth) > LEAST_DEPTH:
         _draw_depth(canvas, at, numbers.depth)
     if editor.posing.readout:
         canvas.label(editor.posing.readout, at.x, at.y - radius - theme.pt(36), side=0.5)

@@ -48,6 +48,13 @@ def draw_handles(editor: Editor) -> None:
     imgui.end_child()
 
 
+def end_row(start: ImVec2, height: float) -> None:
+    """The next row is 2 points below one that began at `start` and is `height` points high."""
+    below = start.y + theme.pt(height + 2) - imgui.get_style().item_spacing.y
+    imgui.set_cursor_screen_pos(ImVec2(start.x, below))
+    imgui.dummy(ImVec2(0, 0))
+
+
 def _draw_row(editor: Editor, h: int) -> None:
     thing = editor.object
     if thing is None or h >= len(thing.handles):
@@ -81,8 +88,7 @@ def _draw_row(editor: Editor, h: int) -> None:
     imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(28), start.y))
     if icon_button(Icon.CLOSE, f"remove{h}", t("Remove it (Del)")):
         editor.posing.remove(h)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(2)))
-    imgui.dummy(ImVec2(0, 0))
+    end_row(start, ROW)
 
 
 def draw_numbers(editor: Editor) -> None:

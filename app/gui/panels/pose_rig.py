@@ -14,6 +14,7 @@ from ...tools.navigate import LARGEST_BRUSH, SMALLEST_BRUSH
 from ..segmented import Choice, segmented
 from ..theme import Icon, theme
 from ..widgets import Number, gap, heading, icon_button, note, number_field
+from .pose_handle import end_row
 
 ROW = 28.0  # points
 ICONS = {
@@ -39,6 +40,7 @@ def draw_modes(editor: Editor) -> None:
     view.mode = segmented("mode", modes, view.mode)
     if view.mode is PoseMode.DRAG:
         return
+    gap(8)
     heading(t(view.mode.value))
     note(t(NOTES[view.mode]))
     gap(4)
@@ -92,5 +94,4 @@ def _draw_region(editor: Editor, region: Region, row: int, name: str) -> None:
     imgui.set_cursor_screen_pos(ImVec2(start.x + width - theme.pt(28), start.y))
     if icon_button(Icon.CLOSE, f"region{row}", t("Remove it")):
         editor.rigging.remove(region)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, start.y + height + theme.pt(2)))
-    imgui.dummy(ImVec2(0, 0))
+    end_row(start, ROW)

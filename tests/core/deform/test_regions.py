@@ -51,6 +51,23 @@ def test_a_rigid_body_keeps_its_shape_and_its_surface():
     assert np.abs(_shape(moved) - _shape(inner)).max() < 1e-6
 
 
+@pytest.mark.parametrize(
+    "rig", [Rig(held=MIDDLE), Rig(bodies=(MIDDLE,)), Rig(seams=(Seam(LEFT, RIGHT),))]
+)
+def test_a_deformer_with_another_rig_is_as_one_made_for_it(rig):
+    made, pose = _bent(rig)
+    other = Deformer(LIFTED, DeformSettings(), Rig(stiffness=np.full(len(NODES), 2.0)))
+    handles = (
+        _handle(LIFTED, (-0.5, 0, 0), turn=np.zeros(3)),
+        _handle(LIFTED, (0.5, 0, 0), (-0.2, 0.45, 0.0), turn=np.array([0, 0, 1.2])),
+    )
+    other.solve(handles)
+    changed = other.with_rig(rig)
+    assert (changed.graph is other.graph) is (rig.seams == ())
+    np.testing.assert_allclose(changed.solve(handles).pose.points, pose.points, atol=EXACT)
+    assert made.graph.link_count == changed.graph.link_count
+
+
 def test_frozen_control_points_stay():
     _, pose = _bent(Rig(held=MIDDLE))
     assert np.abs(pose.points[MIDDLE] - NODES[MIDDLE]).max() < EXACT
@@ -67,6 +84,14 @@ def test_a_stiff_part_bends_less_and_a_soft_one_more():
         inner = np.abs(NODES[:, 0]) < 0.08
         bends.append(float(np.ptp(_angles(pose, inner))))
     assert bends[0] > 1.3 * bends[1] > 1.3 * 1.3 * bends[2]
+
+
+@pytest.mark.parametrize("factor", [0.3, 7.0])
+def test_a_stiffness_whose_root_is_not_round_keeps_the_weights_symmetric(factor):
+    stiffness = np.ones(len(NODES))
+    stiffness[MIDDLE] = factor
+    _, pose = _bent(Rig(stiffness=stiffness))
+    assert np.isfinite(pose.points).all()
 
 
 def _angles(pose: Pose, chosen: np.ndarray) -> F64:

@@ -53,6 +53,15 @@ def test_the_plane_between_front_and_back_is_left_out() -> None:
     assert abs(plane.normal @ front) < 0.1
 
 
+def test_of_planes_that_are_as_good_the_upright_one_is_taken() -> None:
+    egg = shapes.ball(3000) * [1.0, 0.9, 0.5]
+    front = np.array([0.0, 0.0, 1.0])
+    for across in np.eye(3)[:2]:
+        plane = find_mirror(egg, front, across)
+        assert plane is not None
+        assert abs(plane.normal @ across) > 0.95
+
+
 def test_mirroring_twice_changes_nothing_and_a_turn_goes_the_other_way() -> None:
     plane = plane_through(np.array([0.2, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     points = shapes.ball(20)
