@@ -12,7 +12,7 @@ from ..editor import Editor
 from ..exporting import LOSSLESS, Format, What
 from ..filing import Dialog
 from ..texts import t
-from .popup import popup
+from .modal import modal
 from .theme import FIELD, PRIMARY, theme
 from .widgets import Kind, button, note, tooltip
 
@@ -36,7 +36,7 @@ def draw_export(editor: Editor) -> None:
     exporting, title = editor.exporting, t("Export")
     if exporting.draft is None and not imgui.is_popup_open(title):
         return
-    with popup(title, WIDTH) as is_shown:
+    with modal(title, WIDTH) as is_shown:
         if not is_shown:
             return
         if exporting.draft is not None:

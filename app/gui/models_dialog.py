@@ -9,7 +9,7 @@ from objectmorpher_core.models import State
 from ..editing.models import DOWNLOAD, names_of
 from ..editor import Editor
 from ..texts import t
-from .popup import popup
+from .modal import modal
 from .theme import Icon, theme
 from .widgets import Kind, bold_text, button, gap, note, rule, tooltip
 
@@ -25,7 +25,7 @@ def draw_models(editor: Editor) -> None:
     """While the list is open."""
     if not editor.models.is_open:
         return
-    with popup(t("Models"), WIDTH, t(ABOUT)) as is_shown:
+    with modal(t("Models"), WIDTH, t(ABOUT)) as is_shown:
         if not is_shown:
             return
         for state in editor.models.states:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs
+from conftest import open_file, wait_for_jobs
 
 from app.commands import run
 from app.editor import Editor
@@ -36,7 +36,7 @@ def own_editor() -> Iterator[Editor]:
 @pytest.mark.parametrize("name", OBJECTS)
 def test_a_dragged_point_stays_under_the_cursor(own_editor: Editor, name: str) -> None:
     editor = own_editor
-    editor.filing.open(resource(f"assets/samples/{name}.jpg"))
+    open_file(editor, resource(f"assets/samples/{name}.jpg"))
     wait_for_jobs(editor)
     editor.selection.add_click(*OBJECTS[name], True)
     wait_for_jobs(editor)

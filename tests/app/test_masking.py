@@ -20,7 +20,6 @@ from app.tools.pointer import Button, Pointer, Tool
 from app.tools.select_tool import SelectTool
 from app.view import Selecting, SelectMode, ToolName
 from objectmorpher_core.brush import Brush
-from objectmorpher_core.document import Document
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.session_file import decode_session, encode_session
 
@@ -311,16 +310,3 @@ def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(editor: Edi
     run(editor, "undo")
     assert len(editor.document.objects) == 1
     assert editor.mask is None
-
-
-def test_the_oldest_steps_go_when_their_masks_are_too_large(
-    editor: Editor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("app.history.MASKS", 5 * WIDTH * HEIGHT)
-    for k in range(12):
-        paint(editor, (10.0 + 5 * k, 20.0))
-    steps: set[Document | None] = {editor.document}
-    for _ in range(20):
-        run(editor, "undo")
-        steps.add(editor.document)
-    assert 3 <= len(steps) <= 7

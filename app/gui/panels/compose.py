@@ -17,7 +17,7 @@ from ...job_functions import Variant
 from ...texts import t
 from ..dial import SIDE, dial
 from ..pictures import pictures
-from ..segments import segments
+from ..segmented import Choice, segmented
 from ..theme import RADIUS, theme
 from ..widgets import (
     LABEL_WIDTH,
@@ -63,9 +63,13 @@ def _draw_background(editor: Editor) -> None:
     labels = [t(INPAINTERS.get(name, name)) for name in names]
     missing = [compose.missing(name) for name in names]
     reasons = [None if m is None else sentence(m) for m in missing]
-    chosen = segments("inpainter", labels, names.index(editor.composing.inpainter), reasons)
-    if names[chosen] != editor.composing.inpainter:
-        editor.composing.choose_inpainter(names[chosen])
+    choices = tuple(
+        Choice(name, label, why_not=reason)
+        for name, label, reason in zip(names, labels, reasons, strict=True)
+    )
+    chosen = segmented("inpainter", choices, editor.composing.inpainter)
+    if chosen != editor.composing.inpainter:
+        editor.composing.choose_inpainter(chosen)
     half = (imgui.get_content_region_avail().x / theme.scale - GAP) / 2
     _command_button(editor, "fill_again", half)
     imgui.same_line(0, theme.pt(GAP))
@@ -175,10 +179,8 @@ def _draw_light(editor: Editor) -> None:
         note(f"{reason}.")
         return
     assert editor.object is not None
-    names = list(compose.REFINERS)
-    labels = [t(REFINERS.get(name, name)) for name in names]
-    chosen = segments("refiner", labels, names.index(editor.composing.refiner))
-    editor.composing.choose_refiner(names[chosen])
+    choices = tuple(Choice(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
+    editor.composing.choose_refiner(segmented("refiner", choices, editor.composing.refiner))
     harmony = editor.object.harmony
     if harmony == 0:
         note(t("Harmonise gives the object the light of its new place."))

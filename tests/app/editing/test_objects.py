@@ -48,7 +48,7 @@ def test_a_copy_is_one_step_and_becomes_current(editor: Editor, ball: Document) 
 def test_the_export_of_a_moved_copy_keeps_the_object(
     copied: Editor, ball: Document, tmp_path: Path
 ) -> None:
-    copied.filing.export(tmp_path / "two.png")
+    copied.exporting.export_to(tmp_path / "two.png")
     wait_for_jobs(copied)
     pixels, photo = np.asarray(Image.open(tmp_path / "two.png")), ball.photo.pixels
     left = (slice(0, 140), slice(0, 78))  # the copy does not reach it

@@ -14,7 +14,7 @@ PADDING = 20.0  # points
 
 
 @contextmanager
-def popup(title: str, width: float, about: str = "") -> Iterator[bool]:
+def modal(title: str, width: float, about: str = "") -> Iterator[bool]:
     """Opens it and yields whether it is drawn; `width` in points. What is inside closes it.
 
     The title doubles as its id.
