@@ -127,7 +127,9 @@ class Filing:
 
     def save_as(self, path: Path) -> None:
         if path.suffix.lower() != SESSION_ENDING:
-            self._editor.complain(f"a session's name ends in {SESSION_ENDING}, not {path.suffix}")
+            usual, own = SESSION_ENDING, path.suffix
+            sentence = t("a session's name ends in {usual}, not {own}", usual=usual, own=own)
+            self._editor.complain(sentence)
             return
         then, self._after_save = self._after_save, None
         self._editor.tasks.save(path, then)

@@ -20,6 +20,7 @@ from . import job_functions
 from .job_functions import Choice, Cut
 from .jobs import JobError
 from .layers import Rendered, Request
+from .texts import t
 from .view import ToolName
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class Tasks:
             self._unreadable = document.photo
 
         editor.jobs.start(
-            "Reading the photo", job_functions.read_photo, document.photo.pixels,
+            t("Reading the photo"), job_functions.read_photo, document.photo.pixels,
             editor.settings.backends.segment,
             done=lambda _: None, failed=fail, kind=READ, is_quiet=is_quiet,
         )  # fmt: skip
@@ -99,7 +100,7 @@ class Tasks:
                 editor.selection.take(question, *answer)
 
         editor.jobs.start(
-            "Selecting", job_functions.segment, photo.pixels, question.prompt,
+            t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
             done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind=SELECT,
         )  # fmt: skip
@@ -128,14 +129,15 @@ class Tasks:
             matte, lifted = answer
             changed = edits.set_lifted(current, k, matte, lifted)
             editor.posing.select(None)
-            editor.apply("Lift object", changed)
+            editor.apply(t("Lift object"), changed)
             editor.derived.prepare(changed, k)
             editor.view.tool = ToolName.POSE
-            editor.say(f"Lifted: {len(lifted.gaussians):,} Gaussians. Now drag a point on it")
+            count = f"{len(lifted.gaussians):,}"
+            editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
 
         photo = document.photo
         editor.jobs.start(
-            "Lifting the object", job_functions.lift, Cut(photo.pixels, photo.camera, selection),
+            t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
@@ -167,10 +169,10 @@ class Tasks:
 
         def retry_later() -> None:
             if self._no_plate is not None and _same(self._no_plate, masks):
-                editor.say("The background behind the object is not filled in")
+                editor.say(t("The background behind the object is not filled in"))
 
         editor.jobs.start(
-            "Filling in the background", job_functions.inpaint, document.photo.pixels,
+            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
             done=accept, failed=editor.complain_of, cancelled=retry_later, kind=PLATE,
         )  # fmt: skip
@@ -206,12 +208,12 @@ class Tasks:
                 history.mark_saved(document)
                 editor.path = path
                 editor.settings = editor.settings.with_recent(path)
-                editor.say(f"Saved {path.name}")
+                editor.say(t("Saved {name}", name=path.name))
                 if then is not None:
                     then()
 
         editor.jobs.start(
-            f"Saving {path.name}", job_functions.write_session, document, path,
+            t("Saving {name}", name=path.name), job_functions.write_session, document, path,
             done=accept, failed=editor.complain_of, kind=f"{WRITE} {path}",
         )  # fmt: skip
 

@@ -191,9 +191,12 @@ class Exporting:
         editor, settings = self._editor, self._editor.settings
         format = format_of(path.suffix)
         if format is None:
-            editor.complain(f"a photo cannot be written as {path.suffix}; choose {KNOWN}")
+            editor.complain(
+                t("a photo cannot be written as {ending}; choose {known}",
+                  ending=path.suffix, known=KNOWN)
+            )  # fmt: skip
         elif self._is_opened(path):
-            editor.complain("the export would overwrite the opened photo; choose another name")
+            editor.complain(t("the export would overwrite the opened photo; choose another name"))
         else:
             is_webp = format is Format.WEBP
             quality = settings.webp_quality if is_webp else settings.quality

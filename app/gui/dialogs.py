@@ -12,6 +12,7 @@ from imgui_bundle import portable_file_dialogs as pfd
 
 from ..editor import Editor
 from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog
+from ..texts import t
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
 from .models_dialog import draw_models
@@ -102,24 +103,22 @@ class Dialogs:
 
     def _draw_answers(self, editor: Editor) -> None:
         with bold_text():
-            imgui.text_unformatted("Save what you have changed?")
-        note(
-            "The session keeps the selection, the 3D object and its pose. The photo is not touched."
-        )
+            imgui.text_unformatted(t("Save what you have changed?"))
+        note(t("The session keeps the selection, the 3D object and its pose."))
         imgui.dummy(theme.size(0, 4))
         filing = editor.filing
         answer = None
         top = imgui.get_cursor_pos_y()
-        if button("Save session", Kind.PRIMARY, width=132):
+        if button(t("Save session"), Kind.PRIMARY, width=132):
             answer = filing.answer_save
         lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()
         imgui.set_cursor_pos_y(lower)
-        if button("Don't save", width=104):
+        if button(t("Don't save"), width=104):
             answer = filing.answer_discard
         imgui.same_line()
         imgui.set_cursor_pos_y(lower)
-        if button("Cancel", width=104) or imgui.is_key_pressed(imgui.Key.escape):
+        if button(t("Cancel"), width=104) or imgui.is_key_pressed(imgui.Key.escape):
             answer = filing.answer_cancel
         if answer is not None:
             imgui.close_current_popup()

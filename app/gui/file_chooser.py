@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..editor import Editor
 from ..filing import Dialog
+from ..texts import t
 from .theme import Icon, theme
 from .widgets import Kind, bold_text, button, icon_button, note
 
@@ -70,9 +71,9 @@ class FileChooser:
 
     def _draw_head(self) -> None:
         with bold_text():
-            imgui.text_unformatted(self._dialog.value)
+            imgui.text_unformatted(t(self._dialog.value))
         endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
-        note(f"{endings}. Type a name or a whole path, or choose below.")
+        note(t("{endings}. Type a name or a whole path, or choose below.", endings=endings))
 
     def _draw_path(self) -> bool:
         """The field; True when Enter was pressed in it."""
@@ -80,7 +81,7 @@ class FileChooser:
             imgui.set_keyboard_focus_here()
         imgui.set_next_item_width(-1)
         is_entered, self._name = imgui.input_text_with_hint(
-            "##path", "name or path", self._name, imgui.InputTextFlags_.enter_returns_true
+            "##path", t("name or path"), self._name, imgui.InputTextFlags_.enter_returns_true
         )
         if is_entered and not self._name:
             return False
@@ -88,7 +89,7 @@ class FileChooser:
 
     def _draw_list(self) -> Path | None:
         """Folders and files; a file that was double-clicked."""
-        if icon_button(Icon.UP, "up", "One folder up"):
+        if icon_button(Icon.UP, "up", t("One folder up")):
             self._enter(self._folder.parent)
         imgui.same_line()
         imgui.align_text_to_frame_padding()
@@ -102,7 +103,7 @@ class FileChooser:
         for entry in self._entries:
             chosen = self._draw_entry(entry) or chosen
         if not self._entries:
-            note("No such files here.")
+            note(t("No such files here."))
         imgui.end_child()
         imgui.pop_style_var(2)
         imgui.pop_style_color()
@@ -132,17 +133,17 @@ class FileChooser:
         imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
         if self._replacing is not None:
             imgui.align_text_to_frame_padding()
-            text = f"{self._replacing.name} exists. Press again to replace it."
+            text = t("{name} exists. Press again to replace it.", name=self._replacing.name)
             imgui.text_colored(theme.vec("warning"), text)
             imgui.same_line()
-        verb = "Replace" if self._replacing is not None else VERBS[self._dialog]
+        verb = t("Replace") if self._replacing is not None else t(VERBS[self._dialog])
         right = imgui.get_window_width() - theme.pt(20 + 120 + 8 + 96)
         imgui.same_line(right)
         imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(54))
-        is_cancelled = button("Cancel", width=96)
+        is_cancelled = button(t("Cancel"), width=96)
         imgui.same_line()
         imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
-        why_not = None if self._name else "Type a name or choose a file"
+        why_not = None if self._name else t("Type a name or choose a file")
         return button(verb, Kind.PRIMARY, why_not, width=120), is_cancelled
 
     def _typed(self) -> Path:

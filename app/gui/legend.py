@@ -11,6 +11,7 @@ from ..editor import Editor
 from ..paint import DEPTH_STOPS, FULL_STRAIN, STRAIN_STOPS, Stops
 from ..painter import shown_now
 from ..render.scene import Hatch
+from ..texts import t
 from ..view import Shown
 from .layout import Rect
 from .scenes import INPAINTED, LIFTED
@@ -57,9 +58,9 @@ class Legend:
         self._draw.add_rect_filled(low, high, theme.u32(DARK, 0.85), theme.pt(6))
         self._y += theme.pt(PAD / 2)
         with bold_text():
-            self._text(self._shown.value, WHITE)
+            self._text(t(self._shown.value), WHITE)
         with small_text():
-            self._text("Alt+1: photo", GREY, side=1.0)
+            self._text(t("Alt+1: photo"), GREY, side=1.0)
             self._y += theme.pt(LINE + 4)
             self._draw_rows()
 
@@ -70,24 +71,24 @@ class Legend:
         assert document is not None
         half = self._editor.derived.painter.spread(document).half
         self._bar(DEPTH_STOPS)
-        self._text(f"near  −{half:.2f}", WHITE)
-        self._text(f"+{half:.2f}  far", WHITE, side=1.0)
+        self._text(t("near  −{half}", half=f"{half:.2f}"), WHITE)
+        self._text(t("+{half}  far", half=f"{half:.2f}"), WHITE, side=1.0)
         self._y += theme.pt(LINE)
-        self._text("object diameters from its middle", GREY)
+        self._text(t("object diameters from its middle"), GREY)
 
     def _draw_strain(self) -> None:
         self._bar(STRAIN_STOPS)
         self._text("0 %", WHITE)
         self._text(f"{50 * FULL_STRAIN:.0f} %", WHITE, side=0.5)
-        self._text(f"{100 * FULL_STRAIN:.0f} % or more", WHITE, side=1.0)
+        self._text(t("{percent} % or more", percent=f"{100 * FULL_STRAIN:.0f}"), WHITE, side=1.0)
         self._y += theme.pt(LINE)
-        self._text("longer or shorter than in the photo", GREY)
+        self._text(t("longer or shorter than in the photo"), GREY)
 
     def _draw_normals(self) -> None:
         rows = (
-            ((1.0, 0.5, 0.5), "facing right"),
-            ((0.5, 1.0, 0.5), "facing up"),
-            ((0.5, 0.5, 1.0), "facing the camera"),
+            ((1.0, 0.5, 0.5), t("facing right")),
+            ((0.5, 1.0, 0.5), t("facing up")),
+            ((0.5, 0.5, 1.0), t("facing the camera")),
         )
         for color, text in rows:
             self._swatch(color, None)
@@ -99,17 +100,19 @@ class Legend:
         shares = editor.derived.painter.shares(editor.history.document)  # too slow for a drag
         grey = (0.55, 0.55, 0.55)
         rows = (
-            (None, "from the photo", shares.from_photo),
-            (LIFTED, "invented on the object", shares.from_lifter),
-            (INPAINTED, "invented behind it", shares.from_inpainter),
+            (None, t("from the photo"), shares.from_photo),
+            (LIFTED, t("invented on the object"), shares.from_lifter),
+            (INPAINTED, t("invented behind it"), shares.from_inpainter),
         )
         for hatch, text, share in rows:
             self._swatch(grey, hatch)
             self._text(f"{share:.0%}".replace("%", " %"), WHITE, side=1.0)
             self._row(text)
         is_changed = shares.from_photo + shares.from_lifter + shares.from_inpainter > 0
-        when = "" if editor.preview is None else ", before this drag"
-        self._text(f"of the changed pixels{when}" if is_changed else "nothing is changed", GREY)
+        said = t("of the changed pixels")
+        if editor.preview is not None:
+            said = t("of the changed pixels, before this drag")
+        self._text(said if is_changed else t("nothing is changed"), GREY)
 
     # Parts of rows
 

@@ -13,12 +13,13 @@ from ..editor import Editor
 from ..render.renderer import Renderer
 from ..render.textures import PictureTexture
 from ..resources import resource
+from ..texts import t
 from .landmarks import mark
 from .layout import Rect
 from .panes import FLAGS
 from .recovery_list import draw_recovery, recovery_height
 from .theme import TITLE_SIZE, Icon, theme
-from .widgets import Kind, bold_text, button, note, tooltip
+from .widgets import Kind, bold_text, button, tooltip
 
 SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flower", "Flower"))
 COLUMN = 720.0  # points, width of everything
@@ -65,13 +66,13 @@ class StartScreen:
         draw.add_rect(low, high, theme.u32("pressed"), theme.pt(12), theme.pt(1.5))
         self._centred(Icon.IMAGE, low, column, 40, TITLE_SIZE, "secondary")
         with bold_text():
-            self._centred("Drop a photo here", low, column, 88, TITLE_SIZE, "text")
-        text = "Click an object in it, lift it into 3D, drag its points, save the photo."
+            self._centred(t("Drop a photo here"), low, column, 88, TITLE_SIZE, "text")
+        text = t("Click an object in it, lift it into 3D, drag its points, save the photo.")
         self._centred(text, low, column, 128, 0.0, "secondary")
         imgui.set_cursor_screen_pos(
             ImVec2(low.x + (column - theme.pt(160)) / 2, low.y + theme.pt(172))
         )
-        if button("Open a photo…", Kind.PRIMARY, width=160):
+        if button(t("Open a photo…"), Kind.PRIMARY, width=160):
             run(editor, "open")
         imgui.set_cursor_screen_pos(ImVec2(low.x, high.y))
         imgui.dummy(ImVec2(column, 0))
@@ -87,7 +88,7 @@ class StartScreen:
 
     def _draw_samples(self, editor: Editor, column: float) -> None:
         with bold_text():
-            imgui.text_unformatted("Or try one of these")
+            imgui.text_unformatted(t("Or try one of these"))
         imgui.dummy(theme.size(0, 0))
         gap = (column - len(SAMPLES) * theme.pt(THUMB[0])) / (len(SAMPLES) - 1)
         for i, (name, title) in enumerate(SAMPLES):
@@ -113,7 +114,7 @@ class StartScreen:
         draw.add_image_rounded(picture, low, high, zero, one, white, theme.pt(8))
         if is_hovered:
             draw.add_rect(low, high, theme.u32("accent"), theme.pt(8), theme.pt(2))
-        imgui.text_colored(theme.vec("text" if is_hovered else "secondary"), title)
+        imgui.text_colored(theme.vec("text" if is_hovered else "secondary"), t(title))
         imgui.end_group()
 
     def _thumb(self, name: str) -> PictureTexture:
@@ -133,16 +134,14 @@ class StartScreen:
 
     def _draw_recent(self, editor: Editor, recent: list[Path]) -> None:
         with bold_text():
-            imgui.text_unformatted("Recent")
+            imgui.text_unformatted(t("Recent"))
         imgui.push_style_var(imgui.StyleVar_.button_text_align, ImVec2(0, 0.5))
         for path in recent:
             if button(f"{Icon.FILE}   {path.name}##{path}", Kind.QUIET, width=320):
                 if path.exists():
                     editor.filing.open(path)
                 else:
-                    editor.complain(f"{path.name} is not there any more")
+                    editor.complain(t("{name} is not there any more", name=path.name))
                     editor.filing.forget_recent(str(path))
             tooltip(str(path))
         imgui.pop_style_var()
-        if not recent:
-            note("Nothing yet.")

@@ -9,6 +9,7 @@ from enum import Enum
 
 from imgui_bundle import ImVec2, imgui
 
+from ..texts import t
 from .landmarks import mark
 from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
@@ -171,7 +172,7 @@ def number_field(number: Number, value: float) -> Change:
     imgui.pop_style_color()
     if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
         changed = Change(number.rest, is_changed=value != number.rest, is_done=True)
-    tooltip("Double-click resets it")
+    tooltip(t("Double-click resets it"))
     imgui.same_line(theme.pt(LABEL_WIDTH))
     field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
     imgui.set_next_item_width(field)

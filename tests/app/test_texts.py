@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from app import view
+from app.filing import Dialog
 from app.texts import languages, t, use_language
 
 ROOT = Path(__file__).parents[2]
@@ -25,9 +26,9 @@ SHOWING = {
     "text_unformatted", "text_colored", "note", "heading", "tooltip", "button", "checkbox", "say",
     "complain", "label", "menu_item", "begin_menu", "icon_button", "input_text_with_hint",
 }  # fmt: skip
-TABLES = ("Command", "Number")  # constructors whose first argument is an English text
+TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
 TABLE_FILES = ("commands/gestures.py",)  # literals that are all texts
-ENUMS = (view.ToolName, view.Shown, view.Popup)
+ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog)
 
 
 def calls(path: Path) -> Iterator[ast.Call]:
