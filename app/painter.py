@@ -15,7 +15,7 @@ from objectmorpher_core.pixels import crop
 from . import paint
 from .blend import CELL, build_blend
 from .memo import Memo
-from .view import Shown, View
+from .view import Shown, ToolName, View
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
@@ -37,8 +37,10 @@ class Shares:
 
 
 def shown_now(document: Document | None, view: View) -> Shown:
-    """The view that was chosen, as soon as there is an object for it."""
+    """The view that was chosen, as soon as there is an object for it; selecting needs the photo."""
     if document is None or not any(o.lifted for o in document.objects):
+        return Shown.COMPOSITE
+    if view.tool in (ToolName.SELECT, ToolName.MASK):
         return Shown.COMPOSITE
     return view.shown
 

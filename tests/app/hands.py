@@ -76,6 +76,21 @@ class Hands:
         x0, y0, x1, y1 = self.places()[label]
         return (x0 + x1) / 2, (y0 + y1) / 2
 
+    def catch_up(self) -> None:
+        """Waits until the window has answered everything: it opens and closes its help."""
+        end = time.monotonic() + PATIENCE
+        while "Reset all" not in self.places() and time.monotonic() < end:
+            self.press("Escape")
+            self.press("F1")
+            self._wait_a_moment(lambda: "Reset all" in self.places())
+        self.press("Escape")
+        self.wait(lambda: "Reset all" not in self.places(), "closing the help")
+
+    def _wait_a_moment(self, is_reached: Callable[[], bool]) -> None:
+        end = time.monotonic() + 3.0
+        while not is_reached() and time.monotonic() < end:
+            time.sleep(0.05)
+
     def choose(self, label: str) -> None:
         """Clicks the button that says `label`."""
         self.click(*self.place(label))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -102,10 +101,9 @@ def check(hands: Hands, session: Path, log: Path) -> None:
     """The window still works: what it saves is whole, and its log holds no error."""
     for button in (1, 2, 3):
         hands.xdotool("mouseup", button)
-    for _ in range(6):
-        hands.press("Escape")
-    time.sleep(1.0)
+    hands.catch_up()
     hands.press("ctrl+shift+s")
+    hands.place("Cancel")
     hands.fill_in(session)
     hands.wait(session.exists, "saving after the monkey")
     data = session.read_bytes()
