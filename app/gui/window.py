@@ -139,6 +139,8 @@ class Window:
             if self._frame_log is not None:
                 self._frame_log.begin()
             self._frame()
+            if len(imgui.get_current_context().input_events_queue):
+                lively = SETTLE  # ImGui takes one key or button of a kind a frame
             drawn += 1
             if self._is_over(drawn):
                 break
