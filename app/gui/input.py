@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import traceback
 from dataclasses import replace
 
@@ -32,6 +33,7 @@ class Input:
     def __init__(self, shortcuts: Shortcuts) -> None:
         self._shortcuts = shortcuts
         self.shape = Shape.ARROW
+        self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
@@ -80,10 +82,18 @@ class Input:
 
     def take_key(self, keys: str) -> None:
         """A key went down, or repeats: "Ctrl+Shift+S"."""
-        self._pressed.append(keys)
+        self._waiting.append((imgui.get_current_context().input_events_next_event_id, keys))
+
+    def _take_waiting(self) -> None:
+        """Chords go after the pointer's events that came before them and that ImGui still holds."""
+        queue = imgui.get_current_context().input_events_queue
+        first = queue[0].event_id if len(queue) else math.inf
+        while self._waiting and self._waiting[0][0] <= first:
+            self._pressed.append(self._waiting.pop(0)[1])
 
     def _run_keys(self, editor: Editor) -> None:
         """What was pressed since the last frame; nothing while a field or a dialog has the keys."""
+        self._take_waiting()
         pressed, self._pressed = self._pressed, []
         if pressed and self._shortcuts.take(pressed[-1]):
             return
