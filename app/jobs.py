@@ -41,12 +41,15 @@ class JobError:
     sentence: str  # for the status line
     trace: str  # for "Details" and the log
     retry: Callable[[], None] | None = None  # asks for the same once more, where that may help
+    is_expected: bool = False  # one of our own errors: the request was at fault, not the program
 
     @classmethod
     def of(cls, error: Exception, what: str) -> JobError:
         """From an exception that is being handled; `what` failed."""
         name = type(error).__name__
-        return cls(name, str(error) or f"{what} failed ({name})", traceback.format_exc())
+        is_expected = isinstance(error, ValueError) and type(error) is not ValueError
+        sentence = str(error) or f"{what} failed ({name})"
+        return cls(name, sentence, traceback.format_exc(), is_expected=is_expected)
 
 
 @dataclass(eq=False)
@@ -261,7 +264,8 @@ class Jobs:
         elif what == "cancelled" or job.stop_asked is not None:
             self._finish(job, job.cancelled)
         elif what == "failed":
-            log.error("%s failed: %s\n%s", job.title, value.sentence, value.trace)
+            level = logging.INFO if value.is_expected else logging.ERROR
+            log.log(level, "%s failed: %s\n%s", job.title, value.sentence, value.trace)
             self._finish(job, lambda: job.failed(value))
         else:
             level = logging.DEBUG if job.is_quiet else logging.INFO

@@ -113,7 +113,6 @@ def check(hands: Hands, session: Path, log: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="after some hundred events ImGui gets no keys any more; not found yet")
 @pytest.mark.parametrize(("seed", "count"), [(1, 150), (2, EVENTS)])
 def test_random_events_break_nothing(
     window_environment: dict[str, str], photo_path: Path, tmp_path: Path, seed: int, count: int
