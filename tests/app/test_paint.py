@@ -9,7 +9,7 @@ from app import paint
 from app.derived import Derived
 from app.editor import Editor
 from app.painter import PAINTED, shown_now
-from app.view import Shown, View
+from app.view import Shown, ToolName, View
 from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import Document, Placement
@@ -126,10 +126,15 @@ def test_shares_are_about_those_of_the_export(editor: Editor, ball: Document, tu
 
 
 def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:
-    view = View(shown=Shown.STRAIN)
+    view = View(tool=ToolName.POSE, shown=Shown.STRAIN)
     assert shown_now(None, view) is Shown.COMPOSITE
     assert shown_now(editor.document, view) is Shown.COMPOSITE
     assert shown_now(ball, view) is Shown.STRAIN
+
+
+@pytest.mark.parametrize("tool", [ToolName.SELECT, ToolName.MASK])
+def test_selecting_shows_the_photo_whatever_the_view(ball: Document, tool: ToolName) -> None:
+    assert shown_now(ball, View(tool=tool, shown=Shown.STRAIN)) is Shown.COMPOSITE
 
 
 def _sphere(count: int) -> np.ndarray:
