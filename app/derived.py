@@ -81,6 +81,7 @@ class Derived:
     def __init__(self) -> None:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
+        self._drafts: dict[int, Memo] = {}
         self.layers = Layers(self)
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
@@ -148,6 +149,16 @@ class Derived:
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
 
+    def draft(self, document: Document, k: int) -> PosedSplats:
+        """The same for pictures that must be quick: of a large object fewer, wider ones."""
+        thing = document.objects[k]
+        puppet = self.shape(document.photo, thing).puppet
+        if not puppet.has_draft:
+            return self.posed(document, k)
+        return self._drafts.setdefault(k, Memo(POSES))(
+            lambda: puppet.draft(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
     def body_points(self, document: Document, k: int) -> F64:
         """(N, 3) object frame: object `k`'s solid Gaussians, deformed."""
         thing = document.objects[k]
@@ -176,6 +187,7 @@ class Derived:
     def forget(self, lifted: set[int]) -> None:
         """Drops what was posed and projected of objects other than these."""
         self._posed = {k: kept for k, kept in self._posed.items() if k in lifted}
+        self._drafts = {k: kept for k, kept in self._drafts.items() if k in lifted}
         self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
 
     def blend(self, document: Document, view: View) -> F32:

@@ -19,8 +19,10 @@ from .raster.picking import pick
 from .raster.posed import PosedSplats, RestSplats
 from .raster.reference import Picture3D
 from .raster.texture import TextureLevels
+from .raster.thinning import thinned
 from .raster.tiles import Drawable
 
+DRAFT = 10_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
 EXACT, CLOSE = 1e-9, 1e-6  # object units by which it may miss: at once, and after all steps
 
@@ -77,6 +79,27 @@ class Puppet:
         skinned = self.deformer.skin_points(pieces.means, pose, pieces.normals)
         matrix = placement.matrix(self.lifted, self.camera)
         return PosedSplats(RestSplats(lifted, self.camera), skinned, matrix)
+
+    @property
+    def has_draft(self) -> bool:
+        """Whether `draft` is less work than `posed`."""
+        return self._draft_rest is not None
+
+    def draft(self, pose: Pose | None, placement: Placement) -> PosedSplats:
+        """The same from about `DRAFT` wider Gaussians: where the object is and where it looks."""
+        assert self._draft_rest is not None, "it has few Gaussians"
+        rest, chosen = self._draft_rest
+        matrix = placement.matrix(self.lifted, self.camera)
+        motion = None if pose is None else self.deformer.gaussians_motion(pose, chosen)
+        return PosedSplats(rest, motion, matrix)
+
+    @cached_property
+    def _draft_rest(self) -> tuple[RestSplats, I32] | None:
+        """The wider Gaussians and which ones they are; None where there are few anyway."""
+        if (fewer := thinned(self.lifted, DRAFT)) is None:
+            return None
+        lifted, chosen = fewer
+        return RestSplats(lifted, self.camera), chosen
 
     def _posed_whole(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The Gaussians as they were lifted, none of them split."""

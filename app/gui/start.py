@@ -28,6 +28,9 @@ THUMB = (168.0, 112.0)
 RECENT = 4  # files shown
 
 
+UNLIKE = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_background  # a pane
+
+
 class StartScreen:
     """Owns the samples' thumbnails."""
 
@@ -39,7 +42,7 @@ class StartScreen:
         imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_color(imgui.Col_.window_bg, theme.vec("surround"))
-        imgui.begin("##start", None, FLAGS & ~imgui.WindowFlags_.no_scrollbar)
+        imgui.begin("##start", None, FLAGS & ~UNLIKE)
         imgui.pop_style_color()
         column = min(theme.pt(COLUMN), rect.width - theme.pt(48))
         recent = [Path(r) for r in editor.settings.recent[:RECENT]]

@@ -227,7 +227,7 @@ class Window:
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
-        self._renderer.clear(theme.rgb("surround"), size)
+        self._renderer.clear(theme.rgb("panel"), size)
         scene = build_scene(self.editor, self._renderer.kind)
         if scene is not None:
             view = self.editor.view
