@@ -78,9 +78,8 @@ def test_a_part_of_the_view_is_that_part_of_the_whole() -> None:
     box = drawable.box()
     assert box is not None
     picture = tiles.draw(drawable, scene.texture, box)
-    on_view = tuple(factor * v for v in box)
-    part, _ = sharpen(picture, scene.texture, factor, on_view, (0.0, 0.0), zoom)
-    x0, y0, x1, y1 = on_view
+    x0, y0, x1, y1 = (factor * v for v in box)
+    part, _ = sharpen(picture, scene.texture, factor, (x0, y0, x1, y1), (0.0, 0.0), zoom)
     np.testing.assert_allclose(part / 255, whole[y0:y1, x0:x1], atol=2 * LEVEL)
 
 
