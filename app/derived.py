@@ -5,6 +5,7 @@ The heavy modules of the core are imported when the first object is lifted, or b
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -29,13 +30,13 @@ from .layers import Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
+from .shape import Shape, build_shape
 from .surface_facts import SurfaceFacts
 from .view import View
 
 if TYPE_CHECKING:
-    from objectmorpher_core.puppet import Puppet, SurfacePoint
+    from objectmorpher_core.puppet import SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
-    from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 
 PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
@@ -65,14 +66,6 @@ class ObjectFrame:
     corners: F64  # (4, 2) image px: left top, right top, right bottom, left bottom
     centre: F64  # (2,) image px, of the placed object
     radius: float  # image px, of the ring around it
-
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """All that depends on the lifted object only."""
-
-    puppet: Puppet
-    texture: TextureLevels
 
 
 class Derived:
@@ -131,15 +124,17 @@ class Derived:
         """Of a rig that changed, only what depends on it."""
         similar = self._latest
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
-            shape = replace(similar[2], puppet=similar[2].puppet.with_rig(thing.rig))
+            shape = Shape(similar[2].puppet.with_rig(thing.rig), similar[2].texture)
         else:
-            shape = _build_shape(photo, thing)
+            shape = build_shape(photo, thing)
         self._latest = (thing.lifted, thing.deform, shape)
         return shape
 
-    def prepare(self, document: Document, k: int) -> None:
-        """Makes ready what the first drag of object `k` needs."""
-        self.shape(document.photo, document.objects[k]).puppet.deformer  # noqa: B018
+    def adopt(self, document: Document, shapes: Mapping[int, Shape]) -> None:
+        """Takes over shapes of the document's objects that were made elsewhere."""
+        for k, shape in shapes.items():
+            thing = document.objects[k]
+            self._shapes(lambda shape=shape: shape, thing.lifted, thing.deform, thing.rig)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""
@@ -305,14 +300,6 @@ def _strongest(weights: Sparse, count: int) -> I32:
         ends = weights.indices[first + strongest]
         pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
     return np.array(sorted(pairs), np.int32).reshape(-1, 2)
-
-
-def _build_shape(photo: Photo, thing: EditObject) -> Shape:
-    from objectmorpher_core.compose.composite import object_texture
-    from objectmorpher_core.puppet import puppet_of
-
-    assert thing.matte is not None
-    return Shape(puppet_of(thing, photo.camera), object_texture(thing.matte))
 
 
 def _outlines(mask: Mask) -> tuple[F32, ...]:

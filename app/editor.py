@@ -240,6 +240,7 @@ class Editor:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
         is_changed = self.background.poll() or is_changed
+        self.tasks.rehearse()
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
         self.autosave.poll()

@@ -8,8 +8,11 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from objectmorpher_core.progress import Progress
+
 from .jobs import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
+from .shape import Shape, build_ready
 from .texts import t
 
 if TYPE_CHECKING:
@@ -159,24 +162,28 @@ class Filing:
         editor, given_up = self._editor, self._editor.committed
         fov, seed = self._fov, self._seed
 
-        def show(opened: Opened) -> None:
+        def read(progress: Progress) -> tuple[Opened, dict[int, Shape]]:
+            opened = read_document(path, fov, seed, progress)
+            return opened, build_ready(opened.document)
+
+        def show(opened: Opened, shapes: dict[int, Shape]) -> None:
             editor.start(opened.document)
+            editor.derived.adopt(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(opened: Opened) -> None:
+        def accept(answer: tuple[Opened, dict[int, Shape]]) -> None:
             if editor.committed is given_up or editor.is_saved:
-                show(opened)
+                show(*answer)
             else:
-                self.guard(lambda: show(opened))
+                self.guard(lambda: show(*answer))
 
         def fail(error: JobError) -> None:
             editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
 
         editor.background.start(
-            t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),
-            kind=OPEN, done=accept, failed=fail,
+            t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip
 
     def forget_recent(self, path: str) -> None:

@@ -20,12 +20,14 @@ from . import job_functions
 from .job_functions import Choice, Cut
 from .jobs import JobError
 from .layers import Rendered, Request
+from .shape import rehearse
 from .texts import t
 from .view import ToolName
 
 if TYPE_CHECKING:
     from .editor import Editor
 
+REHEARSE = "rehearse"  # kind of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 
 
@@ -130,7 +132,6 @@ class Tasks:
             changed = edits.set_lifted(current, k, matte, lifted)
             editor.posing.select(None)
             editor.apply(t("Lift object"), changed)
-            editor.derived.prepare(changed, k)
             editor.view.tool = ToolName.POSE
             count = f"{len(lifted.gaussians):,}"
             editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
@@ -140,6 +141,25 @@ class Tasks:
             t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
             done=accept, failed=editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def rehearse(self) -> None:
+        """Sees to it that the current object can be dragged at once; each frame."""
+        editor, document = self._editor, self._editor.committed
+        if document is None or editor.background.is_busy(REHEARSE) or not editor.is_lifted:
+            return
+        if editor.current >= len(document.objects):
+            return
+        photo, thing = document.photo, document.objects[editor.current]
+        if thing.lifted is None:
+            return
+        shape = editor.derived.shape(photo, thing)
+        if shape.is_rehearsed:
+            return
+        shape.is_rehearsed = True
+        editor.background.start(
+            "Getting ready", lambda progress: rehearse(photo, thing, shape), kind=REHEARSE,
+            done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
     def ensure_plate(self) -> bool:

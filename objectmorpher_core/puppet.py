@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -52,18 +53,31 @@ class Puppet:
         self._settings = settings
         self._rig = rig
         self._rest = RestSplats(lifted, camera)
+        self._lock = Lock()
+        self._deformer: Deformer | None = None
+        self._similar: Deformer | None = None  # of the same object with another rig
 
-    @cached_property
+    @property
     def deformer(self) -> Deformer:
-        """The object's graph and solver; made when the object is first deformed."""
+        """The object's graph and solver; made when the object is first deformed.
+
+        By one thread: another one that asks meanwhile waits for it.
+        """
+        with self._lock:
+            if self._deformer is None:
+                self._deformer, self._similar = self._build_deformer(), None
+            return self._deformer
+
+    def _build_deformer(self) -> Deformer:
+        if self._similar is not None and self._rig is not None:
+            return self._similar.with_rig(self._rig)
         return Deformer(self.lifted, self._settings, self._rig)
 
     def with_rig(self, rig: Rig) -> Puppet:
         """The same object with another rig; what does not depend on it is kept."""
         other = copy.copy(self)
-        other._rig = rig
-        if "deformer" in self.__dict__:
-            other.deformer = self.deformer.with_rig(rig)
+        other._rig, other._lock = rig, Lock()
+        other._similar, other._deformer = self._deformer or self._similar, None
         return other
 
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
