@@ -19,8 +19,8 @@ from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, EditObject
 
 from .autosave import Autosave
-from .background import Background
 from .candidate import Candidates
+from .chores import Chores
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
@@ -55,7 +55,7 @@ class Editor:
         self.view = View()
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
-        self.background = Background(wake)
+        self.chores = Chores(wake)
         self.autosave, self.recovery = Autosave(self), Recovery(self)
         self.derived = Derived()
         self.tasks = Tasks(self)
@@ -153,7 +153,7 @@ class Editor:
     def close_document(self) -> None:
         self.hand.abort(self)
         self.jobs.cancel(patience=RELUCTANCE)
-        self.background.cancel(OPEN)
+        self.chores.cancel(OPEN)
         self.exporting.close()
         self.tasks.forget()
         self.composing.forget()
@@ -239,7 +239,7 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
-        is_changed = self.background.poll() or is_changed
+        is_changed = self.chores.poll() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
         self.autosave.poll()
@@ -251,6 +251,6 @@ class Editor:
         self.settings = replace(self.settings, theme=theme)
 
     def shut_down(self) -> None:
-        self.background.close()
+        self.chores.close()
         self.autosave.close()
         self.jobs.close()

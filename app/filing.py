@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .editor import Editor
 
 EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
-OPEN = "open"  # kind of what runs in the background
+OPEN = "open"  # kind of chores
 EXPECTED = ("OpeningError",)  # errors that need no details
 NAMED = 3  # files named in a message
 
@@ -152,7 +152,7 @@ class Filing:
         return folder / f"{stem}-edited.png"
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
-        """Reads the file in the background; `then` is called when it is shown.
+        """Reads the file in a thread; `then` is called when it is shown.
 
         What is open now may be lost: that was asked. What is done to it meanwhile may not.
         """
@@ -174,7 +174,7 @@ class Filing:
         def fail(error: JobError) -> None:
             editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
 
-        editor.background.start(
+        editor.chores.start(
             t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),
             kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip

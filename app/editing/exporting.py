@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..export_functions import write_export
-from ..exporting import FORMATS, NAMES, Format, Plan, What, format_of
+from ..export_plan import FORMATS, NAMES, Format, Plan, What, format_of
 from ..texts import t
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ..editing.exporting import Exporting
 from ..editor import Editor
-from ..exporting import LOSSLESS, Format, What
+from ..export_plan import LOSSLESS, Format, What
 from ..filing import Dialog
 from ..texts import t
 from .modal import modal

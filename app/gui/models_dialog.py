@@ -62,7 +62,7 @@ def _draw_state(editor: Editor, state: State) -> None:
     """Installed, on its way with Cancel, or the button that gets it."""
     models, id = editor.models, state.weight.id
     if models.downloading == id:
-        chore = editor.background.shown
+        chore = editor.chores.shown
         share = chore.fraction if chore is not None and chore.kind == DOWNLOAD else 0.0
         if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
             models.cancel()

@@ -1,4 +1,4 @@
-"""What runs beside the window in a thread of its own: opening files, downloads.
+"""Chores, each in a thread of its own beside the window: opening files, downloads.
 
 The worker process (`jobs.py`) computes; here is what mostly waits for a disk or a network, or
 what must not wait behind a long computation. Answers are delivered on the main thread by `poll`.
@@ -42,7 +42,7 @@ class Chore:
     thread: threading.Thread | None = None
 
 
-class Background:
+class Chores:
     """What runs, and the answers."""
 
     def __init__(self, wake: Callable[[], None] = lambda: None) -> None:
