@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -124,8 +124,8 @@ class Editor:
 
     # Saying things
 
-    def say(self, text: str, action: Action | None = None) -> None:
-        self.message = Message(text, action=action)
+    def say(self, text: str) -> None:
+        self.message = Message(text)
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
@@ -184,28 +184,30 @@ class Editor:
         if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
-        label, before = self.history.undo_label, self.history.document
-        self.history.undo()
-        self.objects.follow(before)
-        self._after_travel(t("Undone: {label}", label=label) if label else t("Nothing to undo"))
+        label = self.history.undo_label
+        text = t("Undone: {label}", label=label) if label else t("Nothing to undo")
+        self._travel(self.history.undo, text)
 
     def redo(self) -> None:
         if self.hand.is_busy or self.history is None:
             return
-        label, before = self.history.redo_label, self.history.document
-        self.history.redo()
-        self.objects.follow(before)
-        self._after_travel(t("Done again: {label}", label=label) if label else t("Nothing to redo"))
+        label = self.history.redo_label
+        text = t("Done again: {label}", label=label) if label else t("Nothing to redo")
+        self._travel(self.history.redo, text)
 
     def travel(self, index: int) -> None:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        self.history.jump(index)
-        self._after_travel(t("Now after: {label}", label=self.history.steps[index]))
+        text = t("Now after: {label}", label=self.history.steps[index])
+        self._travel(partial(self.history.jump, index), text)
 
-    def _after_travel(self, text: str) -> None:
-        """The document may have lost what the view points at."""
+    def _travel(self, go: Callable[[], None], text: str) -> None:
+        """Goes to another step, which may lack what the view points at."""
+        before = self.committed
+        go()
+        assert before is not None
+        self.objects.follow(before)
         self.hover = Hover()
         self.posing.forget_lost()
         self.objects.forget_lost()
@@ -245,10 +247,6 @@ class Editor:
         self.autosave.poll()
         self.candidates.poll(time.monotonic())
         return is_changed
-
-    def set_theme(self, theme: str) -> None:
-        """ "dark" or "light"."""
-        self.settings = replace(self.settings, theme=theme)
 
     def shut_down(self) -> None:
         self.chores.close()
