@@ -45,7 +45,7 @@ class Chore:
 class Chores:
     """What runs, and the answers."""
 
-    def __init__(self, wake: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, wake: Callable[[], None]) -> None:
         """`wake` is called from another thread when `poll` has something to do."""
         self._wake = wake
         self._running: dict[str, Chore] = {}  # by kind

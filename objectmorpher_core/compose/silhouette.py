@@ -36,15 +36,13 @@ class Silhouette:
     pitch: float  # photo px per px of the grid
 
 
-def silhouette(
-    splats: PosedSplats, texture: TextureLevels, camera: Camera, side: int = FINE
-) -> Silhouette | None:
-    """The object as the photo's `camera` sees it, `side` px long; None where it is not seen."""
+def silhouette(splats: PosedSplats, texture: TextureLevels, camera: Camera) -> Silhouette | None:
+    """The object as the photo's `camera` sees it; None where it is not seen."""
     box = _box(splats, camera, splats.means)
     if box is None:
         return None
     (left, top), (right, bottom) = box
-    pitch = max((right - left) / side, (bottom - top) / side, 1.0)
+    pitch = max((right - left) / FINE, (bottom - top) / FINE, 1.0)
     width = max(int(np.ceil((right - left) / pitch)), 1)
     height = max(int(np.ceil((bottom - top) / pitch)), 1)
     window = camera.windowed(left, top, width, height, 1 / pitch)
