@@ -116,7 +116,7 @@ class Chores:
             log.debug("%s took %.2f s", chore.title, time.monotonic() - chore.started)
             chore.done(value)
         else:
-            log.error("%s failed: %s\n%s", chore.title, value.sentence, value.trace)
+            value.write_log(chore.title)
             chore.failed(value)
 
     def _work(self, chore: Chore) -> None:

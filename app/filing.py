@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 OPEN = "open"  # kind of chores
-EXPECTED = ("OpeningError",)  # errors that need no details
 NAMED = 3  # files named in a message
 
 
@@ -172,7 +171,7 @@ class Filing:
                 self.guard(lambda: show(opened))
 
         def fail(error: JobError) -> None:
-            editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
+            editor.complain(error.sentence, "" if error.is_expected else error.trace)
 
         editor.chores.start(
             t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),

@@ -140,7 +140,8 @@ def read_coverage(path: Path, size: tuple[int, int], progress: Progress) -> U8:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{path.name} cannot be opened: {error.strerror or error}") from error
+        sentence = f"{path.name} cannot be opened: {error.strerror or error}"
+        raise image.ImageError(sentence) from error
     return image.read_coverage(data, size)
 
 
