@@ -159,7 +159,7 @@ class Editor:
         self.composing.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
-        self.hover, self.rubber, self.message = Hover(), None, None
+        self.hover, self.message = Hover(), None
 
     def quit(self) -> None:
         """Closes the program; nothing is asked here."""
@@ -218,8 +218,8 @@ class Editor:
     def escape(self) -> None:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
-            self.rubber = None
-        elif self.tasks.question is not None:
+            return
+        if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
             self.posing.select(None)
