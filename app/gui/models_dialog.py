@@ -11,7 +11,7 @@ from ..editor import Editor
 from ..texts import t
 from .modal import modal
 from .theme import Icon, theme
-from .widgets import Kind, bold_text, button, gap, note, rule, tooltip
+from .widgets import Kind, bold_text, button, gap, half_width, note, rule, tooltip
 
 WIDTH = 560.0  # points
 BUTTON = 120.0
@@ -88,7 +88,7 @@ def draw_offer(editor: Editor) -> None:
            gain=_lower(t(names_of(weight.id).gain)),
            size=f"{weight.wheel_size / 1e6:.0f}"))  # fmt: skip
     gap(8)
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
+    half = half_width()
     if button(t("See the model…"), width=half):
         models.open()
     imgui.same_line()

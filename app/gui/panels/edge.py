@@ -9,8 +9,8 @@ from objectmorpher_core.segment.mask_edit import LARGEST_REACH
 from ...commands import COMMANDS, run, why_not
 from ...editor import Editor
 from ...texts import t
-from ..theme import Icon, theme
-from ..widgets import Number, button, gap, heading, note, number_field, tooltip
+from ..theme import Icon
+from ..widgets import Number, button, gap, half_width, heading, note, number_field, tooltip
 
 ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
@@ -38,8 +38,7 @@ def draw_edge(editor: Editor) -> None:
 
 def draw_pair(editor: Editor, left: str, right: str) -> None:
     """Two commands side by side."""
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
-    draw_command(editor, left, half)
+    draw_command(editor, left, half_width())
     imgui.same_line()
     draw_command(editor, right)
 

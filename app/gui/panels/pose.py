@@ -14,8 +14,8 @@ from ...pose_view import PoseMode
 from ...texts import t
 from ...view import Shown
 from ..segmented import Choice, segmented
-from ..theme import Icon, theme
-from ..widgets import button, checkbox, gap, heading, note, tooltip
+from ..theme import Icon
+from ..widgets import button, checkbox, gap, half_width, heading, note, tooltip
 from .pose_handle import draw_handles, draw_numbers
 from .pose_rig import draw_modes, draw_regions
 
@@ -38,10 +38,10 @@ def draw_pose(editor: Editor) -> None:
     _draw_symmetry(editor)
     _draw_overlays(editor)
     gap(12)
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
+    half = half_width()
     if button(t("All to rest"), why_not=why_not(editor, "reset_handles"), width=half):
         run(editor, "reset_handles")
-    imgui.same_line(0, theme.pt(8))
+    imgui.same_line()
     label = f"{Icon.RESET}  {t('Reset pose')}"
     if button(label, why_not=why_not(editor, "reset_pose"), width=half):
         run(editor, "reset_pose")
