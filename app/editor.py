@@ -41,7 +41,7 @@ from .jobs import RELUCTANCE, JobError, Jobs
 from .recovery import Recovery
 from .settings import Settings
 from .tasks import SELECT, Tasks
-from .texts import t
+from .texts import sentence, t
 from .tools.pointer import Hand, Pointer
 from .view import Shown, ToolName, View
 
@@ -129,8 +129,7 @@ class Editor:
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
-        sentence = text[:1].upper() + text[1:]
-        self.message = Message(sentence, is_error=True, details=details, action=action)
+        self.message = Message(sentence(text), is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
         retry = Action(t("Retry"), error.retry) if error.retry else None

@@ -11,10 +11,10 @@ from objectmorpher_core import compose
 from objectmorpher_core.joining import LEAST_FEATHER, MOST_FEATHER, MOST_SHADOW
 
 from ...commands import COMMANDS, run, why_not
-from ...commands.compose import not_moved, sentence
+from ...commands.compose import not_moved
 from ...editor import Editor
 from ...job_functions import Variant
-from ...texts import t
+from ...texts import sentence, t
 from ..dial import SIDE, dial
 from ..pictures import pictures
 from ..segmented import Choice, segmented
