@@ -18,10 +18,9 @@ from .document import (
     Plate,
     Pose,
     Prompt,
-    Rig,
-    Seam,
 )
 from .joining import LEAST_FEATHER, MOST_FEATHER, Shadow
+from .rig import Rig, Seam
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 

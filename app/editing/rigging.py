@@ -11,7 +11,8 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64, I32, Mask
-from objectmorpher_core.document import Document, Rig
+from objectmorpher_core.document import Document
+from objectmorpher_core.rig import Rig
 
 from ..pose_view import PoseMode
 from ..texts import t

@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits
-from objectmorpher_core.document import (
-    Click,
-    DeformSettings,
-    Document,
-    Placement,
-    Prompt,
-    Rig,
-    Seam,
-)
+from objectmorpher_core.document import Click, DeformSettings, Document, Placement, Prompt
 from objectmorpher_core.edits import EditError
+from objectmorpher_core.rig import Rig, Seam
 from objectmorpher_core.segment.mask_edit import feather, grow, shrink
 from tests import shapes
 
