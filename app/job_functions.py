@@ -159,7 +159,7 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
 
     Compiling takes many seconds after an installation and nothing later.
     """
-    from objectmorpher_core.compose.composite import object_texture
+    from objectmorpher_core.compose.lighting import object_texture
     from objectmorpher_core.document import Handle, Placement
     from objectmorpher_core.puppet import puppet_of
 

@@ -167,8 +167,10 @@ class Jobs:
         """
         self._count += 1
         kind = kind or function.__name__
-        job = Job(title, function, arguments, done, failed, cancelled, kind)
-        job.number, job.is_quiet, job.is_spare = self._count, is_quiet, is_spare
+        job = Job(
+            title, function, arguments, done, failed, cancelled, kind,
+            number=self._count, is_quiet=is_quiet, is_spare=is_spare,
+        )  # fmt: skip
         self._wait_for(job)
 
     def _wait_for(self, job: Job) -> None:
@@ -267,7 +269,7 @@ class Jobs:
         self._worker.has_answered = True
         if job is None or number != job.number:
             return  # an answer of a process that was ended
-        elif what == "progress":
+        if what == "progress":
             job.fraction, job.note = value
         elif what == "cancelled" or job.stop_asked is not None:
             self._finish(job, job.cancelled)

@@ -102,14 +102,14 @@ class Tasks:
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind=SELECT,
+            done=accept, failed=self._fail_segment, cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
 
     def _fail_segment(self, error: JobError) -> None:
-        self.question = None
+        self._drop_question()
         self._editor.complain_of(error)
 
-    def _drop_prompt(self) -> None:
+    def _drop_question(self) -> None:
         self.question = None
 
     def lift(self) -> None:
@@ -120,7 +120,7 @@ class Tasks:
         if document is None or selection is None:
             return
         editor.message = None
-        settings = editor.settings
+        photo, settings = document.photo, editor.settings
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
             current = editor.document
@@ -135,7 +135,6 @@ class Tasks:
             count = f"{len(lifted.gaussians):,}"
             editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
 
-        photo = document.photo
         editor.jobs.start(
             t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
@@ -167,14 +166,14 @@ class Tasks:
         def accept(plate: Plate) -> None:
             self._plate = (masks, plate)
 
-        def retry_later() -> None:
+        def say_so() -> None:
             if self._no_plate is not None and _same(self._no_plate, masks):
                 editor.say(t("The background behind the object is not filled in"))
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
-            done=accept, failed=editor.complain_of, cancelled=retry_later, kind=PLATE,
+            done=accept, failed=editor.complain_of, cancelled=say_so, kind=PLATE,
         )  # fmt: skip
 
     def fill_background(self) -> None:

@@ -66,11 +66,8 @@ class Dialogs:
             self._chooser.open(dialog, suggestion, FILTERS[dialog])
             return
         patterns = " ".join(f"*{ending}" for ending in FILTERS[dialog])
-        filters = [dialog.value, patterns, "All files", "*"]
-        if dialog.is_opening:
-            native = pfd.open_file(dialog.value, str(suggestion), filters)
-        else:
-            native = pfd.save_file(dialog.value, str(suggestion), filters)
+        title, ask = t(dialog.value), pfd.open_file if dialog.is_opening else pfd.save_file
+        native = ask(title, str(suggestion), [title, patterns, t("All files"), "*"])
         self._native = (dialog, native)
 
     def _poll_native(self, editor: Editor) -> None:

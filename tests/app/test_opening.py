@@ -75,7 +75,7 @@ def test_what_is_done_while_a_file_is_read_is_asked_about(
     other.write_bytes(photo_bytes)
     editor.filing.open(other)
     editor.redo()
-    wait_until(editor, lambda: editor.chores.is_idle)
+    wait_for_file(editor)
     assert editor.committed is edited
     assert editor.filing.question is not None
     editor.filing.answer_discard()
