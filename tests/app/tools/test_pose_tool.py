@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from conftest import CENTRE, RADII
+from strokes import move, press, release
 
 from app.commands import run
 from app.editor import Editor
 from app.pose_view import PoseView
-from app.tools.pointer import Button, Pointer
+from app.tools.pointer import Pointer
 from app.tools.pose_tool import RING, PoseTool
 from app.view import ToolName
 from objectmorpher_core.document import Document
@@ -35,18 +36,12 @@ def at(editor: Editor, x: float, y: float) -> np.ndarray:
     return editor.view.canvas_from_image(np.array([x, y]))
 
 
-def press(editor: Editor, place: np.ndarray, **held: bool) -> None:
-    pointer = Pointer(*place, button=Button.LEFT, is_down=True, **held)
-    editor.hand.press(TOOL.press(editor, pointer), Button.LEFT)
-
-
 def stroke(editor: Editor, *places: np.ndarray, wheel: float = 0.0, **held: bool) -> None:
     """Press at the first place, through the others, release at the last."""
     TOOL.hover(editor, Pointer(*places[0], **held))
-    press(editor, places[0], **held)
-    for place in places[1:]:
-        editor.hand.move(Pointer(*place, is_down=True, wheel=wheel, **held))
-    editor.hand.move(Pointer(*places[-1], is_down=False, **held))
+    press(editor, TOOL, places[0], **held)
+    move(editor, *places[1:], wheel=wheel, **held)
+    release(editor, places[-1], **held)
 
 
 def labels(editor: Editor) -> list[str]:
@@ -78,11 +73,11 @@ def test_the_dragged_point_stays_under_the_pointer_at_any_zoom(posed: Editor, zo
         angle, share = random.uniform(0, 2 * np.pi), np.sqrt(random.uniform(0, 0.85))
         offset = share * np.array([np.cos(angle), np.sin(angle)]) * RADII
         start = at(posed, *(np.array(CENTRE) + offset))
-        press(posed, start)
+        press(posed, TOOL, start)
         for _ in range(2):
             way = random.uniform(-25, 25, 2) * zoom
             now = start + way * max(1.0, 6.0 / np.abs(way).max())  # a drag, not a click
-            posed.hand.move(Pointer(*now, is_down=True))
+            move(posed, now)
             assert np.abs(surface_xy(posed, 0) - now).max() < PIXEL
         posed.escape()
         assert posed.document is begun
@@ -204,7 +199,7 @@ def test_a_box_selects_and_delete_removes_all_in_one_step(posed: Editor) -> None
 
 
 def test_an_aborted_new_handle_is_not_selected(posed: Editor) -> None:
-    press(posed, at(posed, 90, 60))
+    press(posed, TOOL, at(posed, 90, 60))
     posed.escape()
     assert posed.posing.handle is None
 
