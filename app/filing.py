@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .export_plan import Format
 from .jobs import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
 from .texts import t
@@ -15,7 +16,7 @@ from .texts import t
 if TYPE_CHECKING:
     from .editor import Editor
 
-EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
 OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
