@@ -10,11 +10,12 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core import compose
 from objectmorpher_core.joining import LEAST_FEATHER, MOST_FEATHER, MOST_SHADOW
 
-from ...commands import COMMANDS, run, why_not
+from ...commands import run
 from ...commands.compose import not_moved
 from ...editor import Editor
 from ...job_functions import Variant
 from ...texts import sentence, t
+from ..command_button import command_button
 from ..dial import SIDE, dial
 from ..pictures import pictures
 from ..segmented import Choice, segmented
@@ -24,7 +25,6 @@ from ..widgets import (
     LABEL_WIDTH,
     Change,
     Number,
-    button,
     checkbox,
     half_width,
     heading,
@@ -73,18 +73,13 @@ def _draw_background(editor: Editor) -> None:
     if chosen != editor.composing.inpainter:
         editor.composing.choose_inpainter(chosen)
     half = half_width()
-    _command_button(editor, "fill_again", half)
+    command_button(editor, "fill_again", width=half)
     imgui.same_line()
-    _command_button(editor, "variants", half)
+    command_button(editor, "variants", width=half)
     _draw_variants(editor)
     if is_bare and editor.document is not None and editor.document.plate is not None:
         draw_brush_fields(editor)
         note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
-
-
-def _command_button(editor: Editor, name: str, width: float) -> None:
-    if button(t(COMMANDS[name].label), why_not=why_not(editor, name), width=width):
-        run(editor, name)
 
 
 def _draw_variants(editor: Editor) -> None:

@@ -9,9 +9,10 @@ from ...editor import Editor
 from ...painter import shown_now
 from ...texts import t
 from ...view import Shown
+from ..command_button import command_button
 from ..rows import end_row, fill_row, text_top
 from ..theme import Icon, theme
-from ..widgets import button, checkbox, gap, heading, note, small_text, tooltip
+from ..widgets import checkbox, gap, heading, note, small_text, tooltip
 
 ROW = 28.0  # points
 ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "800 %"))
@@ -23,10 +24,8 @@ def draw_look(editor: Editor) -> None:
     for shown in Shown:
         _draw_view(editor, shown)
     gap(12)
-    if button(
-        f"{Icon.RESET}  {t(COMMANDS['reset_look'].label)}", why_not=why_not(editor, "reset_look")
-    ):
-        run(editor, "reset_look")
+    label = t(COMMANDS["reset_look"].label)
+    command_button(editor, "reset_look", f"{Icon.RESET}  {label}")
     gap(12)
     heading(t("Before and after"))
     is_split = editor.view.split is not None
@@ -76,8 +75,7 @@ def _draw_zooms(editor: Editor) -> None:
         if i:
             imgui.same_line(0, space)
         imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 6))
-        if button(t(label), why_not=why_not(editor, name), width=across / theme.scale):
-            run(editor, name)
+        command_button(editor, name, t(label), across / theme.scale)
         imgui.pop_style_var()
         if why_not(editor, name) is None:
             keys = keys_of(editor, name)

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import run, why_not
 from ...editing.handle_numbers import Numbers
 from ...editor import Editor
 from ...texts import t
+from ..command_button import command_button
 from ..rows import BETWEEN, end_row, fill_row, text_top
 from ..theme import Icon, theme
 from ..widgets import (
     Number,
-    button,
     checkbox,
     gap,
     half_width,
@@ -105,12 +104,10 @@ def draw_numbers(editor: Editor) -> None:
     if now_pin != is_pin:
         editor.handle_numbers.set_pin(now_pin)
     half = half_width()
-    if button(t("Reset"), why_not=why_not(editor, "reset_handle"), width=half):
-        run(editor, "reset_handle")
+    command_button(editor, "reset_handle", t("Reset"), half)
     tooltip(t("Selected handles go back to where their points were"))
     imgui.same_line()
-    if button(t("Remove"), why_not=why_not(editor, "remove_handle"), width=half):
-        run(editor, "remove_handle")
+    command_button(editor, "remove_handle", t("Remove"), half)
 
 
 def _draw_place(editor: Editor, numbers: Numbers) -> None:
