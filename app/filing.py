@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from objectmorpher_core.progress import Progress
 
+from .export_plan import Format
 from .jobs import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
 from .shape import Shape, build_ready
@@ -18,9 +19,8 @@ from .texts import t
 if TYPE_CHECKING:
     from .editor import Editor
 
-EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
-OPEN = "open"  # kind of what runs in the background
-EXPECTED = ("OpeningError",)  # errors that need no details
+EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
+OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
 
@@ -155,7 +155,7 @@ class Filing:
         return folder / f"{stem}-edited.png"
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
-        """Reads the file in the background; `then` is called when it is shown.
+        """Reads the file in a thread; `then` is called when it is shown.
 
         What is open now may be lost: that was asked. What is done to it meanwhile may not.
         """
@@ -180,9 +180,9 @@ class Filing:
                 self.guard(lambda: show(*answer))
 
         def fail(error: JobError) -> None:
-            editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
+            editor.complain(error.sentence, "" if error.is_expected else error.trace)
 
-        editor.background.start(
+        editor.chores.start(
             t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 STALE = 24 * 3600  # s; a folder without a document that is older holds nothing and never will
-RECOVER = "recover"  # kind of what runs in the background
+RECOVER = "recover"  # kind of chores
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Recovery:
             self.left = tuple(broken if other is left else other for other in self.left)
             editor.complain(sentence, error.trace)
 
-        editor.background.start(
+        editor.chores.start(
             t("Recovering {name}", name=left.name), read, kind=RECOVER,
             done=accept, failed=fail, cancelled=lock.release,
         )  # fmt: skip

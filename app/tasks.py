@@ -104,14 +104,14 @@ class Tasks:
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=self._fail_segment, cancelled=self._drop_prompt, kind=SELECT,
+            done=accept, failed=self._fail_segment, cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
 
     def _fail_segment(self, error: JobError) -> None:
-        self.question = None
+        self._drop_question()
         self._editor.complain_of(error)
 
-    def _drop_prompt(self) -> None:
+    def _drop_question(self) -> None:
         self.question = None
 
     def lift(self) -> None:
@@ -122,7 +122,7 @@ class Tasks:
         if document is None or selection is None:
             return
         editor.message = None
-        settings = editor.settings
+        photo, settings = document.photo, editor.settings
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
             current = editor.document
@@ -136,7 +136,6 @@ class Tasks:
             count = f"{len(lifted.gaussians):,}"
             editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
 
-        photo = document.photo
         editor.jobs.start(
             t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
@@ -146,7 +145,7 @@ class Tasks:
     def rehearse(self) -> None:
         """Sees to it that the current object can be dragged at once; each frame."""
         editor, document = self._editor, self._editor.committed
-        if document is None or editor.background.is_busy(REHEARSE) or not editor.is_lifted:
+        if document is None or editor.chores.is_busy(REHEARSE) or not editor.is_lifted:
             return
         if editor.current >= len(document.objects):
             return
@@ -157,7 +156,7 @@ class Tasks:
         if shape.is_rehearsed:
             return
         shape.is_rehearsed = True
-        editor.background.start(
+        editor.chores.start(
             "Getting ready", lambda progress: rehearse(photo, thing, shape), kind=REHEARSE,
             done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
@@ -187,14 +186,14 @@ class Tasks:
         def accept(plate: Plate) -> None:
             self._plate = (masks, plate)
 
-        def retry_later() -> None:
+        def say_so() -> None:
             if self._no_plate is not None and _same(self._no_plate, masks):
                 editor.say(t("The background behind the object is not filled in"))
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
-            done=accept, failed=editor.complain_of, cancelled=retry_later, kind=PLATE,
+            done=accept, failed=editor.complain_of, cancelled=say_so, kind=PLATE,
         )  # fmt: skip
 
     def fill_background(self) -> None:

@@ -13,7 +13,7 @@ from .arrays import F64, I32
 from .camera import Camera
 from .deform.deformer import Deformer
 from .deform.splitting import Split, split_stretched
-from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose, Rig
+from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose
 from .gaussians import Gaussians
 from .raster import tiles
 from .raster.picking import pick
@@ -22,6 +22,7 @@ from .raster.reference import Picture3D
 from .raster.texture import TextureLevels
 from .raster.thinning import thinned
 from .raster.tiles import Drawable
+from .rig import Rig
 
 DRAFT = 10_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual

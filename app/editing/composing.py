@@ -18,6 +18,7 @@ from objectmorpher_core.joining import Shadow
 from .. import job_functions
 from ..job_functions import Choice, Variant
 from ..layers import Layer
+from ..tasks import PLATE
 from ..texts import t
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from ..editor import Editor
 
-PLATE, VARIANTS, REPAIR = "plate", "variants", "repair"  # kinds of jobs
+VARIANTS, REPAIR = "variants", "repair"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
 USUAL_HARMONY = 0.8  # strength, when it is turned on
 USUAL_SHADOW = 0.55

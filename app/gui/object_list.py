@@ -7,10 +7,12 @@ from imgui_bundle import ImVec2, imgui
 from ..commands import COMMANDS, keys_of, run, why_not
 from ..editor import Editor
 from ..texts import t
+from .rows import end_row, fill_row, text_top
 from .theme import SMALL_SIZE, Icon, theme
 from .widgets import Kind, button, heading, icon_button, note
 
 ROW = 32.0  # points
+BETWEEN = 12.0  # rows
 SIDE = 24.0  # of the buttons beside the title
 NAME = 34.0  # from the row's left to the name
 BUTTONS = (
@@ -75,10 +77,8 @@ def _draw_object(editor: Editor, k: int) -> None:
     end = ImVec2(start.x + width, start.y + height)
     is_hovered = _take_clicks(editor, k, ImVec2(width, height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
-    if is_current or is_hovered:
-        role = "raised" if is_current else "hovered"
-        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
-    middle = start.y + (height - imgui.get_font_size()) / 2
+    fill_row(start, end, is_current, is_hovered)
+    middle = text_top(start, height)
     icon = Icon.CUBE if thing.lifted else Icon.SELECT
     role = "accent" if is_current else "secondary"
     draw.add_text(ImVec2(start.x + theme.pt(8), middle), theme.u32(role), icon)
@@ -91,8 +91,7 @@ def _draw_object(editor: Editor, k: int) -> None:
         eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
         if icon_button(eye, f"eye{k}", t("Hide or show the object")):
             editor.objects.toggle_visible(k)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(4)))
-    imgui.dummy(ImVec2(0, 0))
+    end_row(start, ROW, BETWEEN)
 
 
 def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:

@@ -171,11 +171,11 @@ class Window:
         if self._options.frames is None:
             self.editor.recovery.look()
             self.editor.models.look()
-            self.editor.background.start(
+            self.editor.chores.start(
                 "Getting ready", lambda progress: warm_up(), kind="warm up",
                 done=lambda _: None, failed=self.editor.complain_of, is_quiet=True,
             )  # fmt: skip
-        while self._options.frames is not None and not self.editor.background.is_idle:
+        while self._options.frames is not None and not self.editor.chores.is_idle:
             self.editor.poll()
             time.sleep(SOON)
 

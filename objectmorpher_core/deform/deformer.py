@@ -9,7 +9,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import F64, I32, frozen
-from ..document import DeformSettings, Handle, LiftedObject, Pose, Rig
+from ..document import DeformSettings, Handle, LiftedObject, Pose
+from ..rig import Rig
 from ..rotations import matrix_from_vector
 from .arap import ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind

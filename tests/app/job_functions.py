@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from objectmorpher_core.edits import EditError
 from objectmorpher_core.progress import Progress
 
 _seen: list[np.ndarray] = []
@@ -40,6 +41,15 @@ def hang(seconds: float, progress: Progress) -> str:
 
 def fail(progress: Progress) -> None:
     raise ValueError("the mask is empty")
+
+
+def divide(progress: Progress) -> None:
+    """Fails with an error of numpy's."""
+    np.linalg.inv(np.zeros((2, 2)))
+
+
+def refuse(progress: Progress) -> None:
+    raise EditError("nothing is selected")
 
 
 def crash(progress: Progress) -> None:

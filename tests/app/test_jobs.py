@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 
@@ -26,6 +27,14 @@ class Log:
 
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Jobs]:
+    jobs = Jobs()
+    yield jobs
+    jobs.close()
+
+
+@pytest.fixture
+def jobs() -> Iterator[Jobs]:
+    """With a worker of its own, for what ends it."""
     jobs = Jobs()
     yield jobs
     jobs.close()
@@ -102,6 +111,18 @@ def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     assert "job_functions" in log.errors[0].trace
 
 
+def test_the_log_tells_the_programs_failures_from_the_requests(
+    worker: Jobs, caplog: pytest.LogCaptureFixture
+) -> None:
+    log = Log()
+    with caplog.at_level(logging.INFO, "app.jobs"):
+        for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
+            start(worker, log, function)
+            run_until(worker, lambda: worker.is_idle)
+    told = [r.levelname for r in caplog.records if "failed" in r.message]
+    assert told == ["ERROR", "ERROR", "INFO"]
+
+
 def test_an_answer_that_cannot_be_used_is_a_failure(worker: Jobs) -> None:
     log = Log()
 
@@ -113,18 +134,15 @@ def test_an_answer_that_cannot_be_used_is_a_failure(worker: Jobs) -> None:
     assert [e.sentence for e in log.errors] == ["nothing is selected"]
 
 
-def test_a_crash_is_a_failure_and_the_next_job_runs() -> None:
-    jobs = Jobs()
+def test_a_crash_is_a_failure_and_the_next_job_runs(jobs: Jobs) -> None:
     log = Log()
     start(jobs, log, job_functions.crash)
     start(jobs, log, job_functions.double, np.ones(1))
     run_until(jobs, lambda: bool(log.answers))
     assert log.errors[0].name == "Crash"
-    jobs.close()
 
 
-def test_what_crashed_can_be_asked_for_again() -> None:
-    jobs = Jobs()
+def test_what_crashed_can_be_asked_for_again(jobs: Jobs) -> None:
     log = Log()
     start(jobs, log, job_functions.wait, 0.3)
     run_until(jobs, lambda: jobs.current is not None and jobs.current.fraction > 0)
@@ -136,7 +154,6 @@ def test_what_crashed_can_be_asked_for_again() -> None:
     retry()
     run_until(jobs, lambda: bool(log.answers))
     assert log.answers == ["waited"]
-    jobs.close()
 
 
 def test_a_worker_that_cannot_live_is_not_started_without_end() -> None:
@@ -152,8 +169,7 @@ def test_a_worker_that_cannot_live_is_not_started_without_end() -> None:
     jobs.close()
 
 
-def test_a_job_that_does_not_listen_is_ended_within_half_a_second() -> None:
-    jobs = Jobs()
+def test_a_job_that_does_not_listen_is_ended_within_half_a_second(jobs: Jobs) -> None:
     restarts: list[int] = []
     jobs.restarted = lambda: restarts.append(1)
     log = Log()
@@ -168,4 +184,3 @@ def test_a_job_that_does_not_listen_is_ended_within_half_a_second() -> None:
     assert (log.cancels, restarts) == (1, [1])
     start(jobs, log, job_functions.double, np.ones(1))
     run_until(jobs, lambda: bool(log.answers))
-    jobs.close()

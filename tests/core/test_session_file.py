@@ -25,11 +25,10 @@ from objectmorpher_core.document import (
     Plate,
     Pose,
     Prompt,
-    Rig,
-    Seam,
 )
 from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.image import Picture, encode_picture, read_picture
+from objectmorpher_core.rig import Rig, Seam
 from objectmorpher_core.session_file import (
     SessionError,
     decode_session,

@@ -131,3 +131,11 @@ def test_a_name_is_one_step_and_an_empty_one_none(editor: Editor, ball: Document
     assert editor.document is before
     run(editor, "undo")
     assert editor.document is ball
+
+
+def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
+    copied.objects.toggle_visible(0)
+    assert copied.current == 1 and copied.history is not None
+    copied.travel(copied.history.cursor - 1)
+    assert copied.document is not None and copied.document.objects[0].is_visible
+    assert copied.current == 0

@@ -7,7 +7,8 @@ import pytest
 
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings, Handle, LiftedObject, Pose, Rig, Seam
+from objectmorpher_core.document import DeformSettings, Handle, LiftedObject, Pose
+from objectmorpher_core.rig import Rig, Seam
 from tests import shapes
 
 EXACT = 1e-9
