@@ -96,8 +96,12 @@ class Derived:
         objects = document.objects
         there = [k for k, o in enumerate(objects) if o.is_moved and leaves_a_hole(objects, k)]
         masks = [mask for k in there if (mask := objects[k].mask) is not None]
-        nothing = np.zeros(document.photo.size[::-1], bool)
-        return self._holes(lambda: np.logical_or.reduce([nothing, *masks]), *masks)
+
+        def build() -> Mask:
+            nothing = np.zeros(document.photo.size[::-1], bool)
+            return np.logical_or.reduce([nothing, *masks])
+
+        return self._holes(build, document.photo, *masks)
 
     def plate(self, document: Document) -> Plate | None:
         """What is seen behind the objects: the photo around those that are still there."""
@@ -253,11 +257,6 @@ class Derived:
         xy = document.photo.camera.project(world)
         scale = document.objects[k].placement.scale
         return Spot(xy, float(world[2]), lifted.diameter * lifted.scale * scale)
-
-    def object_point(self, document: Document, k: int, spot: Spot) -> F64:
-        """The object-frame point (3,) that is seen at a spot."""
-        world = document.photo.camera.unproject(spot.xy, spot.depth)
-        return self.unplaced(document, k, world)
 
     def unplaced(self, document: Document, k: int, world: np.ndarray) -> F64:
         """Object-frame position (3,) of a world point, the placement taken back."""

@@ -17,7 +17,7 @@ from objectmorpher_core.arrays import F32, Mask
 from objectmorpher_core.document import Document, EditObject, Placement
 
 from .layers import Layer
-from .memo import Memo
+from .memo import Memo, same
 from .view import View
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Lights:
         splats, now = self._derived.posed(document, k), time.monotonic()
         sources = (splats, item.shadow, item.harmony, document.plate)
         kept = self._kept.get(k)
-        if kept is None or not _same(kept.sources, sources):
+        if kept is None or not same(kept.sources, sources):
             has_shadow = item.shadow.strength > 0
             is_sketch = self._is_hurried and has_shadow
             kept = _Kept(sources, self._compute(document, item, splats, is_sketch), now, is_sketch)
@@ -145,10 +145,6 @@ class Lights:
 
 def _is_edited(document: Document) -> bool:
     return any(o.is_moved for o in document.objects)
-
-
-def _same(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
-    return all(x is y or (isinstance(x, float) and x == y) for x, y in zip(a, b, strict=True))
 
 
 def _inked(alpha: F32, colour: tuple[float, float, float]) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
+PLAIN = (int, float, str, bool)
 KEPT = 6  # results remembered of each kind, usually
 
 
@@ -27,3 +28,14 @@ class Memo:
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key][1]
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two values are the same: plain ones by what they are, the document's by identity."""
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    return isinstance(a, PLAIN) and a == b

@@ -20,6 +20,7 @@ from . import job_functions
 from .job_functions import Choice, Cut
 from .jobs import JobError
 from .layers import Rendered, Request
+from .memo import same
 from .shape import rehearse
 from .texts import t
 from .view import ToolName
@@ -169,10 +170,10 @@ class Tasks:
         masks = tuple(o.mask for o in document.objects)
         if not any(o.lifted for o in document.objects):
             return False
-        if self._plate is not None and _same(self._plate[0], masks):
+        if self._plate is not None and same(self._plate[0], masks):
             self._add_plate(self._plate[1])
             return True
-        if self._no_plate is not None and _same(self._no_plate, masks):
+        if self._no_plate is not None and same(self._no_plate, masks):
             return False
         self._no_plate = masks
         self._ask_plate(document, masks)
@@ -187,7 +188,7 @@ class Tasks:
             self._plate = (masks, plate)
 
         def say_so() -> None:
-            if self._no_plate is not None and _same(self._no_plate, masks):
+            if self._no_plate is not None and same(self._no_plate, masks):
                 editor.say(t("The background behind the object is not filled in"))
 
         editor.jobs.start(
@@ -235,7 +236,3 @@ class Tasks:
             t("Saving {name}", name=path.name), job_functions.write_session, document, path,
             done=accept, failed=editor.complain_of, kind=f"{WRITE} {path}",
         )  # fmt: skip
-
-
-def _same(a: tuple[Mask | None, ...], b: tuple[Mask | None, ...]) -> bool:
-    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))

@@ -18,6 +18,7 @@ from objectmorpher_core.joining import Shadow
 from .. import job_functions
 from ..job_functions import Choice, Variant
 from ..layers import Layer
+from ..memo import same
 from ..tasks import PLATE
 from ..texts import t
 
@@ -132,7 +133,7 @@ class Composing:
         """The backgrounds to choose from, as long as the masks are the same."""
         document = self._editor.document
         masks, variants = self._variants
-        return variants if document is not None and _same(masks, _masks(document)) else ()
+        return variants if document is not None and same(masks, _masks(document)) else ()
 
     def choose_variant(self, variant: Variant) -> None:
         document = self._editor.document
@@ -142,7 +143,7 @@ class Composing:
     def _take_plate(self, masks: tuple[Mask | None, ...], plate: Plate, label: str) -> None:
         editor = self._editor
         document = editor.committed
-        if document is not None and _same(masks, _masks(document)):
+        if document is not None and same(masks, _masks(document)):
             editor.apply(label, edits.set_plate(document, plate))
 
     def _choice(self, seed: int) -> Choice:
@@ -296,7 +297,3 @@ class Composing:
 
 def _masks(document: Document) -> tuple[Mask | None, ...]:
     return tuple(o.mask for o in document.objects)
-
-
-def _same(a: tuple[Mask | None, ...], b: tuple[Mask | None, ...]) -> bool:
-    return len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True))

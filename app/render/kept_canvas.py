@@ -13,10 +13,9 @@ import moderngl
 
 from objectmorpher_core.arrays import U8
 
+from ..memo import same
 from ..view import View
 from .scene import Colour, Scene
-
-PLAIN = (int, float, str, bool)
 
 
 class KeptCanvas:
@@ -33,9 +32,9 @@ class KeptCanvas:
     def shows(self, scene: Scene, view: View, place: tuple[Any, ...]) -> bool:
         """Whether it shows this already; `place`: where, and on what colour."""
         place = (*place, *view.place, view.scale)
-        is_same = self._scene is not None and place == self._place and same(scene, self._scene)
-        self._scene, self._place = scene, place
-        return is_same
+        before, self._scene = self._scene, scene
+        is_there, self._place = place == self._place, place
+        return is_there and before is not None and same_scene(scene, before)
 
     def begin(self, size: tuple[int, int], surround: Colour) -> moderngl.Framebuffer:
         """Empties it, to be drawn anew; the whole window in one colour."""
@@ -59,16 +58,10 @@ class KeptCanvas:
         self.buffer = self._color = self._scene = None
 
 
-def same(a: Any, b: Any) -> bool:
-    """Whether two parts of scenes are the same: arrays and documents by identity."""
-    if a is b:
-        return True
-    if type(a) is not type(b):
-        return False
-    if isinstance(a, tuple):
-        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
-    if isinstance(a, PLAIN):
-        return a == b
-    if is_dataclass(a) and type(a).__module__ == Scene.__module__:  # made anew for each frame
-        return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    return False
+def same_scene(a: Any, b: Any) -> bool:
+    """Whether two scenes, or parts of them, are the same; they are made anew for each frame."""
+    if type(a) is type(b) and is_dataclass(a) and type(a).__module__ == Scene.__module__:
+        return all(same_scene(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(map(same_scene, a, b))
+    return same(a, b)

@@ -9,7 +9,7 @@ from typing import Any
 from objectmorpher_core.arrays import U8
 
 from ..view import View
-from .kept_canvas import same
+from .kept_canvas import same_scene
 from .layer_pass import photo_box
 from .scene import Scene
 
@@ -49,7 +49,7 @@ class StillView:
 
     def _picture(self, name: str, scene: Scene, draw: Draw) -> U8:
         kept = self._pictures.get(name)
-        if kept is None or not same(kept[0], scene):
+        if kept is None or not same_scene(kept[0], scene):
             kept = self._pictures[name] = (scene, draw(scene))
         return kept[1]
 

@@ -68,7 +68,7 @@ def _bent(document: Document) -> Document:
         point = shape.puppet.pick(xy, None, Placement(), shape.texture)
         assert point is not None
         spot = derived.spot(document, 0, point.rest).moved(np.array(move), 0.0)
-        target = derived.object_point(document, 0, spot)
+        target = derived.unplaced(document, 0, document.photo.camera.unproject(spot.xy, spot.depth))
         document = edits.add_handle(document, 0, point.rest, target, is_pin=move == (0.0, 0.0))
     document = derived.solved(document, 0, None)
     return edits.set_placement(document, 0, Placement(turn=TURN))
