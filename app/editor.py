@@ -155,6 +155,7 @@ class Editor:
         self.jobs.cancel(patience=RELUCTANCE)
         self.background.cancel(OPEN)
         self.exporting.close()
+        self.objects.carried = None
         self.tasks.forget()
         self.composing.forget()
         self.history = self.preview = self.path = self.source = None
@@ -217,6 +218,8 @@ class Editor:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
             self.rubber = None
+        elif self.objects.carried is not None:
+            self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
