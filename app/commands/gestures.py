@@ -26,10 +26,12 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Wheel while dragging", "Nearer, farther"),
         ("Alt-click", "Pin that stays"),
         ("Right-click", "Remove a point"),
+        ("Click on another object", "Choose it"),
         ("Arrows, with Shift", "Nudge by 1 px, by 10 px"),
     ),
     "Place": (
         ("Drag", "Move the object"),
+        ("Drag another object", "Choose and move it"),
         ("Wheel while dragging", "Nearer, farther"),
         ("Corner", "Scale"),
         ("Ring", "Turn · Shift: in steps of 15°"),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document
@@ -35,12 +38,23 @@ class Objects:
 
     def choose(self, k: int) -> None:
         """The tools change object `k` now."""
+        self._editor.hand.abort(self._editor)
+        self.take(k)
+
+    def take(self, k: int) -> Callable[[], None]:
+        """As `choose`, for a stroke in progress; what is returned takes it back."""
         editor = self._editor
-        editor.hand.abort(editor)
+        before, selected = editor.current, editor.posing.selected
+
+        def restore() -> None:
+            editor.current = before
+            editor.posing.select(*selected)
+
         editor.current = k
         editor.posing.select(None)
         if not editor.is_lifted:
             editor.view.tool = ToolName.SELECT
+        return restore
 
     def follow(self, before: Document) -> None:
         """After a step back or forth: the tools change the object that the step changed."""
@@ -103,6 +117,27 @@ class Objects:
         editor.apply(t("Remove object"), left)
         self.choose(max(min(k, len(left.objects) - 1), 0))
         editor.say(t("{name} is not edited any more", name=name))
+
+    def other_at(self, canvas_xy: np.ndarray) -> int | None:
+        """Another lifted object that is in front of all at canvas px; None where the current is."""
+        editor, document = self._editor, self._editor.document
+        order = self.order()
+        if document is None or len(order) < 2:
+            return None
+        for k in reversed(order):
+            is_there = k == editor.current or document.objects[k].is_visible
+            if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return None if k == editor.current or self._is_over_current(k) else k
+        return None
+
+    def _is_over_current(self, k: int) -> bool:
+        """Whether object `k` is a copy exactly where the current one is: nobody sees which."""
+        editor = self._editor
+        assert editor.document is not None
+        other, own = editor.document.objects[k], editor.object
+        return own is not None and all(
+            (other.lifted is own.lifted, other.pose is own.pose, other.placement == own.placement)
+        )
 
     # Which covers which
 

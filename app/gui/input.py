@@ -154,7 +154,8 @@ class Input:
     def _hover(self, tool: Tool, editor: Editor, pointer: Pointer) -> None:
         """Looks under the pointer anew only where it, the view or the document changed."""
         view = editor.view
-        key = (tool, pointer, editor.document, view.left, view.top, view.zoom, view.tool)
+        place = (view.left, view.top, view.zoom)
+        key = (tool, pointer, editor.document, editor.current, view.tool, *place)
         if self._hovered is None or any(
             a is not b and a != b for a, b in zip(key, self._hovered, strict=True)
         ):

@@ -10,6 +10,7 @@ from objectmorpher_core.document import EditObject
 from ...pose_view import PoseMode
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
+from .other import draw_other
 from .rig import draw_brush, draw_regions
 from .ring import draw_ring
 from .select import draw_rubber
@@ -38,6 +39,7 @@ def draw_pose(canvas: Canvas) -> None:
         _draw_hint_points(canvas)
     if not is_dragging:
         draw_brush(canvas)
+    draw_other(canvas)
     if editor.hover.surface is not None and not editor.hand.is_busy:
         _draw_surface_point(canvas)
     if editor.rubber is not None:
