@@ -121,10 +121,8 @@ def _drag_row(editor: Editor, top: ImVec2) -> None:
     if landing is not None:
         width = imgui.get_content_region_avail().x
         y = top.y + landing * height - (theme.pt(GAP) + spacing) / 2
-        draw = imgui.get_window_draw_list()
         ends = ImVec2(top.x, y), ImVec2(top.x + width, y)
-        draw.add_line(*ends, theme.u32("accent"), theme.pt(2))
-        draw.add_circle_filled(ends[0], theme.pt(3), theme.u32("accent"))
+        imgui.get_window_draw_list().add_line(*ends, theme.u32("accent"), theme.pt(2))
 
 
 def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
