@@ -37,11 +37,15 @@ class Shares:
 
 
 def shown_now(document: Document | None, view: View) -> Shown:
-    """The view that was chosen, as soon as there is an object for it; selecting needs the photo."""
+    """The view that was chosen, as soon as there is an object for it; selecting needs the photo,
+    and from elsewhere than the photo's view the composite's object is alone."""
     if document is None or not any(o.lifted for o in document.objects):
         return Shown.COMPOSITE
     if view.tool in (ToolName.SELECT, ToolName.MASK):
         return Shown.COMPOSITE
+    is_orbiting = view.tool is ToolName.LOOK and view.orbit is not None
+    if is_orbiting and view.shown is Shown.COMPOSITE:
+        return Shown.OBJECT
     return view.shown
 
 

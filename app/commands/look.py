@@ -23,6 +23,8 @@ def _show(shown: Shown, number: int) -> Command:
 def _shower(shown: Shown) -> Callable[[Editor], None]:
     def run(editor: Editor) -> None:
         editor.view.shown = shown
+        if shown is Shown.COMPOSITE:  # which there is from the photo's view only
+            editor.looking.reset()
 
     return run
 
