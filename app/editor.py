@@ -133,6 +133,7 @@ class Editor:
         self.message = Message(sentence, is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
+        """A job that failed; where another try may help there is a button for it."""
         retry = Action(t("Retry"), error.retry) if error.retry else None
         self.complain(error.sentence, error.trace, retry)
 

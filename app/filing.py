@@ -172,7 +172,7 @@ class Filing:
                 self.guard(lambda: show(opened))
 
         def fail(error: JobError) -> None:
-            editor.complain(error.sentence, error.trace if error.name not in EXPECTED else "")
+            editor.complain_of(error if error.name not in EXPECTED else replace(error, trace=""))
 
         editor.background.start(
             t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),
