@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,7 +11,8 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64, I32, Mask
-from objectmorpher_core.document import Document, Rig, Seam
+from objectmorpher_core.document import Document
+from objectmorpher_core.rig import Rig, Seam
 
 from ..pose_view import PoseMode
 from ..texts import t
@@ -88,16 +90,25 @@ class Rigging:
         """Freezes, stiffens or groups control points; or takes that back."""
         if len(nodes) == 0:
             return
-        if is_erasing:
+        if kind is PoseMode.FREEZE:
+            change = edits.thaw if is_erasing else edits.freeze
+            self._hold(t("Erase") if is_erasing else t("Freeze"), change, nodes)
+        elif is_erasing:
             self._apply(t("Erase"), _erased(self.rig, kind, nodes, self._count))
-        elif kind is PoseMode.FREEZE:
-            held = np.empty(0, np.int32) if self.rig.held is None else self.rig.held
-            self._apply(t("Freeze"), replace(self.rig, held=np.union1d(held, nodes)))
         elif kind is PoseMode.STIFFEN:
             value = self._editor.view.pose.stiffness
             self._apply(t("Stiffen"), _stiffened(self.rig, nodes, value, self._count))
         else:
             self._group(nodes)
+
+    def _hold(self, label: str, change: Callable[..., Document], nodes: I32) -> None:
+        """Freezes or thaws; the pose goes on from what is seen, so that nothing jumps."""
+        editor = self._editor
+        document, thing = editor.document, editor.object
+        if document is not None and thing is not None:
+            changed = change(document, editor.current, nodes)
+            solved = editor.derived.solved(changed, editor.current, thing.pose)
+            editor.apply(label, solved)
 
     def _group(self, nodes: I32) -> None:
         """A group of its own, or more of the group that the stroke began on."""
@@ -160,6 +171,9 @@ class Rigging:
     def remove(self, region: Region) -> None:
         """Takes back what was said about a region."""
         rig = self.rig
+        if region.kind is PoseMode.FREEZE:
+            self._hold(t("Remove region"), edits.thaw, region.nodes)
+            return
         if region.seam >= 0:
             seams = tuple(s for i, s in enumerate(rig.seams) if i != region.seam)
             rig = replace(rig, seams=seams)
@@ -234,8 +248,5 @@ def _erased(rig: Rig, kind: PoseMode, nodes: I32, count: int) -> Rig:
     if kind is PoseMode.STIFFEN:
         return _stiffened(rig, nodes, USUAL, count)
     gone = _is_in(nodes, count)
-    if kind is PoseMode.FREEZE:
-        left = None if rig.held is None else rig.held[~gone[rig.held]]
-        return replace(rig, held=left if left is not None and len(left) else None)
     bodies = (body[~gone[body]] for body in rig.bodies)
     return replace(rig, bodies=tuple(body for body in bodies if len(body) > 1))

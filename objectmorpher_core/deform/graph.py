@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ..arrays import F64, I32, Mask
-from ..document import DeformSettings, Seam
+from ..document import DeformSettings
+from ..rig import Seam
 from .struts import find_struts, weigh_struts
 from .surface_links import CHUNK, TINY, Cells, Edges, Surface, without_gaps
 
