@@ -8,9 +8,10 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Wheel", "Zoom at the pointer"),
         ("X (hold)", "Show the photo as it was"),
         ("Esc", "Take back the stroke, deselect"),
+        ("Enter", "The next step, which the large button names"),
     ),
     "Select": (
-        ("Click", "Add to the selection"),
+        ("Click, Enter", "Add to the selection"),
         ("Right-click, Alt-click", "Remove from the selection"),
         ("Drag", "Draw a box around the object"),
     ),

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ..commands import run
+from ..commands import run, take_next_step
 from ..editor import Editor
 from ..feedback import Hover
 from ..shortcuts import Shortcuts
@@ -111,6 +111,8 @@ class Input:
             editor.view.popup = None
         elif keys == "Escape":
             editor.escape()
+        elif keys == "Enter" and editor.view.popup is None:
+            take_next_step(editor)
         elif keys == HELP:
             run(editor, "shortcuts")
         elif direction is not None:
