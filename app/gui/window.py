@@ -29,6 +29,7 @@ from ..tools.pointer import Shape
 from . import landmarks
 from . import theme as looks
 from .dialogs import Dialogs
+from .fade import fades
 from .frame_log import FrameLog
 from .input import HELP, Input
 from .inspector import draw_inspector
@@ -143,6 +144,8 @@ class Window:
             if self._frame_log is not None:
                 self._frame_log.begin()
             self._frame()
+            if fades.is_moving:
+                lively = max(lively, 1)
             if len(imgui.get_current_context().input_events_queue):
                 lively = SETTLE  # ImGui takes one key or button of a kind a frame
             drawn += 1
@@ -203,6 +206,8 @@ class Window:
         if 0 in size:  # minimised
             return
         self._adopt_look()
+        is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
+        fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
