@@ -55,6 +55,7 @@ def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
     editor.view.resize(size, scale, editor.photo_size)
     with opened(window_environment, session) as hands:
         hands.wait(lambda: rows(hands) == ["Object 2", "Object 1"], "listing")
+        hands.catch_up()
         take_up(hands, "Object 1", "Object 2")
         hands.wait(lambda: has_line(hands), "showing where it lands")
         hands.press("Escape")
