@@ -37,7 +37,7 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
     for k, thing in enumerate(document.objects):
         if thing.lifted is None or not thing.is_moved:
             continue
-        splats = derived.posed(document, k)
+        splats = derived.draft(document, k)
         rest = splats.rest.lifted.texture.u0.astype(np.float64)
         now = camera.project(splats.means) if thing.is_visible else None
         points = _moved_points(rest, now, max(composite.STILL, TOLERANCE / view.zoom))

@@ -5,6 +5,7 @@ The heavy modules of the core are imported when the first object is lifted, or b
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -29,13 +30,13 @@ from .layers import Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
+from .shape import Shape, build_shape
 from .surface_facts import SurfaceFacts
 from .view import View
 
 if TYPE_CHECKING:
-    from objectmorpher_core.puppet import Puppet, SurfacePoint
+    from objectmorpher_core.puppet import SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
-    from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 
 PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
@@ -67,20 +68,13 @@ class ObjectFrame:
     radius: float  # image px, of the ring around it
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """All that depends on the lifted object only."""
-
-    puppet: Puppet
-    texture: TextureLevels
-
-
 class Derived:
     """Solver, posed Gaussians and rendered layers of the document's objects."""
 
     def __init__(self) -> None:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
+        self._drafts: dict[int, Memo] = {}
         self.layers = Layers(self)
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
@@ -130,15 +124,17 @@ class Derived:
         """Of a rig that changed, only what depends on it."""
         similar = self._latest
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
-            shape = replace(similar[2], puppet=similar[2].puppet.with_rig(thing.rig))
+            shape = Shape(similar[2].puppet.with_rig(thing.rig), similar[2].texture)
         else:
-            shape = _build_shape(photo, thing)
+            shape = build_shape(photo, thing)
         self._latest = (thing.lifted, thing.deform, shape)
         return shape
 
-    def prepare(self, document: Document, k: int) -> None:
-        """Makes ready what the first drag of object `k` needs."""
-        self.shape(document.photo, document.objects[k]).puppet.deformer  # noqa: B018
+    def adopt(self, document: Document, shapes: Mapping[int, Shape]) -> None:
+        """Takes over shapes of the document's objects that were made elsewhere."""
+        for k, shape in shapes.items():
+            thing = document.objects[k]
+            self._shapes(lambda shape=shape: shape, thing.lifted, thing.deform, thing.rig)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""
@@ -146,6 +142,16 @@ class Derived:
         puppet = self.shape(document.photo, thing).puppet
         return self._posed.setdefault(k, Memo(POSES))(
             lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
+    def draft(self, document: Document, k: int) -> PosedSplats:
+        """The same for pictures that must be quick: of a large object fewer, wider ones."""
+        thing = document.objects[k]
+        puppet = self.shape(document.photo, thing).puppet
+        if not puppet.has_draft:
+            return self.posed(document, k)
+        return self._drafts.setdefault(k, Memo(POSES))(
+            lambda: puppet.draft(thing.pose, thing.placement), puppet, thing.pose, thing.placement
         )
 
     def body_points(self, document: Document, k: int) -> F64:
@@ -176,6 +182,7 @@ class Derived:
     def forget(self, lifted: set[int]) -> None:
         """Drops what was posed and projected of objects other than these."""
         self._posed = {k: kept for k, kept in self._posed.items() if k in lifted}
+        self._drafts = {k: kept for k, kept in self._drafts.items() if k in lifted}
         self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
 
     def blend(self, document: Document, view: View) -> F32:
@@ -293,14 +300,6 @@ def _strongest(weights: Sparse, count: int) -> I32:
         ends = weights.indices[first + strongest]
         pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
     return np.array(sorted(pairs), np.int32).reshape(-1, 2)
-
-
-def _build_shape(photo: Photo, thing: EditObject) -> Shape:
-    from objectmorpher_core.compose.composite import object_texture
-    from objectmorpher_core.puppet import puppet_of
-
-    assert thing.matte is not None
-    return Shape(puppet_of(thing, photo.camera), object_texture(thing.matte))
 
 
 def _outlines(mask: Mask) -> tuple[F32, ...]:

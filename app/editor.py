@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +19,8 @@ from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, EditObject
 
 from .autosave import Autosave
-from .background import Background
 from .candidate import Candidates
+from .chores import Chores
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
@@ -41,7 +41,7 @@ from .jobs import RELUCTANCE, JobError, Jobs
 from .recovery import Recovery
 from .settings import Settings
 from .tasks import SELECT, Tasks
-from .texts import t
+from .texts import sentence, t
 from .tools.pointer import Hand, Pointer
 from .view import Shown, ToolName, View
 
@@ -55,7 +55,7 @@ class Editor:
         self.view = View()
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
-        self.background = Background(wake)
+        self.chores = Chores(wake)
         self.autosave, self.recovery = Autosave(self), Recovery(self)
         self.derived = Derived()
         self.tasks = Tasks(self)
@@ -129,8 +129,7 @@ class Editor:
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
-        sentence = text[:1].upper() + text[1:]
-        self.message = Message(sentence, is_error=True, details=details, action=action)
+        self.message = Message(sentence(text), is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
         """A job that failed; where another try may help there is a button for it."""
@@ -154,14 +153,14 @@ class Editor:
     def close_document(self) -> None:
         self.hand.abort(self)
         self.jobs.cancel(patience=RELUCTANCE)
-        self.background.cancel(OPEN)
+        self.chores.cancel(OPEN)
         self.exporting.close()
         self.objects.carried = None
         self.tasks.forget()
         self.composing.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
-        self.hover, self.rubber, self.message = Hover(), None, None
+        self.hover, self.message = Hover(), None
 
     def quit(self) -> None:
         """Closes the program; nothing is asked here."""
@@ -186,28 +185,30 @@ class Editor:
         if self.tasks.question is not None:
             self.jobs.cancel(SELECT)
             return
-        label, before = self.history.undo_label, self.history.document
-        self.history.undo()
-        self.objects.follow(before)
-        self._after_travel(t("Undone: {label}", label=label) if label else t("Nothing to undo"))
+        label = self.history.undo_label
+        text = t("Undone: {label}", label=label) if label else t("Nothing to undo")
+        self._travel(self.history.undo, text)
 
     def redo(self) -> None:
         if self.hand.is_busy or self.history is None:
             return
-        label, before = self.history.redo_label, self.history.document
-        self.history.redo()
-        self.objects.follow(before)
-        self._after_travel(t("Done again: {label}", label=label) if label else t("Nothing to redo"))
+        label = self.history.redo_label
+        text = t("Done again: {label}", label=label) if label else t("Nothing to redo")
+        self._travel(self.history.redo, text)
 
     def travel(self, index: int) -> None:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        self.history.jump(index)
-        self._after_travel(t("Now after: {label}", label=self.history.steps[index]))
+        text = t("Now after: {label}", label=self.history.steps[index])
+        self._travel(partial(self.history.jump, index), text)
 
-    def _after_travel(self, text: str) -> None:
-        """The document may have lost what the view points at."""
+    def _travel(self, go: Callable[[], None], text: str) -> None:
+        """Goes to another step, which may lack what the view points at."""
+        before = self.committed
+        go()
+        assert before is not None
+        self.objects.follow(before)
         self.hover = Hover()
         self.posing.forget_lost()
         self.objects.forget_lost()
@@ -218,8 +219,8 @@ class Editor:
     def escape(self) -> None:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
-            self.rubber = None
-        elif self.objects.carried is not None:
+            return
+        if self.objects.carried is not None:
             self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
@@ -243,18 +244,15 @@ class Editor:
     def poll(self) -> bool:
         """Takes in what the worker sent; once a frame. Whether anything changed."""
         is_changed = self.jobs.poll()
-        is_changed = self.background.poll() or is_changed
+        is_changed = self.chores.poll() or is_changed
+        self.tasks.rehearse()
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
         self.autosave.poll()
         self.candidates.poll(time.monotonic())
         return is_changed
 
-    def set_theme(self, theme: str) -> None:
-        """ "dark" or "light"."""
-        self.settings = replace(self.settings, theme=theme)
-
     def shut_down(self) -> None:
-        self.background.close()
+        self.chores.close()
         self.autosave.close()
         self.jobs.close()

@@ -12,7 +12,7 @@ import numpy as np
 from objectmorpher_core.document import Document, EditObject
 from objectmorpher_core.progress import Progress, part
 
-from .exporting import Plan, What
+from .export_plan import Plan, What
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.composite import Composite

@@ -8,16 +8,19 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from objectmorpher_core.progress import Progress
+
+from .export_plan import Format
 from .jobs import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
+from .shape import Shape, build_ready
 from .texts import t
 
 if TYPE_CHECKING:
     from .editor import Editor
 
-EXPORT_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
-OPEN = "open"  # kind of what runs in the background
-EXPECTED = ("OpeningError",)  # errors that need no details
+EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
+OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
 
@@ -152,31 +155,35 @@ class Filing:
         return folder / f"{stem}-edited.png"
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
-        """Reads the file in the background; `then` is called when it is shown.
+        """Reads the file in a thread; `then` is called when it is shown.
 
         What is open now may be lost: that was asked. What is done to it meanwhile may not.
         """
         editor, given_up = self._editor, self._editor.committed
         fov, seed = self._fov, self._seed
 
-        def show(opened: Opened) -> None:
+        def read(progress: Progress) -> tuple[Opened, dict[int, Shape]]:
+            opened = read_document(path, fov, seed, progress)
+            return opened, build_ready(opened.document)
+
+        def show(opened: Opened, shapes: dict[int, Shape]) -> None:
             editor.start(opened.document)
+            editor.derived.adopt(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(opened: Opened) -> None:
+        def accept(answer: tuple[Opened, dict[int, Shape]]) -> None:
             if editor.committed is given_up or editor.is_saved:
-                show(opened)
+                show(*answer)
             else:
-                self.guard(lambda: show(opened))
+                self.guard(lambda: show(*answer))
 
         def fail(error: JobError) -> None:
-            editor.complain_of(error if error.name not in EXPECTED else replace(error, trace=""))
+            editor.complain_of(replace(error, trace="") if error.is_expected else error)
 
-        editor.background.start(
-            t("Opening {name}", name=path.name), lambda p: read_document(path, fov, seed, p),
-            kind=OPEN, done=accept, failed=fail,
+        editor.chores.start(
+            t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip
 
     def forget_recent(self, path: str) -> None:

@@ -32,7 +32,7 @@ class Step:
 class History:
     """The documents since the file was opened, and which of them is shown."""
 
-    def __init__(self, document: Document, label: str = "Open", limit: int = LIMIT) -> None:
+    def __init__(self, document: Document, limit: int = LIMIT) -> None:
         """`limit`: bytes."""
         self._steps: list[Step] = []
         self._memory: dict[int, int] = {}  # bytes of every block that a step holds
@@ -40,7 +40,7 @@ class History:
         self._limit = limit
         self._cursor = 0
         self._saved: Document | None = document
-        self._append(label, document)
+        self._append("Open", document)
 
     @property
     def document(self) -> Document:

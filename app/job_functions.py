@@ -140,7 +140,8 @@ def read_coverage(path: Path, size: tuple[int, int], progress: Progress) -> U8:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{path.name} cannot be opened: {error.strerror or error}") from error
+        sentence = f"{path.name} cannot be opened: {error.strerror or error}"
+        raise image.ImageError(sentence) from error
     return image.read_coverage(data, size)
 
 
@@ -158,7 +159,7 @@ def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
 
     Compiling takes many seconds after an installation and nothing later.
     """
-    from objectmorpher_core.compose.composite import object_texture
+    from objectmorpher_core.compose.lighting import object_texture
     from objectmorpher_core.document import Handle, Placement
     from objectmorpher_core.puppet import puppet_of
 

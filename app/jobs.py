@@ -30,6 +30,7 @@ log = logging.getLogger(__name__)
 
 PATIENCE = 0.35  # s between asking a job to stop and ending its process: the user waits
 RELUCTANCE = 2.0  # s, where nobody waits: a new process has to read the photo again
+OURS = ("app", "objectmorpher_core")  # packages
 TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
 # What the system says of a wrong request: no other try makes it right.
@@ -51,7 +52,9 @@ class JobError:
     def of(cls, error: Exception, what: str) -> JobError:
         """From an exception that is being handled; `what` failed."""
         name = type(error).__name__
-        is_expected = isinstance(error, ValueError) and type(error) is not ValueError
+        # Of others' kinds some are values' errors, too: numpy's of a singular matrix is one.
+        is_ours = type(error).__module__.partition(".")[0] in OURS
+        is_expected = is_ours and isinstance(error, ValueError)
         sentence = str(error) or f"{what} failed ({name})"
         return cls(
             name, sentence, traceback.format_exc(),
@@ -61,6 +64,11 @@ class JobError:
     def retried_by(self, again: Callable[[], None]) -> JobError:
         """The same error, with `again` as its remedy if another try may help."""
         return replace(self, retry=again) if self.may_pass else self
+
+    def write_log(self, title: str) -> None:
+        """That what is called `title` failed: an error of the program's, unless it was expected."""
+        level = logging.INFO if self.is_expected else logging.ERROR
+        log.log(level, "%s failed: %s\n%s", title, self.sentence, self.trace)
 
 
 @dataclass(eq=False)
@@ -170,8 +178,10 @@ class Jobs:
         """
         self._count += 1
         kind = kind or function.__name__
-        job = Job(title, function, arguments, done, failed, cancelled, kind)
-        job.number, job.is_quiet, job.is_spare = self._count, is_quiet, is_spare
+        job = Job(
+            title, function, arguments, done, failed, cancelled, kind,
+            number=self._count, is_quiet=is_quiet, is_spare=is_spare,
+        )  # fmt: skip
         self._wait_for(job)
 
     def _wait_for(self, job: Job) -> None:
@@ -270,13 +280,12 @@ class Jobs:
         self._worker.has_answered = True
         if job is None or number != job.number:
             return  # an answer of a process that was ended
-        elif what == "progress":
+        if what == "progress":
             job.fraction, job.note = value
         elif what == "cancelled" or job.stop_asked is not None:
             self._finish(job, job.cancelled)
         elif what == "failed":
-            level = logging.INFO if value.is_expected else logging.ERROR
-            log.log(level, "%s failed: %s\n%s", job.title, value.sentence, value.trace)
+            value.write_log(job.title)
             self._finish(job, lambda: job.failed(value.retried_by(lambda: self._again(job))))
         else:
             level = logging.DEBUG if job.is_quiet else logging.INFO

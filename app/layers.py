@@ -1,9 +1,8 @@
 """The moved objects as the canvas shows them, in the time that a frame has.
 
-Where the rasteriser needs longer, a frame shows a *draft*: the object at a fraction of the
-canvas's resolution, together with where each of its pixels looks in the photo. That map is smooth,
-so the renderer samples the photo through it at full resolution and the draft stays sharp. When
-nothing has changed for a moment, the worker is asked for the exact picture, which replaces it.
+Where the rasteriser needs longer, a frame shows a *draft*: the object from fewer Gaussians at a
+fraction of the canvas's resolution, made sharp by looking up the photo at all of it (`sharpening`).
+When nothing has changed for a moment, the worker is asked for the exact picture, which replaces it.
 """
 
 from __future__ import annotations
@@ -15,10 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Document
 
@@ -27,26 +24,15 @@ from .view import Shown, View
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
-    from objectmorpher_core.raster.reference import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 
     from .derived import Derived
 
-FRAME = 0.028  # s, what rendering may take of a frame
+FRAME = 0.014  # s, what rendering may take of a frame
 STILL = 0.12  # s without a change, after which the exact picture is asked for
 COARSEST = 6  # canvas px per px of a draft
 FIRST_RATE = 2.5e-7  # s per px, before anything has been measured
-
-
-@dataclass(frozen=True, eq=False)
-class Draft:
-    """What makes a coarse layer sharp: for each px where it looks in the photo."""
-
-    looks: F32  # (h, w, 4): x, y in photo px relative to where the pixel is; share; unused
-    texture: F32  # (H, W, 4) straight colour and alpha, a crop of the photo
-    left: float  # photo px, the crop's corner
-    top: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +42,8 @@ class Layer:
     box: tuple[float, float, float, float]  # x0, y0, x1, y1 canvas px
     rgba: np.ndarray  # (h, w, 4) premultiplied sRGB, f32 in [0, 1] or u8
     invented: np.ndarray | None = None  # (h, w) u8, what of alpha is not the photo's: hatched
-    draft: Draft | None = None  # makes a coarse layer of the photo sharp
-    is_coarse: bool = False  # else it is exact, px for px
+    is_coarse: bool = False  # with fewer px than its box; else px for px
+    is_draft: bool = False  # to be replaced by the exact picture
     is_tint: bool = False  # lies over everything, translucent
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
 
@@ -105,12 +91,13 @@ class _Work:
     splats: PosedSplats  # what is drawn of it
     view: tuple[float, ...]
     request: Request  # for the exact one
-    box: tuple[int, int, int, int]  # canvas px
+    box: Box  # canvas px
     shown: Layer
     since: float  # s, monotonic, when the splats or the view changed last
     is_asked: bool = False
 
 
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px
 Ask = Callable[[Request, Callable[[Rendered], None]], None]
 
 
@@ -121,7 +108,7 @@ class Layers:
         self._derived = derived
         self._works: dict[Part, _Work] = {}  # its last picture
         self._drawn: list[_Work] = []  # in the last frame
-        self._rates: dict[Shown, float] = {}  # s per px, measured
+        self._rates: dict[tuple[Shown, bool], float] = {}  # s per px, exact or draft; measured
         self.frame_time = FRAME  # s; infinite where only the last frame counts
         self.ask: Ask | None = None  # renders elsewhere and calls back
 
@@ -130,7 +117,7 @@ class Layers:
         """Whether an exact picture is still to be asked for."""
         if self._derived.lights.is_waiting:
             return True
-        return any(w.shown.is_coarse and not w.is_asked for w in self._drawn)
+        return any(w.shown.is_draft and not w.is_asked for w in self._drawn)
 
     def draw(
         self, document: Document, view: View, shown: Shown = Shown.COMPOSITE
@@ -199,43 +186,61 @@ class Layers:
     def _render(self, document: Document, part: Part, view: View, seconds: float) -> None:
         """A new picture of the part, in about so many seconds."""
         k, camera, derived = part.k, document.photo.camera, self._derived
-        splats = derived.painter.painted(document, k, part.look)
-        if part.is_painted:
-            drawable = _prepare(splats, view.camera(camera), camera)
-        else:
-            drawable = derived.drawable(document, k, view)
-        box = drawable.box()
-        if box is None:
+        factor = self._factor(document, part, view, seconds)
+        layer = self._draw(document, part, view, factor)
+        if layer is None:
             self._works.pop(part, None)
             return
+        x0, y0, x1, y1 = layer.box
+        box = (int(x0), int(y0), int(x1), int(y1))
+        splats = derived.painter.painted(document, k, part.look)
         texture = derived.shape(document.photo, document.objects[k]).texture
         request = Request(splats, texture, view.camera(camera, box), camera, part)
-        shown = self._first(request, box, drawable, seconds)
         source, now = derived.posed(document, k), time.monotonic()
-        self._works[part] = _Work(source, splats, view.place, request, box, shown, now)
+        self._works[part] = _Work(source, splats, view.place, request, box, layer, now)
 
-    def _first(
-        self,
-        request: Request,
-        box: tuple[int, int, int, int],
-        drawable: Drawable,
-        seconds: float,
-    ) -> Layer:
-        """Exact where the time allows, else coarse."""
-        pixels, look = (box[2] - box[0]) * (box[3] - box[1]), request.part.look
-        excess = pixels * self._rates.get(look, FIRST_RATE) / seconds
-        coarse = 1 if excess <= 1 else min(max(math.ceil(math.sqrt(excess)), 2), COARSEST)
+    def _factor(self, document: Document, part: Part, view: View, seconds: float) -> int:
+        """Canvas px per px of what can be drawn in so many seconds; 1 is exact."""
+        low, high = self._derived.frame(document, part.k).corners[[0, 2]]
+        corners = view.canvas_from_image(np.array([low, high]))
+        sides = np.ptp(corners.clip(0, (view.width, view.height)), axis=0)
+        pixels = float(sides.prod())
+        if pixels * self._rates.get((part.look, False), FIRST_RATE) <= seconds:
+            return 1
+        excess = pixels * self._rates.get((part.look, True), FIRST_RATE) / seconds
+        return int(np.clip(math.ceil(math.sqrt(excess)), 2, COARSEST))
+
+    def _draw(self, document: Document, part: Part, view: View, factor: int) -> Layer | None:
+        """The picture of a part, or None where nothing of it is on the canvas."""
+        derived, camera, k = self._derived, document.photo.camera, part.k
+        texture = derived.shape(document.photo, document.objects[k]).texture
         start = time.perf_counter()
-        if coarse == 1:
-            layer = _layer(box, _rendered(drawable, request, box), request.part)
+        if part.is_painted:
+            drawable = _prepare(
+                derived.painter.painted(document, k, part.look),
+                _coarser(view.camera(camera), factor), camera,
+            )  # fmt: skip
+        elif factor == 1:
+            drawable = derived.drawable(document, k, view)
         else:
-            layer = _coarse_layer(request, box, coarse)
-        self._learn(look, time.perf_counter() - start, pixels / coarse**2)
+            splats = derived.draft(document, k)
+            drawable = _prepare(splats, _coarser(view.camera(camera), factor), camera)
+        box = drawable.box()
+        if box is None:
+            return None
+        if factor == 1:
+            layer = _layer(box, _rendered(drawable, texture, part, box), part)
+        elif part.is_painted:
+            layer = _coarse_layer(drawable, texture, part, box, factor)
+        else:
+            layer = _sharp_layer(drawable, texture, part, box, factor, view)
+        pixels = (box[2] - box[0]) * (box[3] - box[1])
+        self._learn((part.look, factor > 1), time.perf_counter() - start, pixels)
         return layer
 
     def _want_exact(self, work: _Work) -> None:
         """Asks for the exact picture of what has not changed for a moment."""
-        if self.ask is None or not work.shown.is_coarse or work.is_asked:
+        if self.ask is None or not work.shown.is_draft or work.is_asked:
             return
         if time.monotonic() - work.since < STILL:
             return
@@ -246,17 +251,17 @@ class Layers:
 
         self.ask(work.request, accept)
 
-    def _learn(self, look: Shown, seconds: float, pixels: float) -> None:
+    def _learn(self, kind: tuple[Shown, bool], seconds: float, pixels: float) -> None:
         """A moving average, so that one disturbed frame decides little."""
         rate = seconds / max(pixels, 1.0)
-        mean = 0.7 * self._rates.get(look, FIRST_RATE) + 0.3 * rate
-        self._rates[look] = float(np.clip(mean, 1e-9, 1e-5))
+        mean = 0.7 * self._rates.get(kind, FIRST_RATE) + 0.3 * rate
+        self._rates[kind] = float(np.clip(mean, 1e-9, 1e-5))
 
 
 def render(request: Request) -> Rendered:
     """The exact picture."""
     drawable = _prepare(request.splats, request.window, request.camera)
-    return _rendered(drawable, request)
+    return _rendered(drawable, request.texture, request.part)
 
 
 def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawable:
@@ -266,44 +271,56 @@ def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawa
 
 
 def _rendered(
-    drawable: Drawable, request: Request, box: tuple[int, int, int, int] | None = None
+    drawable: Drawable, texture: TextureLevels, part: Part, box: Box | None = None
 ) -> Rendered:
     """All of the view or the part `box` of it."""
     from objectmorpher_core.raster import tiles
 
-    if not request.part.is_marked:
-        return Rendered(tiles.draw_rgba(drawable, request.texture, box))
-    picture = tiles.draw(drawable, request.texture, box)
+    if not part.is_marked:
+        return Rendered(tiles.draw_rgba(drawable, texture, box))
+    picture = tiles.draw(drawable, texture, box)
     rgba = np.dstack([picture.color, picture.alpha])
-    return Rendered(_as_u8(rgba), _invented(picture))
+    return Rendered(_as_u8(rgba), _as_u8(picture.alpha - picture.from_photo))
 
 
-def _layer(box: tuple[int, int, int, int], rendered: Rendered, part: Part) -> Layer:
-    x0, y0, x1, y1 = box
-    own = (float(x0), float(y0), float(x1), float(y1))
-    return Layer(own, rendered.rgba, rendered.invented, is_tint=part.look is Shown.STRAIN)
+def _layer(box: Box, rendered: Rendered, part: Part) -> Layer:
+    return Layer(_floats(box), rendered.rgba, rendered.invented, is_tint=_is_tint(part))
 
 
-def _coarse_layer(request: Request, box: tuple[int, int, int, int], coarse: int) -> Layer:
-    """With `coarse` times fewer px across and down."""
+def _coarse_layer(
+    drawable: Drawable, texture: TextureLevels, part: Part, box: Box, factor: int
+) -> Layer:
+    """A painted object, smooth already; `box` in px of the drawable, `factor` canvas px wide."""
     from objectmorpher_core.raster import tiles
 
-    window, part = _coarser(request.window, coarse), request.part
-    covered = (box[0], box[1], box[0] + window.width * coarse, box[1] + window.height * coarse)
-    drawable = _prepare(request.splats, window, request.camera)
-    if part.is_painted:  # smooth already
-        rgba = tiles.draw_rgba(drawable, request.texture)
-        return Layer(covered, rgba, is_coarse=True, is_tint=part.look is Shown.STRAIN)
-    picture, texture = tiles.draw(drawable, request.texture), request.texture
-    draft = Draft(_looks(picture), texture.levels[0], texture.left, texture.top)
-    invented = _invented(picture) if part.is_marked else None
-    rgba = np.dstack([picture.color, picture.alpha])
-    return Layer(covered, rgba, invented, draft, is_coarse=True)
+    rgba = tiles.draw_rgba(drawable, texture, box)
+    x0, y0, x1, y1 = box
+    covered = _floats((factor * x0, factor * y0, factor * x1, factor * y1))
+    return Layer(covered, rgba, is_draft=True, is_coarse=True, is_tint=_is_tint(part))
 
 
-def _invented(picture: Picture3D) -> np.ndarray:
-    """(h, w) u8 share of the pixel that shows the object, but nothing of the photo."""
-    return _as_u8(picture.alpha - picture.from_photo)
+def _sharp_layer(
+    drawable: Drawable, texture: TextureLevels, part: Part, box: Box, factor: int, view: View
+) -> Layer:
+    """An object that shows the photo, see `sharpening`; `box` as above."""
+    from objectmorpher_core.raster import tiles
+    from objectmorpher_core.raster.sharpening import sharpen
+
+    picture = tiles.draw(drawable, texture, box)
+    x0, y0, x1, y1 = (factor * v for v in box)
+    covered = (x0, y0, min(x1, view.width), min(y1, view.height))
+    corner = (view.left, view.top)
+    rgba, invented = sharpen(picture, texture, factor, covered, corner, view.zoom)
+    return Layer(_floats(covered), rgba, invented if part.is_marked else None, is_draft=True)
+
+
+def _floats(box: Box) -> tuple[float, float, float, float]:
+    x0, y0, x1, y1 = box
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def _is_tint(part: Part) -> bool:
+    return part.look is Shown.STRAIN
 
 
 def _as_u8(values: np.ndarray) -> np.ndarray:
@@ -312,19 +329,7 @@ def _as_u8(values: np.ndarray) -> np.ndarray:
 
 def _coarser(window: Camera, coarse: int) -> Camera:
     """The same window with `coarse` times fewer px across and down."""
+    if coarse == 1:
+        return window
     width, height = -(-window.width // coarse), -(-window.height // coarse)
     return window.windowed(0.0, 0.0, width, height, 1.0 / coarse)
-
-
-def _looks(picture: Picture3D) -> F32:
-    """The draft's map, continued a little beyond the object so that it can be interpolated."""
-    is_seen = (picture.alpha > 0.02) & (picture.from_photo > 0)
-    weight = is_seen.astype(np.float32)
-    shift = picture.shift * weight[..., None]
-    for _ in range(2):
-        around = cv2.blur(weight, (3, 3))
-        spread = cv2.blur(shift, (3, 3)) / np.maximum(around, 1e-6)[..., None]
-        is_new = (weight == 0) & (around > 0)
-        shift[is_new], weight[is_new] = spread[is_new], 1.0
-    share = np.clip(picture.from_photo / np.maximum(picture.alpha, 1e-3), 0, 1)
-    return np.dstack([shift, share, np.zeros_like(share)]).astype(np.float32)

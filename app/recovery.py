@@ -18,6 +18,7 @@ from objectmorpher_core.session_tree import SessionError
 from .autosave import LOCK, Held, recovery_root
 from .file_lock import FileLock
 from .jobs import JobError
+from .shape import Shape, build_ready
 from .texts import t
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 STALE = 24 * 3600  # s; a folder without a document that is older holds nothing and never will
-RECOVER = "recover"  # kind of what runs in the background
+RECOVER = "recover"  # kind of chores
 
 
 @dataclass(frozen=True)
@@ -82,13 +83,16 @@ class Recovery:
             editor.complain(t("{name} was recovered elsewhere already", name=left.name))
             return
 
-        def read(progress: Progress) -> Document:
+        def read(progress: Progress) -> tuple[Document, dict[int, Shape]]:
             progress(0.2, "")
-            return read_journal(left.folder)
+            document = read_journal(left.folder)
+            return document, build_ready(document)
 
-        def accept(document: Document) -> None:
+        def accept(answer: tuple[Document, dict[int, Shape]]) -> None:
+            document, shapes = answer
             self._forget(left)
             editor.start(document)
+            editor.derived.adopt(document, shapes)
             editor.path, editor.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()
@@ -104,7 +108,7 @@ class Recovery:
             self.left = tuple(broken if other is left else other for other in self.left)
             editor.complain(sentence, error.trace)
 
-        editor.background.start(
+        editor.chores.start(
             t("Recovering {name}", name=left.name), read, kind=RECOVER,
             done=accept, failed=fail, cancelled=lock.release,
         )  # fmt: skip

@@ -38,7 +38,7 @@ class Settings:
     is_motion_reduced: bool = False
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
-    export_what: str = "Photo"  # the last export's, see `exporting.py`
+    export_what: str = "Photo"  # the last export's, see `export_plan.py`
     export_format: str = "PNG"
     export_bits: int = 0  # 8 or 16; 0: the photo's own
     export_folder: str = ""  # for photos that are no file of the user's

@@ -21,12 +21,14 @@ from .feedback import Action
 from .job_functions import Choice, Cut
 from .jobs import JobError
 from .layers import Rendered, Request
+from .shape import rehearse
 from .texts import t
 from .view import ToolName
 
 if TYPE_CHECKING:
     from .editor import Editor
 
+REHEARSE = "rehearse"  # kind of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 
 
@@ -104,14 +106,14 @@ class Tasks:
             t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
             done=accept, failed=lambda error: self._fail_segment(error, question),
-            cancelled=self._drop_prompt, kind=SELECT,
+            cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
 
     def _fail_segment(self, error: JobError, question: Question) -> None:
-        self.question = None
+        self._drop_question()
         self._editor.complain_of(error.retried_by(lambda: self.segment(question)))
 
-    def _drop_prompt(self) -> None:
+    def _drop_question(self) -> None:
         self.question = None
 
     def lift(self) -> None:
@@ -122,7 +124,7 @@ class Tasks:
         if document is None or selection is None:
             return
         editor.message = None
-        settings = editor.settings
+        photo, settings = document.photo, editor.settings
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
             current = editor.document
@@ -132,16 +134,33 @@ class Tasks:
             changed = edits.set_lifted(current, k, matte, lifted)
             editor.posing.select(None)
             editor.apply(t("Lift object"), changed)
-            editor.derived.prepare(changed, k)
             editor.view.tool = ToolName.POSE
             count = f"{len(lifted.gaussians):,}"
             editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
 
-        photo = document.photo
         editor.jobs.start(
             t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
             Choice(settings.backends.lift, document.seed), settings.gaussians,
             done=accept, failed=editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def rehearse(self) -> None:
+        """Sees to it that the current object can be dragged at once; each frame."""
+        editor, document = self._editor, self._editor.committed
+        if document is None or editor.chores.is_busy(REHEARSE) or not editor.is_lifted:
+            return
+        if editor.current >= len(document.objects):
+            return
+        photo, thing = document.photo, document.objects[editor.current]
+        if thing.lifted is None:
+            return
+        shape = editor.derived.shape(photo, thing)
+        if shape.is_rehearsed:
+            return
+        shape.is_rehearsed = True
+        editor.chores.start(
+            "Getting ready", lambda progress: rehearse(photo, thing, shape), kind=REHEARSE,
+            done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
     def ensure_plate(self) -> bool:
@@ -169,7 +188,7 @@ class Tasks:
         def accept(plate: Plate) -> None:
             self._plate = (masks, plate)
 
-        def retry_later() -> None:
+        def say_so() -> None:
             if self._no_plate is not None and _same(self._no_plate, masks):
                 fill_in = Action(t("Fill in"), self.fill_background)
                 editor.say(t("The background behind the object is not filled in"), fill_in)
@@ -182,7 +201,7 @@ class Tasks:
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
-            done=accept, failed=fail, cancelled=retry_later, kind=PLATE,
+            done=accept, failed=fail, cancelled=say_so, kind=PLATE,
         )  # fmt: skip
 
     def fill_background(self) -> None:

@@ -50,3 +50,8 @@ def t(text: str, **values: object) -> str:
     """`text` in the user's language, `{names}` in it replaced by `values`."""
     found = _texts.get(text, text)
     return found.format(**values) if values else found
+
+
+def sentence(text: str) -> str:
+    """With a capital: the library's reasons have none."""
+    return text[:1].upper() + text[1:]

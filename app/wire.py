@@ -41,7 +41,7 @@ class _Unpickler(pickle.Unpickler):
 def _is_large(value: Any) -> bool:
     if type(value) is bytes:
         return len(value) >= LARGE
-    # A writeable array may change after it was sent; a view's pixels belong to another array.
+    # A writeable array may change after it was sent: it goes with each message.
     return type(value) is np.ndarray and value.nbytes >= LARGE and not value.flags.writeable
 
 

@@ -29,10 +29,10 @@ class EditError(ValueError):
     """The change makes no sense; one sentence."""
 
 
-def add_object(document: Document, name: str | None = None) -> Document:
+def add_object(document: Document) -> Document:
     """A new, empty object at the end of the list."""
     count = len(document.objects)
-    return document.with_object(count, EditObject(name or f"Object {count + 1}"))
+    return document.with_object(count, EditObject(f"Object {count + 1}"))
 
 
 def remove_object(document: Document, k: int) -> Document:

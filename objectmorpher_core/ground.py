@@ -17,7 +17,8 @@ from .arrays import F64
 from .camera import Camera
 
 FARTHEST = 40.0  # x the height of the camera: to which depth an object slides
-NEAREST = 0.02
+NEAREST = 0.02  # x the same: from which depth on
+LEAST_BELOW = 1.0  # px of the photo, of the contact below the horizon
 
 
 class GroundError(ValueError):
@@ -71,8 +72,9 @@ def ground_under(points: np.ndarray, camera: Camera, horizon: float) -> Ground:
     """
     normal = np.array([0.0, camera.focal, camera.cy - horizon])
     normal /= np.linalg.norm(normal)
-    height = float((points @ normal).max())
-    lowest = camera.project(points[int((points @ normal).argmax())])
-    if lowest[1] - horizon < 1.0 or height <= 0:
+    depths = points @ normal  # (N,) world units, below the camera
+    lowest = int(depths.argmax())
+    height = float(depths[lowest])
+    if camera.project(points[lowest])[1] - horizon < LEAST_BELOW or height <= 0:
         raise GroundError("the object's lowest point is above the horizon, so it cannot stand")
     return Ground(normal, height)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -12,15 +13,18 @@ from .arrays import F64, I32
 from .camera import Camera
 from .deform.deformer import Deformer
 from .deform.splitting import Split, split_stretched
-from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose, Rig
+from .document import DeformSettings, EditObject, LiftedObject, PhotoTexture, Placement, Pose
 from .gaussians import Gaussians
 from .raster import tiles
 from .raster.picking import pick
 from .raster.posed import PosedSplats, RestSplats
 from .raster.reference import Picture3D
 from .raster.texture import TextureLevels
+from .raster.thinning import thinned
 from .raster.tiles import Drawable
+from .rig import Rig
 
+DRAFT = 10_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
 EXACT, CLOSE = 1e-9, 1e-6  # object units by which it may miss: at once, and after all steps
 
@@ -50,18 +54,31 @@ class Puppet:
         self._settings = settings
         self._rig = rig
         self._rest = RestSplats(lifted, camera)
+        self._lock = Lock()
+        self._deformer: Deformer | None = None
+        self._similar: Deformer | None = None  # of the same object with another rig
 
-    @cached_property
+    @property
     def deformer(self) -> Deformer:
-        """The object's graph and solver; made when the object is first deformed."""
+        """The object's graph and solver; made when the object is first deformed.
+
+        By one thread: another one that asks meanwhile waits for it.
+        """
+        with self._lock:
+            if self._deformer is None:
+                self._deformer, self._similar = self._build_deformer(), None
+            return self._deformer
+
+    def _build_deformer(self) -> Deformer:
+        if self._similar is not None and self._rig is not None:
+            return self._similar.with_rig(self._rig)
         return Deformer(self.lifted, self._settings, self._rig)
 
     def with_rig(self, rig: Rig) -> Puppet:
         """The same object with another rig; what does not depend on it is kept."""
         other = copy.copy(self)
-        other._rig = rig
-        if "deformer" in self.__dict__:
-            other.deformer = self.deformer.with_rig(rig)
+        other._rig, other._lock = rig, Lock()
+        other._similar, other._deformer = self._deformer or self._similar, None
         return other
 
     def posed(self, pose: Pose | None, placement: Placement) -> PosedSplats:
@@ -77,6 +94,27 @@ class Puppet:
         skinned = self.deformer.skin_points(pieces.means, pose, pieces.normals)
         matrix = placement.matrix(self.lifted, self.camera)
         return PosedSplats(RestSplats(lifted, self.camera), skinned, matrix)
+
+    @property
+    def has_draft(self) -> bool:
+        """Whether `draft` is less work than `posed`."""
+        return self._draft_rest is not None
+
+    def draft(self, pose: Pose | None, placement: Placement) -> PosedSplats:
+        """The same from about `DRAFT` wider Gaussians: where the object is and where it looks."""
+        assert self._draft_rest is not None, "it has few Gaussians"
+        rest, chosen = self._draft_rest
+        matrix = placement.matrix(self.lifted, self.camera)
+        motion = None if pose is None else self.deformer.gaussians_motion(pose, chosen)
+        return PosedSplats(rest, motion, matrix)
+
+    @cached_property
+    def _draft_rest(self) -> tuple[RestSplats, I32] | None:
+        """The wider Gaussians and which ones they are; None where there are few anyway."""
+        if (fewer := thinned(self.lifted, DRAFT)) is None:
+            return None
+        lifted, chosen = fewer
+        return RestSplats(lifted, self.camera), chosen
 
     def _posed_whole(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The Gaussians as they were lifted, none of them split."""

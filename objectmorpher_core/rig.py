@@ -1,4 +1,4 @@
-"""What the artist says about how regions of an object move: cut, glued, rigid, frozen, stiff."""
+"""How an object's regions move: cut apart, glued together, rigid, frozen, stiffer than the rest."""
 
 from __future__ import annotations
 

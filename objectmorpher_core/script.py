@@ -1,7 +1,6 @@
 """The edit script: what is to be done to one photo, in the words of the command line.
 
-The options of `objectmorpher edit`, a JSON file of `--script` and the script that a session
-keeps are all this one dataclass.
+The options of `objectmorpher edit` and a JSON file of `--script` are this one dataclass.
 """
 
 from __future__ import annotations
@@ -63,19 +62,6 @@ class EditScript:
         """This script with the fields `said` taken from `other`, be they defaults or not."""
         return replace(self, **{name: getattr(other, name) for name in said})
 
-    def to_json(self) -> dict[str, Any]:
-        """The script as `--script` reads it; options at their default are left out."""
-        default = EditScript()
-        result: dict[str, Any] = {}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if value == getattr(default, f.name):
-                continue
-            if f.name == "handle":
-                value = [{"at": list(h.at), "to": list(h.to), "dz": h.dz} for h in value]
-            result[f.name.replace("_", "-")] = _plain(value)
-        return result
-
 
 @dataclass(frozen=True)
 class BatchItem:
@@ -118,12 +104,6 @@ def _batch_item(item: Any) -> BatchItem:
         if key in item and not isinstance(item[key], str):
             raise ScriptError(f"the script's {key!r} is not a file name")
     return BatchItem(script_from(options), item.get("photo"), item.get("out"))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    return value
 
 
 def _number(key: str, value: Any) -> float:

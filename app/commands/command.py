@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..editor import Editor
+from ..filing import Dialog
 from ..tasks import LIFT, SELECT
 from ..texts import t
 
@@ -47,8 +48,8 @@ def cannot_lift(editor: Editor) -> str | None:
         return t("The object is being lifted")
     if editor.jobs.is_busy(SELECT):
         return t("The selection is not ready yet")
-    is_done = editor.is_lifted
-    return no_selection(editor) or (t("The object is lifted already") if is_done else None)
+    is_lifted = editor.is_lifted
+    return no_selection(editor) or (t("The object is lifted already") if is_lifted else None)
 
 
 def no_undo(editor: Editor) -> str | None:
@@ -76,3 +77,12 @@ class Command:
     why_not: Reason = no_photo
     is_on: Callable[[Editor], bool] | None = None  # of a toggle
     other_keys: tuple[str, ...] = ()  # that do the same and are not shown
+
+
+def asks_for(dialog: Dialog) -> Callable[[Editor], None]:
+    """What such a command does: the window shows a file dialog."""
+
+    def run(editor: Editor) -> None:
+        editor.filing.wanted = dialog
+
+    return run

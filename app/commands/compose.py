@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from objectmorpher_core import compose
 
-from ..editing.composing import PLATE, VARIANTS
+from ..editing.composing import VARIANTS
 from ..editor import Editor
-from ..texts import t
+from ..tasks import PLATE
+from ..texts import sentence, t
 from ..view import ToolName
 from .command import Command, no_lift, nothing_lifted
 
@@ -46,11 +47,6 @@ def _cannot_vary(editor: Editor) -> str | None:
     if not compose.is_random(name):
         return t("This way of filling gives the same every time")
     return nothing_lifted(editor)
-
-
-def sentence(text: str) -> str:
-    """With a capital."""
-    return text[:1].upper() + text[1:]
 
 
 def not_moved(editor: Editor) -> str | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..editor import Editor
 from ..tools import navigate
 from ..view import ToolName
@@ -14,11 +12,7 @@ def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
     def is_on(editor: Editor) -> bool:
         return editor.view.tool is tool
 
-    return Command(tool.value, keys, _choose(tool), why_not, is_on)
-
-
-def _choose(tool: ToolName) -> Callable[[Editor], None]:
-    return lambda editor: editor.choose_tool(tool)
+    return Command(tool.value, keys, lambda editor: editor.choose_tool(tool), why_not, is_on)
 
 
 COMMANDS: dict[str, Command] = {

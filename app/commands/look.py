@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..editor import Editor
 from ..painter import shown_now
 from ..texts import t
@@ -13,20 +11,16 @@ from .command import Command, no_lift, no_photo, nothing_lifted
 
 
 def _show(shown: Shown, number: int) -> Command:
-    def is_on(editor: Editor) -> bool:
-        return shown_now(editor.document, editor.view) is shown
-
-    why_not = nothing_lifted if number > 1 else no_photo
-    return Command(shown.value, f"Alt+{number}", _shower(shown), why_not, is_on)
-
-
-def _shower(shown: Shown) -> Callable[[Editor], None]:
     def run(editor: Editor) -> None:
         editor.view.shown = shown
         if shown is Shown.COMPOSITE:  # which there is from the photo's view only
             editor.looking.reset()
 
-    return run
+    def is_on(editor: Editor) -> bool:
+        return shown_now(editor.document, editor.view) is shown
+
+    why_not = nothing_lifted if number > 1 else no_photo
+    return Command(shown.value, f"Alt+{number}", run, why_not, is_on)
 
 
 def _fit(editor: Editor) -> None:

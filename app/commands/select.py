@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
-from .command import Command, cannot_lift, no_selection
-
-
-def _want(dialog: Dialog) -> Callable[[Editor], None]:
-    def run(editor: Editor) -> None:
-        editor.filing.wanted = dialog
-
-    return run
+from .command import Command, asks_for, cannot_lift, no_selection
 
 
 def _no_soft_edge(editor: Editor) -> str | None:
@@ -36,7 +27,7 @@ COMMANDS: dict[str, Command] = {
     "feather": Command("Feather", "", lambda e: e.masking.feather(), no_selection),
     "fill_holes": Command("Fill holes", "", lambda e: e.masking.fill_holes(), no_selection),
     "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
-    "import_mask": Command("Import mask…", "", _want(Dialog.MASK_OPEN)),
-    "export_mask": Command("Export mask…", "", _want(Dialog.MASK_SAVE), no_selection),
+    "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),
+    "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
 }

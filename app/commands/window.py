@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..editor import Editor
 from ..view import Popup
 from .command import Command, never
 
 
 def _toggle(popup: Popup) -> Command:
+    def run(editor: Editor) -> None:
+        editor.view.popup = None if is_on(editor) else popup
+
     def is_on(editor: Editor) -> bool:
         return editor.view.popup is popup
 
-    return Command(popup.value, _KEYS.get(popup, ""), _toggler(popup), never, is_on)
-
-
-def _toggler(popup: Popup) -> Callable[[Editor], None]:
-    def run(editor: Editor) -> None:
-        editor.view.popup = None if editor.view.popup is popup else popup
-
-    return run
+    return Command(popup.value, _KEYS.get(popup, ""), run, never, is_on)
 
 
 _KEYS = {Popup.SHORTCUTS: "F1", Popup.PREFERENCES: "Ctrl+,"}

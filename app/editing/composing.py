@@ -19,6 +19,7 @@ from .. import job_functions
 from ..job_functions import Choice, Variant
 from ..jobs import JobError
 from ..layers import Layer
+from ..tasks import PLATE
 from ..texts import t
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..editor import Editor
 
-PLATE, VARIANTS, REPAIR = "plate", "variants", "repair"  # kinds of jobs
+VARIANTS, REPAIR = "variants", "repair"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
 USUAL_HARMONY = 0.8  # strength, when it is turned on
 USUAL_SHADOW = 0.55

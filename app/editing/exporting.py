@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..export_functions import write_export
-from ..exporting import FORMATS, NAMES, Format, Plan, What, format_of
+from ..export_plan import FORMATS, NAMES, Format, Plan, What, format_of
+from ..tasks import WRITE
 from ..texts import t
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
-WRITE = "write"  # kind of jobs
 KNOWN = "PNG, JPG, TIF, WEBP"
 
 

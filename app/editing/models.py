@@ -47,7 +47,7 @@ class Models:
 
     def look(self) -> None:
         """Reads anew what is there; a damaged file counts as none."""
-        self._editor.background.start(
+        self._editor.chores.start(
             "Looking at the models", lambda progress: models.verify(),
             kind=LOOK, done=self._take, failed=lambda error: None, is_quiet=True,
         )  # fmt: skip
@@ -67,7 +67,7 @@ class Models:
     @property
     def downloading(self) -> str | None:
         """The model on its way."""
-        return self._loading if self._editor.background.is_busy(DOWNLOAD) else None
+        return self._loading if self._editor.chores.is_busy(DOWNLOAD) else None
 
     def download(self, id: str) -> None:
         """Gets a model; the user has clicked the button that says so."""
@@ -83,14 +83,14 @@ class Models:
             self._use_anew()
             editor.say(t("{name} is ready", name=names_of(id).name))
 
-        editor.background.start(
+        editor.chores.start(
             t("Downloading {name}", name=names_of(id).name), fetch, kind=DOWNLOAD,
             done=accept, failed=lambda error: self._complain(error, id), cancelled=self.look,
         )  # fmt: skip
 
     def cancel(self) -> None:
         """Stops the download; nothing of it stays."""
-        self._editor.background.cancel(DOWNLOAD)
+        self._editor.chores.cancel(DOWNLOAD)
 
     def decline(self, id: str) -> None:
         """Not now: it is not offered again, but stays in the list."""

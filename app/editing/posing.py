@@ -149,7 +149,7 @@ class Posing:
         target = editor.derived.unplaced(editor.document, k, seen.world)
         changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
         added = len(item.handles)
-        self._preview(self.mirroring.followed(changed, (added,)), DRAG_SECONDS)
+        self.change(self.mirroring.followed(changed, (added,)))
         self.select(*others, added)
         return added
 
@@ -188,7 +188,7 @@ class Posing:
         except ValueError as error:
             editor.complain(str(error))
             return
-        self._preview(self.mirroring.followed(changed, tuple(places)), DRAG_SECONDS)
+        self.change(self.mirroring.followed(changed, tuple(places)))
 
     def turn(self, handle: int, start: F64, turn: F64) -> None:
         """Previews the handle turned from `start` (3,), object frame, by `turn` (3,), world."""
@@ -198,7 +198,7 @@ class Posing:
         k = editor.current
         own = editor.derived.facts.turn_of(editor.document, k).T @ turn
         changed = edits.turn_handle(editor.document, k, handle, turned_by(start, own))
-        self._preview(self.mirroring.followed(changed, (handle,)), DRAG_SECONDS)
+        self.change(self.mirroring.followed(changed, (handle,)))
 
     def _is_frozen(self, handle: int) -> bool:
         """Whether a handle is on a frozen part, which moves for nobody; says so."""
@@ -209,15 +209,11 @@ class Posing:
         return is_frozen
 
     def change(self, changed: Document) -> None:
-        """Previews handles that are changed otherwise."""
-        self._preview(changed, DRAG_SECONDS)
-
-    def _preview(self, changed: Document, seconds: float) -> None:
-        """Solves for the handles of `changed`, from the pose that is shown."""
+        """Previews the handles of `changed`, solved for from the pose that is shown."""
         editor = self._editor
         assert editor.object is not None
         start = editor.object.pose
-        solved = editor.derived.solved(changed, editor.current, start, seconds)
+        solved = editor.derived.solved(changed, editor.current, start, DRAG_SECONDS)
         editor.preview = self._restless = solved
 
     def relax(self) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64, I32, Mask
-from objectmorpher_core.document import Document
-from objectmorpher_core.rig import Rig, Seam
+from objectmorpher_core.document import Document, Pose
+from objectmorpher_core.rig import Rig
 
 from ..pose_view import PoseMode
 from ..texts import t
@@ -91,36 +91,29 @@ class Rigging:
         if len(nodes) == 0:
             return
         if kind is PoseMode.FREEZE:
-            change = edits.thaw if is_erasing else edits.freeze
-            self._hold(t("Erase") if is_erasing else t("Freeze"), change, nodes)
+            edit = edits.thaw if is_erasing else edits.freeze
+            self._hold(t("Erase") if is_erasing else t("Freeze"), edit, nodes)
         elif is_erasing:
-            self._apply(t("Erase"), _erased(self.rig, kind, nodes, self._count))
+            self._set(t("Erase"), _erased(self.rig, kind, nodes, self._count))
         elif kind is PoseMode.STIFFEN:
             value = self._editor.view.pose.stiffness
-            self._apply(t("Stiffen"), _stiffened(self.rig, nodes, value, self._count))
+            self._set(t("Stiffen"), _stiffened(self.rig, nodes, value, self._count))
         else:
             self._group(nodes)
 
-    def _hold(self, label: str, change: Callable[..., Document], nodes: I32) -> None:
+    def _hold(self, label: str, edit: Callable[..., Document], nodes: I32) -> None:
         """Freezes or thaws; the pose goes on from what is seen, so that nothing jumps."""
-        editor = self._editor
-        document, thing = editor.document, editor.object
-        if document is not None and thing is not None:
-            changed = change(document, editor.current, nodes)
-            solved = editor.derived.solved(changed, editor.current, thing.pose)
-            editor.apply(label, solved)
+        thing = self._editor.object
+        self._apply(label, edit, nodes, start=None if thing is None else thing.pose)
 
     def _group(self, nodes: I32) -> None:
         """A group of its own, or more of the group that the stroke began on."""
-        editor = self._editor
         own = [body for body in self.rig.bodies if nodes[0] in body]
-        whole = np.unique(np.concatenate([nodes, *own])).astype(np.int32)
+        whole = np.unique(np.concatenate([nodes, *own]))
         if len(whole) < 2:
-            editor.say(t("A rigid group needs a larger stroke"))
+            self._editor.say(t("A rigid group needs a larger stroke"))
             return
-        assert editor.document is not None
-        changed = edits.make_body(editor.document, editor.current, whole)
-        self._apply(t("Rigid group"), changed.objects[editor.current].rig)
+        self._apply(t("Rigid group"), edits.make_body, whole)
 
     def cut(self, way: F64) -> None:
         """Parts what is left of a line (S, 2), image px, from what is right of it."""
@@ -136,7 +129,7 @@ class Rigging:
         if len(first) == 0 or len(second) == 0:
             editor.say(t("Draw the cut across the object"))
             return
-        self._apply(t("Cut"), replace(self.rig, seams=(*self.rig.seams, Seam(first, second))))
+        self._apply(t("Cut"), edits.cut, first, second)
 
     def glue(self, way: F64) -> None:
         """Joins what is under the brush at the beginning of a line to what is at its end."""
@@ -153,9 +146,7 @@ class Rigging:
         if along < TOGETHER * straight.min():
             editor.say(t("These parts hang together already"))
             return
-        self._apply(
-            t("Glue"), replace(self.rig, seams=(*self.rig.seams, Seam(first, second, True)))
-        )
+        self._apply(t("Glue"), edits.glue, first, second)
 
     def unseam(self, kind: PoseMode, nodes: I32) -> None:
         """Takes back the cuts, or the glue, that these control points are part of."""
@@ -166,7 +157,7 @@ class Rigging:
             or not np.isin(nodes, np.concatenate([s.first, s.second])).any()
         )  # fmt: skip
         if len(kept) < len(self.rig.seams):
-            self._apply(t("Erase"), replace(self.rig, seams=kept))
+            self._set(t("Erase"), replace(self.rig, seams=kept))
 
     def remove(self, region: Region) -> None:
         """Takes back what was said about a region."""
@@ -183,18 +174,17 @@ class Rigging:
             )
         else:
             rig = _erased(rig, region.kind, region.nodes, self._count)
-        self._apply(t("Remove region"), rig)
+        self._set(t("Remove region"), rig)
 
     def set_rigidity(self, rigidity: Rigidity) -> None:
         """What the whole object is made of."""
         from objectmorpher_core.deform.rigidity import with_rigidity
 
         editor = self._editor
-        if editor.document is None or editor.object is None:
+        if editor.object is None:
             return
         settings = with_rigidity(editor.object.deform, rigidity)
-        changed = edits.set_deform(editor.document, editor.current, settings)
-        self._solve(t("Rigidity"), changed)
+        self._apply(t("Rigidity"), edits.set_deform, settings)
 
     @property
     def _count(self) -> int:
@@ -202,21 +192,22 @@ class Rigging:
         assert thing is not None and thing.lifted is not None
         return len(thing.lifted.control_points)
 
-    def _apply(self, label: str, rig: Rig) -> None:
+    def _set(self, label: str, rig: Rig) -> None:
+        self._apply(label, edits.set_rig, rig)
+
+    def _apply(
+        self, label: str, edit: Callable[..., Document], *arguments: Any, start: Pose | None = None
+    ) -> None:
+        """One step by an edit of the object, with the same handles at the same places."""
         editor = self._editor
         if editor.document is None:
             return
         try:
-            changed = edits.set_rig(editor.document, editor.current, rig)
-        except ValueError as error:
+            changed = edit(editor.document, editor.current, *arguments)
+        except edits.EditError as error:
             editor.complain(str(error))
             return
-        self._solve(label, changed)
-
-    def _solve(self, label: str, changed: Document) -> None:
-        """One step, with the same handles at the same places."""
-        editor = self._editor
-        editor.apply(label, editor.derived.solved(changed, editor.current, None))
+        editor.apply(label, editor.derived.solved(changed, editor.current, start))
 
 
 def gaps_to_way(points: F64, way: F64) -> F64:

@@ -6,12 +6,12 @@ import math
 
 from imgui_bundle import ImVec2, imgui
 
+from ..tools.pointer import SNAP
 from .theme import theme
 from .widgets import Change, tooltip
 
 SIDE = 60.0  # points
 KNOB = 5.0
-SNAP = 15.0  # degrees, with Shift
 
 
 def dial(name: str, degrees: float, hint: str) -> Change:

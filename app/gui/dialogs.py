@@ -7,20 +7,21 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 from imgui_bundle import portable_file_dialogs as pfd
 
 from ..editor import Editor
-from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog
+from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog, Filing
 from ..texts import t
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
+from .modal import modal
 from .models_dialog import draw_models
 from .theme import FIELD, PRIMARY, theme
-from .widgets import Kind, bold_text, button, note
+from .widgets import Kind, button
 
 HELPERS = ("zenity", "kdialog", "matedialog", "qarma")  # what the system's dialogs need on Linux
-QUESTION = "Unsaved changes"
+QUESTION = 400.0  # points, width
 FILTERS = {
     Dialog.OPEN: (*PHOTO_ENDINGS, SESSION_ENDING),
     Dialog.SAVE: (SESSION_ENDING,),
@@ -65,11 +66,8 @@ class Dialogs:
             self._chooser.open(dialog, suggestion, FILTERS[dialog])
             return
         patterns = " ".join(f"*{ending}" for ending in FILTERS[dialog])
-        filters = [dialog.value, patterns, "All files", "*"]
-        if dialog.is_opening:
-            native = pfd.open_file(dialog.value, str(suggestion), filters)
-        else:
-            native = pfd.save_file(dialog.value, str(suggestion), filters)
+        title, ask = t(dialog.value), pfd.open_file if dialog.is_opening else pfd.save_file
+        native = ask(title, str(suggestion), [title, patterns, t("All files"), "*"])
         self._native = (dialog, native)
 
     def _poll_native(self, editor: Editor) -> None:
@@ -87,26 +85,14 @@ class Dialogs:
             editor.filing.cancel_dialog()
 
     def _draw_question(self, editor: Editor) -> None:
-        if editor.filing.question is not None and not imgui.is_popup_open(QUESTION):
-            imgui.open_popup(QUESTION)
-        centre = imgui.get_main_viewport().get_center()
-        imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
-        imgui.set_next_window_size(ImVec2(theme.pt(400), 0))
-        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(20, 20))
-        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
-        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
-        is_shown = imgui.begin_popup_modal(QUESTION, None, flags)[0]
-        imgui.pop_style_var(2)
-        if is_shown:
-            self._draw_answers(editor)
-            imgui.end_popup()
+        if editor.filing.question is None:
+            return
+        about = t("The session keeps the selection, the 3D object and its pose.")
+        with modal(t("Save what you have changed?"), QUESTION, about) as is_shown:
+            if is_shown:
+                self._draw_answers(editor.filing)
 
-    def _draw_answers(self, editor: Editor) -> None:
-        with bold_text():
-            imgui.text_unformatted(t("Save what you have changed?"))
-        note(t("The session keeps the selection, the 3D object and its pose."))
-        imgui.dummy(theme.size(0, 4))
-        filing = editor.filing
+    def _draw_answers(self, filing: Filing) -> None:
         answer = None
         top = imgui.get_cursor_pos_y()
         if button(t("Save session"), Kind.PRIMARY, width=132):

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from collections.abc import Iterable
 
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 
 from ..editing.exporting import Exporting
 from ..editor import Editor
-from ..exporting import LOSSLESS, Format, What
+from ..export_plan import LOSSLESS, Format, What
 from ..filing import Dialog
 from ..texts import t
 from .modal import modal
+from .segmented import Choice, segmented
 from .theme import FIELD, PRIMARY, theme
-from .widgets import Kind, button, note, tooltip
-
-T = TypeVar("T")
+from .widgets import Kind, button, note, shortened, tooltip
 
 WIDTH = 480.0  # points
 LABELS = 88.0  # width of the names left of the fields
@@ -62,16 +60,15 @@ def _draw_what(exporting: Exporting) -> None:
 def _draw_how(exporting: Exporting) -> None:
     assert exporting.draft is not None
     _name(t("Format"))
-    formats = exporting.formats
-    names = [format.value for format in formats]
-    format = _segments("format", formats, exporting.draft.format, names)
-    if format is not None:
+    choices = tuple(Choice(format, format.value) for format in exporting.formats)
+    format = segmented("format", choices, exporting.draft.format)
+    if format is not exporting.draft.format:
         exporting.choose_format(format)
     if exporting.has_bits:
         _name(t("Depth"))
-        names = [t("{bits} bit", bits=bits) for bits in DEPTHS]
-        bits = _segments("bits", DEPTHS, exporting.bits, names)
-        if bits is not None:
+        depths = tuple(Choice(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
+        bits = segmented("bits", depths, exporting.bits)
+        if bits != exporting.bits:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
     elif exporting.draft.format.has_quality:
         _name(t("Quality"))
@@ -102,7 +99,7 @@ def _draw_where(editor: Editor) -> bool:
     imgui.align_text_to_frame_padding()
     room = imgui.get_content_region_avail().x - theme.pt(BROWSE + 8)
     folder = str(exporting.path.parent)
-    imgui.text_colored(theme.vec("secondary"), _shortened(folder, room))
+    imgui.text_colored(theme.vec("secondary"), shortened(folder, room))
     tooltip(folder)
     imgui.same_line(imgui.get_window_width() - theme.pt(20 + BROWSE))
     if button(t("Browse…"), width=BROWSE):
@@ -126,7 +123,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     is_cancelled = button(t("Cancel"), width=BROWSE)
     imgui.same_line()
     imgui.set_cursor_pos_y(top)
-    label = f"{_shortened(exporting.label, theme.pt(WIDTH - 3 * 20 - BROWSE - 16))}###go"
+    label = f"{shortened(exporting.label, theme.pt(WIDTH - 3 * 20 - BROWSE - 16))}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
     is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
     is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
@@ -162,31 +159,3 @@ def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporti
                 tooltip(reason)
         imgui.end_combo()
     return found
-
-
-def _segments(name: str, choices: Sequence[T], chosen: T, labels: Sequence[str]) -> T | None:
-    """Buttons side by side, of which one is down. The one that was pressed, or None."""
-    found = None
-    room = imgui.get_content_region_avail().x
-    width = (room - theme.pt(2) * (len(choices) - 1)) / len(choices)
-    for k, choice in enumerate(choices):
-        if k:
-            imgui.same_line(0, theme.pt(2))
-        is_on = choice == chosen
-        role, text = ("accent", "on_accent") if is_on else ("raised", "text")
-        imgui.push_style_color(imgui.Col_.button, theme.vec(role))
-        imgui.push_style_color(imgui.Col_.button_hovered, theme.vec(role if is_on else "hovered"))
-        imgui.push_style_color(imgui.Col_.text, theme.vec(text))
-        if imgui.button(f"{labels[k]}##{name}{k}", ImVec2(width, theme.pt(FIELD))):
-            found = choice
-        imgui.pop_style_color(3)
-    return found
-
-
-def _shortened(text: str, room: float) -> str:
-    """The text's end, as much as fits."""
-    if imgui.calc_text_size(text).x <= room:
-        return text
-    while text and imgui.calc_text_size(f"…{text}").x > room:
-        text = text[1:]
-    return f"…{text}"

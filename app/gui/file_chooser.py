@@ -9,11 +9,11 @@ from imgui_bundle import ImVec2, imgui
 from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
+from .modal import modal
 from .theme import Icon, theme
-from .widgets import Kind, bold_text, button, icon_button, note
+from .widgets import Kind, button, icon_button, note, shortened
 
-TITLE = "Choose a file"
-SIZE = (640.0, 480.0)  # points
+WIDTH, HEIGHT = 640.0, 480.0  # points
 ROW = 28.0
 VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
@@ -42,22 +42,17 @@ class FileChooser:
         self._name = "" if is_folder else suggestion.name
         self.is_open = self._is_first = True
         self._replacing = None
-        imgui.open_popup(TITLE)
 
     def draw(self, editor: Editor) -> None:
         if not self.is_open:
             return
-        centre = imgui.get_main_viewport().get_center()
-        imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
-        imgui.set_next_window_size(theme.size(*SIZE))
-        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(20, 20))
-        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
-        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
-        is_shown = imgui.begin_popup_modal(TITLE, None, flags)[0]
-        imgui.pop_style_var(2)
-        if not is_shown:
-            return
-        self._draw_head()
+        endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
+        about = t("{endings}. Type a name or a whole path, or choose below.", endings=endings)
+        with modal(t(self._dialog.value), WIDTH, about, HEIGHT) as is_shown:
+            if is_shown:
+                self._draw(editor)
+
+    def _draw(self, editor: Editor) -> None:
         is_entered = self._draw_path()
         chosen = self._draw_list()
         is_confirmed, is_cancelled = self._draw_foot()
@@ -67,13 +62,6 @@ class FileChooser:
             editor.filing.cancel_dialog()
         elif chosen is not None or is_entered or is_confirmed:
             self._choose(editor, chosen or self._typed())
-        imgui.end_popup()
-
-    def _draw_head(self) -> None:
-        with bold_text():
-            imgui.text_unformatted(t(self._dialog.value))
-        endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
-        note(t("{endings}. Type a name or a whole path, or choose below.", endings=endings))
 
     def _draw_path(self) -> bool:
         """The field; True when Enter was pressed in it."""
@@ -83,9 +71,7 @@ class FileChooser:
         is_entered, self._name = imgui.input_text_with_hint(
             "##path", t("name or path"), self._name, imgui.InputTextFlags_.enter_returns_true
         )
-        if is_entered and not self._name:
-            return False
-        return is_entered
+        return is_entered and bool(self._name)
 
     def _draw_list(self) -> Path | None:
         """Folders and files; a file that was double-clicked."""
@@ -93,7 +79,8 @@ class FileChooser:
             self._enter(self._folder.parent)
         imgui.same_line()
         imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec("secondary"), _shortened(self._folder, 80))
+        room = imgui.get_content_region_avail().x
+        imgui.text_colored(theme.vec("secondary"), shortened(str(self._folder), room))
         imgui.push_style_color(imgui.Col_.child_bg, theme.vec("surround"))
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
@@ -176,8 +163,3 @@ class FileChooser:
             return
         self._folder = folder.resolve()
         self._entries = folders + sorted(files, key=lambda e: e.name.lower())
-
-
-def _shortened(path: Path, length: int) -> str:
-    text = str(path)
-    return text if len(text) <= length else f"…{text[-length:]}"

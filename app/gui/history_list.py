@@ -6,10 +6,12 @@ from imgui_bundle import ImVec2, imgui
 
 from ..editor import Editor
 from ..texts import t
+from .rows import fill_row, text_top
 from .theme import theme
 from .widgets import heading, rule
 
 ROW = 28.0  # points
+CORNER = 4.0  # radius
 MOST = 9  # rows shown without scrolling
 
 
@@ -38,13 +40,11 @@ def _draw_step(k: int, label: str, cursor: int) -> bool:
     start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     is_clicked = imgui.invisible_button(f"##step{k}", ImVec2(width, theme.pt(ROW)))
     draw, end = imgui.get_window_draw_list(), ImVec2(start.x + width, start.y + theme.pt(ROW))
-    if k == cursor or imgui.is_item_hovered():
-        role = "raised" if k == cursor else "hovered"
-        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(4))
+    fill_row(start, end, k == cursor, imgui.is_item_hovered(), CORNER)
     if k == cursor:
         bar = ImVec2(start.x + theme.pt(3), end.y)
         draw.add_rect_filled(start, bar, theme.u32("accent"), theme.pt(2))
-    middle = start.y + (theme.pt(ROW) - imgui.get_font_size()) / 2
+    middle = text_top(start, theme.pt(ROW))
     role, alpha = ("text", 1.0) if k <= cursor else ("secondary", 0.6)
     draw.add_text(ImVec2(start.x + theme.pt(12), middle), theme.u32(role, alpha), t(label))
     return is_clicked

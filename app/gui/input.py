@@ -72,8 +72,6 @@ class Input:
         else:
             self.shape = Shape.ARROW
             editor.hover, self._hovered = Hover(), None
-        if not editor.hand.is_busy and editor.rubber is not None:
-            editor.rubber = None
 
     def hint(self, editor: Editor) -> str:
         if editor.document is None:

@@ -14,16 +14,16 @@ PADDING = 20.0  # points
 
 
 @contextmanager
-def modal(title: str, width: float, about: str = "") -> Iterator[bool]:
-    """Opens it and yields whether it is drawn; `width` in points. What is inside closes it.
+def modal(title: str, width: float, about: str = "", height: float = 0.0) -> Iterator[bool]:
+    """Opens it and yields whether it is drawn. What is inside closes it.
 
-    The title doubles as its id.
+    `width` and `height` in points, 0 as much as it needs. The title doubles as its id.
     """
     if not imgui.is_popup_open(title):
         imgui.open_popup(title)
     centre = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(ImVec2(theme.pt(width), 0))
+    imgui.set_next_window_size(theme.size(width, height))
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(PADDING, PADDING))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings

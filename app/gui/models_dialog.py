@@ -11,7 +11,7 @@ from ..editor import Editor
 from ..texts import t
 from .modal import modal
 from .theme import Icon, theme
-from .widgets import Kind, bold_text, button, gap, note, rule, tooltip
+from .widgets import Kind, bold_text, button, gap, half_width, note, rule, tooltip
 
 WIDTH = 560.0  # points
 BUTTON = 120.0
@@ -62,7 +62,7 @@ def _draw_state(editor: Editor, state: State) -> None:
     """Installed, on its way with Cancel, or the button that gets it."""
     models, id = editor.models, state.weight.id
     if models.downloading == id:
-        chore = editor.background.shown
+        chore = editor.chores.shown
         share = chore.fraction if chore is not None and chore.kind == DOWNLOAD else 0.0
         if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
             models.cancel()
@@ -88,7 +88,7 @@ def draw_offer(editor: Editor) -> None:
            gain=_lower(t(names_of(weight.id).gain)),
            size=f"{weight.wheel_size / 1e6:.0f}"))  # fmt: skip
     gap(8)
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
+    half = half_width()
     if button(t("See the model…"), width=half):
         models.open()
     imgui.same_line()

@@ -11,11 +11,12 @@ from ..commands import COMMANDS, keys_of, run, why_not
 from ..editor import Editor
 from ..texts import t
 from .landmarks import mark
+from .rows import end_row, fill_row, text_top
 from .theme import SMALL_SIZE, Icon, theme
 from .widgets import Kind, button, heading, icon_button, note
 
 ROW = 32.0  # points
-GAP = 4.0  # points between two rows
+BETWEEN = 12.0  # points from a row to the next
 SLACK = 4.0  # points; a press that moves less is a click
 SIDE = 24.0  # of the buttons beside the title
 NAME = 34.0  # from the row's left to the name
@@ -85,10 +86,8 @@ def _draw_object(editor: Editor, k: int) -> None:
     end = ImVec2(start.x + width, start.y + height)
     is_hovered = _take_clicks(editor, k, ImVec2(width, height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
-    if is_current or is_hovered or k == editor.objects.carried:
-        role = "raised" if is_current else "hovered"
-        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
-    middle = start.y + (height - imgui.get_font_size()) / 2
+    fill_row(start, end, is_current, is_hovered or k == editor.objects.carried)
+    middle = text_top(start, height)
     icon = Icon.CUBE if thing.lifted else Icon.SELECT
     role = "accent" if is_current else "secondary"
     draw.add_text(ImVec2(start.x + theme.pt(8), middle), theme.u32(role), icon)
@@ -101,15 +100,13 @@ def _draw_object(editor: Editor, k: int) -> None:
         eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
         if icon_button(eye, f"eye{k}", t("Hide or show the object")):
             editor.objects.toggle_visible(k)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y + theme.pt(GAP)))
-    imgui.dummy(ImVec2(0, 0))
+    end_row(start, ROW, BETWEEN)
 
 
 def _drag_row(editor: Editor, top: ImVec2) -> None:
     """The line where the carried row would land; the rows begin at `top`. The release drops it."""
     global _is_dragged
-    spacing = imgui.get_style().item_spacing.y  # after the dummy of each row
-    height = theme.pt(ROW) + theme.pt(GAP) + spacing
+    height = theme.pt(ROW + BETWEEN)
     gap = round((imgui.get_mouse_pos().y - top.y) / height)
     if not imgui.is_mouse_down(0):
         _is_dragged = False
@@ -120,7 +117,7 @@ def _drag_row(editor: Editor, top: ImVec2) -> None:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ns)
     if landing is not None:
         width = imgui.get_content_region_avail().x
-        y = top.y + landing * height - (theme.pt(GAP) + spacing) / 2
+        y = top.y + landing * height - theme.pt(BETWEEN) / 2
         ends = ImVec2(top.x, y), ImVec2(top.x + width, y)
         imgui.get_window_draw_list().add_line(*ends, theme.u32("accent"), theme.pt(2))
 

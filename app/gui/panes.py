@@ -16,6 +16,7 @@ FLAGS = (
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.no_bring_to_front_on_focus
     | imgui.WindowFlags_.no_nav_focus
+    | imgui.WindowFlags_.no_background  # the window is cleared in its colour
 )
 
 

@@ -27,10 +27,10 @@ class Choice(Generic[T]):
     icon: str = ""
 
 
-def segmented(name: str, choices: Sequence[Choice[T]], chosen: T, width: float = 0.0) -> T:
-    """As wide as there is room, or `width` points; the value that is chosen now."""
+def segmented(name: str, choices: Sequence[Choice[T]], chosen: T) -> T:
+    """As wide as there is room; the value that is chosen now."""
     start = imgui.get_cursor_screen_pos()
-    across = theme.pt(width) if width else imgui.get_content_region_avail().x
+    across = imgui.get_content_region_avail().x
     height, part = theme.pt(FIELD), across / len(choices)
     draw = imgui.get_window_draw_list()
     end = ImVec2(start.x + across, start.y + height)

@@ -25,7 +25,12 @@ SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flo
 COLUMN = 720.0  # points, width of everything
 DROP_HEIGHT = 240.0
 THUMB = (168.0, 112.0)
+SAMPLES_HEIGHT = THUMB[1] + 156.0  # with the title above them, their names and what is around
 RECENT = 4  # files shown
+RECENT_TITLE, RECENT_ROW = 44.0, 28.0  # heights
+
+
+UNLIKE = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_background  # a pane
 
 
 class StartScreen:
@@ -39,12 +44,12 @@ class StartScreen:
         imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_color(imgui.Col_.window_bg, theme.vec("surround"))
-        imgui.begin("##start", None, FLAGS & ~imgui.WindowFlags_.no_scrollbar)
+        imgui.begin("##start", None, FLAGS & ~UNLIKE)
         imgui.pop_style_color()
         column = min(theme.pt(COLUMN), rect.width - theme.pt(48))
         recent = [Path(r) for r in editor.settings.recent[:RECENT]]
-        content = DROP_HEIGHT + 12 + 80 + THUMB[1] + 64 + (28 * len(recent) + 44 if recent else 0)
-        content += recovery_height(editor)
+        content = DROP_HEIGHT + SAMPLES_HEIGHT + recovery_height(editor)
+        content += RECENT_TITLE + RECENT_ROW * len(recent) if recent else 0
         top = max((rect.height - theme.pt(content)) / 2, theme.pt(24))
         imgui.set_cursor_pos(ImVec2((rect.width - column) / 2, top))
         imgui.begin_group()
@@ -64,11 +69,13 @@ class StartScreen:
         high = ImVec2(low.x + column, low.y + theme.pt(DROP_HEIGHT))
         draw.add_rect_filled(low, high, theme.u32("panel"), theme.pt(12))
         draw.add_rect(low, high, theme.u32("pressed"), theme.pt(12), theme.pt(1.5))
-        self._centred(Icon.IMAGE, low, column, 40, TITLE_SIZE, "secondary")
+        middle = low.x + column / 2
+        _draw_centred(Icon.IMAGE, middle, low.y + theme.pt(40), "secondary", TITLE_SIZE)
         with bold_text():
-            self._centred(t("Drop a photo here"), low, column, 88, TITLE_SIZE, "text")
+            title = t("Drop a photo here")
+            _draw_centred(title, middle, low.y + theme.pt(88), "text", TITLE_SIZE)
         text = t("Click an object in it, lift it into 3D, drag its points, save the photo.")
-        self._centred(text, low, column, 128, 0.0, "secondary")
+        _draw_centred(text, middle, low.y + theme.pt(128), "secondary")
         imgui.set_cursor_screen_pos(
             ImVec2(low.x + (column - theme.pt(160)) / 2, low.y + theme.pt(172))
         )
@@ -76,15 +83,6 @@ class StartScreen:
             run(editor, "open")
         imgui.set_cursor_screen_pos(ImVec2(low.x, high.y))
         imgui.dummy(ImVec2(column, 0))
-
-    def _centred(
-        self, text: str, low: ImVec2, column: float, y: float, size: float, role: str
-    ) -> None:
-        imgui.push_font(None, size)
-        across = imgui.calc_text_size(text).x
-        at = ImVec2(low.x + (column - across) / 2, low.y + theme.pt(y))
-        imgui.get_window_draw_list().add_text(at, theme.u32(role), text)
-        imgui.pop_font()
 
     def _draw_samples(self, editor: Editor, column: float) -> None:
         with bold_text():
@@ -145,3 +143,11 @@ class StartScreen:
                     editor.filing.forget_recent(str(path))
             tooltip(str(path))
         imgui.pop_style_var()
+
+
+def _draw_centred(text: str, middle: float, top: float, role: str, size: float = 0.0) -> None:
+    """A line of text; `middle` and `top` on the screen, `size` of the font, 0 as it is."""
+    imgui.push_font(None, size)
+    at = ImVec2(middle - imgui.calc_text_size(text).x / 2, top)
+    imgui.get_window_draw_list().add_text(at, theme.u32(role), text)
+    imgui.pop_font()

@@ -6,7 +6,7 @@ import time
 
 from imgui_bundle import ImVec2, imgui
 
-from ..background import Chore
+from ..chores import Chore
 from ..editing.models import DOWNLOAD
 from ..editor import Editor
 from ..feedback import Message
@@ -67,7 +67,7 @@ def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
 
 def _shown_job(editor: Editor) -> Job | Chore | None:
     """What the user waits for most: what opens, before what is computed."""
-    chore, job = editor.background.shown, editor.jobs.current
+    chore, job = editor.chores.shown, editor.jobs.current
     if chore is not None and (chore.kind != DOWNLOAD or job is None or job.is_quiet):
         return chore
     return None if job is None or job.is_quiet else job
@@ -85,7 +85,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     x = right - theme.pt(16) - side
     imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
     if icon_button(Icon.CLOSE, "cancel", t("Cancel"), None, side / theme.scale):
-        (editor.jobs if isinstance(job, Job) else editor.background).cancel(job.kind)
+        (editor.jobs if isinstance(job, Job) else editor.chores).cancel(job.kind)
     x -= imgui.calc_text_size("100 %").x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
     imgui.text_unformatted(share)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -124,22 +125,32 @@ class Theme:
 
     def u32(self, role: str, alpha: float = 1.0) -> int:
         """A role's colour for draw lists; `role` may be #RRGGBB too."""
-        return imgui.color_convert_float4_to_u32(self.vec(role, alpha))
+        return _u32(self._code(role), round(255 * alpha))
 
     def vec(self, role: str, alpha: float = 1.0) -> ImVec4:
         r, g, b = self.rgb(role)
         return ImVec4(r, g, b, alpha)
 
     def rgb(self, role: str) -> Colour:
-        return rgb(role if role.startswith("#") else getattr(self.palette, role))
+        return rgb(self._code(role))
+
+    def _code(self, role: str) -> str:
+        return role if role.startswith("#") else getattr(self.palette, role)
 
 
 theme = Theme()
 
 
+@cache
 def rgb(code: str) -> Colour:
     """(r, g, b) in [0, 1] of #RRGGBB."""
     return tuple(int(code[i : i + 2], 16) / 255 for i in (1, 3, 5))  # type: ignore[return-value]
+
+
+@cache  # asked for a thousand times a frame, of a few dozen colours
+def _u32(code: str, alpha: int) -> int:
+    """`alpha` of 255."""
+    return imgui.color_convert_float4_to_u32(ImVec4(*rgb(code), alpha / 255))
 
 
 def load_fonts() -> None:

@@ -14,6 +14,7 @@ from .landmarks import mark
 from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
+GAP = 8.0  # between two that stand side by side
 STEPPER = 24.0  # points, width of a field's - and + buttons
 
 
@@ -107,6 +108,20 @@ def icon_button(
     return is_pressed
 
 
+def half_width() -> float:
+    """Points, of each of two buttons side by side."""
+    return (imgui.get_content_region_avail().x / theme.scale - GAP) / 2
+
+
+def shortened(text: str, room: float) -> str:
+    """The text's end, as much as fits; `room` in window units."""
+    if imgui.calc_text_size(text).x <= room:
+        return text
+    while text and imgui.calc_text_size(f"…{text}").x > room:
+        text = text[1:]
+    return f"…{text}"
+
+
 def heading(text: str) -> None:
     """The title of a group in a panel."""
     with bold_text():
@@ -167,9 +182,7 @@ def number_field(number: Number, value: float) -> Change:
     changed = Change(value)
     imgui.push_id(number.name)
     imgui.align_text_to_frame_padding()
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.text_unformatted(number.name)
-    imgui.pop_style_color()
+    imgui.text_colored(theme.vec("secondary"), number.name)
     if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
         changed = Change(number.rest, is_changed=value != number.rest, is_done=True)
     tooltip(t("Double-click resets it"))

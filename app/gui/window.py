@@ -178,11 +178,11 @@ class Window:
         if self._options.frames is None:
             self.editor.recovery.look()
             self.editor.models.look()
-            self.editor.background.start(
+            self.editor.chores.start(
                 "Getting ready", lambda progress: warm_up(), kind="warm up",
                 done=lambda _: None, failed=self.editor.complain_of, is_quiet=True,
             )  # fmt: skip
-        while self._options.frames is not None and not self.editor.background.is_idle:
+        while self._options.frames is not None and not self.editor.chores.is_idle:
             self.editor.poll()
             time.sleep(SOON)
 
@@ -237,7 +237,7 @@ class Window:
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
-        self._renderer.clear(theme.rgb("surround"), size)
+        self._renderer.clear(theme.rgb("panel"), size)
         scene = build_scene(self.editor, self._renderer.kind)
         if scene is not None:
             view = self.editor.view

@@ -11,6 +11,8 @@ from typing import Any
 
 import moderngl
 
+from objectmorpher_core.arrays import U8
+
 from ..view import View
 from .scene import Colour, Scene
 
@@ -43,6 +45,11 @@ class KeptCanvas:
             self.buffer = self._context.framebuffer([self._color])
         self.buffer.clear(*surround, 1.0)
         return self.buffer
+
+    def write(self, pixels: U8, viewport: tuple[int, int, int, int]) -> None:
+        """A picture of the canvas (h, w, 4), bottom row first, in place of what it shows there."""
+        assert self._color is not None
+        self._color.write(pixels, viewport=viewport)
 
     def forget(self) -> None:
         """Nothing is kept."""

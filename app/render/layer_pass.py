@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from ..layers import Draft, Layer
+from ..layers import Layer
 from ..view import View
 from .blend_texture import BLEND, blend_cells
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
-from .textures import PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPicture
 
-LAYER, LOOKS, CROP, MARKS = range(4)  # texture units
-_UNITS = {"layer": LAYER, "looks": LOOKS, "crop": CROP, "marks": MARKS, "blend": BLEND}
-KEPT_CROPS = 4
+LAYER, MARKS = range(2)  # texture units
+_UNITS = {"layer": LAYER, "marks": MARKS, "blend": BLEND}
 TINT = 0.6  # opacity
 
 
@@ -29,10 +27,8 @@ class LayerPass:
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
-        self._exact = Programs(context, "quad.vert", "layer.frag", _UNITS)
-        self._draft = Programs(context, "quad.vert", "draft.frag", _UNITS)
+        self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
         self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
-        self._crops: dict[int, tuple[np.ndarray, PictureTexture]] = {}
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -40,11 +36,8 @@ class LayerPass:
         for layer in scene.shades + scene.layers:
             for unit, texture in self._textures(layer).items():
                 texture.use(unit)
-            programs = self._exact if layer.draft is None else self._draft
             defines = _defines(scene, layer.invented is not None, layer.is_tint)
-            program, quad = programs(*defines)
-            if layer.draft is not None:
-                set_uniforms(program, **self._use_draft(layer.draft, view))
+            program, quad = self._programs(*defines)
             set_uniforms(program, box=layer.box, **_appearance(layer))
             self._render(program, quad, scene, view)
 
@@ -56,7 +49,7 @@ class LayerPass:
         is_marked = item.is_marked and picture.detail is not None
         if picture.detail is not None:
             picture.detail.use(MARKS)
-        program, quad = self._exact("DETAIL", *_defines(scene, is_marked, item.is_tint))
+        program, quad = self._programs("DETAIL", *_defines(scene, is_marked, item.is_tint))
         set_uniforms(program, box=(0, 0, view.width, view.height), **_appearance(item))
         self._render(program, quad, scene, view)
 
@@ -66,7 +59,7 @@ class LayerPass:
         set_uniforms(
             program,
             canvas=(view.width, view.height),
-            photo_box=_photo_box(scene, view),
+            photo_box=photo_box(scene, view),
             cells=blend_cells(scene),
             split=scene.split * view.width,
             **hatch_uniforms(scene.marks, view),
@@ -75,19 +68,6 @@ class LayerPass:
         self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         quad.render(moderngl.TRIANGLE_STRIP, 4)
         self._context.disable(moderngl.BLEND)
-
-    def _use_draft(self, draft: Draft, view: View) -> dict[str, Any]:
-        """Binds its crop of the photo; the uniforms that say where it is."""
-        height, width = draft.texture.shape[:2]
-        crop_box = (draft.left, draft.top, draft.left + width, draft.top + height)
-        corner = (view.left, view.top)
-        if id(draft.texture) not in self._crops:
-            picture = PictureTexture(self._context)
-            picture.upload(_as_u8(draft.texture))
-            kept = list(self._crops.items())[: KEPT_CROPS - 1]
-            self._crops = {id(draft.texture): (draft.texture, picture), **dict(kept)}
-        self._crops[id(draft.texture)][1].use(CROP, min(view.zoom, 1.0))
-        return {"crop_box": crop_box, "corner": corner, "zoom": view.zoom}
 
     def _forget(self, layers: tuple[Layer, ...]) -> None:
         """Releases what is not shown any more."""
@@ -103,8 +83,6 @@ class LayerPass:
             textures = {LAYER: self._upload(_as_u8(layer.rgba))}
             if layer.invented is not None:
                 textures[MARKS] = self._upload(layer.invented[..., None])
-            if layer.draft is not None:
-                textures[LOOKS] = self._upload(layer.draft.looks)
             near = moderngl.LINEAR if layer.is_coarse else moderngl.NEAREST
             for texture in textures.values():
                 texture.filter = near, near
@@ -128,7 +106,7 @@ def _defines(scene: Scene, is_marked: bool, is_tint: bool) -> list[str]:
     return defines + (["HAS_BLEND"] if scene.blend is not None and not is_tint else [])
 
 
-def _photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
+def photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
     """The photo on the canvas: what lies beyond it is not exported."""
     height, width = scene.photo.shape[:2]
     (x0, y0), (x1, y1) = view.canvas_from_image(np.array([[0, 0], [width, height]]))

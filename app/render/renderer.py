@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from objectmorpher_core.arrays import U8
+
 from ..view import View
 from .blend_texture import BlendTexture
 from .kept_canvas import KeptCanvas
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
+from .still_view import StillView
 from .textures import PictureTexture
 
 if TYPE_CHECKING:
@@ -33,14 +36,14 @@ class Renderer:
         """`wanted`: "gl", "tiles" or "auto" (tiles where OpenGL is emulated)."""
         context = moderngl.create_context(require=330)
         self.gl_name = str(context.info["GL_RENDERER"])
-        is_software = any(word in self.gl_name.lower() for word in SOFTWARE)
-        self.kind = ("tiles" if is_software else "gl") if wanted == "auto" else wanted
+        self._is_emulated = any(word in self.gl_name.lower() for word in SOFTWARE)
+        self.kind = ("tiles" if self._is_emulated else "gl") if wanted == "auto" else wanted
         self._context = context
         self._blend = BlendTexture(context)
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
         self._splat_pass: SplatPass | None = None
-        self._kept = KeptCanvas(context)
+        self._kept, self._still = KeptCanvas(context), StillView()
         self._target = context.screen
         self._surround: Colour = (0.0, 0.0, 0.0)
         self._size = (1, 1)
@@ -57,12 +60,33 @@ class Renderer:
         """The scene in `viewport` of the window that was cleared."""
         kept, place = self._kept, (self._surround, self._size, viewport)
         if not kept.shows(scene, view, place):
-            self._target = kept.begin(self._size, self._surround)
-            self._draw(scene, view, viewport)
-            self._target = self._context.screen
+            flat = self._flat(scene, view, viewport)
+            if flat is not None:
+                kept.write(flat, viewport)
+            else:
+                self._target = kept.begin(self._size, self._surround)
+                self._draw(scene, view, viewport)
+                self._target = self._context.screen
         assert kept.buffer is not None
         self._context.copy_framebuffer(self._target, kept.buffer)
         self._begin(viewport)
+
+    def _flat(self, scene: Scene, view: View, viewport: Viewport) -> U8 | None:
+        """The canvas by the processor, where that is faster; None where it is not."""
+        if not self._is_emulated:
+            return None
+        place = (self._surround, self._size, viewport)
+        return self._still.flat(
+            scene, view, place, lambda under: self._read_canvas(under, view, viewport)
+        )
+
+    def _read_canvas(self, scene: Scene, view: View, viewport: Viewport) -> U8:
+        """A scene drawn by the shaders, (h, w, 4) u8, upright."""
+        buffer = self._target = self._kept.begin(self._size, self._surround)
+        self._draw(scene, view, viewport)
+        self._target = self._context.screen
+        data = buffer.read(viewport=viewport, components=4, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(view.height, view.width, 4)[::-1].copy()
 
     def _draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
         """Into the target."""

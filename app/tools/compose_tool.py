@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..texts import t
-from .pointer import Button, Pointer, Shape, Stroke
+from .pointer import Button, Pointer, Shape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -18,9 +18,9 @@ class ComposeTool:
         is_restoring = pointer.alt or pointer.button is Button.RIGHT
         if not editor.view.compose.is_bare:
             editor.say(t("Show the background alone to paint on it"))
-            return _ignore()
+            return ignore()
         if not editor.composing.start_stroke(is_restoring):
-            return _ignore()
+            return ignore()
         return self._paint(editor, pointer)
 
     def _paint(self, editor: Editor, pointer: Pointer) -> Stroke:
@@ -42,8 +42,3 @@ class ComposeTool:
         if editor.hand.is_busy:
             return t("Let go to fill in what is painted · Esc takes it back")
         return t("Paint what to fill in again · Alt-paint brings the photo back · [ ] brush size")
-
-
-def _ignore() -> Stroke:
-    while (yield).is_down:
-        pass

@@ -6,20 +6,17 @@ from typing import TYPE_CHECKING
 
 from ..texts import t
 from ..view import Orbit
-from .pointer import Button, Pointer, Shape, Stroke, has_moved
+from .pointer import TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved
 
 if TYPE_CHECKING:
     from ..editor import Editor
-
-TURN_SPEED = 0.4  # degrees per point that the pointer moves
 
 
 class LookTool:
     """Drag turns the object, a double click shows the photo again."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        start, is_moved = editor.looking.orbit or Orbit(), False
-        first = pointer
+        start, first, is_moved = editor.looking.orbit or Orbit(), pointer, False
         if first.clicks == 2:
             editor.looking.reset()
         while (pointer := (yield)).is_down:

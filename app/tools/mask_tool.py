@@ -15,7 +15,7 @@ class MaskTool:
     """Left paints, right or Alt erases; Shift draws a straight line from the last stroke's end."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        is_erasing = self.is_erasing(editor, pointer)
+        is_erasing = erases(editor, pointer)
         editor.masking.start_stroke(pointer, is_erasing)
         try:
             while (pointer := (yield)).is_down:
@@ -24,11 +24,6 @@ class MaskTool:
             editor.masking.finish_stroke(label)
         finally:
             editor.masking.drop_stroke()
-
-    def is_erasing(self, editor: Editor, pointer: Pointer) -> bool:
-        """Whether a press with these buttons and keys would take away."""
-        is_other = pointer.button is Button.RIGHT or pointer.alt
-        return is_other != editor.view.selecting.is_erasing
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
@@ -41,3 +36,9 @@ class MaskTool:
         if editor.view.selecting.is_erasing:
             return t("Drag erases · Right-drag or Alt paints · Shift-click draws a line · [ ] size")
         return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")
+
+
+def erases(editor: Editor, pointer: Pointer) -> bool:
+    """Whether a press with these buttons and keys takes away."""
+    is_other = pointer.button is Button.RIGHT or pointer.alt
+    return is_other != editor.view.selecting.is_erasing

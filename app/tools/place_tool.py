@@ -12,15 +12,13 @@ from objectmorpher_core.document import Placement
 
 from ..texts import t
 from .gizmo import TURNS, Gizmo, gizmo
-from .pointer import Button, Pointer, Shape, Stroke, has_moved
+from .pointer import SNAP, TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved, ignore, one_axis
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
 REACH = 10.0  # points around a corner, or beside a ring, where a press takes it
-TURN_SPEED = 0.4  # degrees per point that the pointer moves
 DEPTH_STEP = 0.05  # object diameters per notch of the wheel
-SNAP = 15.0  # degrees, with Shift
 SCALE_SNAP = 0.1  # with Shift
 MIN_SCALE, MAX_SCALE = 0.02, 50.0
 OTHER = "other"  # another object, which a press takes instead
@@ -38,7 +36,7 @@ class PlaceTool:
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         part = self.part_at(editor, pointer)
         if part is None or pointer.button is not Button.LEFT:
-            return _ignore()
+            return ignore()
         editor.hover = replace(editor.hover, part=part)
         if part == "horizon":
             return self._drag_horizon(editor, pointer)
@@ -123,25 +121,12 @@ def _with_way_back(stroke: Stroke, restore: Callable[[], None]) -> Stroke:
             restore()
 
 
-def _ignore() -> Stroke:
-    while (yield).is_down:
-        pass
-
-
-def _one_axis(delta: np.ndarray, is_locked: bool) -> np.ndarray:
-    """(2,) with its smaller part dropped where Shift is held."""
-    if is_locked:
-        delta = delta.copy()
-        delta[np.abs(delta).argmin()] = 0.0
-    return delta
-
-
 def _move(editor: Editor, first: Pointer) -> Change:
     """What was grabbed stays under the pointer; on the ground, what the object stands on."""
     hold = editor.placing.hold(first.xy)
 
     def change(now: Pointer, away: float) -> Placement:
-        delta = _one_axis((now.xy - first.xy) / editor.view.zoom, now.shift)
+        delta = one_axis((now.xy - first.xy) / editor.view.zoom, now)
         return hold.moved(delta, away)
 
     return change
@@ -208,7 +193,7 @@ def _turn(editor: Editor, first: Pointer) -> Change:
     assert start is not None
 
     def change(now: Pointer, away: float) -> Placement:
-        delta = _one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now.shift)
+        delta = one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now)
         yaw, pitch, roll = start.turn
         turn = (wrapped(yaw - delta[0]), wrapped(pitch + delta[1]), roll)
         return editor.placing.stood(replace(start, turn=turn, depth=start.depth + away))

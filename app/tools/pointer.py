@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 CLICK_SLACK = 4.0  # points; a press that moves less is a click
+TURN_SPEED = 0.4  # degrees per point that the pointer moves
+SNAP = 15.0  # degrees, with Shift
 
 
 class Button(Enum):
@@ -130,3 +132,30 @@ class Hand:
 def has_moved(editor: Editor, start: Pointer, now: Pointer) -> bool:
     """Whether a press has become a drag."""
     return float(np.hypot(*(now.xy - start.xy))) > CLICK_SLACK * editor.view.scale
+
+
+def one_axis(delta: np.ndarray, pointer: Pointer) -> np.ndarray:
+    """(2,) without its smaller part while Shift is held."""
+    if not pointer.shift:
+        return delta
+    is_larger = np.arange(2) != np.abs(delta).argmin()
+    return delta * is_larger
+
+
+def ignore() -> Stroke:
+    """Nothing, until the button goes up."""
+    while (yield).is_down:
+        pass
+
+
+def draw_box(editor: Editor, start: Pointer) -> Generator[None, Pointer, Pointer | None]:
+    """Shows the box that is drawn; where it ended, or None where the press was a click."""
+    is_box = False
+    try:
+        while (pointer := (yield)).is_down:
+            is_box = is_box or has_moved(editor, start, pointer)
+            if is_box:
+                editor.rubber = (start.x, start.y, pointer.x, pointer.y)
+    finally:
+        editor.rubber = None
+    return pointer if is_box else None

@@ -12,15 +12,13 @@ from objectmorpher_core.picture_line import along_line
 from objectmorpher_core.rotations import turn_about, turn_matrix, vector_from_matrix
 
 from ..texts import t
-from .pointer import Pointer, Stroke, has_moved
+from .pointer import SNAP, TURN_SPEED, Pointer, Stroke, draw_box, has_moved, one_axis
 
 if TYPE_CHECKING:
     from ..derived import Spot
     from ..editor import Editor
 
 DEPTH_STEP = 0.03  # object diameters per notch of the wheel
-TURN_SPEED = 0.4  # degrees per point that the pointer moves, out of the picture's plane
-SNAP = 15.0  # degrees, with Shift on the ring
 STEADY = 5.0  # points around a handle within which the pointer has no direction
 SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
 
@@ -82,8 +80,7 @@ def _follow(editor: Editor, held: Held, start: Pointer, now: Pointer, depth: flo
         gone = along_line(camera, place, normal, delta)
         editor.posing.move_all({h: p + gone * n for h, (p, n) in held.lines.items()})
         return
-    if now.shift:  # along one axis of the picture
-        delta[np.abs(delta).argmin()] = 0.0
+    delta = one_axis(delta, now)
     editor.posing.drag_all({h: spot.moved(delta, depth) for h, spot in held.spots.items()})
 
 
@@ -144,14 +141,9 @@ def box(editor: Editor, start: Pointer, other: int | None = None) -> Stroke:
 
     A click on the `other` object makes that one the current one.
     """
-    pointer, is_box = start, False
-    while (pointer := (yield)).is_down:
-        is_box = is_box or has_moved(editor, start, pointer)
-        if is_box:
-            editor.rubber = (start.x, start.y, pointer.x, pointer.y)
-    editor.rubber = None
-    corners = editor.view.image_from_canvas(np.array([start.xy, pointer.xy]))
-    if is_box:
+    end = yield from draw_box(editor, start)
+    if end is not None:
+        corners = editor.view.image_from_canvas(np.array([start.xy, end.xy]))
         editor.posing.select_box(corners.min(0), corners.max(0), start.shift)
     elif other is not None:
         editor.objects.take(other)

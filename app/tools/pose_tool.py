@@ -10,7 +10,7 @@ from ..feedback import Hover
 from ..pose_view import PoseMode
 from ..texts import t
 from . import pose_strokes, rig_brush
-from .pointer import Button, Pointer, Shape, Stroke
+from .pointer import Button, Pointer, Shape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -42,8 +42,7 @@ class PoseTool:
         return pose_strokes.drag(editor, pointer, handle, is_new=False)
 
     def _remove(self, editor: Editor, handle: int | None) -> Stroke:
-        while (yield).is_down:
-            pass
+        yield from ignore()
         if handle is not None:
             editor.posing.remove(handle)
 

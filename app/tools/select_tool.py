@@ -10,7 +10,7 @@ from ..feedback import Hover
 from ..tasks import Combine
 from ..texts import t
 from ..view import SelectMode
-from .pointer import Button, Pointer, Shape, Stroke, has_moved
+from .pointer import Button, Pointer, Shape, Stroke, draw_box, ignore
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -23,24 +23,26 @@ class SelectTool:
     """Left click adds, right click removes, drag draws a box or, in Lasso mode, a line."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        is_left = pointer.button is Button.LEFT
-        if editor.view.selecting.mode is SelectMode.LASSO and is_left:
+        if pointer.button is Button.RIGHT:
+            return self._remove_click(editor, pointer)
+        if editor.view.selecting.mode is SelectMode.LASSO:
             return self._lasso(editor, pointer)
         return self._click_or_box(editor, pointer)
 
-    def _click_or_box(self, editor: Editor, pointer: Pointer) -> Stroke:
-        start, is_box = pointer, False
-        while (pointer := (yield)).is_down:
-            is_box = is_box or has_moved(editor, start, pointer)
-            if is_box and start.button is Button.LEFT:
-                editor.rubber = (start.x, start.y, pointer.x, pointer.y)
-        editor.rubber = None
-        if is_box and start.button is Button.LEFT:
-            self._choose_box(editor, start, pointer)
-        elif editor.view.selecting.mode is SelectMode.CLICK or start.button is Button.RIGHT:
-            x, y = editor.view.image_from_canvas(start.xy)
-            is_foreground = start.button is Button.LEFT and not start.alt
-            editor.selection.add_click(float(x), float(y), is_foreground)
+    def _click_or_box(self, editor: Editor, start: Pointer) -> Stroke:
+        end = yield from draw_box(editor, start)
+        if end is not None:
+            self._choose_box(editor, start, end)
+        elif editor.view.selecting.mode is SelectMode.CLICK:
+            self._click(editor, start, is_foreground=not start.alt)
+
+    def _remove_click(self, editor: Editor, start: Pointer) -> Stroke:
+        yield from ignore()
+        self._click(editor, start, is_foreground=False)
+
+    def _click(self, editor: Editor, pointer: Pointer, is_foreground: bool) -> None:
+        x, y = editor.view.image_from_canvas(pointer.xy)
+        editor.selection.add_click(float(x), float(y), is_foreground)
 
     def _choose_box(self, editor: Editor, start: Pointer, end: Pointer) -> None:
         assert editor.photo_size is not None

@@ -119,7 +119,7 @@ def _blurred(shadow: Shadow, standing: _Standing) -> F32:
     for k, blur in enumerate(BLURS):
         weight = np.clip(1 - np.abs(np.clip(share, 0, 1) * (len(BLURS) - 1) - k), 0, 1)
         sigma = max(HARDEST, blur * shadow.softness) * standing.height
-        mixed += weight * smooth(standing.alpha, sigma)
+        mixed += weight * _smooth(standing.alpha, sigma)
     return np.asarray(mixed * (1 - FADE * np.clip(share, 0, 1)), np.float32)
 
 
@@ -133,7 +133,7 @@ def _contact(standing: _Standing) -> F32:
     """What touches the ground, blurred, 1 at its darkest."""
     band = np.clip(1 - np.abs(_above(standing)) / (BAND * standing.height), 0, 1)
     touching = np.asarray(standing.alpha * band * standing.share, np.float32)
-    near = smooth(touching, BAND_BLUR * standing.height)
+    near = _smooth(touching, BAND_BLUR * standing.height)
     return near / max(float(near.max()), 1e-6)
 
 
@@ -163,10 +163,10 @@ def _thrown(shadow: Shadow, standing: _Standing, values: F32) -> tuple[F32, int,
     ]
     total, squares = (cv2.blur(s, (3, 3), borderType=cv2.BORDER_CONSTANT) for s in sums)
     mean = squares / np.maximum(total, 1e-6)
-    return smooth(np.asarray(mean, np.float32), sigma), left, top
+    return _smooth(np.asarray(mean, np.float32), sigma), left, top
 
 
-def smooth(values: F32, sigma: float) -> F32:
+def _smooth(values: F32, sigma: float) -> F32:
     """Three boxes one after the other: nearly a bell, and as quick for any width."""
     width = 2 * round(sigma) + 1
     for _ in range(3):

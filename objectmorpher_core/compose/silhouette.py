@@ -36,17 +36,14 @@ class Silhouette:
     pitch: float  # photo px per px of the grid
 
 
-def silhouette(
-    splats: PosedSplats, texture: TextureLevels, camera: Camera, side: int = FINE
-) -> Silhouette | None:
-    """The object as the photo's `camera` sees it, `side` px long; None where it is not seen."""
+def silhouette(splats: PosedSplats, texture: TextureLevels, camera: Camera) -> Silhouette | None:
+    """The object as the photo's `camera` sees it; None where it is not seen."""
     box = _box(splats, camera, splats.means)
     if box is None:
         return None
     (left, top), (right, bottom) = box
-    pitch = max((right - left) / side, (bottom - top) / side, 1.0)
-    width = max(int(np.ceil((right - left) / pitch)), 1)
-    height = max(int(np.ceil((bottom - top) / pitch)), 1)
+    pitch = max((right - left) / FINE, (bottom - top) / FINE, 1.0)
+    width, height = _cells(right - left, pitch), _cells(bottom - top, pitch)
     window = camera.windowed(left, top, width, height, 1 / pitch)
     drawn = tiles.draw_rgba(tiles.prepare(splats, window, camera), texture)
     alpha = drawn[..., 3].astype(np.float32) / np.float32(255)
@@ -63,8 +60,7 @@ def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
     (left, top), (right, bottom) = found
     few = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(means)))
     pitch = max((right - left) / COARSE, (bottom - top) / COARSE, few, 1.0)
-    width = max(int(np.ceil((right - left) / pitch)), 1)
-    height = max(int(np.ceil((bottom - top) / pitch)), 1)
+    width, height = _cells(right - left, pitch), _cells(bottom - top, pitch)
     seen = camera.project(means[means[:, 2] > 0])
     x, y = ((seen - (left, top)) / pitch).T
     is_inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
@@ -73,6 +69,11 @@ def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
     around = cv2.blur(count.astype(np.float32), (3, 3), borderType=cv2.BORDER_CONSTANT)
     usual = float(np.median(around[around > 0])) if len(index) else 1.0
     return Silhouette(np.clip(2 * around / usual, 0, 1).astype(np.float32), left, top, pitch)
+
+
+def _cells(length: float, pitch: float) -> int:
+    """Of a grid, so that they cover `length` photo px."""
+    return max(int(np.ceil(length / pitch)), 1)
 
 
 def _box(

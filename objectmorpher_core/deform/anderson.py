@@ -15,11 +15,11 @@ RIDGE = 1e-12  # on the normalised Gram matrix of the steps: float64 squared lea
 class Anderson:
     """Extrapolates from the last few steps of x -> g(x)."""
 
-    def __init__(self, size: int, window: int = WINDOW) -> None:
+    def __init__(self, size: int) -> None:
         """`size`: how many numbers x is."""
-        self._residuals = np.zeros((window, size))  # changes of g(x) - x from step to step
-        self._values = np.zeros((window, size))  # changes of g(x)
-        self._gram = np.zeros((window, window))  # of the residuals' changes
+        self._residuals = np.zeros((WINDOW, size))  # changes of g(x) - x from step to step
+        self._values = np.zeros((WINDOW, size))  # changes of g(x)
+        self._gram = np.zeros((WINDOW, WINDOW))  # of the residuals' changes
         self._count = 0  # steps kept
         self._next = 0  # row of the next step
         self._last: tuple[F64, F64] | None = None  # g(x), g(x) - x
@@ -47,10 +47,10 @@ class Anderson:
         return mixed.reshape(value.shape)
 
     def _keep(self, value: F64, residual: F64) -> None:
-        row, window = self._next, len(self._gram)
+        row = self._next
         self._residuals[row], self._values[row] = residual, value
-        self._count = min(self._count + 1, window)
-        self._next = (row + 1) % window
+        self._count = min(self._count + 1, WINDOW)
+        self._next = (row + 1) % WINDOW
         products = _products(self._residuals[: self._count], residual)
         self._gram[row, : self._count] = self._gram[: self._count, row] = products
 

@@ -44,6 +44,12 @@ class Binding:
         columns = rows.reshape(blocks, LANES, 4 * own).transpose(0, 2, 1)
         return frozen(columns.reshape(blocks, 4 * own * LANES))
 
+    def select(self, index: np.ndarray) -> Binding:
+        """Of the points at `index` only."""
+        return Binding(
+            self.control_points[index], self.weights[index], self.weight_gradients[index]
+        )
+
 
 def bind(
     points: np.ndarray, control_points: np.ndarray, graph: Graph, normals: np.ndarray | None = None

@@ -60,6 +60,7 @@ class Deformer:
         self.graph: Graph = build_graph(self.points, settings, _surface(lifted), self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
         self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
+        self._last_chosen: tuple[I32, F64, Binding] | None = None
         self._prepare_solver()
 
     def with_rig(self, rig: Rig) -> Deformer:
@@ -216,12 +217,24 @@ class Deformer:
         """The object's Gaussians under `pose`."""
         return self._skin(self._means, self.binding, pose)
 
-    def gaussians_motion(self, pose: Pose) -> Skin | Skinned:
-        """The same, left to the renderer where it can be: it projects what is still in reach."""
+    def gaussians_motion(self, pose: Pose, chosen: I32 | None = None) -> Skin | Skinned:
+        """The same, left to the renderer where it can be: it projects what is still in reach.
+
+        `chosen` (n,): of these Gaussians only.
+        """
+        means, binding = self._means, self.binding
+        if chosen is not None:
+            means, binding = self._chosen(chosen)
         if self.settings.is_faithful:
-            return self.skin_gaussians(pose)
-        motion = Motion(self.points, pose.points, pose.rotations)
-        return Skin(self._means, self.binding, motion)
+            return self._skin(means, binding, pose)
+        return Skin(means, binding, Motion(self.points, pose.points, pose.rotations))
+
+    def _chosen(self, chosen: I32) -> tuple[F64, Binding]:
+        """Means and binding of these Gaussians; the last ones asked for are kept."""
+        if self._last_chosen is None or self._last_chosen[0] is not chosen:
+            means, binding = frozen(self._means[chosen]), self.binding.select(chosen)
+            self._last_chosen = (chosen, means, binding)
+        return self._last_chosen[1:]
 
     def _skin(self, points: np.ndarray, binding: Binding, pose: Pose) -> Skinned:
         motion = Motion(self.points, pose.points, pose.rotations)

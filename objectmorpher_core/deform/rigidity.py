@@ -31,8 +31,7 @@ class Rigidity(Enum):
 
 def rigidity_of(settings: DeformSettings) -> Rigidity | None:
     """The material of these settings; None for one of its own."""
-    found = [r for r in Rigidity if r.value == settings.stiffness]
-    return found[0] if found else None
+    return next((r for r in Rigidity if r.value == settings.stiffness), None)
 
 
 def with_rigidity(settings: DeformSettings, rigidity: Rigidity) -> DeformSettings:

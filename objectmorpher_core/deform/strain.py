@@ -20,11 +20,6 @@ class Strain:
     most: F64  # (M,) largest stretch along the surface, 1 = none
     least: F64  # (M,) smallest
 
-    @property
-    def worst(self) -> float:
-        """The largest factor by which anything is longer or shorter than at rest."""
-        return float(max(self.most.max(), 1.0 / max(float(self.least.min()), 1e-9)))
-
 
 def measure_strain(points: F64, weights: Sparse, pose: Pose) -> Strain:
     """Strain of `pose` on the links `weights` (M, M) between rest control points (M, 3).

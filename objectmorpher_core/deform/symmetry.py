@@ -16,8 +16,10 @@ from scipy.spatial import KDTree
 from ..arrays import F64
 
 CANDIDATES = 200  # directions on a half sphere: about 10 degrees apart
-FITTED = 5  # of them, the best
+ROUGH = 64  # points that all candidates mirror
+FITTED = 5  # of the candidates, the best
 STEPS = 12  # of a fit, at most
+SETTLED = 1e-4  # x the gap: a fit that gains less is done
 SAMPLES, DENSE = 256, 3000  # points that are mirrored, and those they are compared with
 SYMMETRIC = 0.03  # x diameter, mean gap of a mirrored object to itself: more is no symmetry
 LEANING = 2.0  # how much worse a plane counts that is not upright at all
@@ -68,19 +70,18 @@ def find_mirror(
     if sight is not None:
         normals = normals[np.abs(normals @ _unit(sight)) <= FACING]
     centre = dense.mean(0)
-    rough = few[:: max(len(few) // 64, 1)] - centre
+    rough = few[:: max(len(few) // ROUGH, 1)] - centre
     images = rough[None] - 2 * (rough @ normals.T).T[..., None] * normals[:, None]
     gaps = tree.query((images + centre).reshape(-1, 3))[0].reshape(len(normals), -1).mean(1)
     best: MirrorPlane | None = None
     for k in np.argsort(gaps * _strangeness(normals, across), kind="stable")[:FITTED]:
-        plane = _fitted(tree, few, normals[k], float(normals[k] @ centre))
+        start = MirrorPlane(normals[k], float(normals[k] @ centre), float("inf"))
+        plane = _fitted(tree, few, start, diameter)
         if sight is not None and abs(plane.normal @ _unit(sight)) > FACING:
             continue
         if best is None or _cost(plane, across) < _cost(best, across):
             best = plane
-    if best is None or best.gap > SYMMETRIC * diameter:
-        return None
-    return MirrorPlane(best.normal, best.offset, best.gap / diameter)
+    return None if best is None or best.gap > SYMMETRIC else best
 
 
 def plane_through(point: np.ndarray, normal: np.ndarray) -> MirrorPlane:
@@ -89,15 +90,15 @@ def plane_through(point: np.ndarray, normal: np.ndarray) -> MirrorPlane:
     return MirrorPlane(unit, float(unit @ point), float("inf"))
 
 
-def _fitted(tree: KDTree, points: F64, normal: F64, offset: float) -> MirrorPlane:
-    """The plane near this one for which the mirrored `points` are nearest to the object."""
+def _fitted(tree: KDTree, points: F64, start: MirrorPlane, diameter: float) -> MirrorPlane:
+    """The plane near `start` for which the mirrored `points` are nearest to the object."""
     dense = np.asarray(tree.data)
-    best = MirrorPlane(normal, offset, float("inf"))
+    best, normal, offset = start, start.normal, start.offset
     for _ in range(STEPS):
         images = points - 2 * (points @ normal - offset)[:, None] * normal
         gaps, nearest = tree.query(images)
-        gap = float(gaps.mean())
-        if gap >= best.gap * (1 - 1e-4):
+        gap = float(gaps.mean()) / diameter
+        if gap >= best.gap * (1 - SETTLED):
             break
         best = MirrorPlane(normal, offset, gap)
         there = dense[nearest]

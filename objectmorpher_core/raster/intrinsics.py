@@ -55,6 +55,53 @@ def _sixteen_texels(typing_context, texels, first, stride, wx, wy):
     return signature, generate
 
 
+def _four_texels(typing_context, texels, first, stride, right, below):
+    """The texel at `first` and those right of it and below mixed bilinearly: a tuple.
+
+    `texels`, `first`, `stride` as for sixteen; `right`, `below` f32 in [0, 1]: the others' shares.
+    """
+    four = types.UniTuple(types.float32, 4)
+    signature = four(texels, types.uint64, types.uint64, types.float32, types.float32)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, first, stride, right, below = arguments
+        data = make_array(signature.args[0])(context, builder, array).data
+        upper = _load(builder, builder.gep(data, [first]))
+        lower = _load(builder, builder.gep(data, [builder.add(first, stride)]))
+        share = _spread(builder, below, EIGHT)
+        mixed = _add(builder, share, builder.fsub(lower, upper), upper)
+        one, two = _half(builder, mixed, 0), _half(builder, mixed, 4)
+        share = _spread(builder, right, FOUR)
+        total = builder.fadd(one, builder.fmul(share, builder.fsub(two, one)))
+        values = [builder.extract_element(total, LANE(k)) for k in range(4)]
+        return impl_ret_untracked(
+            context, builder, signature.return_type, cgutils.pack_array(builder, values)
+        )
+
+    return signature, generate
+
+
+def _between(typing_context, numbers, first, second, share):
+    """(1 - share) a + share b of eight numbers that begin at `first` and at `second`: a tuple.
+
+    `numbers` (n,) f32; both u64.
+    """
+    eight = types.UniTuple(types.float32, 8)
+    signature = eight(numbers, types.uint64, types.uint64, types.float32)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, first, second, share = arguments
+        data = make_array(signature.args[0])(context, builder, array).data
+        a, b = (_load(builder, builder.gep(data, [at])) for at in (first, second))
+        total = _add(builder, _spread(builder, share, EIGHT), builder.fsub(b, a), a)
+        values = [builder.extract_element(total, LANE(k)) for k in range(8)]
+        return impl_ret_untracked(
+            context, builder, signature.return_type, cgutils.pack_array(builder, values)
+        )
+
+    return signature, generate
+
+
 def _fetch(typing_context, texels, at):
     """Asks for the line of memory around `texels[at]`, without waiting for it."""
 
@@ -72,6 +119,8 @@ def _fetch(typing_context, texels, at):
 
 
 sixteen_texels: Any = intrinsic(_sixteen_texels)  # called without the typing context
+four_texels: Any = intrinsic(_four_texels)
+between: Any = intrinsic(_between)
 fetch: Any = intrinsic(_fetch)
 
 

@@ -65,14 +65,8 @@ def grow(selection: Selection, px: float) -> Selection:
     """All that is at most `px` from what is selected: round at corners."""
     changed = selection.copy()
     window = _around(selection, px + 1)
-    if window is None:
-        return changed
-    part = np.ascontiguousarray(selection[window])
-    if selection.dtype != np.bool_:
-        changed[window] = _dilated(part, px)
-        return changed
-    away = cv2.distanceTransform((~part).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    changed[window] = away <= px + EXACT
+    if window is not None:
+        changed[window] = _grown_everywhere(np.ascontiguousarray(selection[window]), px)
     return changed
 
 
@@ -99,13 +93,13 @@ def smooth(selection: Selection, px: float) -> Selection:
 
 def fill_holes(selection: Selection) -> Selection:
     """Without holes: what is not selected and does not reach the photo's frame."""
+    if selection.dtype == np.bool_:
+        return selection | _closed_in(~selection, ~selection)
     changed = selection.copy()
-    if selection.dtype != np.bool_:
-        # Together with its soft rim; a soft place without a hole in it is meant.
-        for level in (FULL, HALF):
-            changed[_closed_in(changed < level, changed < HALF)] = FULL
-        return changed
-    return changed | _closed_in(~selection, ~selection)
+    # Together with its soft rim; a soft place without a hole in it is meant.
+    for level in (FULL, HALF):
+        changed[_closed_in(changed < level, changed < HALF)] = FULL
+    return changed
 
 
 def invert(selection: Selection) -> Selection:

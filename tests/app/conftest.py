@@ -92,7 +92,7 @@ def ball(
 def open_file(editor: Editor, path: Path) -> None:
     """Opens it and waits for it, or for the question about unsaved changes."""
     editor.filing.open(path)
-    wait_until(editor, lambda: editor.background.is_idle)
+    wait_until(editor, lambda: editor.chores.is_idle)
 
 
 def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
@@ -107,7 +107,7 @@ def wait_until(editor: Editor, is_reached: Callable[[], bool]) -> None:
 def wait_for_jobs(editor: Editor) -> None:
     wait_until(
         editor,
-        lambda: not editor.poll() and editor.jobs.is_idle and editor.background.is_idle,
+        lambda: not editor.poll() and editor.jobs.is_idle and editor.chores.is_idle,
     )
 
 

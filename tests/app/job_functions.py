@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.exporting import Plan
+from app.export_plan import Plan
 from objectmorpher_core.document import Document
+from objectmorpher_core.edits import EditError
 from objectmorpher_core.files import OutputError
 from objectmorpher_core.progress import Progress
 
@@ -69,6 +70,15 @@ def export_when_there_is_room(document: Document, plan: Plan, progress: Progress
 
 def inpaint_badly(*arguments: object, progress: Progress) -> None:
     raise ArithmeticError("the fill did not converge")
+
+
+def divide(progress: Progress) -> None:
+    """Fails with an error of numpy's."""
+    np.linalg.inv(np.zeros((2, 2)))
+
+
+def refuse(progress: Progress) -> None:
+    raise EditError("nothing is selected")
 
 
 def crash(progress: Progress) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from conftest import open_file, wait_for_jobs
+from strokes import move, press, release
 
 from app.commands import run
 from app.editor import Editor
 from app.resources import resource
 from app.settings import Settings
-from app.tools.pointer import Button, Pointer
 from app.tools.registry import TOOLS
 from app.view import ToolName
 
@@ -72,13 +72,10 @@ def _drag(editor: Editor, start: np.ndarray, cursor: np.ndarray) -> float:
     """Canvas px between the cursor and where the pressed point of the surface is seen then."""
     seen = editor.posing.surface_at(start)
     assert seen is not None
-    tool = TOOLS[ToolName.POSE]
-    pressed = Pointer(*start, button=Button.LEFT, is_down=True)
-    editor.hand.press(tool.press(editor, pressed), Button.LEFT)
-    for share in (0.3, 0.7, 1.0):
-        editor.hand.move(Pointer(*(start + share * (cursor - start)), is_down=True))
+    press(editor, TOOLS[ToolName.POSE], start)
+    move(editor, *(start + share * (cursor - start) for share in (0.3, 0.7, 1.0)))
     during = _picture_of(editor, seen.rest)
-    editor.hand.move(Pointer(*cursor, is_down=False))
+    release(editor, cursor)
     after = _picture_of(editor, seen.rest)
     return max(float(np.linalg.norm(at - cursor)) for at in (during, after))
 

@@ -181,7 +181,7 @@ def kill_and_read(tmp_path: Path, seconds: float) -> tuple[Document | None, int,
         (left,) = editor.recovery.left
         assert left.name == "noise.png" and left.objects == 1 and not left.problem
         editor.recovery.recover(left)
-        wait_until(editor, lambda: editor.background.is_idle)
+        wait_until(editor, lambda: editor.chores.is_idle)
         assert not editor.is_saved
         return editor.committed, int(steps[-1][0]), max(old, default=0)
     finally:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import wait_for_jobs, wait_until
+from strokes import press, stroke
 
 from app.commands import COMMANDS, run
 from app.editor import Editor
 from app.tools.compose_tool import ComposeTool
-from app.tools.pointer import Button, Pointer
 from app.view import ToolName
 from objectmorpher_core import edits
 from objectmorpher_core.compose.plate import plate_picture
@@ -35,11 +35,7 @@ def clean(shared_editor: Editor):
 def paint(editor: Editor, *places: tuple[float, float], alt: bool = False) -> None:
     """A stroke of the Compose tool, image px."""
     at = [editor.view.canvas_from_image(np.array(p)) for p in places]
-    pointer = Pointer(*at[0], button=Button.LEFT, is_down=True, alt=alt)
-    editor.hand.press(ComposeTool().press(editor, pointer), Button.LEFT)
-    for xy in at:
-        editor.hand.move(Pointer(*xy, is_down=True, alt=alt))
-    editor.hand.move(Pointer(*at[-1], is_down=False, alt=alt))
+    stroke(editor, ComposeTool(), at[0], *at, alt=alt)
 
 
 def wait_for_repairs(editor: Editor) -> None:
@@ -85,8 +81,7 @@ def test_alt_brings_the_photo_back_at_once(bare: Editor, ball: Document) -> None
 
 
 def test_escape_takes_a_stroke_back(bare: Editor, ball: Document) -> None:
-    pointer = Pointer(*bare.view.canvas_from_image(np.array([20, 20])), button=Button.LEFT)
-    bare.hand.press(ComposeTool().press(bare, pointer), Button.LEFT)
+    press(bare, ComposeTool(), bare.view.canvas_from_image(np.array([20, 20])))
     assert bare.composing.painted_layer() is not None
     bare.escape()
     assert bare.composing.painted_layer() is None

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from conftest import CENTRE, lift_ball, open_file, wait_for_jobs
 from PIL import Image
+from strokes import move, press, release, stroke
 
 from app.commands import COMMANDS, next_step, run
 from app.editor import Editor
 from app.filing import Dialog
-from app.tools.pointer import Button, Pointer
+from app.tools.pointer import Pointer
 from app.tools.pose_tool import PoseTool
 from app.view import ToolName
 from objectmorpher_core import edits
@@ -30,11 +31,8 @@ def canvas_xy(editor: Editor, x: float, y: float) -> np.ndarray:
 
 def drag(editor: Editor, start: np.ndarray, end: np.ndarray) -> None:
     """A stroke of the Pose tool in five moves."""
-    pointer = Pointer(*start, button=Button.LEFT, is_down=True)
-    editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
-    for share in (0.2, 0.5, 0.8, 1.0, 1.0):
-        editor.hand.move(Pointer(*(start + share * (end - start)), is_down=True))
-    editor.hand.move(Pointer(*end, is_down=False))
+    shares = (0, 0.2, 0.5, 0.8, 1.0, 1.0)
+    stroke(editor, PoseTool(), *(start + share * (end - start) for share in shares))
 
 
 def test_the_whole_job(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> None:
@@ -129,9 +127,8 @@ def test_an_aborted_stroke_changes_nothing(editor: Editor, ball: Document) -> No
     before = ball
     editor.start(ball)
     start = canvas_xy(editor, 90, 60)
-    pointer = Pointer(*start, button=Button.LEFT, is_down=True)
-    editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
-    editor.hand.move(Pointer(*(start + 60), is_down=True))
+    press(editor, PoseTool(), start)
+    move(editor, start + 60)
     assert editor.document is not before
     editor.escape()
     assert editor.document is before
@@ -142,9 +139,8 @@ def test_pins_hold_and_handles_can_be_removed(editor: Editor, ball: Document) ->
     editor.start(ball)
     pin, start = canvas_xy(editor, 90, 100), canvas_xy(editor, 90, 50)
     for at, alt in ((pin, True), (start, False)):
-        pointer = Pointer(*at, button=Button.LEFT, is_down=True, alt=alt)
-        editor.hand.press(PoseTool().press(editor, pointer), Button.LEFT)
-        editor.hand.move(Pointer(*at, is_down=False))
+        press(editor, PoseTool(), at, alt=alt)
+        release(editor, at)
     assert editor.object is not None
     assert [h.is_pin for h in editor.object.handles] == [True, False]
     held = editor.posing.positions()[0]

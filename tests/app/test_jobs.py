@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -30,6 +31,14 @@ class Log:
 
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Jobs]:
+    jobs = Jobs()
+    yield jobs
+    jobs.close()
+
+
+@pytest.fixture
+def jobs() -> Iterator[Jobs]:
+    """With a worker of its own, for what ends it."""
     jobs = Jobs()
     yield jobs
     jobs.close()
@@ -138,6 +147,18 @@ def test_only_what_another_try_may_mend_can_be_retried(error: Exception, may_pas
     assert JobError.of(error, "It").may_pass is JobError.of(wrapped, "It").may_pass is may_pass
 
 
+def test_the_log_tells_the_programs_failures_from_the_requests(
+    worker: Jobs, caplog: pytest.LogCaptureFixture
+) -> None:
+    log = Log()
+    with caplog.at_level(logging.INFO, "app.jobs"):
+        for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
+            start(worker, log, function)
+            run_until(worker, lambda: worker.is_idle)
+    told = [r.levelname for r in caplog.records if "failed" in r.message]
+    assert told == ["ERROR", "ERROR", "INFO"]
+
+
 def test_an_answer_that_cannot_be_used_is_a_failure(worker: Jobs) -> None:
     log = Log()
 
@@ -149,18 +170,15 @@ def test_an_answer_that_cannot_be_used_is_a_failure(worker: Jobs) -> None:
     assert [e.sentence for e in log.errors] == ["nothing is selected"]
 
 
-def test_a_crash_is_a_failure_and_the_next_job_runs() -> None:
-    jobs = Jobs()
+def test_a_crash_is_a_failure_and_the_next_job_runs(jobs: Jobs) -> None:
     log = Log()
     start(jobs, log, job_functions.crash)
     start(jobs, log, job_functions.double, np.ones(1))
     run_until(jobs, lambda: bool(log.answers))
     assert log.errors[0].name == "Crash"
-    jobs.close()
 
 
-def test_what_crashed_can_be_asked_for_again() -> None:
-    jobs = Jobs()
+def test_what_crashed_can_be_asked_for_again(jobs: Jobs) -> None:
     log = Log()
     start(jobs, log, job_functions.wait, 0.3)
     run_until(jobs, lambda: jobs.current is not None and jobs.current.fraction > 0)
@@ -172,7 +190,6 @@ def test_what_crashed_can_be_asked_for_again() -> None:
     retry()
     run_until(jobs, lambda: bool(log.answers))
     assert log.answers == ["waited"]
-    jobs.close()
 
 
 def test_a_worker_that_cannot_live_is_not_started_without_end() -> None:
@@ -188,8 +205,7 @@ def test_a_worker_that_cannot_live_is_not_started_without_end() -> None:
     jobs.close()
 
 
-def test_a_job_that_does_not_listen_is_ended_within_half_a_second() -> None:
-    jobs = Jobs()
+def test_a_job_that_does_not_listen_is_ended_within_half_a_second(jobs: Jobs) -> None:
     restarts: list[int] = []
     jobs.restarted = lambda: restarts.append(1)
     log = Log()
@@ -204,4 +220,3 @@ def test_a_job_that_does_not_listen_is_ended_within_half_a_second() -> None:
     assert (log.cancels, restarts) == (1, [1])
     start(jobs, log, job_functions.double, np.ones(1))
     run_until(jobs, lambda: bool(log.answers))
-    jobs.close()

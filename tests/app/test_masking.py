@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
 from PIL import Image
+from strokes import move, press, stroke
 
 from app.commands import run
 from app.editor import Editor
 from app.filing import Dialog
 from app.tasks import Combine
 from app.tools.mask_tool import MaskTool
-from app.tools.pointer import Button, Pointer, Tool
+from app.tools.pointer import Button, Tool
 from app.tools.select_tool import SelectTool
 from app.view import Selecting, SelectMode, ToolName
 from objectmorpher_core.brush import Brush
@@ -34,21 +36,14 @@ def editor(editor: Editor) -> Iterator[Editor]:
     editor.view.selecting, editor.view.brush = Selecting(), Brush()
 
 
-def stroke(
-    editor: Editor, tool: Tool, places: Places, button: Button = Button.LEFT, **held: bool
-) -> None:
-    """A drag through places of the photo, image px."""
-    at = [editor.view.canvas_from_image(np.array(place)) for place in places]
-    first = Pointer(*at[0], button=button, is_down=True, **held)
-    editor.hand.press(tool.press(editor, first), button)
-    for xy in at[1:]:
-        editor.hand.move(Pointer(*xy, is_down=True, **held))
-    editor.hand.move(Pointer(*at[-1], is_down=False, **held))
+def draw(editor: Editor, tool: Tool, places: Places, **held: Any) -> None:
+    """A stroke through places of the photo, image px."""
+    stroke(editor, tool, *editor.view.canvas_from_image(np.array(places)), **held)
 
 
 def paint(editor: Editor, *places: tuple[float, float], **held: bool) -> None:
     editor.view.tool = ToolName.MASK
-    stroke(editor, MaskTool(), list(places), **held)
+    draw(editor, MaskTool(), list(places), **held)
 
 
 def select_ball(editor: Editor) -> np.ndarray:
@@ -91,11 +86,10 @@ def test_the_stroke_is_seen_while_it_is_painted_and_esc_takes_it_back(editor: Ed
     document = editor.document
     editor.view.tool = ToolName.MASK
     at = editor.view.canvas_from_image(np.array(FAR))
-    pointer = Pointer(*at, button=Button.LEFT, is_down=True)
-    editor.hand.press(MaskTool().press(editor, pointer), Button.LEFT)
+    press(editor, MaskTool(), at)
     assert editor.masking.shown is not None
     assert editor.masking.shown[20, 20] == 255
-    editor.hand.move(Pointer(*(at + 80), is_down=True))
+    move(editor, at + 80)
     assert editor.masking.painting is not None
     assert len(editor.masking.painting.touched) == 2
     editor.escape()
@@ -200,14 +194,14 @@ def test_a_click_on_a_selection_made_by_hand_adds_or_takes_away_an_object(editor
 def test_a_line_around_something_is_new_added_or_taken_away(editor: Editor) -> None:
     editor.view.selecting.mode = SelectMode.LASSO
     square: Places = [(20, 20), (60, 20), (60, 60), (20, 60)]
-    stroke(editor, SelectTool(), square)
+    draw(editor, SelectTool(), square)
     assert editor.mask is not None
     assert editor.mask.sum() == pytest.approx(1600, rel=0.06)
-    stroke(editor, SelectTool(), [(x + 60, y) for x, y in square], shift=True)
+    draw(editor, SelectTool(), [(x + 60, y) for x, y in square], shift=True)
     assert editor.mask.sum() == pytest.approx(3200, rel=0.06)
-    stroke(editor, SelectTool(), [(x + 20, y) for x, y in square], alt=True)
+    draw(editor, SelectTool(), [(x + 20, y) for x, y in square], alt=True)
     assert editor.mask.sum() == pytest.approx(2400, rel=0.06)
-    stroke(editor, SelectTool(), square)
+    draw(editor, SelectTool(), square)
     assert editor.mask[40, 40] and not editor.mask[40, 110]
     assert editor.selection.path is None
 

@@ -33,7 +33,7 @@ def editor(shared_editor: Editor, photo_path: Path) -> Iterator[Editor]:
 
 
 def wait_for_file(editor: Editor) -> None:
-    wait_until(editor, lambda: editor.background.is_idle)
+    wait_until(editor, lambda: editor.chores.is_idle)
 
 
 def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_pa
     cv2.imwrite(str(path), cv2.resize(noise, MEGAPIXELS, interpolation=cv2.INTER_NEAREST))
     editor.filing.open(path)
     longest = count = 0.0
-    while editor.background.is_busy("open"):
+    while editor.chores.is_busy("open"):
         started = time.perf_counter()
         editor.poll()
         longest = max(longest, time.perf_counter() - started)
@@ -75,7 +75,7 @@ def test_what_is_done_while_a_file_is_read_is_asked_about(
     other.write_bytes(photo_bytes)
     editor.filing.open(other)
     editor.redo()
-    wait_until(editor, lambda: editor.background.is_idle)
+    wait_for_file(editor)
     assert editor.committed is edited
     assert editor.filing.question is not None
     editor.filing.answer_discard()

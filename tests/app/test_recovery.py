@@ -41,7 +41,7 @@ def leave(name: str, hour: int, step: int = 1) -> Path:
 def recover(editor: Editor, name: str) -> None:
     (left,) = (left for left in editor.recovery.left if left.folder.name == name)
     editor.recovery.recover(left)
-    wait_until(editor, lambda: editor.background.is_idle)
+    wait_until(editor, lambda: editor.chores.is_idle)
 
 
 def test_every_crashed_editor_is_listed_the_newest_first(editor: Editor) -> None:

@@ -92,9 +92,9 @@ class Canvas:
         self.draw.add_circle_filled(at, 1.5 * r, theme.u32(DARK, 0.55 * alpha), 8)
         self.draw.add_circle_filled(at, r, theme.u32(WHITE, alpha), 8)
 
-    def ring(self, at: ImVec2, radius: float, color: str, width: float = 2.0) -> None:
-        self.draw.add_circle(at, theme.pt(radius), theme.u32(DARK, 0.6), 0, theme.pt(width + 2))
-        self.draw.add_circle(at, theme.pt(radius), theme.u32(color), 0, theme.pt(width))
+    def ring(self, at: ImVec2, radius: float, color: str) -> None:
+        self.draw.add_circle(at, theme.pt(radius), theme.u32(DARK, 0.6), 0, theme.pt(4))
+        self.draw.add_circle(at, theme.pt(radius), theme.u32(color), 0, theme.pt(2))
 
     def diamond(self, at: ImVec2, radius: float, fill: str, alpha: float = 1.0) -> None:
         outer = theme.pt(radius + 2)

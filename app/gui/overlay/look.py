@@ -6,9 +6,13 @@ import numpy as np
 from imgui_bundle import ImVec2
 
 from ...texts import t
+from ...tools.place_tool import wrapped
 from ...view import PIXELS_FROM
 from ..theme import theme
 from .canvas import DARK, WHITE, Canvas
+
+DARKNESS, LIGHTNESS = 0.28, 0.16  # alpha of the pixel grid's lines, at their strongest
+FAINTEST = 0.4  # x that, where the grid begins to show
 
 
 def draw_look(canvas: Canvas) -> None:
@@ -16,8 +20,8 @@ def draw_look(canvas: Canvas) -> None:
     editor, rect = canvas.editor, canvas.rect
     orbit = editor.looking.orbit
     if orbit is not None:
-        yaw = (orbit.yaw + 180.0) % 360.0 - 180.0
-        text = t("Preview, turned by {yaw}° and {pitch}°", yaw=round(yaw), pitch=round(orbit.pitch))
+        yaw, pitch = round(wrapped(orbit.yaw)), round(orbit.pitch)
+        text = t("Preview, turned by {yaw}° and {pitch}°", yaw=yaw, pitch=pitch)
         canvas.label(text, rect.x + theme.pt(12), rect.y + theme.pt(12))
 
 
@@ -31,8 +35,8 @@ def draw_pixel_grid(canvas: Canvas) -> None:
     shown = (view.width, view.height)
     high = np.clip(np.ceil(view.image_from_canvas(shown)), 0, size).astype(int)
     start, end = canvas.at(np.array([low, high], np.float64))
-    strength = float(np.clip((view.zoom - PIXELS_FROM) / PIXELS_FROM, 0.4, 1.0))
-    dark, light = theme.u32(DARK, 0.28 * strength), theme.u32(WHITE, 0.16 * strength)
+    strength = float(np.clip((view.zoom - PIXELS_FROM) / PIXELS_FROM, FAINTEST, 1.0))
+    dark, light = theme.u32(DARK, DARKNESS * strength), theme.u32(WHITE, LIGHTNESS * strength)
     for color, shift in ((dark, 0.0), (light, 1.0)):
         for point in canvas.at(np.array([(x, 0) for x in range(low[0], high[0] + 1)], float)):
             x = round(point.x) + shift

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...tools.mask_tool import MaskTool
+from ...tools.mask_tool import erases
 from .canvas import WARM, WHITE, Canvas
 from .select import draw_edge
 
@@ -13,5 +13,4 @@ def draw_mask(canvas: Canvas) -> None:
     if editor.masking.painting is None:
         draw_edge(canvas)
     if editor.pointer is not None:
-        is_erasing = MaskTool().is_erasing(editor, editor.pointer)
-        canvas.brush(WARM if is_erasing else WHITE)
+        canvas.brush(WARM if erases(editor, editor.pointer) else WHITE)

@@ -10,6 +10,7 @@ from ..theme import theme
 from .canvas import ACCENT, DARK, WARM, Canvas
 
 DOTS = 6.0  # points between the dots of a dotted line
+DOT = 1.4  # points, their radius
 
 
 def draw_selection(canvas: Canvas) -> None:
@@ -30,7 +31,7 @@ def draw_selection(canvas: Canvas) -> None:
     if editor.rubber is not None:
         draw_rubber(canvas)
     if editor.selection.path is not None:
-        draw_line(canvas, editor.selection.path)
+        _draw_lasso(canvas, editor.selection.path)
 
 
 def draw_edge(canvas: Canvas) -> None:
@@ -48,7 +49,7 @@ def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:
     places = np.arange(0, along[-1], theme.pt(DOTS) * canvas.ratio)
     dots = np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])
     for at in canvas.on_canvas(dots):
-        canvas.dot(at, 1.4, alpha=0.9 * share)
+        canvas.dot(at, DOT, alpha=0.9 * share)
 
 
 def draw_rubber(canvas: Canvas) -> None:
@@ -60,7 +61,7 @@ def draw_rubber(canvas: Canvas) -> None:
     canvas.draw.add_rect(low, high, theme.u32(ACCENT), 0.0, theme.pt(1.5))
 
 
-def draw_line(canvas: Canvas, path: list[np.ndarray]) -> None:
+def _draw_lasso(canvas: Canvas, path: list[np.ndarray]) -> None:
     """The line that is being drawn around something, canvas px (2,) each; its end is dashed."""
     points = canvas.on_canvas(np.array(path))
     if len(points) > 1:

@@ -10,32 +10,34 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core import compose
 from objectmorpher_core.joining import LEAST_FEATHER, MOST_FEATHER, MOST_SHADOW
 
-from ...commands import COMMANDS, run, why_not
-from ...commands.compose import not_moved, sentence
+from ...commands import run
+from ...commands.compose import not_moved
 from ...editor import Editor
 from ...job_functions import Variant
-from ...texts import t
+from ...texts import sentence, t
+from ..command_button import command_button
 from ..dial import SIDE, dial
 from ..pictures import pictures
 from ..segmented import Choice, segmented
 from ..theme import RADIUS, theme
 from ..widgets import (
+    GAP,
     LABEL_WIDTH,
     Change,
     Number,
-    button,
     checkbox,
+    half_width,
     heading,
     note,
     number_field,
     rule,
     tooltip,
 )
+from .brush import draw_brush_fields
 
 INPAINTERS = {"auto": "Automatic", "patchmatch": "Patches", "telea": "Smooth"}
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
-GAP = 8.0  # points
 
 
 def draw_compose(editor: Editor) -> None:
@@ -70,18 +72,14 @@ def _draw_background(editor: Editor) -> None:
     chosen = segmented("inpainter", choices, editor.composing.inpainter)
     if chosen != editor.composing.inpainter:
         editor.composing.choose_inpainter(chosen)
-    half = (imgui.get_content_region_avail().x / theme.scale - GAP) / 2
-    _command_button(editor, "fill_again", half)
-    imgui.same_line(0, theme.pt(GAP))
-    _command_button(editor, "variants", half)
+    half = half_width()
+    command_button(editor, "fill_again", width=half)
+    imgui.same_line()
+    command_button(editor, "variants", width=half)
     _draw_variants(editor)
     if is_bare and editor.document is not None and editor.document.plate is not None:
-        _draw_brush(editor)
-
-
-def _command_button(editor: Editor, name: str, width: float) -> None:
-    if button(t(COMMANDS[name].label), why_not=why_not(editor, name), width=width):
-        run(editor, name)
+        draw_brush_fields(editor)
+        note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
 
 
 def _draw_variants(editor: Editor) -> None:
@@ -111,19 +109,6 @@ def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> Non
     if is_chosen or is_hovered:
         role = "accent" if is_chosen else "secondary"
         draw.add_rect(start, end, theme.u32(role), corner, theme.pt(2))
-
-
-def _draw_brush(editor: Editor) -> None:
-    brush = editor.view.brush
-    size = Number(t("Brush"), "%.0f px", 0.5, 4.0, rest=40.0, low=1.0, high=4000.0)
-    change = number_field(size, 2 * brush.radius)
-    if change.is_changed:
-        editor.view.brush = replace(brush, radius=change.value / 2)
-    hardness = Number(t("Hardness"), "%.0f %%", 0.5, 10.0, rest=80.0, low=0.0, high=100.0)
-    change = number_field(hardness, 100 * brush.hardness)
-    if change.is_changed:
-        editor.view.brush = replace(editor.view.brush, hardness=change.value / 100)
-    note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
 
 
 def _draw_shadow(editor: Editor) -> None:

@@ -6,11 +6,12 @@ from imgui_bundle import imgui
 
 from objectmorpher_core.segment.mask_edit import LARGEST_REACH
 
-from ...commands import COMMANDS, run, why_not
+from ...commands import COMMANDS, why_not
 from ...editor import Editor
 from ...texts import t
-from ..theme import Icon, theme
-from ..widgets import Number, button, gap, heading, note, number_field, tooltip
+from ..command_button import command_button
+from ..theme import Icon
+from ..widgets import Number, gap, half_width, heading, note, number_field, tooltip
 
 ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
@@ -38,19 +39,17 @@ def draw_edge(editor: Editor) -> None:
 
 def draw_pair(editor: Editor, left: str, right: str) -> None:
     """Two commands side by side."""
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
-    draw_command(editor, left, half)
+    draw_command(editor, left, half_width())
     imgui.same_line()
     draw_command(editor, right)
 
 
 def draw_command(editor: Editor, name: str, width: float = -1.0) -> None:
     """A command as a button; `width` in points, -1 fills."""
-    reason = why_not(editor, name)
-    if button(f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}", why_not=reason, width=width):
-        run(editor, name)
+    label = f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}"
+    command_button(editor, name, label, width)
     hint = _hint(name)
-    if reason is None and hint:
+    if hint and why_not(editor, name) is None:
         tooltip(hint)
 
 

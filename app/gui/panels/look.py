@@ -9,8 +9,10 @@ from ...editor import Editor
 from ...painter import shown_now
 from ...texts import t
 from ...view import Shown
+from ..command_button import command_button
+from ..rows import end_row, fill_row, text_top
 from ..theme import Icon, theme
-from ..widgets import button, checkbox, gap, heading, note, small_text, tooltip
+from ..widgets import checkbox, gap, heading, note, small_text, tooltip
 
 ROW = 28.0  # points
 ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "800 %"))
@@ -22,10 +24,8 @@ def draw_look(editor: Editor) -> None:
     for shown in Shown:
         _draw_view(editor, shown)
     gap(12)
-    if button(
-        f"{Icon.RESET}  {t(COMMANDS['reset_look'].label)}", why_not=why_not(editor, "reset_look")
-    ):
-        run(editor, "reset_look")
+    label = t(COMMANDS["reset_look"].label)
+    command_button(editor, "reset_look", f"{Icon.RESET}  {label}")
     gap(12)
     heading(t("Before and after"))
     is_split = editor.view.split is not None
@@ -50,21 +50,17 @@ def _draw_view(editor: Editor, shown: Shown) -> None:
     draw = imgui.get_window_draw_list()
     end = ImVec2(start.x + size.x, start.y + size.y)
     is_current = shown_now(editor.document, editor.view) is shown
-    if is_current or (imgui.is_item_hovered() and reason is None):
-        role = "raised" if is_current else "hovered"
-        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
+    fill_row(start, end, is_current, imgui.is_item_hovered() and reason is None)
     dim = 0.45 if reason is not None else 1.0
-    top = start.y + (size.y - imgui.get_font_size()) / 2
+    top = text_top(start, size.y)
     role = "accent" if is_current else "text"
     draw.add_text(ImVec2(start.x + theme.pt(8), top), theme.u32(role, dim), t(shown.value))
     with small_text():
         keys = keys_of(editor, name)
         width = imgui.calc_text_size(keys).x
-        top = start.y + (size.y - imgui.get_font_size()) / 2
-        at = ImVec2(end.x - theme.pt(8) - width, top)
+        at = ImVec2(end.x - theme.pt(8) - width, text_top(start, size.y))
         draw.add_text(at, theme.u32("secondary", dim), keys)
-    imgui.set_cursor_screen_pos(ImVec2(start.x, end.y - theme.pt(6)))  # 2 with the spacing
-    imgui.dummy(ImVec2(0, 0))
+    end_row(start, ROW)
     if reason is not None:
         tooltip(reason)
     elif is_pressed:
@@ -79,8 +75,7 @@ def _draw_zooms(editor: Editor) -> None:
         if i:
             imgui.same_line(0, space)
         imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 6))
-        if button(t(label), why_not=why_not(editor, name), width=across / theme.scale):
-            run(editor, name)
+        command_button(editor, name, t(label), across / theme.scale)
         imgui.pop_style_var()
         if why_not(editor, name) is None:
             keys = keys_of(editor, name)

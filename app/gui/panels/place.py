@@ -11,10 +11,10 @@ from objectmorpher_core.document import Placement
 from ...commands import COMMANDS, run, why_not
 from ...editor import Editor
 from ...texts import t
+from ..command_button import command_button
 from ..theme import SMALL_SIZE, Icon, theme
 from ..widgets import (
     Number,
-    button,
     checkbox,
     gap,
     heading,
@@ -79,9 +79,8 @@ def draw_place(editor: Editor) -> None:
         if group.title == "Position":
             _draw_depth(editor, placement)
         gap(12)
-    label = f"{Icon.RESET}  {t(COMMANDS['reset_place'].label)}"
-    if button(label, why_not=why_not(editor, "reset_place")):
-        run(editor, "reset_place")
+    label = t(COMMANDS["reset_place"].label)
+    command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
 
 
 def _draw_ground(editor: Editor) -> None:

@@ -7,15 +7,15 @@ from imgui_bundle import imgui
 from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
 from objectmorpher_core.document import EditObject
 
-from ...commands import run, why_not
 from ...editor import Editor
 from ...painter import shown_now
 from ...pose_view import PoseMode
 from ...texts import t
 from ...view import Shown
+from ..command_button import command_button
 from ..segmented import Choice, segmented
-from ..theme import Icon, theme
-from ..widgets import button, checkbox, gap, heading, note, tooltip
+from ..theme import Icon
+from ..widgets import checkbox, gap, half_width, heading, note, tooltip
 from .pose_handle import draw_handles, draw_numbers
 from .pose_rig import draw_modes, draw_regions
 
@@ -38,13 +38,10 @@ def draw_pose(editor: Editor) -> None:
     _draw_symmetry(editor)
     _draw_overlays(editor)
     gap(12)
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
-    if button(t("All to rest"), why_not=why_not(editor, "reset_handles"), width=half):
-        run(editor, "reset_handles")
-    imgui.same_line(0, theme.pt(8))
-    label = f"{Icon.RESET}  {t('Reset pose')}"
-    if button(label, why_not=why_not(editor, "reset_pose"), width=half):
-        run(editor, "reset_pose")
+    half = half_width()
+    command_button(editor, "reset_handles", t("All to rest"), half)
+    imgui.same_line()
+    command_button(editor, "reset_pose", f"{Icon.RESET}  {t('Reset pose')}", half)
 
 
 def _draw_material(editor: Editor, thing: EditObject) -> None:

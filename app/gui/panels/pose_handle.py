@@ -6,16 +6,17 @@ from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import run, why_not
 from ...editing.handle_numbers import Numbers
 from ...editor import Editor
 from ...texts import t
+from ..command_button import command_button
+from ..rows import BETWEEN, end_row, fill_row, text_top
 from ..theme import Icon, theme
 from ..widgets import (
     Number,
-    button,
     checkbox,
     gap,
+    half_width,
     heading,
     icon_button,
     note,
@@ -40,19 +41,12 @@ def draw_handles(editor: Editor) -> None:
         for h in range(count):
             _draw_row(editor, h)
         return
-    step = theme.pt(ROW + 2)
+    step = theme.pt(ROW + BETWEEN)
     imgui.begin_child("##handles", ImVec2(0, VISIBLE_ROWS * step + step / 2))
     for h in range(count):
         if editor.object is not None and h < len(editor.object.handles):  # one may be removed
             _draw_row(editor, h)
     imgui.end_child()
-
-
-def end_row(start: ImVec2, height: float) -> None:
-    """The next row is 2 points below one that began at `start` and is `height` points high."""
-    below = start.y + theme.pt(height + 2) - imgui.get_style().item_spacing.y
-    imgui.set_cursor_screen_pos(ImVec2(start.x, below))
-    imgui.dummy(ImVec2(0, 0))
 
 
 def _draw_row(editor: Editor, h: int) -> None:
@@ -71,10 +65,7 @@ def _draw_row(editor: Editor, h: int) -> None:
             editor.posing.select(h)
     draw = imgui.get_window_draw_list()
     end = ImVec2(start.x + size.x, start.y + size.y)
-    is_selected = h in editor.posing.selected
-    if is_selected or imgui.is_item_hovered():
-        role = "raised" if is_selected else "hovered"
-        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(6))
+    fill_row(start, end, h in editor.posing.selected, imgui.is_item_hovered())
     middle = ImVec2(start.x + theme.pt(16), (start.y + end.y) / 2)
     if h == editor.posing.handle:
         draw.add_circle(middle, theme.pt(9), theme.u32("accent"), 0, theme.pt(2))
@@ -82,7 +73,7 @@ def _draw_row(editor: Editor, h: int) -> None:
         draw.add_ngon_filled(middle, theme.pt(6), theme.u32("text"), 4)
     else:
         draw.add_circle_filled(middle, theme.pt(5), theme.u32("accent"))
-    top = start.y + (size.y - imgui.get_font_size()) / 2
+    top = text_top(start, size.y)
     name = t("Pin {number}", number=h + 1) if is_pin else t("Handle {number}", number=h + 1)
     draw.add_text(ImVec2(start.x + theme.pt(34), top), theme.u32("text"), name)
     imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(28), start.y))
@@ -112,13 +103,11 @@ def draw_numbers(editor: Editor) -> None:
     now_pin = checkbox(t("Pin: it holds still"), is_pin)
     if now_pin != is_pin:
         editor.handle_numbers.set_pin(now_pin)
-    half = (imgui.get_content_region_avail().x / theme.scale - 8) / 2
-    if button(t("Reset"), why_not=why_not(editor, "reset_handle"), width=half):
-        run(editor, "reset_handle")
+    half = half_width()
+    command_button(editor, "reset_handle", t("Reset"), half)
     tooltip(t("Selected handles go back to where their points were"))
-    imgui.same_line(0, theme.pt(8))
-    if button(t("Remove"), why_not=why_not(editor, "remove_handle"), width=half):
-        run(editor, "remove_handle")
+    imgui.same_line()
+    command_button(editor, "remove_handle", t("Remove"), half)
 
 
 def _draw_place(editor: Editor, numbers: Numbers) -> None:

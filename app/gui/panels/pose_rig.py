@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from imgui_bundle import ImVec2, imgui
 
 from ...editing.rigging import Region
 from ...editor import Editor
 from ...pose_view import BRUSHES, PoseMode
 from ...texts import t
-from ...tools.navigate import LARGEST_BRUSH, SMALLEST_BRUSH
+from ..rows import end_row, text_top
 from ..segmented import Choice, segmented
 from ..theme import Icon, theme
 from ..widgets import Number, gap, heading, icon_button, note, number_field
-from .pose_handle import end_row
+from .brush import draw_radius
 
 ROW = 28.0  # points
 ICONS = {
@@ -44,12 +42,8 @@ def draw_modes(editor: Editor) -> None:
     heading(t(view.mode.value))
     note(t(NOTES[view.mode]))
     gap(4)
-    brush = editor.view.brush
     if view.mode in BRUSHES or view.mode is PoseMode.GLUE:
-        size = Number(t("Brush"), "%.1f px", 0.5, 5.0, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
-        change = number_field(size, brush.radius)
-        if change.is_changed:
-            editor.view.brush = replace(brush, radius=change.value)
+        draw_radius(editor)
     if view.mode is PoseMode.STIFFEN:
         stiff = Number(t("Stiffness"), "%.2f x", 0.02, 0.5, 4.0, 0.05, 50.0)
         view.stiffness = number_field(stiff, view.stiffness).value
@@ -85,7 +79,7 @@ def _draw_region(editor: Editor, region: Region, row: int, name: str) -> None:
     start = imgui.get_cursor_screen_pos()
     width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
     draw = imgui.get_window_draw_list()
-    top = start.y + (height - imgui.get_font_size()) / 2
+    top = text_top(start, height)
     draw.add_text(ImVec2(start.x + theme.pt(8), top), theme.u32("secondary"), ICONS[region.kind])
     draw.add_text(ImVec2(start.x + theme.pt(34), top), theme.u32("text"), name)
     points = t("{count} points", count=len(region.nodes))

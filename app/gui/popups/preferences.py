@@ -15,7 +15,7 @@ from ..widgets import checkbox, gap, heading, note
 from .frame import popup
 
 SIZE = (520.0, 340.0)  # points
-LABEL = 132.0
+LABEL = 132.0  # points, of the names left of the fields
 SCALES = (0.0, 1.0, 1.25, 1.5, 2.0)  # 0: the monitor's
 
 
@@ -63,7 +63,5 @@ def _prefer(editor: Editor, name: str, value: object) -> None:
 
 def _label(text: str) -> None:
     imgui.align_text_to_frame_padding()
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.text_unformatted(text)
-    imgui.pop_style_color()
+    imgui.text_colored(theme.vec("secondary"), text)
     imgui.same_line(theme.pt(LABEL))

@@ -117,9 +117,7 @@ def _draw_label(text: str) -> float:
     left = imgui.get_cursor_pos_x()
     width = imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
-    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-    imgui.text_unformatted(text)
-    imgui.pop_style_color()
+    imgui.text_colored(theme.vec("secondary"), text)
     return left + width - theme.pt(KEYS + 12)
 
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 from app.commands import run
 from app.editor import Editor
-from app.exporting import Format, What
+from app.export_plan import Format, What
 from app.settings import Settings
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement

@@ -27,7 +27,7 @@ def choosing(editor: Editor) -> Editor:
     """An editor that knows what is there: nothing."""
     editor.settings = Settings()
     editor.models.look()
-    wait_until(editor, lambda: editor.background.is_idle)
+    wait_until(editor, lambda: editor.chores.is_idle)
     return editor
 
 
@@ -43,7 +43,7 @@ def test_the_best_missing_model_is_offered_until_declined(choosing: Editor) -> N
 
 def test_looking_downloads_nothing(choosing: Editor, cache: Path) -> None:
     choosing.models.open()
-    wait_until(choosing, lambda: choosing.background.is_idle)
+    wait_until(choosing, lambda: choosing.chores.is_idle)
     assert not cache.exists()
 
 
@@ -65,7 +65,7 @@ def test_a_cancelled_download_leaves_nothing(choosing: Editor, cache: Path) -> N
     choosing.models.download("u2netp")
     choosing.models.cancel()
     assert choosing.models.downloading is None
-    wait_until(choosing, lambda: choosing.background.is_idle)
+    wait_until(choosing, lambda: choosing.chores.is_idle)
     wait_until(choosing, lambda: not cache.exists() or list(cache.iterdir()) == [])
 
 

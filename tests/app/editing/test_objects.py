@@ -181,3 +181,11 @@ def test_what_has_no_place_among_others_cannot_be_dragged(editor: Editor, ball: 
     assert editor.objects.landing(0) is None
     editor.objects.drop(0)
     assert editor.document is ball
+
+
+def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
+    copied.objects.toggle_visible(0)
+    assert copied.current == 1 and copied.history is not None
+    copied.travel(copied.history.cursor - 1)
+    assert copied.document is not None and copied.document.objects[0].is_visible
+    assert copied.current == 0

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from strokes import stroke
 
 from app.commands import COMMANDS, next_step, run, why_not
 from app.editor import Editor
-from app.tools.look_tool import TURN_SPEED, LookTool
-from app.tools.pointer import Button, Pointer
+from app.tools.look_tool import LookTool
+from app.tools.pointer import TURN_SPEED
 from app.view import STEEPEST, Shown, ToolName
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
@@ -25,10 +26,7 @@ def looking(editor: Editor, ball: Document) -> Editor:
 
 
 def drag(editor: Editor, dx: float, dy: float, clicks: int = 1) -> None:
-    start = Pointer(300, 200, button=Button.LEFT, is_down=True, clicks=clicks)
-    editor.hand.press(LookTool().press(editor, start), Button.LEFT)
-    editor.hand.move(Pointer(300 + dx, 200 + dy, is_down=True))
-    editor.hand.move(Pointer(300 + dx, 200 + dy, is_down=False))
+    stroke(editor, LookTool(), (300, 200), (300 + dx, 200 + dy), clicks=clicks)
 
 
 def test_dragging_turns_what_is_shown_and_not_the_document(looking: Editor) -> None:

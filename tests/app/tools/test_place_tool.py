@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from strokes import move, press, release
 
 from app.commands import run, why_not
 from app.editor import Editor
 from app.tools.gizmo import TURNS, gizmo
 from app.tools.place_tool import PlaceTool, wrapped
-from app.tools.pointer import Button, Pointer, Shape
+from app.tools.pointer import Pointer, Shape
 from app.view import ToolName
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
@@ -33,14 +34,11 @@ def stroke(editor: Editor, *places: np.ndarray, wheel: float = 0.0, **held: bool
     """Press at the first place, go to the others, let go; the wheel turns at the last one."""
     tool = PlaceTool()
     tool.hover(editor, Pointer(*places[0]))
-    editor.hand.press(
-        tool.press(editor, Pointer(*places[0], button=Button.LEFT, is_down=True)), Button.LEFT
-    )
-    for at in places[1:]:
-        editor.hand.move(Pointer(*at, is_down=True, **held))
+    press(editor, tool, places[0])
+    move(editor, *places[1:], **held)
     if wheel:
-        editor.hand.move(Pointer(*places[-1], is_down=True, wheel=wheel, **held))
-    editor.hand.move(Pointer(*places[-1], is_down=False))
+        move(editor, places[-1], wheel=wheel, **held)
+    release(editor, places[-1])
     assert editor.object is not None
     return editor.object.placement
 
@@ -179,9 +177,8 @@ def test_an_aborted_turn_changes_nothing(placed: Editor) -> None:
     before, shown = placed.document, gizmo(placed)
     assert shown is not None
     a, b = shown.rings["roll"].seen(np.radians([200.0, 260.0]))
-    tool = PlaceTool()
-    placed.hand.press(tool.press(placed, Pointer(*a, button=Button.LEFT, is_down=True)), None)
-    placed.hand.move(Pointer(*b, is_down=True))
+    press(placed, PlaceTool(), a)
+    move(placed, b)
     assert placed.document is not before
     placed.escape()
     assert placed.document is before

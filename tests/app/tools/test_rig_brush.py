@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import CENTRE
+from strokes import press, stroke
 
 from app.editing.rigging import gaps_to_way
 from app.editor import Editor
 from app.pose_view import PoseMode, PoseView
-from app.tools.pointer import Button, Pointer
+from app.tools.pointer import Pointer
 from app.tools.pose_tool import PoseTool
 from app.view import ToolName
 from objectmorpher_core.brush import Brush
@@ -29,20 +30,16 @@ def painter(editor: Editor, ball: Document) -> Iterator[Editor]:
     editor.start(ball)
     editor.view.tool, editor.view.pose = ToolName.POSE, PoseView()
     editor.view.brush = Brush(RADIUS)
-    stroke(editor, (90, 45), (96, 40))
+    draw(editor, (90, 45), (96, 40))
     yield editor
     editor.view.pose, editor.view.brush = PoseView(), Brush()
 
 
-def stroke(editor: Editor, *places: tuple[float, float], **held: bool) -> None:
-    """Through image px."""
-    canvas = [editor.view.canvas_from_image(np.array(place)) for place in places]
-    pointer = Pointer(*canvas[0], button=Button.LEFT, is_down=True, **held)
-    TOOL.hover(editor, pointer)
-    editor.hand.press(TOOL.press(editor, pointer), Button.LEFT)
-    for place in canvas:
-        editor.hand.move(Pointer(*place, is_down=True, **held))
-    editor.hand.move(Pointer(*canvas[-1], is_down=False, **held))
+def draw(editor: Editor, *places: tuple[float, float], **held: bool) -> None:
+    """A stroke through image px."""
+    canvas = editor.view.canvas_from_image(np.array(places))
+    TOOL.hover(editor, Pointer(*canvas[0], **held))
+    stroke(editor, TOOL, canvas[0], *canvas, **held)
 
 
 def label(editor: Editor) -> str | None:
@@ -60,7 +57,7 @@ def test_freezing_marks_what_is_under_the_brush_and_seen(painter: Editor) -> Non
     before = painter.object.pose
     assert before is not None
     painter.view.pose.mode = PoseMode.FREEZE
-    stroke(painter, *(tuple(xy) for xy in way.tolist()))
+    draw(painter, *(tuple(xy) for xy in way.tolist()))
     held = painter.rigging.rig.held
     assert held is not None and len(held)
     assert under[held].all()
@@ -79,23 +76,22 @@ def test_freezing_marks_what_is_under_the_brush_and_seen(painter: Editor) -> Non
 
 def test_alt_erases_and_an_aborted_stroke_paints_nothing(painter: Editor) -> None:
     painter.view.pose.mode = PoseMode.FREEZE
-    stroke(painter, (80, 85), (100, 85))
+    draw(painter, (80, 85), (100, 85))
     before = painter.document
-    pointer = Pointer(*painter.view.canvas_from_image(np.array([90, 90])), is_down=True)
-    painter.hand.press(TOOL.press(painter, pointer), Button.LEFT)
+    press(painter, TOOL, painter.view.canvas_from_image(np.array([90, 90])))
     painter.escape()
     assert painter.document is before
     painter.view.brush = Brush(3 * RADIUS)
-    stroke(painter, (70, 85), (110, 85), alt=True)
+    draw(painter, (70, 85), (110, 85), alt=True)
     assert painter.rigging.rig.held is None
     assert label(painter) == "Erase"
 
 
 def test_stiffening_takes_the_panels_factor(painter: Editor) -> None:
     painter.view.pose.mode, painter.view.pose.stiffness = PoseMode.STIFFEN, 7.0
-    stroke(painter, (80, 80), (100, 80))
+    draw(painter, (80, 80), (100, 80))
     painter.view.pose.stiffness = 0.5
-    stroke(painter, (80, 100), (100, 100))
+    draw(painter, (80, 100), (100, 100))
     values = [r.value for r in painter.rigging.regions()]
     assert values == [0.5, 7.0]
     painter.rigging.remove(painter.rigging.regions()[0])
@@ -104,30 +100,30 @@ def test_stiffening_takes_the_panels_factor(painter: Editor) -> None:
 
 def test_a_stroke_that_begins_on_a_group_makes_it_larger(painter: Editor) -> None:
     painter.view.pose.mode = PoseMode.BODY
-    stroke(painter, (78, 80), (90, 80))
+    draw(painter, (78, 80), (90, 80))
     (first,) = painter.rigging.rig.bodies
-    stroke(painter, (90, 80), (102, 80))
+    draw(painter, (90, 80), (102, 80))
     (second,) = painter.rigging.rig.bodies
     assert set(first.tolist()) < set(second.tolist())
-    stroke(painter, (90, 105), (96, 105))
+    draw(painter, (90, 105), (96, 105))
     assert len(painter.rigging.rig.bodies) == 2
     assert [r.kind for r in painter.rigging.regions()] == [PoseMode.BODY, PoseMode.BODY]
 
 
 def test_a_cut_across_the_ball_makes_two_parts_and_can_be_erased(painter: Editor) -> None:
     painter.view.pose.mode = PoseMode.CUT
-    stroke(painter, (30, 80), (90, 82), (150, 80))
+    draw(painter, (30, 80), (90, 82), (150, 80))
     assert painter.document is not None and painter.object is not None
     assert label(painter) == "Cut"
     graph = painter.derived.shape(painter.document.photo, painter.object).puppet.deformer.graph
     assert graph.component_count == 2
     assert len(painter.object.handles) == 1
     painter.view.pose.mode = PoseMode.GLUE
-    stroke(painter, (90, 72), (90, 92))
+    draw(painter, (90, 72), (90, 92))
     graph = painter.derived.shape(painter.document.photo, painter.object).puppet.deformer.graph
     assert [r.kind for r in painter.rigging.regions()] == [PoseMode.CUT, PoseMode.GLUE]
     painter.view.pose.mode = PoseMode.CUT
-    stroke(painter, (85, 80), (95, 82), alt=True)
+    draw(painter, (85, 80), (95, 82), alt=True)
     assert [r.kind for r in painter.rigging.regions()] == [PoseMode.GLUE]
 
 
@@ -140,7 +136,7 @@ def test_strokes_that_mean_nothing_say_so_and_are_no_step(painter: Editor) -> No
         (PoseMode.FREEZE, ((5, 5), (20, 5))),
     ):
         painter.message, painter.view.pose.mode = None, mode
-        stroke(painter, *places)
+        draw(painter, *places)
         assert painter.document is before
         assert (painter.message is None) is (mode is PoseMode.FREEZE)
 
@@ -148,7 +144,7 @@ def test_strokes_that_mean_nothing_say_so_and_are_no_step(painter: Editor) -> No
 def test_a_small_brush_takes_the_nearest_point(painter: Editor) -> None:
     painter.view.brush = replace(painter.view.brush, radius=0.6)
     painter.view.pose.mode = PoseMode.FREEZE
-    stroke(painter, CENTRE)
+    draw(painter, CENTRE)
     assert painter.rigging.rig.held is not None
     assert len(painter.rigging.rig.held) == 1
 

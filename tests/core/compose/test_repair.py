@@ -121,9 +121,12 @@ def test_a_session_keeps_repairs():
 
 
 @pytest.mark.parametrize("size", [(160, 120), (40, 300)])
-def test_thumbnails_have_one_shape(size):
+def test_thumbnails_have_one_shape_and_what_is_filled_in_their_middle(size):
     document = _document()
     photo = cv2.resize(document.photo.pixels, size)
-    hole = np.ones((10, 12), bool)
-    plate = replace(document.plate, left=3, top=4, pixels=photo[4:14, 3:15], hole=hole)
-    assert thumbnail(photo, plate).shape == (THUMB[1], THUMB[0], 3)
+    hole, color = np.ones((10, 12), bool), np.array([255, 0, 255], np.uint8)
+    filled = np.tile(color, (10, 12, 1))
+    small = thumbnail(photo, replace(document.plate, left=3, top=4, pixels=filled, hole=hole))
+    assert small.shape == (THUMB[1], THUMB[0], 3)
+    assert np.array_equal(small[THUMB[1] // 2, THUMB[0] // 2], color)
+    assert np.array_equal(small[0, 0], photo[3, 1]), "some of the photo is around it"

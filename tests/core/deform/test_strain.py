@@ -27,14 +27,12 @@ def test_a_rigid_motion_strains_nothing():
     assert strain.energy.max() < EXACT
     assert np.abs(strain.most - 1).max() < EXACT
     assert np.abs(strain.least - 1).max() < EXACT
-    assert strain.worst == pytest.approx(1.0)
 
 
 def test_a_stretched_sheet_is_stretched_by_that_much_everywhere():
     strain = measure_strain(SHEET, WEIGHTS, Pose(SHEET * [2.0, 0.5, 1.0], _still(SHEET)))
     assert np.abs(strain.most - 2.0).max() < EXACT
     assert np.abs(strain.least - 0.5).max() < EXACT
-    assert strain.worst == pytest.approx(2.0)
     assert (strain.energy > 0.1).all()
 
 

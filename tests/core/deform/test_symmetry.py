@@ -12,6 +12,7 @@ from tests import shapes
 
 DEGREE = 1.0
 EXACT = 1e-9
+SCALED = 1e-6  # x the gap: means of float64 distances
 
 
 def _body(seed: int) -> F64:
@@ -34,6 +35,13 @@ def test_the_plane_of_a_symmetric_shape_is_found_however_it_is_turned(seed: int)
     cosine = min(abs(float(plane.normal @ turn[:, 0])), 1.0)
     assert np.degrees(np.arccos(cosine)) < DEGREE
     assert plane.distance(shift) < 0.01
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_the_gap_does_not_depend_on_the_size(scale: float) -> None:
+    plane, other = find_mirror(_body(0)), find_mirror(scale * _body(0))
+    assert plane is not None and other is not None
+    assert other.gap == pytest.approx(plane.gap, rel=SCALED)
 
 
 def test_a_shape_without_a_plane_has_none() -> None:
@@ -65,6 +73,7 @@ def test_of_planes_that_are_as_good_the_upright_one_is_taken() -> None:
 def test_mirroring_twice_changes_nothing_and_a_turn_goes_the_other_way() -> None:
     plane = plane_through(np.array([0.2, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     points = shapes.ball(20)
+    np.testing.assert_allclose(plane.mirrored(points)[:, 0], 0.4 - points[:, 0], atol=EXACT)
     np.testing.assert_allclose(plane.mirrored(plane.mirrored(points)), points, atol=EXACT)
     turn = np.array([0.3, -0.5, 0.9])
     mirror = np.diag([-1.0, 1.0, 1.0])

@@ -1,4 +1,4 @@
-"""What runs beside the window in a thread of its own: opening files, downloads.
+"""Chores, each in a thread of its own beside the window: opening files, downloads.
 
 The worker process (`jobs.py`) computes; here is what mostly waits for a disk or a network, or
 what must not wait behind a long computation. Answers are delivered on the main thread by `poll`.
@@ -42,10 +42,10 @@ class Chore:
     thread: threading.Thread | None = None
 
 
-class Background:
+class Chores:
     """What runs, and the answers."""
 
-    def __init__(self, wake: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, wake: Callable[[], None]) -> None:
         """`wake` is called from another thread when `poll` has something to do."""
         self._wake = wake
         self._running: dict[str, Chore] = {}  # by kind
@@ -116,7 +116,7 @@ class Background:
             log.debug("%s took %.2f s", chore.title, time.monotonic() - chore.started)
             chore.done(value)
         else:
-            log.error("%s failed: %s\n%s", chore.title, value.sentence, value.trace)
+            value.write_log(chore.title)
             chore.failed(value.retried_by(lambda: self._again(chore)))
 
     def _again(self, chore: Chore) -> None:

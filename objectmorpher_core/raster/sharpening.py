@@ -1,0 +1,152 @@
+"""A coarse picture of an object made sharp: a draft of what `surface` draws.
+
+Where an object shows the photo, the map of where its pixels look is smooth. Drawn with few pixels,
+it is interpolated to the view's own, and the photo is looked up through it at full resolution.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+
+from ..arrays import F32, U8
+from ..threads import EXACT, in_threads
+from .intrinsics import between, four_texels
+from .reference import Picture3D
+from .singles import HALF, ONE, TWO, ZERO
+from .texture import TextureLevels
+
+Box = tuple[int, int, int, int]
+
+R, G, B, A, SHARE, SX, SY, SEEN = range(8)  # columns of a coarse pixel
+LEAST_ALPHA = np.float32(0.02)  # with which a pixel's map counts
+LEAST_SHOWN = np.float32(1e-3)  # alpha, of which a share can be told
+ROUNDS = 2  # px by which the map is continued, so that it can be interpolated at the edge
+PARTS = 4  # pieces of the picture for each thread
+FULL = np.float32(255.0)
+A_ON, EIGHT, SIXTEEN, TWENTY_FOUR = (np.uint64(v) for v in (A, 8, 16, 24))
+
+
+def sharpen(
+    picture: Picture3D,
+    texture: TextureLevels,
+    factor: int,
+    box: Box,
+    corner: tuple[float, float],
+    zoom: float,
+) -> tuple[U8, U8]:
+    """The part `box` (x0, y0, x1, y1 px) of a view: (h, w, 4) premultiplied, and (h, w) invented.
+
+    The photo is looked up bilinearly, in the halved copy that is nearest to the view's scale.
+
+    `picture` is the part of the view that begins at the box's corner, with `factor` x `factor` of
+    its px in one. `corner`: photo px at the view's left top; `zoom`: view px per photo px. What is
+    invented is the share of a pixel that shows the object, but nothing of the photo.
+    """
+    coarse = _packed(picture)
+    height, width = box[3] - box[1], box[2] - box[0]
+    rgba, invented = np.empty((height, width), "<u4"), np.empty((height, width), np.uint8)
+    level = round(math.log2(max(1 / zoom, 1.0)))
+    level = min(level, len(texture.shapes) - 1)
+    scale = 2.0**-level
+    # Texels at the box's first px, and per view px.
+    left = scale * (corner[0] + (box[0] + 0.5) / zoom - texture.left) - 0.5
+    top = scale * (corner[1] + (box[1] + 0.5) / zoom - texture.top) - 0.5
+    frame = (factor, left, top, scale / zoom, scale)
+    u = (np.arange(width) + 0.5) / factor - 0.5  # where each px is among the coarse ones
+    pixels = np.floor(u).clip(0, coarse.shape[1] - 1)
+    inputs: tuple[Any, ...] = (
+        coarse, *(np.float32(v) for v in frame), texture.texels, texture.shapes[level],
+        (8 * pixels).astype(np.uint64), (u - pixels).clip(0, 1).astype(np.float32), rgba, invented,
+    )  # fmt: skip
+    in_threads(lambda first, last: _sharpen(first, last, *inputs), height, PARTS)
+    return rgba.view(np.uint8).reshape(height, width, 4), invented
+
+
+def _packed(picture: Picture3D) -> F32:
+    """(h, w, 8) columns as above; the map is continued around the object."""
+    coarse = np.empty((*picture.alpha.shape, 8), np.float32)
+    _pack(picture.color, picture.alpha, picture.from_photo, picture.shift, coarse)
+    _continue(coarse)
+    return coarse
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _pack(color, alpha, from_photo, shift, coarse):
+    for y in range(alpha.shape[0]):
+        for x in range(alpha.shape[1]):
+            p, a = coarse[y, x], alpha[y, x]
+            p[R], p[G], p[B], p[A] = color[y, x, 0], color[y, x, 1], color[y, x, 2], a
+            p[SHARE] = min(max(from_photo[y, x] / max(a, LEAST_SHOWN), ZERO), ONE)
+            p[SX], p[SY] = shift[y, x, 0], shift[y, x, 1]
+            p[SEEN] = ONE if a > LEAST_ALPHA and from_photo[y, x] > ZERO else ZERO
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _continue(coarse):
+    """Gives each pixel around the seen ones the mean map of its seen neighbours."""
+    height, width = coarse.shape[:2]
+    for round in range(ROUNDS):
+        done = np.float32(1 + round)  # a pixel of this round is no neighbour in it
+        for y in range(height):
+            for x in range(width):
+                if coarse[y, x, SEEN] > ZERO:
+                    continue
+                count, sx, sy = ZERO, ZERO, ZERO
+                for i in range(max(y - 1, 0), min(y + 2, height)):
+                    for j in range(max(x - 1, 0), min(x + 2, width)):
+                        if ZERO < coarse[i, j, SEEN] <= done:
+                            count += ONE
+                            sx += coarse[i, j, SX]
+                            sy += coarse[i, j, SY]
+                if count > ZERO:
+                    coarse[y, x, SX], coarse[y, x, SY] = sx / count, sy / count
+                    coarse[y, x, SEEN] = done + ONE
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _sharpen(
+    first, last, coarse, factor, left, top, step, scale, texels, shape, pixels, shares,
+    rgba, invented,
+):  # fmt: skip
+    """Rows first..last of `rgba` and `invented`; `pixels`, `shares`: see `_between`."""
+    rows, columns = coarse.shape[:2]
+    row = np.empty(8 * columns, np.float32)
+    down, across, first_texel = shape
+    stride = np.uint64(4 * across)
+    for y in range(first, last):
+        v = (y + HALF) / factor - HALF
+        i = min(max(int(math.floor(v)), 0), rows - 1)
+        t, below = min(max(v - np.float32(i), ZERO), ONE), min(i + 1, rows - 1)
+        for x in range(columns):
+            for c in range(8):
+                row[8 * x + c] = coarse[i, x, c] + t * (coarse[below, x, c] - coarse[i, x, c])
+        for x in range(rgba.shape[1]):
+            one = pixels[x]
+            two = min(one + EIGHT, np.uint64(8 * (columns - 1)))
+            if row[one + A_ON] <= ZERO and row[two + A_ON] <= ZERO:
+                rgba[y, x], invented[y, x] = 0, 0
+                continue
+            r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, shares[x])
+            invented[y, x] = np.uint8((ONE - share) * a * FULL + HALF)
+            if share > ZERO:
+                u = left + np.float32(x) * step + scale * shift_x
+                v = top + np.float32(y) * step + scale * shift_y
+                column, line = np.int64(math.floor(u)), np.int64(math.floor(v))
+                texel = ZERO, ZERO, ZERO, ZERO
+                if 0 <= column < across - 1 and 0 <= line < down - 1:
+                    at = np.uint64(4 * (first_texel + line * across + column))
+                    share_x, share_y = u - np.float32(column), v - np.float32(line)
+                    texel = four_texels(texels, at, stride, share_x, share_y)
+                alpha, rest = texel[3] * min(TWO * a, ONE) * share, ONE - share
+                r, g = rest * r + alpha * texel[0], rest * g + alpha * texel[1]
+                b, a = rest * b + alpha * texel[2], rest * a + alpha
+            rgba[y, x] = (
+                np.uint32(r * FULL + HALF)
+                | np.uint32(g * FULL + HALF) << EIGHT
+                | np.uint32(b * FULL + HALF) << SIXTEEN
+                | np.uint32(a * FULL + HALF) << TWENTY_FOUR
+            )

@@ -1,0 +1,122 @@
+"""The canvas by the processor is what the shaders draw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.blend import CELL
+from app.layers import Layer
+from app.render.scene import Hatch, Scene
+from app.view import View
+from objectmorpher_core.document import Plate
+
+pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
+
+moderngl = pytest.importorskip("moderngl")
+
+SIZE = (203, 151)  # px, of the window; not a multiple of anything
+VIEWPORT = (12, 7, 181, 133)
+PHOTO = (90, 60)
+ROUNDED = 2  # of 255: the shaders round after each layer
+
+
+@pytest.fixture
+def renderer(context, monkeypatch):
+    from app.render.renderer import Renderer
+
+    window = context.framebuffer([context.texture(SIZE, 4)])
+    monkeypatch.setattr(moderngl, "create_context", lambda **_: context)
+    monkeypatch.setattr(context, "_screen", window)
+    yield Renderer("tiles")
+    context.finish()
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """A photo with a plate, a shadow, an object in another light, and a blend with soft edges."""
+    random = np.random.default_rng(4)
+    photo = random.integers(0, 255, (PHOTO[1], PHOTO[0], 3), np.uint8)
+    behind = random.integers(0, 255, (40, 50, 3), np.uint8)
+    plate = Plate(10, 8, behind, np.ones((40, 50), bool), "made")
+    blend = np.zeros((-(-VIEWPORT[3] // CELL), -(-VIEWPORT[2] // CELL)), np.float32)
+    blend[4:28, 6:40] = 1.0
+    blend[8:20, 36:44] = random.random((12, 8), np.float32)
+    shade = np.zeros((20, 24, 4), np.uint8)
+    shade[..., 3] = random.integers(0, 200, (20, 24))
+    item = random.integers(0, 256, (70, 90, 4)).astype(np.uint8)
+    item[10:40, 10:60, 3], item[50:] = 255, 0
+    item[..., :3] = np.minimum(item[..., :3], item[..., 3:])  # premultiplied
+    shades = (Layer((20.3, 14.6, 120.1, 99.7), shade, is_coarse=True),)
+    layers = (Layer((40.0, 30.0, 130.0, 100.0), item, gain=(1.2, 0.9, 0.7)),)
+    return Scene(photo, (0.1, 0.2, 0.3), plate, shades, layers, blend=blend)
+
+
+def _view(zoom: float) -> View:
+    view = View()
+    view.resize(VIEWPORT[2:], 1.0, PHOTO)
+    view.set_zoom(zoom, (45, 30), PHOTO)
+    return view
+
+
+def _shown(renderer, scene: Scene, view: View, is_emulated: bool) -> np.ndarray:
+    """After another picture of the same view: only what stands still is flattened."""
+    renderer._is_emulated = is_emulated
+    for drawn in (Scene(scene.photo, scene.surround), scene):
+        renderer.clear((0.5, 0.5, 0.5), SIZE)
+        renderer.draw(drawn, view, VIEWPORT)
+    return renderer.read(SIZE).astype(int)
+
+
+def _both(renderer, monkeypatch, scene: Scene, view: View) -> tuple[np.ndarray, np.ndarray, int]:
+    """The window by the processor and by the shaders, and how often the first was asked."""
+    from app.render import flattening
+
+    calls = []
+    flatten = flattening.flatten
+    monkeypatch.setattr(flattening, "flatten", lambda *a: calls.append(1) or flatten(*a))
+    flat, drawn = (_shown(renderer, scene, view, emulated) for emulated in (True, False))
+    return flat, drawn, len(calls)
+
+
+@pytest.mark.parametrize("zoom", [0.7, 1.0, 1.9, 6.0])
+def test_both_draw_the_same(renderer, monkeypatch, scene: Scene, zoom: float) -> None:
+    flat, drawn, calls = _both(renderer, monkeypatch, scene, _view(zoom))
+    assert calls == 1
+    assert np.abs(flat - drawn).max() <= ROUNDED
+    assert len(np.unique(flat.reshape(-1, 3), axis=0)) > 1000  # not of one colour
+
+
+def test_pixels_that_are_not_there_yet_are_hatched(renderer, monkeypatch, scene: Scene) -> None:
+    mask = np.zeros(PHOTO[::-1], bool)
+    mask[10:50, 20:70] = True
+    hatched = replace(scene, plate=None, mask=mask, hatch=Hatch((0.5, 0.5, 0.5), 0.35, 0.25))
+    flat, drawn, calls = _both(renderer, monkeypatch, hatched, _view(1.9))
+    assert calls == 1
+    assert np.abs(flat - drawn).max() <= ROUNDED
+
+
+def test_what_it_cannot_draw_is_left_to_the_shaders(renderer, monkeypatch, scene: Scene) -> None:
+    item = scene.layers[0]
+    marked = replace(item, invented=np.full(item.rgba.shape[:2], 99, np.uint8))
+    others = [
+        replace(scene, split=0.5),
+        replace(scene, paper=((0.1,) * 3, (0.2,) * 3)),
+        replace(scene, layers=(marked,), marks=Hatch((1.0, 0.7, 0.0))),
+        replace(scene, layers=(replace(item, is_tint=True),)),
+        replace(scene, blend=None),
+    ]
+    for other in others:
+        _, _, calls = _both(renderer, monkeypatch, other, _view(1.9))
+        assert calls == 0
+
+
+def test_another_background_is_seen_at_once(renderer, monkeypatch, scene: Scene) -> None:
+    assert scene.plate is not None
+    view = _view(1.9)
+    _shown(renderer, scene, view, True)
+    other = replace(scene, plate=replace(scene.plate, pixels=255 - scene.plate.pixels))
+    flat, drawn, _ = _both(renderer, monkeypatch, other, view)
+    assert np.abs(flat - drawn).max() <= ROUNDED

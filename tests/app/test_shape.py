@@ -1,0 +1,60 @@
+"""What a drag needs is ready before the pointer is pressed, and was made beside the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from conftest import open_file, wait_for_jobs
+
+from app.editor import Editor
+from app.shape import Shape, build_shape, rehearse
+from objectmorpher_core import edits
+from objectmorpher_core.document import DeformSettings, Document
+from objectmorpher_core.session_file import save_session
+
+
+def _shape(editor: Editor) -> Shape:
+    assert editor.document is not None and editor.object is not None
+    return editor.derived.shape(editor.document.photo, editor.object)
+
+
+def _has_deformer(shape: Shape) -> bool:
+    return vars(shape.puppet)["_deformer"] is not None
+
+
+def test_a_lifted_object_is_made_ready(editor: Editor, ball: Document) -> None:
+    soft = edits.set_deform(ball, 0, DeformSettings(stiffness=0.7))
+    editor.start(soft)
+    shape = _shape(editor)
+    assert not _has_deformer(shape)  # not at once: the window would stand still
+    wait_for_jobs(editor)
+    assert _has_deformer(shape)
+    assert _shape(editor) is shape
+
+
+def test_a_session_is_ready_when_it_is_shown(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    path = tmp_path / "ball.omorph"
+    save_session(ball, path)
+    open_file(editor, path)
+    shape = _shape(editor)
+    assert shape.is_rehearsed and _has_deformer(shape)
+
+
+def test_a_rehearsal_changes_nothing(ball: Document) -> None:
+    """The solver that a drag goes on with is not the one that rehearsed."""
+    thing = ball.objects[0]
+    assert thing.lifted is not None
+    point = thing.lifted.control_points[0].astype(np.float64)
+    handled = edits.add_handle(ball, 0, point, point + 0.1).objects[0]
+    poses = []
+    for is_rehearsed in (False, True):
+        shape = build_shape(ball.photo, thing)
+        deformer = shape.puppet.deformer
+        first = deformer.solve(handled.handles)
+        if is_rehearsed:
+            rehearse(ball.photo, thing, shape)
+        poses.append(deformer.solve(handled.handles, start=first.pose).pose)
+    np.testing.assert_array_equal(poses[0].points, poses[1].points)
