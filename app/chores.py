@@ -117,7 +117,14 @@ class Chores:
             chore.done(value)
         else:
             value.write_log(chore.title)
-            chore.failed(value)
+            chore.failed(value.retried_by(lambda: self._again(chore)))
+
+    def _again(self, chore: Chore) -> None:
+        """The request of a chore that failed, once more."""
+        self.start(
+            chore.title, chore.function, kind=chore.kind, done=chore.done, failed=chore.failed,
+            cancelled=chore.cancelled, is_quiet=chore.is_quiet,
+        )  # fmt: skip
 
     def _work(self, chore: Chore) -> None:
         """In the thread."""

@@ -204,7 +204,7 @@ class Derived:
         `start` and few `seconds` give a drag's frame; without, the solve is complete.
         """
         thing = document.objects[k]
-        if not thing.handles:
+        if not thing.handles and thing.rig.shifts is None:
             return edits.set_pose(document, k, None)
         deformer = self.shape(document.photo, thing).puppet.deformer
         solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, seconds)

@@ -124,14 +124,15 @@ class Editor:
 
     # Saying things
 
-    def say(self, text: str) -> None:
-        self.message = Message(text)
+    def say(self, text: str, action: Action | None = None) -> None:
+        self.message = Message(text, action=action)
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
         self.message = Message(sentence(text), is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
+        """A job that failed; where another try may help there is a button for it."""
         retry = Action(t("Retry"), error.retry) if error.retry else None
         self.complain(error.sentence, error.trace, retry)
 
@@ -154,6 +155,7 @@ class Editor:
         self.jobs.cancel(patience=RELUCTANCE)
         self.chores.cancel(OPEN)
         self.exporting.close()
+        self.objects.carried = None
         self.tasks.forget()
         self.composing.forget()
         self.history = self.preview = self.path = self.source = None
@@ -218,7 +220,9 @@ class Editor:
         """Takes back the stroke; without one, ends what runs; else deselects."""
         if self.hand.abort(self):
             return
-        if self.tasks.question is not None:
+        if self.objects.carried is not None:
+            self.objects.carried = None
+        elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
             self.posing.select(None)

@@ -37,3 +37,4 @@ class Hover:
     is_pin: bool = False  # a click would set a pin
     part: str | None = None  # of the Place tool's frame
     place: tuple[float, float] | None = None  # image px, where a click would select something
+    other: int | None = None  # index of the object that a click would make the current one

@@ -180,7 +180,7 @@ class Filing:
                 self.guard(lambda: show(*answer))
 
         def fail(error: JobError) -> None:
-            editor.complain(error.sentence, "" if error.is_expected else error.trace)
+            editor.complain_of(replace(error, trace="") if error.is_expected else error)
 
         editor.chores.start(
             t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,

@@ -7,6 +7,7 @@ newest request counts. Cancelling asks first and ends the process a little later
 
 from __future__ import annotations
 
+import errno
 import importlib
 import logging
 import math
@@ -32,6 +33,8 @@ RELUCTANCE = 2.0  # s, where nobody waits: a new process has to read the photo a
 OURS = ("app", "objectmorpher_core")  # packages
 TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
+# What the system says of a wrong request: no other try makes it right.
+LASTING = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL)
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class JobError:
     trace: str  # for "Details" and the log
     retry: Callable[[], None] | None = None  # asks for the same once more, where that may help
     is_expected: bool = False  # one of our own errors: the request was at fault, not the program
+    may_pass: bool = False  # the machine was at fault: the same may succeed on another try
 
     @classmethod
     def of(cls, error: Exception, what: str) -> JobError:
@@ -52,7 +56,14 @@ class JobError:
         is_ours = type(error).__module__.partition(".")[0] in OURS
         is_expected = is_ours and isinstance(error, ValueError)
         sentence = str(error) or f"{what} failed ({name})"
-        return cls(name, sentence, traceback.format_exc(), is_expected=is_expected)
+        return cls(
+            name, sentence, traceback.format_exc(),
+            is_expected=is_expected, may_pass=_may_pass(error),
+        )  # fmt: skip
+
+    def retried_by(self, again: Callable[[], None]) -> JobError:
+        """The same error, with `again` as its remedy if another try may help."""
+        return replace(self, retry=again) if self.may_pass else self
 
     def write_log(self, title: str) -> None:
         """That what is called `title` failed: an error of the program's, unless it was expected."""
@@ -275,7 +286,7 @@ class Jobs:
             self._finish(job, job.cancelled)
         elif what == "failed":
             value.write_log(job.title)
-            self._finish(job, lambda: job.failed(value))
+            self._finish(job, lambda: job.failed(value.retried_by(lambda: self._again(job))))
         else:
             level = logging.DEBUG if job.is_quiet else logging.INFO
             log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
@@ -289,8 +300,8 @@ class Jobs:
             self._finish(job, job.cancelled)
         elif job is not None:
             sentence = f"{job.title} stopped: the worker process ended unexpectedly"
-            error = JobError("Crash", sentence, sentence, lambda: self._again(job))
-            self._finish(job, lambda: job.failed(error))
+            error = JobError("Crash", sentence, sentence, may_pass=True)
+            self._finish(job, lambda: job.failed(error.retried_by(lambda: self._again(job))))
         if self._worker is not None:
             self.restarted()
 
@@ -300,6 +311,18 @@ class Jobs:
         if not is_replaced:  # a replaced request is not the user's question any more
             tell()
         self._send_next()
+
+
+def _may_pass(error: BaseException | None) -> bool:
+    """Whether the system failed, and not for good: a full disk, a lost drive, too little memory.
+
+    An error without a number is not the system's: Pillow calls a broken picture an OSError.
+    """
+    if error is None or isinstance(error, MemoryError):
+        return error is not None
+    if isinstance(error, OSError) and error.errno is not None and error.errno not in LASTING:
+        return True
+    return _may_pass(error.__cause__)
 
 
 def _accept(job: Job, value: Any) -> None:

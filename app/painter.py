@@ -29,19 +29,24 @@ LEAST = 0.02  # of a pixel that something new covers: with less it counts as unc
 
 @dataclass(frozen=True)
 class Shares:
-    """Where the changed pixels come from; they sum to 1, or are 0 where nothing changed."""
+    """Where the changed pixels come from; these sum to 1, or are 0 where nothing changed."""
 
     from_photo: float = 0.0
     from_lifter: float = 0.0
     from_inpainter: float = 0.0
+    changed: float = 0.0  # of all pixels of the photo
 
 
 def shown_now(document: Document | None, view: View) -> Shown:
-    """The view that was chosen, as soon as there is an object for it; selecting needs the photo."""
+    """The view that was chosen, as soon as there is an object for it; selecting needs the photo,
+    and from elsewhere than the photo's view the composite's object is alone."""
     if document is None or not any(o.lifted for o in document.objects):
         return Shown.COMPOSITE
     if view.tool in (ToolName.SELECT, ToolName.MASK):
         return Shown.COMPOSITE
+    is_orbiting = view.tool is ToolName.LOOK and view.orbit is not None
+    if is_orbiting and view.shown is Shown.COMPOSITE:
+        return Shown.OBJECT
     return view.shown
 
 
@@ -121,6 +126,14 @@ class Painter:
         """
         return self._shares(lambda: _count_shares(self._derived, document), document)
 
+    def count_changed(self, document: Document) -> int:
+        """About how many pixels of the photo the edit changes: two figures of the number."""
+        if not any(o.is_moved for o in document.objects):
+            return 0
+        width, height = document.photo.size
+        count = round(self.shares(document).changed * width * height)
+        return round(count, 2 - len(str(count)))
+
 
 def _measured(objects: list[PosedSplats]) -> paint.DepthRange:
     """Of the sides that face the camera: backs are not seen."""
@@ -159,4 +172,5 @@ def _count_shares(derived: Derived, document: Document) -> Shares:
         return Shares()
     by_lifter = float((lifted * edited)[is_changed].mean())
     by_inpainter = float((inpainted * edited)[is_changed].mean())
-    return Shares(1 - by_lifter - by_inpainter, by_lifter, by_inpainter)
+    changed = float(is_changed.mean())
+    return Shares(1 - by_lifter - by_inpainter, by_lifter, by_inpainter, changed)

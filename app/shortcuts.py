@@ -8,7 +8,8 @@ from .commands import COMMANDS, keys_of
 from .editor import Editor
 from .texts import t
 
-FIXED = ("Escape", "Left", "Right", "Up", "Down", "X", "Space", "?")  # have a meaning everywhere
+# What has a meaning everywhere.
+FIXED = ("Escape", "Enter", "Left", "Right", "Up", "Down", "X", "Space", "?")
 
 
 class Shortcuts:

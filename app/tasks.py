@@ -7,7 +7,7 @@ the mask of a document never change, they are replaced.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document, LiftedObject, Matte, Photo, Plate, Prompt
 
 from . import job_functions
+from .feedback import Action
 from .job_functions import Choice, Cut
 from .jobs import JobError
 from .layers import Rendered, Request
@@ -105,12 +106,13 @@ class Tasks:
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
             Choice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=self._fail_segment, cancelled=self._drop_question, kind=SELECT,
+            done=accept, failed=lambda error: self._fail_segment(error, question),
+            cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
 
-    def _fail_segment(self, error: JobError) -> None:
+    def _fail_segment(self, error: JobError, question: Question) -> None:
         self._drop_question()
-        self._editor.complain_of(error)
+        self._editor.complain_of(error.retried_by(lambda: self.segment(question)))
 
     def _drop_question(self) -> None:
         self.question = None
@@ -189,12 +191,18 @@ class Tasks:
 
         def say_so() -> None:
             if self._no_plate is not None and same(self._no_plate, masks):
-                editor.say(t("The background behind the object is not filled in"))
+                fill_in = Action(t("Fill in"), self.fill_background)
+                editor.say(t("The background behind the object is not filled in"), fill_in)
+
+        def fail(error: JobError) -> None:
+            """Nothing else leads to a background: whatever it was, there is another try."""
+            retry = None if error.is_expected else self.fill_background
+            editor.complain_of(replace(error, retry=retry))
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
-            done=accept, failed=editor.complain_of, cancelled=say_so, kind=PLATE,
+            done=accept, failed=fail, cancelled=say_so, kind=PLATE,
         )  # fmt: skip
 
     def fill_background(self) -> None:
@@ -232,7 +240,10 @@ class Tasks:
                 if then is not None:
                     then()
 
+        def fail(error: JobError) -> None:
+            editor.complain_of(error.retried_by(lambda: self.save(path, then)))  # as it is by then
+
         editor.jobs.start(
             t("Saving {name}", name=path.name), job_functions.write_session, document, path,
-            done=accept, failed=editor.complain_of, kind=f"{WRITE} {path}",
+            done=accept, failed=fail, kind=f"{WRITE} {path}",
         )  # fmt: skip

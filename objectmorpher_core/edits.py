@@ -196,6 +196,41 @@ def make_body(document: Document, k: int, nodes: np.ndarray) -> Document:
     return set_rig(document, k, replace(rig, bodies=bodies))
 
 
+def freeze(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points `nodes` of object `k` stay where they are now, whatever is dragged."""
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before saying how its parts move")
+    rig, rest = item.rig, item.lifted.control_points.astype(np.float64)
+    places = rig.held_at(rest)
+    places[nodes] = rest[nodes] if item.pose is None else item.pose.points[nodes]
+    old = np.empty(0, np.int32) if rig.held is None else rig.held
+    return set_rig(document, k, _with_held(rig, np.union1d(old, nodes), places - rest))
+
+
+def thaw(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points `nodes` of object `k` are frozen no more."""
+    item = document.objects[k]
+    if item.lifted is None or item.rig.held is None:
+        return document
+    left = np.setdiff1d(item.rig.held, nodes)
+    rest = item.lifted.control_points.astype(np.float64)
+    return set_rig(document, k, _with_held(item.rig, left, item.rig.held_at(rest) - rest))
+
+
+def _with_held(rig: Rig, held: np.ndarray, shifts: np.ndarray) -> Rig:
+    """The rig with these frozen control points; `shifts` (M, 3) of all from rest."""
+    own = shifts[held]
+    return replace(rig, held=held if len(held) else None, shifts=own if own.any() else None)
+
+
+def reset_pose(document: Document, k: int) -> Document:
+    """Object `k` in the shape of the photo, without handles; what is frozen is so at rest."""
+    item = document.objects[k]
+    rig = item.rig if item.rig.shifts is None else replace(item.rig, shifts=None)
+    return document.with_object(k, replace(item, handles=(), rig=rig, pose=None))
+
+
 def resample(document: Document, k: int, count: int) -> Document:
     """Object `k` with `count` control points. Handles and rig go to the new ones; no pose.
 

@@ -9,7 +9,9 @@ from ..view import ToolName
 from . import compose, edit, files, look, objects, place, pose, select, window
 from .command import Command
 
-__all__ = ["COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "why_not"]
+__all__ = [
+    "COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "take_next_step", "why_not",
+]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
     "File": files.COMMANDS,
@@ -45,6 +47,17 @@ def run(editor: Editor, name: str) -> None:
 def keys_of(editor: Editor, name: str) -> str:
     """The keys that run a command: the user's own, or the usual ones; "" for none."""
     return editor.settings.shortcuts.get(name, COMMANDS[name].keys)
+
+
+def take_next_step(editor: Editor) -> None:
+    """What the primary button does; where it only says what to do, a click on what is marked."""
+    name = next_step(editor)[1]
+    if editor.hand.is_busy:
+        return
+    if name is not None:
+        run(editor, name)
+    elif editor.candidates.shown is not None and editor.hover.place is not None:
+        editor.selection.add_click(*editor.hover.place, is_foreground=True)
 
 
 def next_step(editor: Editor) -> tuple[str, str | None]:

@@ -13,6 +13,8 @@ from .command import Command, no_lift, no_photo, nothing_lifted
 def _show(shown: Shown, number: int) -> Command:
     def run(editor: Editor) -> None:
         editor.view.shown = shown
+        if shown is Shown.COMPOSITE:  # which there is from the photo's view only
+            editor.looking.reset()
 
     def is_on(editor: Editor) -> bool:
         return shown_now(editor.document, editor.view) is shown

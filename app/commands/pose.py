@@ -13,6 +13,11 @@ def no_handles(editor: Editor) -> str | None:
     return no_lift(editor) or (None if is_there else t("There is no handle yet"))
 
 
+def _no_pose(editor: Editor) -> str | None:
+    is_posed = editor.object is not None and editor.object.pose is not None
+    return None if is_posed else no_handles(editor)
+
+
 def _toggle_ring(editor: Editor) -> None:
     editor.view.pose.has_ring = not editor.view.pose.has_ring
 
@@ -41,7 +46,7 @@ COMMANDS: dict[str, Command] = {
     ),
     "reset_handle": Command("Reset handle", "", _send_back, no_handle),
     "reset_handles": Command("Reset all handles", "", _send_all_back, no_handles),
-    "reset_pose": Command("Reset pose", "", lambda e: e.posing.reset(), no_handles),
+    "reset_pose": Command("Reset pose", "", lambda e: e.posing.reset(), _no_pose),
     "ring": Command(
         "Rotation ring", "R", _toggle_ring, no_lift, lambda e: e.view.pose.has_ring
     ),

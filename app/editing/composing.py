@@ -17,6 +17,7 @@ from objectmorpher_core.joining import Shadow
 
 from .. import job_functions
 from ..job_functions import Choice, Variant
+from ..jobs import JobError
 from ..layers import Layer
 from ..memo import same
 from ..tasks import PLATE
@@ -181,13 +182,17 @@ class Composing:
         if not stroke.coverage[y0:y1, x0:x1].any():
             return
         if not self._is_restoring:
-            self._waiting.append(stroke)
-            if len(self._waiting) == 1:
-                self._ask_repair()
+            self._enqueue(stroke)
             return
         plate = restored(document, patch_of(document, stroke.coverage, stroke.box))
         if plate is not document.plate:
             editor.apply(t("Restore background"), edits.set_plate(document, plate))
+
+    def _enqueue(self, stroke: Stroke) -> None:
+        """One after the other."""
+        self._waiting.append(stroke)
+        if len(self._waiting) == 1:
+            self._ask_repair()
 
     def _ask_repair(self) -> None:
         """For the first stroke that waits, on the background as it is now."""
@@ -204,9 +209,9 @@ class Composing:
         def accept(answer: tuple[Patch, str]) -> None:
             self._ready.append(lambda: self._take_repair(asked, *answer))
 
-        def fail(error: object) -> None:
-            editor.complain_of(error)  # type: ignore[arg-type]
+        def fail(error: JobError) -> None:
             self._waiting = []
+            editor.complain_of(error.retried_by(lambda: self._enqueue(stroke)))
 
         def drop() -> None:
             self._waiting = []

@@ -256,7 +256,8 @@ class Exporting:
         editor.jobs.start(
             t("Exporting {name}", name=name), write_export, document, plan,
             done=lambda _: editor.say(t("Exported {name}", name=name)),
-            failed=editor.complain_of, kind=f"{WRITE} {plan.path}",
+            failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
+            kind=f"{WRITE} {plan.path}",
         )  # fmt: skip
 
 

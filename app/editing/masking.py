@@ -158,15 +158,16 @@ class Masking:
         editor.jobs.start(
             t("Changing the selection"), job_functions.change_mask,
             thing.selection, change.function,
-            done=accept, failed=self._fail, cancelled=self._forget, kind=CHANGE,
+            done=accept, failed=lambda error: self._fail(error, change),
+            cancelled=self._forget, kind=CHANGE,
         )  # fmt: skip
 
     def _forget(self) -> None:
         self._waiting.clear()
 
-    def _fail(self, error: JobError) -> None:
+    def _fail(self, error: JobError, change: Change) -> None:
         self._forget()
-        self._editor.complain_of(error)
+        self._editor.complain_of(error.retried_by(lambda: self._enqueue(change)))
 
     # Files
 

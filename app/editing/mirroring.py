@@ -101,7 +101,7 @@ class Mirroring:
         tree = self._editor.derived.facts.surface(thing.lifted).tree
         point = np.asarray(tree.data)[tree.query(plane.mirrored(handle.point))[1]]
         node = edits.nearest_control_point(thing.lifted, point)
-        if node == handle.control_point:
+        if node == handle.control_point or thing.rig.is_held(node):
             return document, None
         found = _handle_near(thing, point, node, handle)
         if found is None:

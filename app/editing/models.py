@@ -11,6 +11,7 @@ from objectmorpher_core.models import State, Weight
 from objectmorpher_core.progress import Progress
 
 from .. import job_functions
+from ..feedback import Action
 from ..jobs import JobError
 from ..texts import t
 
@@ -84,7 +85,7 @@ class Models:
 
         editor.chores.start(
             t("Downloading {name}", name=names_of(id).name), fetch, kind=DOWNLOAD,
-            done=accept, failed=self._complain, cancelled=self.look,
+            done=accept, failed=lambda error: self._complain(error, id), cancelled=self.look,
         )  # fmt: skip
 
     def cancel(self) -> None:
@@ -100,8 +101,9 @@ class Models:
     def _take(self, states: tuple[State, ...]) -> None:
         self.states = states
 
-    def _complain(self, error: JobError) -> None:
-        self._editor.complain(error.sentence)
+    def _complain(self, error: JobError, id: str) -> None:
+        """Whatever it was: networks come back, disks are cleared, indexes are mended."""
+        self._editor.complain(error.sentence, action=Action(t("Retry"), lambda: self.download(id)))
 
     def _use_anew(self) -> None:
         """The worker chooses its segmenter again, and reads the photo with it."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document
@@ -22,6 +25,7 @@ class Objects:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.renaming: int | None = None  # whose name is being typed
+        self.carried: int | None = None  # whose row is being dragged up or down the list
 
     def start_another(self) -> None:
         """The next click selects another object."""
@@ -34,12 +38,23 @@ class Objects:
 
     def choose(self, k: int) -> None:
         """The tools change object `k` now."""
+        self._editor.hand.abort(self._editor)
+        self.take(k)
+
+    def take(self, k: int) -> Callable[[], None]:
+        """As `choose`, for a stroke in progress; what is returned takes it back."""
         editor = self._editor
-        editor.hand.abort(editor)
+        before, selected = editor.current, editor.posing.selected
+
+        def restore() -> None:
+            editor.current = before
+            editor.posing.select(*selected)
+
         editor.current = k
         editor.posing.select(None)
         if not editor.is_lifted:
             editor.view.tool = ToolName.SELECT
+        return restore
 
     def follow(self, before: Document) -> None:
         """After a step back or forth: the tools change the object that the step changed."""
@@ -64,7 +79,7 @@ class Objects:
     def forget_lost(self) -> None:
         """After a step back: another object is current where the current one is not there."""
         editor = self._editor
-        self.renaming = None
+        self.renaming = self.carried = None
         is_selecting = editor.view.tool in (ToolName.SELECT, ToolName.MASK)
         if editor.document is not None and not is_selecting:
             editor.current = max(min(editor.current, len(editor.document.objects) - 1), 0)
@@ -103,6 +118,27 @@ class Objects:
         self.choose(max(min(k, len(left.objects) - 1), 0))
         editor.say(t("{name} is not edited any more", name=name))
 
+    def other_at(self, canvas_xy: np.ndarray) -> int | None:
+        """Another lifted object that is in front of all at canvas px; None where the current is."""
+        editor, document = self._editor, self._editor.document
+        order = self.order()
+        if document is None or len(order) < 2:
+            return None
+        for k in reversed(order):
+            is_there = k == editor.current or document.objects[k].is_visible
+            if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return None if k == editor.current or self._is_over_current(k) else k
+        return None
+
+    def _is_over_current(self, k: int) -> bool:
+        """Whether object `k` is a copy exactly where the current one is: nobody sees which."""
+        editor = self._editor
+        assert editor.document is not None
+        other, own = editor.document.objects[k], editor.object
+        return own is not None and all(
+            (other.lifted is own.lifted, other.pose is own.pose, other.placement == own.placement)
+        )
+
     # Which covers which
 
     def order(self) -> list[int]:
@@ -140,15 +176,50 @@ class Objects:
 
     def raise_by(self, steps: int, label: str) -> None:
         """Takes the current object past so many others, to the front or (negative) to the back."""
+        order, k = self.order(), self._editor.current
+        self._put(k, min(max(order.index(k) + steps, 0), len(order) - 1), label)
+
+    def _put(self, k: int, place: int, label: str) -> None:
+        """Object `k` to a place of `order`."""
         from objectmorpher_core.compose.order import reordered
 
         editor = self._editor
         if editor.document is None or editor.hand.is_busy:
             return
-        order, k = self.order(), editor.current
-        place = min(max(order.index(k) + steps, 0), len(order) - 1)
+        order = self.order()
         order.remove(k)
         order.insert(place, k)
         document = editor.document
         posed = partial(editor.derived.posed, document)
         editor.apply(label, reordered(document, k, order, posed))
+
+    # A row of the list that is dragged
+
+    def carry(self, k: int) -> bool:
+        """Takes up object `k`'s row; whether it has a place among others."""
+        order = self.order()
+        if k in order and len(order) > 1 and not self._editor.hand.is_busy:
+            self.carried = k
+        return self.carried is not None
+
+    def landing(self, gap: int) -> int | None:
+        """Above which row of the list the carried one would land, let go nearest above row `gap`.
+
+        None where nothing is carried, or it would stay where it is.
+        """
+        shown, order = self.listed(), self.order()
+        if self.carried not in order:
+            return None
+        gap = min(max(gap, len(shown) - len(order)), len(shown))  # what has no shape is above
+        return None if gap - shown.index(self.carried) in (0, 1) else gap
+
+    def drop(self, gap: int) -> None:
+        """Lets the carried row go: its object, now the current one, is before those below it."""
+        k, landing = self.carried, self.landing(gap)
+        self.carried = None
+        if k is None:
+            return
+        self.choose(k)
+        if landing is not None:
+            below = [other for other in self.listed()[landing:] if other != k]
+            self._put(k, len(below), t("Change the order"))

@@ -143,6 +143,9 @@ class Posing:
                 self.select(*others, h)
                 editor.preview = editor.document
                 return h
+        if item.rig.is_held(nearest):
+            editor.say(_frozen())
+            return None
         target = editor.derived.unplaced(editor.document, k, seen.world)
         changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
         added = len(item.handles)
@@ -175,6 +178,9 @@ class Posing:
         changed, k = editor.document, editor.current
         if changed is None or editor.object is None:
             return
+        places = {h: place for h, place in places.items() if not self._is_frozen(h)}
+        if not places:
+            return
         try:
             for h, place in places.items():
                 target = editor.derived.unplaced(changed, k, place)
@@ -187,12 +193,20 @@ class Posing:
     def turn(self, handle: int, start: F64, turn: F64) -> None:
         """Previews the handle turned from `start` (3,), object frame, by `turn` (3,), world."""
         editor = self._editor
-        if editor.document is None or editor.object is None:
+        if editor.document is None or editor.object is None or self._is_frozen(handle):
             return
         k = editor.current
         own = editor.derived.facts.turn_of(editor.document, k).T @ turn
         changed = edits.turn_handle(editor.document, k, handle, turned_by(start, own))
         self.change(self.mirroring.followed(changed, (handle,)))
+
+    def _is_frozen(self, handle: int) -> bool:
+        """Whether a handle is on a frozen part, which moves for nobody; says so."""
+        thing = self._editor.object
+        is_frozen = thing is not None and thing.rig.is_held(thing.handles[handle].control_point)
+        if is_frozen:
+            self._editor.say(_frozen())
+        return is_frozen
 
     def change(self, changed: Document) -> None:
         """Previews the handles of `changed`, solved for from the pose that is shown."""
@@ -279,10 +293,12 @@ class Posing:
     def reset(self) -> None:
         """The object's shape as it was in the photo, without handles."""
         editor = self._editor
-        document, k = editor.document, editor.current
-        if document is None or editor.object is None or not editor.object.handles:
+        document, thing = editor.document, editor.object
+        if document is None or thing is None or not (thing.handles or thing.pose):
             return
-        for h in reversed(range(len(editor.object.handles))):
-            document = edits.remove_handle(document, k, h)
         self.select(None)
-        editor.apply(t("Reset pose"), edits.set_pose(document, k, None))
+        editor.apply(t("Reset pose"), edits.reset_pose(document, editor.current))
+
+
+def _frozen() -> str:
+    return t("This part is frozen: erase that with the Freeze brush before moving it")

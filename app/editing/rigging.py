@@ -11,7 +11,7 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64, I32, Mask
-from objectmorpher_core.document import Document
+from objectmorpher_core.document import Document, Pose
 from objectmorpher_core.rig import Rig
 
 from ..pose_view import PoseMode
@@ -90,16 +90,21 @@ class Rigging:
         """Freezes, stiffens or groups control points; or takes that back."""
         if len(nodes) == 0:
             return
-        if is_erasing:
+        if kind is PoseMode.FREEZE:
+            edit = edits.thaw if is_erasing else edits.freeze
+            self._hold(t("Erase") if is_erasing else t("Freeze"), edit, nodes)
+        elif is_erasing:
             self._set(t("Erase"), _erased(self.rig, kind, nodes, self._count))
-        elif kind is PoseMode.FREEZE:
-            held = np.empty(0, np.int32) if self.rig.held is None else self.rig.held
-            self._set(t("Freeze"), replace(self.rig, held=np.union1d(held, nodes)))
         elif kind is PoseMode.STIFFEN:
             value = self._editor.view.pose.stiffness
             self._set(t("Stiffen"), _stiffened(self.rig, nodes, value, self._count))
         else:
             self._group(nodes)
+
+    def _hold(self, label: str, edit: Callable[..., Document], nodes: I32) -> None:
+        """Freezes or thaws; the pose goes on from what is seen, so that nothing jumps."""
+        thing = self._editor.object
+        self._apply(label, edit, nodes, start=None if thing is None else thing.pose)
 
     def _group(self, nodes: I32) -> None:
         """A group of its own, or more of the group that the stroke began on."""
@@ -157,6 +162,9 @@ class Rigging:
     def remove(self, region: Region) -> None:
         """Takes back what was said about a region."""
         rig = self.rig
+        if region.kind is PoseMode.FREEZE:
+            self._hold(t("Remove region"), edits.thaw, region.nodes)
+            return
         if region.seam >= 0:
             seams = tuple(s for i, s in enumerate(rig.seams) if i != region.seam)
             rig = replace(rig, seams=seams)
@@ -187,7 +195,9 @@ class Rigging:
     def _set(self, label: str, rig: Rig) -> None:
         self._apply(label, edits.set_rig, rig)
 
-    def _apply(self, label: str, edit: Callable[..., Document], *arguments: Any) -> None:
+    def _apply(
+        self, label: str, edit: Callable[..., Document], *arguments: Any, start: Pose | None = None
+    ) -> None:
         """One step by an edit of the object, with the same handles at the same places."""
         editor = self._editor
         if editor.document is None:
@@ -197,7 +207,7 @@ class Rigging:
         except edits.EditError as error:
             editor.complain(str(error))
             return
-        editor.apply(label, editor.derived.solved(changed, editor.current, None))
+        editor.apply(label, editor.derived.solved(changed, editor.current, start))
 
 
 def gaps_to_way(points: F64, way: F64) -> F64:
@@ -229,8 +239,5 @@ def _erased(rig: Rig, kind: PoseMode, nodes: I32, count: int) -> Rig:
     if kind is PoseMode.STIFFEN:
         return _stiffened(rig, nodes, USUAL, count)
     gone = _is_in(nodes, count)
-    if kind is PoseMode.FREEZE:
-        left = None if rig.held is None else rig.held[~gone[rig.held]]
-        return replace(rig, held=left if left is not None and len(left) else None)
     bodies = (body[~gone[body]] for body in rig.bodies)
     return replace(rig, bodies=tuple(body for body in bodies if len(body) > 1))

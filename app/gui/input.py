@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ..commands import run
+from ..commands import run, take_next_step
 from ..editor import Editor
 from ..feedback import Hover
 from ..shortcuts import Shortcuts
@@ -109,6 +109,8 @@ class Input:
             editor.view.popup = None
         elif keys == "Escape":
             editor.escape()
+        elif keys == "Enter" and editor.view.popup is None:
+            take_next_step(editor)
         elif keys == HELP:
             run(editor, "shortcuts")
         elif direction is not None:
@@ -152,7 +154,8 @@ class Input:
     def _hover(self, tool: Tool, editor: Editor, pointer: Pointer) -> None:
         """Looks under the pointer anew only where it, the view or the document changed."""
         view = editor.view
-        key = (tool, pointer, editor.document, view.left, view.top, view.zoom, view.tool)
+        place = (view.left, view.top, view.zoom)
+        key = (tool, pointer, editor.document, editor.current, view.tool, *place)
         if self._hovered is None or any(
             a is not b and a != b for a, b in zip(key, self._hovered, strict=True)
         ):

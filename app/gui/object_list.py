@@ -1,4 +1,7 @@
-"""The photo's objects, what is in front first: choose, name, hide, copy, remove, reorder."""
+"""The photo's objects, what is in front first: choose, name, hide, copy, remove, reorder.
+
+A row that is dragged up or down lands where the line is.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,14 @@ from imgui_bundle import ImVec2, imgui
 from ..commands import COMMANDS, keys_of, run, why_not
 from ..editor import Editor
 from ..texts import t
+from .landmarks import mark
 from .rows import end_row, fill_row, text_top
 from .theme import SMALL_SIZE, Icon, theme
 from .widgets import Kind, button, heading, icon_button, note
 
 ROW = 32.0  # points
-BETWEEN = 12.0  # rows
+BETWEEN = 12.0  # points from a row to the next
+SLACK = 4.0  # points; a press that moves less is a click
 SIDE = 24.0  # of the buttons beside the title
 NAME = 34.0  # from the row's left to the name
 BUTTONS = (
@@ -31,6 +36,7 @@ class _Typing:
 
 
 _typing = _Typing()
+_is_dragged = False  # the mouse has taken up a row; also after Esc, until it lets go
 
 
 def draw_objects(editor: Editor) -> None:
@@ -39,8 +45,11 @@ def draw_objects(editor: Editor) -> None:
     _draw_title(editor, has_buttons=bool(shown))
     if not shown:
         note(t("Click something in the photo."))
+    top = imgui.get_cursor_screen_pos()
     for k in shown:
         _draw_object(editor, k)
+    if _is_dragged:
+        _drag_row(editor, top)
     if editor.object is not None and editor.is_lifted:
         imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
         if button(f"{Icon.PLUS}  {t('Another object')}", Kind.QUIET):
@@ -77,7 +86,7 @@ def _draw_object(editor: Editor, k: int) -> None:
     end = ImVec2(start.x + width, start.y + height)
     is_hovered = _take_clicks(editor, k, ImVec2(width, height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
-    fill_row(start, end, is_current, is_hovered)
+    fill_row(start, end, is_current, is_hovered or k == editor.objects.carried)
     middle = text_top(start, height)
     icon = Icon.CUBE if thing.lifted else Icon.SELECT
     role = "accent" if is_current else "secondary"
@@ -94,14 +103,41 @@ def _draw_object(editor: Editor, k: int) -> None:
     end_row(start, ROW, BETWEEN)
 
 
+def _drag_row(editor: Editor, top: ImVec2) -> None:
+    """The line where the carried row would land; the rows begin at `top`. The release drops it."""
+    global _is_dragged
+    height = theme.pt(ROW + BETWEEN)
+    gap = round((imgui.get_mouse_pos().y - top.y) / height)
+    if not imgui.is_mouse_down(0):
+        _is_dragged = False
+        editor.objects.drop(gap)
+        return
+    landing = editor.objects.landing(gap)
+    if editor.objects.carried is not None:
+        imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ns)
+    if landing is not None:
+        width = imgui.get_content_region_avail().x
+        y = top.y + landing * height - theme.pt(BETWEEN) / 2
+        ends = ImVec2(top.x, y), ImVec2(top.x + width, y)
+        imgui.get_window_draw_list().add_line(*ends, theme.u32("accent"), theme.pt(2))
+
+
 def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
-    """A click chooses the row, a double click begins to name it; whether it is hovered."""
+    """A click chooses the row, a double click begins to name it, a drag takes it up.
+
+    Whether it is hovered.
+    """
+    global _is_dragged
     if editor.objects.renaming == k:  # its field has the mouse
         imgui.dummy(size)
         return False
     imgui.set_next_item_allow_overlap()
-    if imgui.invisible_button(f"##object{k}", size):
+    if imgui.invisible_button(f"##object{k}", size) and not _is_dragged:
         editor.objects.choose(k)
+    assert editor.document is not None
+    mark(f"row of {editor.document.objects[k].name}")
+    if imgui.is_item_active() and imgui.is_mouse_dragging(0, theme.pt(SLACK)) and not _is_dragged:
+        _is_dragged = editor.objects.carry(k)
     is_hovered = imgui.is_item_hovered()
     if is_hovered and imgui.is_mouse_double_clicked(0):
         editor.objects.renaming = k

@@ -12,6 +12,7 @@ from ..editor import Editor
 from ..feedback import Message
 from ..jobs import Job
 from ..texts import t
+from .fade import fades
 from .layout import Rect
 from .panes import edge, pane
 from .theme import Icon, theme
@@ -109,7 +110,7 @@ def _draw_bar(x: float, middle: float, fraction: float) -> None:
 
 def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
     """The message until something else is done, else the hint."""
-    message = editor.message
+    message, share = fades.shown("message", editor.message)
     imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
     imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
     if message is None:
@@ -117,10 +118,10 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
     else:
         role = "error" if message.is_error else "text"
         icon = Icon.WARNING if message.is_error else Icon.INFO
-        imgui.text_colored(theme.vec(role if message.is_error else "accent"), icon)
+        imgui.text_colored(theme.vec(role if message.is_error else "accent", share), icon)
         imgui.same_line(0, theme.pt(6))
-        imgui.text_colored(theme.vec(role), message.text)
-        if message.is_error or message.action is not None:
+        imgui.text_colored(theme.vec(role, share), message.text)
+        if message is editor.message and (message.is_error or message.action is not None):
             _draw_buttons(editor, message)
     imgui.pop_clip_rect()
 

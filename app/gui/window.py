@@ -24,11 +24,12 @@ from ..render.renderer import Renderer
 from ..resources import resource
 from ..settings import read_settings, settings_path, write_settings
 from ..shortcuts import Shortcuts
-from ..texts import ENGLISH, t, use_language
+from ..texts import ENGLISH, use_language
 from ..tools.pointer import Shape
 from . import landmarks
 from . import theme as looks
 from .dialogs import Dialogs
+from .fade import fades
 from .frame_log import FrameLog
 from .input import HELP, Input
 from .inspector import draw_inspector
@@ -41,6 +42,7 @@ from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
 from .theme import theme
+from .title import Title
 from .toolbar import draw_toolbar
 
 log = logging.getLogger(__name__)
@@ -54,6 +56,8 @@ CONTROL = glfw.MOD_SUPER if sys.platform == "darwin" else glfw.MOD_CONTROL
 MODIFIERS = (("Ctrl", CONTROL), ("Shift", glfw.MOD_SHIFT), ("Alt", glfw.MOD_ALT))
 KEY_NAMES = {
     glfw.KEY_ESCAPE: "Escape",
+    glfw.KEY_ENTER: "Enter",
+    glfw.KEY_KP_ENTER: "Enter",
     glfw.KEY_DELETE: "Delete",
     glfw.KEY_BACKSPACE: "Backspace",
     glfw.KEY_LEFT: "Left",
@@ -119,7 +123,8 @@ class Window:
         self._popups = Popups(self._shortcuts)
         self._cursors: dict[int, Any] = {}
         self._cursor: Any = None
-        self._title = ""
+        self._title = Title()
+        self._is_quiet = False  # nothing has happened for a moment
         self._frame_log = FrameLog(options.frame_log) if options.frame_log else None
         if options.frames is not None:
             self.editor.derived.layers.frame_time = math.inf
@@ -139,6 +144,8 @@ class Window:
             if self._frame_log is not None:
                 self._frame_log.begin()
             self._frame()
+            if fades.is_moving:
+                lively = max(lively, 1)
             if len(imgui.get_current_context().input_events_queue):
                 lively = SETTLE  # ImGui takes one key or button of a kind a frame
             drawn += 1
@@ -189,6 +196,7 @@ class Window:
         before = time.monotonic()
         glfw.wait_events_timeout(patience)
         is_event = time.monotonic() - before < 0.95 * patience
+        self._is_quiet = not is_event and patience == IDLE
         return SETTLE if is_event else 1
 
     # One frame
@@ -198,6 +206,8 @@ class Window:
         if 0 in size:  # minimised
             return
         self._adopt_look()
+        is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
+        fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
@@ -218,7 +228,7 @@ class Window:
         self._popups.draw(self.editor)
         self._dialogs.draw(self.editor)
         self._set_cursor()
-        self._set_title()
+        self._title.write(self.editor, self._handle, self._is_quiet)
         imgui.render()
         self._draw(layout.canvas, ratio, size)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
@@ -300,17 +310,6 @@ class Window:
         if self._cursors[wanted] is not self._cursor:
             glfw.set_cursor(self._handle, self._cursors[wanted])
             self._cursor = self._cursors[wanted]
-
-    def _set_title(self) -> None:
-        editor = self.editor
-        title = "ObjectMorpher"
-        if editor.document is not None:
-            name = editor.path.name if editor.path else editor.document.photo.name
-            state = "" if editor.is_saved else f" — {t('edited')}"
-            title = f"{name}{state} · ObjectMorpher"
-        if title != self._title:
-            self._title = title
-            glfw.set_window_title(self._handle, title)
 
     # The rest
 

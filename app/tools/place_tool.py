@@ -21,15 +21,17 @@ REACH = 10.0  # points around a corner, or beside a ring, where a press takes it
 DEPTH_STEP = 0.05  # object diameters per notch of the wheel
 SCALE_SNAP = 0.1  # with Shift
 MIN_SCALE, MAX_SCALE = 0.02, 50.0
+OTHER = "other"  # another object, which a press takes instead
 SHAPES = {
-    "move": Shape.MOVE, "scale": Shape.SIZE, "depth": Shape.SIZE, "horizon": Shape.HAND,
+    "move": Shape.MOVE, OTHER: Shape.MOVE, "scale": Shape.SIZE, "depth": Shape.SIZE,
+    "horizon": Shape.HAND,
 }  # fmt: skip
 
 Change = Callable[[Pointer, float], Placement]  # of the pointer now, diameters by the wheel
 
 
 class PlaceTool:
-    """Drag the object to move it, a corner to scale, a ring to turn, elsewhere to turn freely."""
+    """Drag an object to move it, a corner to scale, a ring to turn, elsewhere to turn freely."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         part = self.part_at(editor, pointer)
@@ -38,7 +40,17 @@ class PlaceTool:
         editor.hover = replace(editor.hover, part=part)
         if part == "horizon":
             return self._drag_horizon(editor, pointer)
+        if part == OTHER:
+            return self._take_other(editor, pointer)
         return self._drag(editor, pointer, part)
+
+    def _take_other(self, editor: Editor, pointer: Pointer) -> Stroke:
+        """Another object becomes the current one and is moved; Esc takes both back."""
+        other = editor.objects.other_at(pointer.xy)
+        assert other is not None
+        restore = editor.objects.take(other)
+        editor.hover = replace(editor.hover, part="move", other=None)
+        return _with_way_back(self._drag(editor, pointer, "move"), restore)
 
     def _drag(self, editor: Editor, first: Pointer, part: str) -> Stroke:
         is_moved, away = False, 0.0
@@ -69,6 +81,8 @@ class PlaceTool:
         part = _handle_at(shown, pointer.xy, reach)
         if part is not None:
             return part
+        if editor.objects.other_at(pointer.xy) is not None:
+            return OTHER
         if editor.posing.surface_at(pointer.xy) is not None:
             return "move"
         is_horizon = shown.horizon is not None and abs(pointer.y - shown.horizon) <= reach
@@ -76,7 +90,8 @@ class PlaceTool:
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         part = self.part_at(editor, pointer)
-        editor.hover = replace(editor.hover, part=part)
+        other = editor.objects.other_at(pointer.xy) if part == OTHER else None
+        editor.hover = replace(editor.hover, part=part, other=other)
         return Shape.ARROW if part is None else SHAPES.get(part, Shape.TURN)
 
     def hint(self, editor: Editor) -> str:
@@ -93,6 +108,17 @@ def _handle_at(shown: Gizmo, xy: np.ndarray, reach: float) -> str | None:
     gaps = {part: ring.gap(xy) for part, ring in shown.rings.items()}
     nearest = min(gaps, key=gaps.__getitem__)
     return nearest if gaps[nearest] <= reach else None
+
+
+def _with_way_back(stroke: Stroke, restore: Callable[[], None]) -> Stroke:
+    """The stroke; `restore` is called where it is aborted."""
+    is_over = False
+    try:
+        yield from stroke
+        is_over = True
+    finally:
+        if not is_over:
+            restore()
 
 
 def _move(editor: Editor, first: Pointer) -> Change:
@@ -198,6 +224,7 @@ def _labels() -> dict[str, str]:
 def _hints() -> dict[str, str]:
     ring = t("Drag along the ring to turn the object · Shift turns in steps of 15°")
     return {
+        OTHER: t("Click chooses this object · Drag moves it"),
         "move": t("Drag moves the object · Wheel moves it in depth · Shift keeps one axis"),
         "depth": t("Drag the arrow to bring the object nearer or farther"),
         "scale": t("Drag a corner to scale the object · Shift scales in steps of 10 %"),

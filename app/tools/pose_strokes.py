@@ -136,11 +136,16 @@ def _tilt(editor: Editor, start: Pointer, now: Pointer) -> F64:
     return vector_from_matrix(turn_matrix(-float(across), float(down), 0.0))
 
 
-def box(editor: Editor, start: Pointer) -> Stroke:
-    """A box around handles selects them, Shift adds them; a click beside the object deselects."""
+def box(editor: Editor, start: Pointer, other: int | None = None) -> Stroke:
+    """A box around handles selects them, Shift adds them; a click beside the object deselects.
+
+    A click on the `other` object makes that one the current one.
+    """
     end = yield from draw_box(editor, start)
     if end is not None:
         corners = editor.view.image_from_canvas(np.array([start.xy, end.xy]))
         editor.posing.select_box(corners.min(0), corners.max(0), start.shift)
+    elif other is not None:
+        editor.objects.take(other)
     elif not start.shift:
         editor.posing.select(None)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..feedback import Hover
 from ..pose_view import PoseMode
 from ..texts import t
 from . import pose_strokes, rig_brush
@@ -33,6 +33,8 @@ class PoseTool:
         if handle is None and self.is_on_ring(editor, pointer):
             assert editor.posing.handle is not None
             return pose_strokes.turn(editor, pointer, editor.posing.handle, is_ring=True)
+        if handle is None and (other := editor.objects.other_at(pointer.xy)) is not None:
+            return pose_strokes.box(editor, pointer, other)
         if handle is None:
             return self._add(editor, pointer)
         if pointer.ctrl:
@@ -76,15 +78,19 @@ class PoseTool:
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         if editor.view.pose.mode is not PoseMode.DRAG:
-            editor.hover = replace(editor.hover, handle=None, surface=None, part=None)
+            editor.hover = Hover()
             return Shape.CROSS
         handle = self.handle_at(editor, pointer)
         is_ring = handle is None and self.is_on_ring(editor, pointer)
         is_beside = handle is None and not is_ring
+        other = editor.objects.other_at(pointer.xy) if is_beside else None
+        if other is not None:
+            editor.hover = Hover(other=other)
+            return Shape.HAND
         point = editor.posing.surface_at(pointer.xy) if is_beside else None
-        part = RING_PART if is_ring else None
         is_pin = pointer.alt and not pointer.ctrl
-        editor.hover = replace(editor.hover, handle=handle, surface=point, is_pin=is_pin, part=part)
+        part = RING_PART if is_ring else None
+        editor.hover = Hover(handle=handle, surface=point, is_pin=is_pin, part=part)
         if is_ring or (pointer.ctrl and not (is_beside and point is None)):
             return Shape.TURN
         if handle is not None:
@@ -102,6 +108,8 @@ class PoseTool:
             return t("Drag along the ring to turn the point · Shift: steps of 15° · R hides it")
         if editor.hover.handle is not None:
             return t("Drag moves it · Ctrl-drag turns it · Shift-click adds it · Del removes it")
+        if editor.hover.other is not None:
+            return t("Click chooses this object · Drag draws a box around handles")
         if editor.hover.surface is not None:
             return t("Drag this point · Ctrl-drag turns it · Click sets a handle · Alt-click a pin")
         return t("Drag a point of the object · Drag beside it selects handles · Space-drag pans")

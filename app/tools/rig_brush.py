@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 HINTS = {
-    PoseMode.FREEZE: "Paint what must stay as in the photo · Alt erases · [ and ] size the brush",
+    PoseMode.FREEZE: "Paint what must stay as it is now · Alt erases · [ and ] size the brush",
     PoseMode.STIFFEN: "Paint what must bend less · Alt erases · [ and ] size the brush",
     PoseMode.BODY: "Paint what must move as one rigid piece · Alt erases · [ and ] size the brush",
     PoseMode.CUT: "Draw a line where parts must come loose; it cuts right through · Alt erases",

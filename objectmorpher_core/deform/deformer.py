@@ -17,7 +17,7 @@ from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
 from .graph import Graph, Surface, build_graph
 from .grip import stiffened
-from .hold import Grasp, Hold
+from .hold import Frozen, Grasp, Hold
 from .skinning import Motion, Skin, Skinned, skin
 from .strain import Strain, measure_strain
 
@@ -73,6 +73,7 @@ class Deformer:
         return other
 
     def _prepare_solver(self) -> None:
+        self._frozen = Frozen.of(self.rig)
         weights = _weighed(self.graph.weights, self.rig.stiffness)
         self._solver = ArapSolver(self.points, weights, self.rig.bodies)
         self._constrained: tuple[object, ...] = ()  # what the solver is prepared for
@@ -109,7 +110,7 @@ class Deformer:
         start: Pose | None = None,
         seconds: float = np.inf,
     ) -> Solution:
-        """The pose in which every handle is at its target.
+        """The pose in which every handle is at its target, but for those on frozen control points.
 
         With `start` the solve continues from there (a drag), for about so many `seconds`; without,
         large moves are made in sub-steps from rest, so the result is a function of the handles
@@ -118,7 +119,8 @@ class Deformer:
         numbers = [v for h in handles for v in (h.point, h.target, h.turn) if v is not None]
         if not np.isfinite(np.concatenate([*numbers, np.zeros(1)])).all():
             raise ValueError("a handle's point, target or turn is not finite")
-        if not handles:
+        handles = self._effective(handles)
+        if not handles and not self._frozen.shifts.any():
             return Solution(self.rest(), (0.0,))
         if (rigid := self._rigid(handles)) is not None:
             return Solution(rigid, (0.0,))
@@ -126,6 +128,10 @@ class Deformer:
         if self.settings.stretch_limit is None or self._is_allowed(solution.pose):
             return solution
         return self._limited(handles, has_auto_anchors, seconds)
+
+    def _effective(self, handles: tuple[Handle, ...]) -> tuple[Handle, ...]:
+        """Those that move anything: what is frozen stays, and they with it."""
+        return tuple(h for h in handles if not self.rig.is_held(h.control_point))
 
     def _rigid(self, handles: tuple[Handle, ...]) -> Pose | None:
         """The pose of handles that are all moved as one body: that motion, with no energy."""
@@ -152,9 +158,15 @@ class Deformer:
     ) -> Solution:
         """The farthest that all handles together can go before the stretch limit, by halving."""
         best, low, high = Solution(self.rest(), (0.0,), 0.0), 0.0, 1.0
+        starts = [h.point for h in handles]
+        if self._frozen.shifts.any():  # they stay: the handles' ways begin where those hold them
+            best = replace(self._solved((), False, None, seconds / LIMIT_STEPS), share=0.0)
+            starts = [self.skin_points(point, best.pose).points[0] for point in starts]
         for _ in range(LIMIT_STEPS):
             share = 0.5 * (low + high)
-            partly = tuple(_on_the_way(h, share) for h in handles)
+            partly = tuple(
+                _on_the_way(h, share, start) for h, start in zip(handles, starts, strict=True)
+            )
             solution = self._solved(partly, has_auto_anchors, best.pose, seconds / LIMIT_STEPS)
             if self._is_allowed(solution.pose):
                 best, low = replace(solution, share=share), share
@@ -189,7 +201,7 @@ class Deformer:
 
     def prepare(self, handles: tuple[Handle, ...], has_auto_anchors: bool = True) -> None:
         """Does now what the first solve with these handles would do: their factorisation."""
-        if handles:
+        if handles := self._effective(handles):
             self._constrain(handles, self.anchors(handles, has_auto_anchors))
 
     def skin_points(
@@ -242,6 +254,9 @@ class Deformer:
         For a small move from `pose`. With the rotations as they are, all follow linearly, and by
         the same share in every direction.
         """
+        if self.rig.is_held(handles[h].control_point):
+            return np.zeros(len(self.points))
+        handles, h = self._effective(handles), len(self._effective(handles[:h]))
         self._constrain(handles, self.anchors(handles, has_auto_anchors))
         rotations = (pose or self.rest()).rotations
         step = np.array([self.diameter, 0.0, 0.0])
@@ -259,11 +274,11 @@ class Deformer:
             *((h.point.tobytes(), h.control_point, h.softness, h.turn is None) for h in handles),
         )
         if key != self._constrained:
-            points, hands = np.array([h.point for h in handles]), None
-            if not self.settings.is_faithful:
+            points, hands = np.array([h.point for h in handles]).reshape(-1, 3), None
+            if len(handles) and not self.settings.is_faithful:
                 hands = stiffened(self.points, self._solver.weights, points, self.diameter)
-            held = anchors if self.rig.held is None else np.union1d(anchors, self.rig.held)
-            self._hold = Hold.of(handles, self._grasp(handles, points), self.points, held)
+            grasp = self._grasp(handles, points)
+            self._hold = Hold.of(handles, grasp, self.points, anchors, self._frozen)
             self._solver.constrain(self._hold.constraints, hands)
             self._constrained = key
         self._solver.aim(self._hold.targets(handles))
@@ -271,7 +286,7 @@ class Deformer:
     def _grasp(self, handles: tuple[Handle, ...], points: F64) -> Grasp:
         """The surface point itself, and what turns with it; in the paper its control point."""
         if self.settings.is_faithful:
-            nodes = np.array([[h.control_point] for h in handles], np.int32)
+            nodes = np.array([h.control_point for h in handles], np.int32).reshape(-1, 1)
             binding = Binding(nodes, np.ones(nodes.shape), np.zeros((*nodes.shape, 3)))
             return Grasp(binding, tuple(nodes), is_on_nodes=True)
         around = []
@@ -286,19 +301,19 @@ class Deformer:
         return Grasp(bind(points, self.points, self.graph), tuple(around))
 
     def _approach(self, handles: tuple[Handle, ...], rotations: F64) -> F64:
-        """Walks the targets from rest to where they belong; returns the rotations there.
+        """Walks targets and frozen points from rest to where they are; returns the rotations there.
 
         From a cold start a large turn ends in a false minimum; in steps of a tenth of the
         diameter each solve begins near its own.
         """
-        moves = np.array([h.target - h.point for h in handles])
-        turns = np.array([np.zeros(3) if h.turn is None else h.turn for h in handles])
+        moves = np.array([*(h.target - h.point for h in handles), *self._frozen.shifts])
+        turns = np.array([np.zeros(3), *(h.turn for h in handles if h.turn is not None)])
         farthest = np.linalg.norm(moves, axis=1).max() / (LARGE_MOVE * self.diameter)
         largest = np.linalg.norm(turns, axis=1).max() / LARGE_TURN
         steps = int(np.clip(np.ceil(max(farthest, largest)), 1, MOST_STEPS))
         for step in range(1, steps):
             partly = tuple(_on_the_way(h, step / steps) for h in handles)
-            self._solver.aim(self._hold.targets(partly))
+            self._solver.aim(self._hold.targets(partly, step / steps))
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
         self._solver.aim(self._hold.targets(handles))
         return rotations
@@ -326,9 +341,10 @@ class Deformer:
         return positions, rotations
 
 
-def _on_the_way(handle: Handle, share: float) -> Handle:
-    """The handle when it has gone a `share` of its way."""
-    target = handle.point + share * (handle.target - handle.point)
+def _on_the_way(handle: Handle, share: float, start: F64 | None = None) -> Handle:
+    """The handle when it has gone a `share` of its way from `start` (3,), or from rest."""
+    start = handle.point if start is None else start
+    target = start + share * (handle.target - start)
     return replace(handle, target=target, turn=None if handle.turn is None else share * handle.turn)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import F64, I32
 from ..document import Handle
+from ..rig import Rig
 from ..rotations import matrix_from_vector
 from .binding import Binding
 from .constraints import Constraints, Targets
@@ -23,6 +24,19 @@ class Grasp:
 
 
 @dataclass(frozen=True, eq=False)
+class Frozen:
+    """Control points that stay, whatever the handles want."""
+
+    nodes: I32  # (P,) sorted
+    shifts: F64  # (P, 3) from where they are at rest
+
+    @classmethod
+    def of(cls, rig: Rig) -> Frozen:
+        nodes = np.empty(0, np.int32) if rig.held is None else rig.held
+        return cls(nodes, np.zeros((len(nodes), 3)) if rig.shifts is None else rig.shifts)
+
+
+@dataclass(frozen=True, eq=False)
 class Hold:
     """The rows of a set of handles. They depend on where the handles are at rest only."""
 
@@ -31,13 +45,16 @@ class Hold:
     places: F64  # (H, 3) the row's surface point from its handle's, at rest
     turners: I32  # (T,) the handle of each turned control point
     held: F64  # (P, 3) held control points, at rest
+    shifts: F64  # (P, 3) how far from there they are held
 
     @classmethod
-    def of(cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, held: I32) -> Hold:
-        """`points` (M, 3) control points at rest; those in `held` stay there.
+    def of(
+        cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, anchors: I32, frozen: Frozen
+    ) -> Hold:
+        """`points` (M, 3) control points at rest; `anchors` stay there, if no handle is on them.
 
         A handle is the surface point that the artist clicked. One that is turned too takes the
-        control points around it along as one rigid body: a row each.
+        control points around it along as one rigid body, all that are not frozen: a row each.
         """
         owners, nodes, weights, turned = [], [], [], []
         binding = grasp.binding
@@ -50,32 +67,39 @@ class Hold:
                 weights.append(shares)
                 owners.append(h)
                 continue
-            for node in np.union1d(own, grasp.around[h]):
+            for node in np.setdiff1d(np.union1d(own, grasp.around[h]), frozen.nodes):
                 nodes.append(np.full(width, node))
                 weights.append(np.eye(1, width)[0])
                 owners.append(h)
                 turned.append((node, h))
-        index, owner = np.array(nodes, np.int32), np.array(owners, np.int32)
-        clicked = np.array([h.point for h in handles])
-        is_node = np.array([grasp.is_on_nodes or handles[h].turn is not None for h in owners])
+        index, owner = np.array(nodes, np.int32).reshape(-1, width), np.array(owners, np.int32)
+        clicked = np.array([h.point for h in handles]).reshape(-1, 3)
+        is_node = [grasp.is_on_nodes or handles[h].turn is not None for h in owners]
+        is_node = np.array(is_node, bool)
         surface = np.where(is_node[:, None], points[index[:, 0]], clicked[owner])
         constraints = Constraints(
-            index, np.array(weights), surface[:, None] - points[index],
+            index, np.array(weights).reshape(-1, width), surface[:, None] - points[index],
             np.array([handles[h].softness for h in owners]),
-            np.setdiff1d(held, index).astype(np.int32),
+            np.concatenate([np.setdiff1d(anchors, index), frozen.nodes]).astype(np.int32),
             np.array([node for node, _ in turned], np.int32),
         )  # fmt: skip
         turners = np.array([h for _, h in turned], np.int32)
-        held_at = points[constraints.held]
-        return cls(constraints, owner, surface - clicked[owner], turners, held_at)
+        shifts = np.zeros((len(constraints.held), 3))
+        shifts[len(shifts) - len(frozen.nodes) :] = frozen.shifts
+        held = points[constraints.held]
+        return cls(constraints, owner, surface - clicked[owner], turners, held, shifts)
 
-    def targets(self, handles: tuple[Handle, ...]) -> Targets:
-        """Where all must be for handles that have the same points at rest."""
-        goals = np.array([h.target for h in handles])
+    def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
+        """Where all must be for handles that have the same points at rest.
+
+        What is frozen has gone a `share` of its way from rest.
+        """
+        goals, held = np.array([h.target for h in handles]), self.held + share * self.shifts
+        goals = goals.reshape(-1, 3)
         if len(self.turners) == 0:
-            return Targets(goals[self.owners] + self.places, self.held, np.empty((0, 3, 3)))
+            return Targets(goals[self.owners] + self.places, held, np.empty((0, 3, 3)))
         turns = np.stack(
             [np.eye(3) if h.turn is None else matrix_from_vector(h.turn) for h in handles]
         )
         turned = (turns[self.owners] @ self.places[..., None])[..., 0]
-        return Targets(goals[self.owners] + turned, self.held, turns[self.turners])
+        return Targets(goals[self.owners] + turned, held, turns[self.turners])

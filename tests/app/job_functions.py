@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import time
+from pathlib import Path
 
 import numpy as np
 
+from app.export_plan import Plan
+from objectmorpher_core.document import Document
 from objectmorpher_core.edits import EditError
+from objectmorpher_core.files import OutputError
 from objectmorpher_core.progress import Progress
 
 _seen: list[np.ndarray] = []
@@ -41,6 +46,30 @@ def hang(seconds: float, progress: Progress) -> str:
 
 def fail(progress: Progress) -> None:
     raise ValueError("the mask is empty")
+
+
+def write_when_there_is_room(path: Path, progress: Progress) -> None:
+    """The disk is full while there is a file FULL beside the path; the first try removes that."""
+    full = path.with_name("FULL")
+    if full.exists():
+        full.unlink()
+        try:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+    path.write_text("written")
+
+
+def save_when_there_is_room(document: Document, path: Path, progress: Progress) -> None:
+    write_when_there_is_room(path, progress)
+
+
+def export_when_there_is_room(document: Document, plan: Plan, progress: Progress) -> None:
+    write_when_there_is_room(plan.path, progress)
+
+
+def inpaint_badly(*arguments: object, progress: Progress) -> None:
+    raise ArithmeticError("the fill did not converge")
 
 
 def divide(progress: Progress) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from conftest import CENTRE, wait_for_jobs, wait_until
 
 from app.candidate import CANDIDATE
-from app.commands import run
+from app.commands import run, take_next_step
 from app.editor import Editor
 from app.tasks import SELECT
 from app.tools.pointer import Pointer
@@ -86,3 +86,22 @@ def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:
     rest_on(editor, -50.0, -50.0)
     editor.poll()
     assert not editor.candidates.is_due
+
+
+def test_enter_takes_the_candidate_then_lifts_it(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, 5.0, 5.0)
+    editor.candidates.shown = None
+    take_next_step(editor)
+    assert editor.document is not None and not editor.document.objects, "nothing is marked yet"
+    rest_on(editor, *CENTRE)
+    wait_until(editor, lambda: editor.candidates.shown is not None)
+    take_next_step(editor)
+    assert editor.mask is not None
+    take_next_step(editor)
+    wait_for_jobs(editor)
+    assert editor.is_lifted
+    assert editor.view.tool is ToolName.POSE
+    before = editor.document
+    take_next_step(editor)
+    assert editor.document is before, "the next step is the user's: to drag a point"

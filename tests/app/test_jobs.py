@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import job_functions
 import numpy as np
 import pytest
+from PIL import UnidentifiedImageError
 
 from app.jobs import JobError, Jobs
+from app.opening import OpeningError
 
 
 class Log:
@@ -109,6 +113,38 @@ def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     run_until(worker, lambda: worker.is_idle)
     assert [(e.name, e.sentence) for e in log.errors] == [("ValueError", "the mask is empty")]
     assert "job_functions" in log.errors[0].trace
+    assert log.errors[0].retry is None, "the same request would fail in the same way"
+
+
+def test_what_failed_for_the_system_can_be_asked_for_again(worker: Jobs, tmp_path: Path) -> None:
+    log = Log()
+    (tmp_path / "FULL").touch()
+    start(worker, log, job_functions.write_when_there_is_room, tmp_path / "out")
+    run_until(worker, lambda: bool(log.errors))
+    assert "No space left" in log.errors[0].sentence
+    assert log.errors[0].retry is not None
+    log.errors[0].retry()
+    run_until(worker, lambda: bool(log.answers))
+    assert (tmp_path / "out").read_text() == "written"
+
+
+@pytest.mark.parametrize(
+    ("error", "may_pass"),
+    [
+        (MemoryError(), True),
+        (OSError(errno.ENOSPC, "full"), True),
+        (PermissionError(errno.EACCES, "locked"), True),
+        (FileNotFoundError(errno.ENOENT, "gone"), False),
+        (IsADirectoryError(errno.EISDIR, "a folder"), False),
+        (UnidentifiedImageError("cannot identify image file"), False),
+        (ValueError("nonsense"), False),
+        (RuntimeError("a mistake of ours"), False),
+    ],
+)
+def test_only_what_another_try_may_mend_can_be_retried(error: Exception, may_pass: bool) -> None:
+    wrapped = OpeningError("it cannot be opened")
+    wrapped.__cause__ = error
+    assert JobError.of(error, "It").may_pass is JobError.of(wrapped, "It").may_pass is may_pass
 
 
 def test_the_log_tells_the_programs_failures_from_the_requests(

@@ -125,6 +125,17 @@ def test_shares_are_about_those_of_the_export(editor: Editor, ball: Document, tu
     assert editor.derived.painter.shares(ball).from_photo == 0  # nothing is changed
 
 
+def test_the_number_of_changed_pixels_is_about_that_of_the_export(
+    editor: Editor, ball: Document
+) -> None:
+    document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0)))
+    exact = (composite(document).pixels != document.photo.pixels).any(2).sum()
+    count = editor.derived.painter.count_changed(document)
+    assert count == pytest.approx(exact, rel=0.1)
+    assert len(str(count).rstrip("0")) <= 2, "two figures: it is not exact"
+    assert editor.derived.painter.count_changed(ball) == 0
+
+
 def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:
     view = View(tool=ToolName.POSE, shown=Shown.STRAIN)
     assert shown_now(None, view) is Shown.COMPOSITE

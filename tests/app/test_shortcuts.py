@@ -57,7 +57,7 @@ def test_keys_that_are_taken_change_hands(shortcuts: Shortcuts, shared_editor: E
     assert shortcuts.command_of(COMMANDS["lift"].keys) == "lift"
 
 
-@pytest.mark.parametrize("keys", ["Escape", "Left", "Shift+Up", "X", "Space", "?"])
+@pytest.mark.parametrize("keys", ["Escape", "Enter", "Left", "Shift+Up", "X", "Space", "?"])
 def test_keys_with_a_fixed_meaning_are_refused(shortcuts: Shortcuts, keys: str) -> None:
     shortcuts.recording = "lift"
     assert shortcuts.take(keys)

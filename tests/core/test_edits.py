@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits
-from objectmorpher_core.document import Click, DeformSettings, Document, Placement, Prompt
+from objectmorpher_core.document import Click, DeformSettings, Document, Placement, Pose, Prompt
 from objectmorpher_core.edits import EditError
 from objectmorpher_core.rig import Rig, Seam
 from objectmorpher_core.segment.mask_edit import feather, grow, shrink
@@ -55,10 +55,39 @@ def test_regions_are_cut_glued_and_made_bodies(document):
     (Rig(held=[0, 100_000]), "beyond the object's"),
     (Rig(held=[-1]), "beyond the object's"),
     (Rig(stiffness=[1.0, 2.0]), "stiffnesses for"),
+    (Rig(shifts=np.zeros((1, 3))), "does not say where"),
+    (Rig(held=[0, 1], shifts=np.zeros((1, 3))), "does not say where"),
+    (Rig(held=[0], shifts=np.full((1, 3), np.nan)), "finite"),
 ])  # fmt: skip
 def test_impossible_rigs_are_refused(document, rig, sentence):
     with pytest.raises(EditError, match=sentence):
         edits.set_rig(document, 0, rig)
+
+
+def test_freezing_remembers_where_points_are_and_thawing_forgets_it(document):
+    rest = document.objects[0].lifted.control_points.astype(np.float64)
+    at_rest = edits.freeze(document, 0, np.array([4, 2]))
+    assert at_rest.objects[0].rig.held.tolist() == [2, 4]
+    assert at_rest.objects[0].rig.shifts is None
+    moves = np.random.default_rng(3).normal(size=rest.shape)
+    pose = Pose(rest + moves, np.broadcast_to(np.eye(3), (len(rest), 3, 3)))
+    posed = edits.freeze(edits.set_pose(at_rest, 0, pose), 0, np.array([3, 7]))
+    rig = posed.objects[0].rig
+    assert rig.held.tolist() == [2, 3, 4, 7]
+    np.testing.assert_allclose(rig.shifts[[0, 2]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(rig.shifts[[1, 3]], moves[[3, 7]], atol=1e-12)
+    assert [rig.is_held(node) for node in (2, 5, 7)] == [True, False, True]
+    left = edits.thaw(posed, 0, np.array([3, 5])).objects[0].rig
+    assert left.held.tolist() == [2, 4, 7]
+    np.testing.assert_allclose(left.shifts[2], moves[7], atol=1e-12)
+    assert edits.thaw(posed, 0, rig.held).objects[0].rig.shifts is None
+    reset = edits.reset_pose(posed, 0).objects[0]
+    assert reset.rig.held.tolist() == [2, 3, 4, 7]
+    assert (reset.rig.shifts, reset.pose, reset.handles) == (None, None, ())
+    nearest = np.array([7, 0, 7, 3])
+    moved = rig.moved_to(nearest)
+    assert moved.held.tolist() == [0, 2, 3]
+    np.testing.assert_allclose(moved.shifts, moves[[7, 7, 3]], atol=1e-12)
 
 
 def test_a_stiffness_must_be_above_nothing(document):

@@ -75,7 +75,7 @@ def full_document(photo: Picture, source: bytes) -> Document:
          Handle(5, random.normal(size=3), random.normal(size=3), True, random.normal(size=3), 0.5)),
         False, DeformSettings("laplacian", "euclidean", True, 0.7, 1.6, True),
         Rig((Seam([0, 1], [2]), Seam([3], [4], True)), ([0, 2], [1, 4]), [5],
-            random.uniform(0.5, 2.0, NODES)),
+            random.uniform(0.5, 2.0, NODES), random.normal(size=(1, 3))),
         Pose(random.normal(size=(NODES, 3)), random.normal(size=(NODES, 3, 3))),
         Placement((0.1, -7.0), 1e-17, (15.0, 0.1 + 0.2, -3.0), 1.5), False,
     )  # fmt: skip

@@ -11,6 +11,7 @@ from ...texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
+from .other import draw_other
 
 PIECES = 96  # of a ring
 COLOURS = {"yaw": "#8FE3B0", "pitch": "#FFC27A", "roll": WHITE}
@@ -26,6 +27,7 @@ def draw_frame(canvas: Canvas) -> None:
     if shown is None:
         return
     part = editor.hover.part
+    draw_other(canvas)
     if shown.horizon is not None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)

@@ -8,8 +8,10 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from objectmorpher_core.document import EditObject
 
 from ...pose_view import PoseMode
+from ..fade import fades
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
+from .other import draw_other
 from .rig import draw_brush, draw_regions
 from .ring import draw_ring
 from .select import draw_rubber
@@ -32,12 +34,15 @@ def draw_pose(canvas: Canvas) -> None:
         _draw_influence(canvas, editor.posing.handle)
     if pose.has_regions or not is_dragging:
         draw_regions(canvas)
+    is_hinting = not thing.handles and editor.hover.surface is None and is_dragging
+    hinting, share = fades.shown("hint points", thing.lifted if is_hinting else None)
+    if hinting is thing.lifted:
+        _draw_hint_points(canvas, share)
     if thing.handles:
         _draw_handles(canvas, thing)
-    elif editor.hover.surface is None and is_dragging:
-        _draw_hint_points(canvas)
     if not is_dragging:
         draw_brush(canvas)
+    draw_other(canvas)
     if editor.hover.surface is not None and not editor.hand.is_busy:
         _draw_surface_point(canvas)
     if editor.rubber is not None:
@@ -106,12 +111,12 @@ def draw_control_points(canvas: Canvas) -> None:
         canvas.dot(at, 1.8, alpha=0.8)
 
 
-def _draw_hint_points(canvas: Canvas) -> None:
+def _draw_hint_points(canvas: Canvas, share: float) -> None:
     """The control points, quietly, while there is no handle: here is something to drag."""
     editor = canvas.editor
     assert editor.document is not None
     for at in canvas.on_photo(editor.derived.control_points(editor.document, editor.current)):
-        canvas.dot(at, 1.7)
+        canvas.dot(at, 1.7, alpha=0.9 * share)
 
 
 def _draw_surface_point(canvas: Canvas) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
+from ..fade import fades
 from ..theme import theme
 from .canvas import ACCENT, DARK, WARM, Canvas
 
@@ -16,9 +17,11 @@ def draw_selection(canvas: Canvas) -> None:
     """For the Select tool."""
     editor = canvas.editor
     draw_edge(canvas)
-    if editor.candidates.shown is not None:
-        for outline in editor.derived.contours(editor.candidates.shown.mask):
-            _draw_dots(canvas, outline)
+    candidate, share = fades.shown("candidate", editor.candidates.shown)
+    document = editor.document
+    if candidate is not None and document is not None and candidate.photo is document.photo:
+        for outline in editor.derived.contours(candidate.mask):
+            _draw_dots(canvas, outline, share)
     prompt = editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
@@ -39,14 +42,14 @@ def draw_edge(canvas: Canvas) -> None:
             canvas.polyline(canvas.at(outline), ACCENT)
 
 
-def _draw_dots(canvas: Canvas, outline: np.ndarray) -> None:
+def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:
     """A dotted closed line (N, 2) image px: what a click would select."""
     corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))
     along = np.concatenate([[0.0], np.linalg.norm(np.diff(corners, axis=0), axis=1).cumsum()])
     places = np.arange(0, along[-1], theme.pt(DOTS) * canvas.ratio)
     dots = np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])
     for at in canvas.on_canvas(dots):
-        canvas.dot(at, DOT)
+        canvas.dot(at, DOT, alpha=0.9 * share)
 
 
 def draw_rubber(canvas: Canvas) -> None:

@@ -20,7 +20,7 @@ ICONS = {
     PoseMode.BODY: Icon.BODY, PoseMode.CUT: Icon.CUT, PoseMode.GLUE: Icon.GLUE,
 }  # fmt: skip
 NOTES = {
-    PoseMode.FREEZE: "Paint what must stay exactly where it is in the photo.",
+    PoseMode.FREEZE: "Paint what must stay exactly where it is now.",
     PoseMode.STIFFEN: "Paint what must bend less than the rest, or more.",
     PoseMode.BODY: "Paint what must move as one rigid piece: a head, a shoe, a lid. "
     "A stroke that begins on a group makes it larger.",

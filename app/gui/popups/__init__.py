@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from imgui_bundle import imgui
+
 from ...editor import Editor
 from ...shortcuts import Shortcuts
 from ...view import Popup
+from ..fade import fades
 from .about import draw_about
 from .preferences import draw_preferences
 from .shortcuts import ShortcutsPopup
+
+LEAST = 0.01  # opacity: ImGui takes no input for what cannot be seen at all
 
 
 class Popups:
@@ -29,4 +34,7 @@ class Popups:
         if popup is None:
             self._shortcuts.recording = None
         else:
+            share = fades.shown("panel", popup)[1]
+            imgui.push_style_var(imgui.StyleVar_.alpha, max(share, LEAST))
             self._drawn[popup](editor)
+            imgui.pop_style_var()

@@ -54,6 +54,11 @@ def test_a_failed_download_is_a_sentence_and_leaves_nothing(choosing: Editor, ca
     assert choosing.message is not None and choosing.message.is_error
     assert "\n" not in choosing.message.text
     assert list(cache.iterdir()) == []
+    retry = choosing.message.action
+    assert retry is not None and retry.label == "Retry"
+    retry.run()
+    assert choosing.models.downloading == "u2netp"
+    wait_until(choosing, lambda: choosing.models.downloading is None)
 
 
 def test_a_cancelled_download_leaves_nothing(choosing: Editor, cache: Path) -> None:

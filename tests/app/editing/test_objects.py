@@ -133,6 +133,56 @@ def test_a_name_is_one_step_and_an_empty_one_none(editor: Editor, ball: Document
     assert editor.document is ball
 
 
+@pytest.fixture
+def three(copied: Editor) -> Editor:
+    """Three balls side by side; in front is the last one, which is current."""
+    run(copied, "duplicate")
+    copied.placing.move_to(Placement(move=(-30.0, 0.0)))
+    copied.commit("Move object")
+    assert copied.objects.listed() == [2, 1, 0]
+    return copied
+
+
+@pytest.mark.parametrize("carried", [0, 1, 2])
+@pytest.mark.parametrize("gap", [-5, 0, 1, 2, 3, 9])
+def test_a_dragged_row_lands_above_the_row_where_the_line_is(
+    three: Editor, carried: int, gap: int
+) -> None:
+    before, rows = three.document, three.objects.listed()
+    assert three.objects.carry(carried)
+    landing = three.objects.landing(gap)
+    three.objects.drop(gap)
+    at = min(max(gap, 0), 3)
+    wanted = [k for k in rows[:at] if k != carried] + [carried]
+    wanted += [k for k in rows[at:] if k != carried]
+    assert three.objects.listed() == wanted
+    assert three.current == carried
+    assert (landing is None) == (three.document is before) == (wanted == rows)
+    assert three.objects.carried is None
+    assert three.history is not None
+    if landing is not None:
+        assert three.history.undo_label == "Change the order"
+        three.undo()
+        assert three.document is before
+
+
+def test_escape_lets_a_dragged_row_go_where_it_was(three: Editor) -> None:
+    before, current = three.document, three.current
+    three.objects.carry(0)
+    three.escape()
+    three.objects.drop(0)
+    assert three.document is before
+    assert three.current == current
+
+
+def test_what_has_no_place_among_others_cannot_be_dragged(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    assert not editor.objects.carry(0)
+    assert editor.objects.landing(0) is None
+    editor.objects.drop(0)
+    assert editor.document is ball
+
+
 def test_travelling_follows_the_object_that_changes(copied: Editor) -> None:
     copied.objects.toggle_visible(0)
     assert copied.current == 1 and copied.history is not None

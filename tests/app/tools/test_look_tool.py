@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from strokes import stroke
 
-from app.commands import next_step, run, why_not
+from app.commands import COMMANDS, next_step, run, why_not
 from app.editor import Editor
 from app.tools.look_tool import LookTool
 from app.tools.pointer import TURN_SPEED
@@ -107,3 +107,22 @@ def test_zooms_have_commands(looking: Editor) -> None:
     assert looking.view.is_at_pixels
     run(looking, "fit")
     assert looking.view.is_fitted
+
+
+def test_the_list_marks_what_is_shown_while_orbiting(looking: Editor) -> None:
+    def marked() -> list[str]:
+        on = {name: COMMANDS[name].is_on for name in COMMANDS if name.startswith("show_")}
+        return [name for name, is_on in on.items() if is_on is not None and is_on(looking)]
+
+    assert marked() == ["show_composite"]
+    drag(looking, 80, 0)
+    assert marked() == ["show_object"]
+    run(looking, "show_depth")
+    assert marked() == ["show_depth"]
+    assert looking.looking.orbit is not None, "the other views are there from every side"
+    run(looking, "show_composite")
+    assert marked() == ["show_composite"]
+    assert looking.looking.orbit is None, "the composite is there from the photo's view only"
+    drag(looking, 80, 0)
+    run(looking, "reset_look")
+    assert marked() == ["show_composite"]

@@ -76,6 +76,80 @@ def test_frozen_control_points_stay():
     assert np.abs(free.points[MIDDLE] - NODES[MIDDLE]).max() > 0.05
 
 
+def _frozen(pose: Pose) -> Rig:
+    """The middle is frozen where a pose has it."""
+    return Rig(held=MIDDLE, shifts=pose.points[MIDDLE] - NODES[MIDDLE])
+
+
+def _bending(move=(-0.2, 0.45, 0.0)) -> tuple[Handle, Handle]:
+    left = _handle(LIFTED, (-0.5, 0, 0), turn=np.zeros(3))
+    return left, _handle(LIFTED, (0.5, 0, 0), move, turn=np.array([0, 0, 1.2]))
+
+
+def test_what_was_frozen_in_a_pose_stays_there_whatever_is_dragged():
+    deformer, pose = _bent(None)
+    frozen = deformer.with_rig(_frozen(pose))
+    same = frozen.solve(_bending(), start=pose).pose
+    assert np.abs(same.points - pose.points).max() < 1e-4, "freezing changes nothing"
+    for start in (pose, None):
+        handles = _bending((0.1, 0.1, 0.3))
+        moved = frozen.solve(handles, start=start).pose
+        assert np.abs(moved.points[MIDDLE] - pose.points[MIDDLE]).max() < EXACT
+        assert np.abs(moved.points - pose.points).max() > 0.2
+        met = frozen.skin_points(np.array([h.point for h in handles]), moved).points
+        np.testing.assert_allclose(met, [h.target for h in handles], atol=1e-6)
+
+
+def test_what_was_frozen_in_a_pose_stays_there_without_any_handle():
+    deformer, pose = _bent(None)
+    alone = deformer.with_rig(_frozen(pose)).solve(()).pose
+    assert np.abs(alone.points[MIDDLE] - pose.points[MIDDLE]).max() < EXACT
+    ends = np.abs(NODES[:, 0]) > 0.4
+    assert np.abs(alone.points[ends] - NODES[ends]).max() > 0.05, "the ends follow it"
+    inner = deformer.strain(alone).most[np.abs(NODES[:, 0]) > 0.25]
+    assert np.abs(inner - 1).max() < 0.02, "and nothing strains them"
+
+
+def test_a_handle_on_a_frozen_part_moves_nothing():
+    deformer, pose = _bent(None)
+    frozen = deformer.with_rig(_frozen(pose))
+    inside = _handle(LIFTED, (0, 0.08, 0), (0.0, 0.5, 0.0))
+    assert inside.control_point in MIDDLE
+    left, right = _bending()
+    with_it = frozen.solve((left, inside, right), start=pose).pose
+    without = frozen.solve((left, right), start=pose).pose
+    np.testing.assert_allclose(with_it.points, without.points, atol=EXACT)
+    assert not frozen.influence((left, inside, right), 1, True, pose).any()
+    shares = frozen.influence((left, inside, right), 2, True, pose)
+    np.testing.assert_allclose(shares, frozen.influence((left, right), 1, True, pose))
+
+
+def test_a_handle_beside_a_frozen_part_is_met_and_the_part_stays():
+    deformer, pose = _bent(None)
+    frozen = deformer.with_rig(_frozen(pose))
+    left, right = _bending()
+    means = LIFTED.gaussians.means.astype(np.float64)
+    near = means[(means[:, 0] > 0.1) & (means[:, 0] < 0.16)]
+    nodes = [deformer.nearest_control_point(point) for point in near]
+    point, node = next((p, n) for p, n in zip(near, nodes, strict=True) if n not in MIDDLE)
+    start = deformer.skin_points(point, pose).points[0]
+    handle = Handle(node, point, start + (0.0, 0.03, 0.02))
+    moved = frozen.solve((left, handle, right), start=pose).pose
+    assert np.abs(moved.points[MIDDLE] - pose.points[MIDDLE]).max() < EXACT
+    met = frozen.skin_points(point, moved).points[0]
+    np.testing.assert_allclose(met, handle.target, atol=1e-5)
+
+
+def test_a_limit_to_stretching_stops_handles_and_not_what_is_frozen():
+    settings = DeformSettings(stretch_limit=1.6)
+    deformer = Deformer(LIFTED, settings)
+    pose = deformer.solve(_bending((-0.1, 0.15, 0.0))).pose
+    frozen = deformer.with_rig(_frozen(pose))
+    solution = frozen.solve(_bending((2.0, 0.5, 0.0)), start=pose)
+    assert 0.0 < solution.share < 1.0
+    assert np.abs(solution.pose.points[MIDDLE] - pose.points[MIDDLE]).max() < EXACT
+
+
 def test_a_stiff_part_bends_less_and_a_soft_one_more():
     bends = []
     for factor in (0.05, 1.0, 20.0):

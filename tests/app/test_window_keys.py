@@ -1,0 +1,30 @@
+"""Keys in the real window: Enter alone does what the large button names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from conftest import CENTRE
+from hands import opened
+from test_window import POSE_TOOL, PRIMARY, screen_xy
+
+pytestmark = pytest.mark.window
+
+
+def test_enter_takes_the_next_step_and_the_title_counts_what_it_changed(
+    window_environment: dict[str, str], photo_path: Path
+) -> None:
+    with opened(window_environment, photo_path) as hands:
+        x, y = screen_xy(*CENTRE)
+        hands.xdotool("mousemove", round(x), round(y))
+
+        def is_selected() -> bool:
+            hands.press("Return")  # also before the candidate is there: then it does nothing
+            return hands.is_accent(PRIMARY) or hands.is_accent(POSE_TOOL)
+
+        hands.wait(is_selected, "selecting")
+        hands.press("KP_Enter")  # harmless where the last Return has lifted it already
+        hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
+        hands.drag((x, y - 100), (x + 60, y - 120))
+        hands.wait(lambda: "edited, about" in hands.title(), "counting")

@@ -1,0 +1,81 @@
+"""Several objects by hand, in the real window under Xvfb: their order, and which one is meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import lift_ball
+from hands import ACCENT, Hands, opened
+
+from app.editor import Editor
+from objectmorpher_core import edits
+from objectmorpher_core.document import Placement
+from objectmorpher_core.session_file import decode_session, save_session
+
+pytestmark = pytest.mark.window
+
+CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
+PLACE_TOOL = (10, 176)  # in the Place tool's button, beside its icon
+FIRST, TO = np.array([(75.0, 100.0), (60.0, 110.0)])  # image px, on the ball
+
+
+def rows(hands: Hands) -> list[str]:
+    """The objects' names, from the top of the list."""
+    places = {k: v for k, v in hands.places().items() if k.startswith("row of ")}
+    return [k.removeprefix("row of ") for k in sorted(places, key=lambda k: places[k][1])]
+
+
+def take_up(hands: Hands, row: str, target: str) -> None:
+    """Drags a row over another one's upper edge, and does not let go."""
+    x, y = hands.place(f"row of {row}")
+    top = hands.places()[f"row of {target}"][1]
+    hands.xdotool("mousemove", round(x), round(y))
+    hands.xdotool("mousedown", 1)
+    for share in (0.3, 0.6, 1.0):
+        hands.xdotool("mousemove", round(x), round(y + share * (top - y)))
+
+
+def has_line(hands: Hands) -> bool:
+    """Whether an accent line is in the list, from one side of it to the other."""
+    picture = hands.picture()[60:260, 1160:1400, :3]
+    return bool((picture == ACCENT).all(2).all(1).any())
+
+
+def test_order_by_dragging_rows_and_choosing_where_it_is_seen(
+    window_environment: dict[str, str], editor: Editor, tmp_path: Path
+) -> None:
+    session = tmp_path / "balls.omorph"
+    two = edits.duplicate(lift_ball(editor), 0)
+    save_session(edits.set_placement(two, 1, Placement(move=(50.0, 0.0))), session)
+    size, scale = (editor.view.width, editor.view.height), editor.view.scale
+    editor.view.resize((CANVAS[2], CANVAS[3]), 1.0, editor.photo_size)
+    start, end = editor.view.canvas_from_image(np.array([FIRST, TO])) + CANVAS[:2]
+    editor.view.resize(size, scale, editor.photo_size)
+    with opened(window_environment, session) as hands:
+        hands.wait(lambda: rows(hands) == ["Object 2", "Object 1"], "listing")
+        hands.catch_up()
+        take_up(hands, "Object 1", "Object 2")
+        hands.wait(lambda: has_line(hands), "showing where it lands")
+        hands.press("Escape")
+        hands.wait(lambda: not has_line(hands), "letting go of the row")
+        hands.xdotool("mouseup", 1)
+        hands.catch_up()
+        assert rows(hands) == ["Object 2", "Object 1"]
+        assert "edited" not in hands.title()
+        take_up(hands, "Object 1", "Object 2")
+        hands.xdotool("mouseup", 1)
+        hands.wait(lambda: rows(hands) == ["Object 1", "Object 2"], "changing the order")
+        hands.press("ctrl+z")
+        hands.wait(lambda: rows(hands) == ["Object 2", "Object 1"], "going back")
+        hands.choose("row of Object 2")
+        hands.press("4")
+        hands.wait(lambda: hands.is_accent(PLACE_TOOL), "choosing the tool")
+        hands.drag(tuple(start), tuple(end))
+        hands.wait(lambda: "edited" in hands.title(), "moving")
+        hands.press("ctrl+s")
+        hands.wait(lambda: "edited" not in hands.title(), "saving")
+    first, second = decode_session(session.read_bytes()).objects
+    assert first.placement.move[0] < -5, "the one under the pointer was moved"
+    assert second.placement.move == (50.0, 0.0)
