@@ -1,5 +1,7 @@
 """Where the window's buttons and fields are, by what they say: for tests and tours.
 
+So are the photo, the handles on it and the rings: what is drawn there cannot be found otherwise.
+
 With OBJECTMORPHER_LANDMARKS=FILE in the environment the window writes them there whenever they
 change. Without it nothing is collected.
 """
@@ -10,7 +12,7 @@ import json
 import os
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 VARIABLE = "OBJECTMORPHER_LANDMARKS"
 
@@ -25,6 +27,12 @@ def mark(label: str) -> None:
         return
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     _places[clean(label)] = (low.x, low.y, high.x, high.y)
+
+
+def mark_on_canvas(label: str, low: ImVec2, high: ImVec2) -> None:
+    """Something that is drawn over the photo and can be taken hold of."""
+    if _file is not None:
+        _places[label] = (low.x, low.y, high.x, high.y)
 
 
 def clean(label: str) -> str:

@@ -83,7 +83,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     gap = theme.pt(8)
     x = right - theme.pt(16) - side
     imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
-    if icon_button(Icon.CLOSE, "cancel", t("Cancel"), None, side / theme.scale):
+    if icon_button(Icon.CLOSE, "cancel", t("Cancel the job"), None, side / theme.scale):
         (editor.jobs if isinstance(job, Job) else editor.background).cancel(job.kind)
     x -= imgui.calc_text_size("100 %").x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))

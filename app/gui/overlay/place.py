@@ -9,9 +9,11 @@ from objectmorpher_core.document import Placement
 
 from ...texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
+from ..landmarks import mark_on_canvas
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
 
+MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
 PIECES = 96  # of a ring
 COLOURS = {"yaw": "#8FE3B0", "pitch": "#FFC27A", "roll": WHITE}
 SHAFT = 5.0  # points, half the arrow's width at its near end
@@ -40,6 +42,9 @@ def draw_frame(canvas: Canvas) -> None:
     for corner in corners:
         canvas.square(corner, 5, ACCENT if part == "scale" else WHITE)
     _draw_centre(canvas, shown)
+    for name, ring in shown.rings.items():
+        at = canvas.on_canvas(ring.seen(np.array([MARKED[name]])))[0]
+        mark_on_canvas(f"Ring: {name}", at, at)
     _draw_value(canvas, part)
 
 

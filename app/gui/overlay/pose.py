@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from objectmorpher_core.document import EditObject
 
 from ...pose_view import PoseMode
+from ..landmarks import mark_on_canvas
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
 from .rig import draw_brush, draw_regions
@@ -65,6 +66,7 @@ def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
         is_hovered = h == editor.hover.handle
         is_selected = h in editor.posing.selected
         _draw_handle(canvas, end, thing.handles[h].is_pin, is_selected, is_hovered)
+        mark_on_canvas(f"Handle {h + 1}", end, end)
 
 
 def _draw_mirror(canvas: Canvas) -> None:
