@@ -12,9 +12,10 @@ from ..editor import Editor
 from ..exporting import LOSSLESS, Format, What
 from ..filing import Dialog
 from ..texts import t
+from .landmarks import mark
 from .modal import modal
 from .theme import FIELD, PRIMARY, theme
-from .widgets import Kind, button, note, tooltip
+from .widgets import FILL, Kind, button, note, shown_path, tooltip
 
 T = TypeVar("T")
 
@@ -75,7 +76,7 @@ def _draw_how(exporting: Exporting) -> None:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
     elif exporting.draft.format.has_quality:
         _name(t("Quality"))
-        imgui.set_next_item_width(-1)
+        imgui.set_next_item_width(FILL)
         is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
         shown = t("lossless") if is_lossless else "%d"
         is_changed, quality = imgui.slider_int("##quality", exporting.quality, 50, 100, shown)
@@ -92,7 +93,7 @@ def _draw_where(editor: Editor) -> bool:
     _name(t("Folder") if exporting.draft.what is What.LAYERS else t("Name"))
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(FILL)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
     name = exporting.draft.name
     is_entered, typed = imgui.input_text_with_hint("##name", t("name or path"), name, flags)
@@ -101,7 +102,7 @@ def _draw_where(editor: Editor) -> bool:
     _name(t("In"))
     imgui.align_text_to_frame_padding()
     room = imgui.get_content_region_avail().x - theme.pt(BROWSE + 8)
-    folder = str(exporting.path.parent)
+    folder = shown_path(exporting.path.parent)
     imgui.text_colored(theme.vec("secondary"), _shortened(folder, room))
     tooltip(folder)
     imgui.same_line(imgui.get_window_width() - theme.pt(20 + BROWSE))
@@ -151,7 +152,7 @@ def _field() -> float:
 def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporting) -> What | None:
     """A list that unfolds; what cannot be chosen says why. What was chosen, or None."""
     found = None
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(FILL)
     if imgui.begin_combo(f"##{name}", t(chosen.value)):
         for choice in choices:
             reason = exporting.why_not(choice)
@@ -179,6 +180,7 @@ def _segments(name: str, choices: Sequence[T], chosen: T, labels: Sequence[str])
         imgui.push_style_color(imgui.Col_.text, theme.vec(text))
         if imgui.button(f"{labels[k]}##{name}{k}", ImVec2(width, theme.pt(FIELD))):
             found = choice
+        mark(labels[k])
         imgui.pop_style_color(3)
     return found
 

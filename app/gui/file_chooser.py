@@ -10,7 +10,7 @@ from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
 from .theme import Icon, theme
-from .widgets import Kind, bold_text, button, icon_button, note
+from .widgets import FILL, Kind, bold_text, button, icon_button, note, shown_path
 
 TITLE = "Choose a file"
 SIZE = (640.0, 480.0)  # points
@@ -79,7 +79,7 @@ class FileChooser:
         """The field; True when Enter was pressed in it."""
         if self._is_first:
             imgui.set_keyboard_focus_here()
-        imgui.set_next_item_width(-1)
+        imgui.set_next_item_width(FILL)
         is_entered, self._name = imgui.input_text_with_hint(
             "##path", t("name or path"), self._name, imgui.InputTextFlags_.enter_returns_true
         )
@@ -93,7 +93,7 @@ class FileChooser:
             self._enter(self._folder.parent)
         imgui.same_line()
         imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec("secondary"), _shortened(self._folder, 80))
+        imgui.text_colored(theme.vec("secondary"), _shortened(self._folder, 72))
         imgui.push_style_color(imgui.Col_.child_bg, theme.vec("surround"))
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
@@ -179,5 +179,5 @@ class FileChooser:
 
 
 def _shortened(path: Path, length: int) -> str:
-    text = str(path)
+    text = shown_path(path)
     return text if len(text) <= length else f"…{text[-length:]}"

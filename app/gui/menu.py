@@ -107,15 +107,17 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     name = editor.path.name if editor.path else editor.document.photo.name
     state = "" if editor.is_saved else t("edited")
     if (text := imgui.calc_text_size(name).x) > rect.width * 0.4:
-        name = f"{name[:24]}…"
+        name = f"{name[:18]}…{name[-9:]}"  # its ending says what it is
         text = imgui.calc_text_size(name).x
     state_width = imgui.calc_text_size(f"{state}   ").x if state else 0.0
-    imgui.same_line(rect.width - buttons - text - state_width - theme.pt(16))
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))
     imgui.text_unformatted(name)
     if state:
         imgui.same_line(0, theme.pt(8))
         imgui.text_colored(theme.vec("secondary"), state)
-    imgui.same_line(rect.width - buttons)
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons)
     points = side / theme.scale
     for i, (icon, name) in enumerate(((Icon.UNDO, "undo"), (Icon.REDO, "redo"))):
         if i:

@@ -31,7 +31,7 @@ def draw_frame(canvas: Canvas) -> None:
     if shown.horizon is not None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)
-    canvas.polyline(corners, WHITE, width=1.0, alpha=0.7)
+    canvas.polyline(corners, WHITE, width=1.0, alpha=0.5)
     names = [name for name in TURNS if part == name or not editor.hand.is_busy]
     for name in names:
         _draw_back(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
