@@ -24,11 +24,11 @@ def draw_history(editor: Editor) -> None:
     steps, cursor = history.steps, history.cursor
     height = theme.pt(ROW) * min(len(steps), MOST)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
-    imgui.begin_child("##history", ImVec2(0, height))
+    is_visible = imgui.begin_child("##history", ImVec2(0, height))
     for k, label in enumerate(steps):
         if _draw_step(k, label, cursor):
             editor.travel(k)
-        if k == cursor and _has_moved(cursor, len(steps)):
+        if is_visible and k == cursor and _has_moved(cursor, len(steps)):
             imgui.set_scroll_here_y(0.5)
     imgui.end_child()
     imgui.pop_style_var()
@@ -59,7 +59,7 @@ class _Seen:
 
     def __init__(self) -> None:
         self.is_shown = False
-        self.step = (-1, -1)  # the current one, and how many there were
+        self.step: tuple[int, int] = (-1, -1)  # the current one, and how many there were
 
 
 _seen = _Seen()

@@ -15,6 +15,7 @@ from pathlib import Path
 from imgui_bundle import ImVec2, imgui
 
 VARIABLE = "OBJECTMORPHER_LANDMARKS"
+POINTER = "Pointer"
 
 _file = os.environ.get(VARIABLE)
 _places: dict[str, tuple[float, float, float, float]] = {}
@@ -46,6 +47,8 @@ def write() -> None:
     global _written
     if _file is None:
         return
+    mouse = imgui.get_io().mouse_pos
+    _places[POINTER] = (mouse.x, mouse.y, mouse.x, mouse.y)  # what came before it was answered
     text = json.dumps(_places)
     _places.clear()
     if text != _written:

@@ -13,7 +13,7 @@ from ..view import Shown
 from .landmarks import mark
 from .layout import Rect
 from .theme import Icon, theme
-from .widgets import icon_button, tooltip
+from .widgets import fitted, icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
@@ -106,9 +106,8 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     buttons = 2 * side + theme.pt(4 + 12)
     name = editor.path.name if editor.path else editor.document.photo.name
     state = "" if editor.is_saved else t("edited")
-    if (text := imgui.calc_text_size(name).x) > rect.width * 0.4:
-        name = f"{name[:18]}…{name[-9:]}"  # its ending says what it is
-        text = imgui.calc_text_size(name).x
+    name = fitted(name, rect.width * 0.28)
+    text = imgui.calc_text_size(name).x
     state_width = imgui.calc_text_size(f"{state}   ").x if state else 0.0
     imgui.same_line()
     imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))

@@ -109,6 +109,17 @@ def icon_button(
     return is_pressed
 
 
+def fitted(name: str, room: float) -> str:
+    """As much of a file's name as has room (window units); its ending tells most, so it stays."""
+    if imgui.calc_text_size(name).x <= room:
+        return name
+    for kept in range(len(name) - 2, 1, -1):
+        shown = f"{name[: kept - kept // 3]}…{name[len(name) - kept // 3 :]}"
+        if imgui.calc_text_size(shown).x <= room:
+            return shown
+    return "…"
+
+
 def shown_path(path: Path) -> str:
     """As it is read: what is in the user's home folder begins with ~."""
     home = Path.home()
@@ -172,6 +183,8 @@ class Change:
 
 def number_field(number: Number, value: float) -> Change:
     """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
+    if not any(digit in "123456789" for digit in number.format % value):
+        value = 0.0  # not "-0.00"
     changed = Change(value)
     imgui.push_id(number.name)
     imgui.align_text_to_frame_padding()
@@ -218,8 +231,11 @@ def checkbox(label: str, is_on: bool) -> bool:
     imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 1))
     imgui.push_style_var(imgui.StyleVar_.frame_border_size, theme.pt(1) if not is_on else 0.0)
     imgui.push_style_color(imgui.Col_.border, theme.vec("secondary", 0.8))
+    for column in ("frame_bg_hovered", "frame_bg_active"):  # or the check would be white on grey
+        role = "accent_hovered" if is_on else "hovered"
+        imgui.push_style_color(getattr(imgui.Col_, column), theme.vec(role))
     is_on = imgui.checkbox(label, is_on)[1]
     mark(label)
-    imgui.pop_style_color()
+    imgui.pop_style_color(3)
     imgui.pop_style_var(2)
     return is_on

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -89,8 +90,22 @@ class Hands:
         self.wait(lambda: label in self.places(), f"showing {label}")
         return self.places()[label]
 
+    def nudge(self) -> None:
+        """Waits until the window has seen the pointer move, and so all that came before it."""
+        x, y = self.pointer()
+        for place in ((x + 1, y), (x, y)):
+            self.xdotool("mousemove", *place)
+            self.wait(lambda place=place: tuple(self.area("Pointer")[:2]) == place, "seeing the pointer")
+
+    def pointer(self) -> tuple[int, int]:
+        """Where it is, px on the screen."""
+        said = self.xdotool("getmouselocation", "--shell")
+        x, y = re.findall(r"^[XY]=(\d+)", said, re.MULTILINE)
+        return int(x), int(y)
+
     def settle(self) -> np.ndarray:
-        """Waits until no job runs and nothing but a caret moves; the picture."""
+        """Waits until all is answered, no job runs and nothing but a caret moves; the picture."""
+        self.nudge()
         before, end, calm = self.picture(), time.monotonic() + PATIENCE, 0
         while calm < CALM and time.monotonic() < end:
             time.sleep(STILL)
