@@ -15,7 +15,7 @@ from ..texts import t
 from .landmarks import mark
 from .modal import modal
 from .theme import FIELD, PRIMARY, theme
-from .widgets import FILL, Kind, button, note, shown_path, tooltip
+from .widgets import FILL, Kind, button, fitted, note, shown_path, tooltip
 
 T = TypeVar("T")
 
@@ -127,7 +127,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     is_cancelled = button(t("Cancel"), width=BROWSE)
     imgui.same_line()
     imgui.set_cursor_pos_y(top)
-    label = f"{_shortened(exporting.label, theme.pt(WIDTH - 3 * 20 - BROWSE - 16))}###go"
+    label = f"{fitted(exporting.label, theme.pt(WIDTH - 4 * 20 - BROWSE - 16))}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
     is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
     is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
@@ -161,6 +161,8 @@ def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporti
                 found = choice
             if reason:
                 tooltip(reason)
+        if imgui.is_key_pressed(imgui.Key.escape):
+            imgui.close_current_popup()
         imgui.end_combo()
     return found
 

@@ -54,6 +54,8 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
         mark(f"Menu: {t(title)}")
         if is_open:
             _draw_items(editor, names)
+            if imgui.is_key_pressed(imgui.Key.escape):
+                imgui.close_current_popup()
             imgui.end_menu()
     imgui.pop_style_var(2)
     _draw_right(editor, rect)

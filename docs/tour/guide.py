@@ -14,6 +14,7 @@ from hands import Hands
 from PIL import Image, ImageDraw
 
 QUALITY = 80  # of the JPEGs
+DRAWN = 400  # px of the screen that differ: more than a hint, less than a small outline
 PIECES = 8  # of a drag
 ARROW = ((0, 0), (0, 16.5), (3.9, 12.9), (6.6, 18.9), (9.2, 17.8), (6.6, 11.9), (12, 11.9))
 FINE = 4  # the arrow is drawn so many times larger, for its edges
@@ -77,6 +78,12 @@ class Guide(Hands):
         """An Alt-click on px of the photo."""
         self.point(self.at(x, y))
         self.xdotool("keydown", "alt", "click", 1, "keyup", "alt")
+
+    def rest(self, x: float, y: float) -> None:
+        """The pointer rests on px of the photo until the window draws what it found there."""
+        before = self.settle()
+        self.point(self.at(x, y))
+        self.wait(lambda: (self.picture() != before).any(2).sum() > DRAWN, "showing a candidate")
 
     def pull(self, label: str, pixels: float) -> None:
         """Drags in a field with a number."""

@@ -38,7 +38,7 @@ def _tilt_head(guide: Guide) -> None:
     guide.point(EMPTY)
     guide.area("Photo")
     guide.shoot("Opened", "The photo, fitted. The button at the lower right says what comes next.")
-    guide.point(guide.at(220, 80))
+    guide.rest(220, 80)
     guide.shoot("Candidate", "The pointer rests: dots go around what a click would select.")
     guide.click(*guide.at(220, 80))
     guide.area("Lift object")
@@ -122,7 +122,7 @@ def _turn_cup(guide: Guide) -> None:
     guide.area("Photo")
     guide.shoot("Opened", "The same window in the light theme; what surrounds the photo stays a "
                 "neutral grey.")  # fmt: skip
-    guide.point(guide.at(300, 130))
+    guide.rest(300, 130)
     guide.shoot("Candidate", "Cup, saucer and spoon are what a click here would select.")
     guide.click(*guide.at(300, 130))
     guide.area("Lift object")

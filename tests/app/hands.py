@@ -95,7 +95,7 @@ class Hands:
         x, y = self.pointer()
         for place in ((x + 1, y), (x, y)):
             self.xdotool("mousemove", *place)
-            self.wait(lambda place=place: tuple(self.area("Pointer")[:2]) == place, "seeing the pointer")
+            self.wait(lambda seen=(*place, *place): tuple(self.area("Pointer")) == seen, "pointing")
 
     def pointer(self) -> tuple[int, int]:
         """Where it is, px on the screen."""
