@@ -106,3 +106,9 @@ ablations: .make/test
 .PHONY: rendering
 rendering: .make/test
 	@$(PYTHON) docs/rendering/make_rendering.py $(PAGES)
+
+# Does the edits of docs/tour again in a window of their own, and takes the pictures of it and of
+# the README; STORIES="dark views" does some of them.
+.PHONY: tour
+tour: .make/test
+	@$(PYTHON) docs/tour/make_tour.py $(STORIES)

@@ -225,6 +225,8 @@ class Editor:
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
         else:
+            if self.view.tool is ToolName.LOOK:
+                self.looking.reset()
             self.posing.select(None)
             self.message = None
 

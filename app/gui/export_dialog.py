@@ -14,7 +14,7 @@ from ..texts import t
 from .modal import modal
 from .segmented import Choice, segmented
 from .theme import FIELD, PRIMARY, theme
-from .widgets import Kind, button, note, shortened, tooltip
+from .widgets import FILL, Kind, button, fitted, note, shortened, shown_path, tooltip
 
 WIDTH = 480.0  # points
 LABELS = 88.0  # width of the names left of the fields
@@ -72,7 +72,7 @@ def _draw_how(exporting: Exporting) -> None:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
     elif exporting.draft.format.has_quality:
         _name(t("Quality"))
-        imgui.set_next_item_width(-1)
+        imgui.set_next_item_width(FILL)
         is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
         shown = t("lossless") if is_lossless else "%d"
         is_changed, quality = imgui.slider_int("##quality", exporting.quality, 50, 100, shown)
@@ -89,7 +89,7 @@ def _draw_where(editor: Editor) -> bool:
     _name(t("Folder") if exporting.draft.what is What.LAYERS else t("Name"))
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(FILL)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
     name = exporting.draft.name
     is_entered, typed = imgui.input_text_with_hint("##name", t("name or path"), name, flags)
@@ -98,7 +98,7 @@ def _draw_where(editor: Editor) -> bool:
     _name(t("In"))
     imgui.align_text_to_frame_padding()
     room = imgui.get_content_region_avail().x - theme.pt(BROWSE + 8)
-    folder = str(exporting.path.parent)
+    folder = shown_path(exporting.path.parent)
     imgui.text_colored(theme.vec("secondary"), shortened(folder, room))
     tooltip(folder)
     imgui.same_line(imgui.get_window_width() - theme.pt(20 + BROWSE))
@@ -123,7 +123,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     is_cancelled = button(t("Cancel"), width=BROWSE)
     imgui.same_line()
     imgui.set_cursor_pos_y(top)
-    label = f"{shortened(exporting.label, theme.pt(WIDTH - 3 * 20 - BROWSE - 16))}###go"
+    label = f"{fitted(exporting.label, theme.pt(WIDTH - 4 * 20 - BROWSE - 16))}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
     is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
     is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
@@ -148,7 +148,7 @@ def _field() -> float:
 def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporting) -> What | None:
     """A list that unfolds; what cannot be chosen says why. What was chosen, or None."""
     found = None
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(FILL)
     if imgui.begin_combo(f"##{name}", t(chosen.value)):
         for choice in choices:
             reason = exporting.why_not(choice)
@@ -157,5 +157,7 @@ def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporti
                 found = choice
             if reason:
                 tooltip(reason)
+        if imgui.is_key_pressed(imgui.Key.escape):
+            imgui.close_current_popup()
         imgui.end_combo()
     return found

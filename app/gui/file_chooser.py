@@ -11,7 +11,7 @@ from ..filing import Dialog
 from ..texts import t
 from .modal import modal
 from .theme import Icon, theme
-from .widgets import Kind, button, icon_button, note, shortened
+from .widgets import FILL, Kind, button, icon_button, note, shortened, shown_path
 
 WIDTH, HEIGHT = 640.0, 480.0  # points
 ROW = 28.0
@@ -67,7 +67,7 @@ class FileChooser:
         """The field; True when Enter was pressed in it."""
         if self._is_first:
             imgui.set_keyboard_focus_here()
-        imgui.set_next_item_width(-1)
+        imgui.set_next_item_width(FILL)
         is_entered, self._name = imgui.input_text_with_hint(
             "##path", t("name or path"), self._name, imgui.InputTextFlags_.enter_returns_true
         )
@@ -80,7 +80,7 @@ class FileChooser:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         room = imgui.get_content_region_avail().x
-        imgui.text_colored(theme.vec("secondary"), shortened(str(self._folder), room))
+        imgui.text_colored(theme.vec("secondary"), shortened(shown_path(self._folder), room))
         imgui.push_style_color(imgui.Col_.child_bg, theme.vec("surround"))
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))

@@ -19,20 +19,24 @@ def draw_history(editor: Editor) -> None:
     """At the inspector's end, while it is switched on."""
     history = editor.history
     if history is None or not editor.view.has_history:
+        _seen.is_shown = False
         return
     rule()
     heading(t("History"))
     steps, cursor = history.steps, history.cursor
     height = theme.pt(ROW) * min(len(steps), MOST)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
-    imgui.begin_child("##history", ImVec2(0, height))
+    is_visible = imgui.begin_child("##history", ImVec2(0, height))
     for k, label in enumerate(steps):
         if _draw_step(k, label, cursor):
             editor.travel(k)
-        if k == cursor and _has_moved(cursor, len(steps)):
+        if is_visible and k == cursor and _has_moved(cursor, len(steps)):
             imgui.set_scroll_here_y(0.5)
     imgui.end_child()
     imgui.pop_style_var()
+    if not _seen.is_shown:  # it was just switched on, maybe below the panel's end
+        imgui.set_scroll_here_y(1.0)
+        _seen.is_shown = True
 
 
 def _draw_step(k: int, label: str, cursor: int) -> bool:
@@ -50,11 +54,18 @@ def _draw_step(k: int, label: str, cursor: int) -> bool:
     return is_clicked
 
 
-_seen = (-1, -1)
+class _Seen:
+    """What the list showed when it was drawn last."""
+
+    def __init__(self) -> None:
+        self.is_shown = False
+        self.step: tuple[int, int] = (-1, -1)  # the current one, and how many there were
+
+
+_seen = _Seen()
 
 
 def _has_moved(cursor: int, count: int) -> bool:
     """Whether the current step is another one than when this was asked last."""
-    global _seen
-    before, _seen = _seen, (cursor, count)
-    return before != _seen
+    before, _seen.step = _seen.step, (cursor, count)
+    return before != _seen.step

@@ -23,15 +23,30 @@ from .theme import PRIMARY, theme
 from .widgets import Kind, button, rule
 
 
+class _Scroll:
+    """Whether the panel had more than there is room for when it was drawn last."""
+
+    is_needed = False
+
+
+_scroll = _Scroll()
+
+
 def draw_inspector(editor: Editor, rect: Rect) -> None:
     with pane("##inspector", rect):
         foot = theme.pt(PRIMARY + 24)
-        imgui.begin_child("##scroll", ImVec2(0, rect.height - foot - theme.pt(12)))
+        bar = imgui.get_style().scrollbar_size if _scroll.is_needed else 0.0
+        across = imgui.get_content_region_avail().x + bar  # the bar stands in the padding
+        imgui.begin_child("##scroll", ImVec2(across, rect.height - foot - theme.pt(12)))
         draw_objects(editor)
         rule()
         _PANELS[editor.view.tool](editor)
         draw_history(editor)
+        _scroll.is_needed = imgui.get_scroll_max_y() > 0
         imgui.end_child()
+        if _scroll.is_needed:
+            top = rect.y + rect.height - foot + 0.5
+            edge((rect.x, top), (rect.x + rect.width, top))
         _draw_foot(editor, rect, foot)
         edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
 

@@ -1,5 +1,7 @@
 """Where the window's buttons and fields are, by what they say: for tests and tours.
 
+So are the photo, the handles on it and the rings: what is drawn there cannot be found otherwise.
+
 With OBJECTMORPHER_LANDMARKS=FILE in the environment the window writes them there whenever they
 change. Without it nothing is collected.
 """
@@ -10,9 +12,10 @@ import json
 import os
 from pathlib import Path
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 VARIABLE = "OBJECTMORPHER_LANDMARKS"
+POINTER = "Pointer"
 
 _file = os.environ.get(VARIABLE)
 _places: dict[str, tuple[float, float, float, float]] = {}
@@ -27,6 +30,12 @@ def mark(label: str) -> None:
     _places[clean(label)] = (low.x, low.y, high.x, high.y)
 
 
+def mark_on_canvas(label: str, low: ImVec2, high: ImVec2) -> None:
+    """Something that is drawn over the photo and can be taken hold of."""
+    if _file is not None:
+        _places[label] = (low.x, low.y, high.x, high.y)
+
+
 def clean(label: str) -> str:
     """What a user reads of it: no icon (they are in the private use area), no id."""
     text = label.partition("##")[0]
@@ -38,6 +47,8 @@ def write() -> None:
     global _written
     if _file is None:
         return
+    mouse = imgui.get_io().mouse_pos
+    _places[POINTER] = (mouse.x, mouse.y, mouse.x, mouse.y)  # what came before it was answered
     text = json.dumps(_places)
     _places.clear()
     if text != _written:

@@ -13,7 +13,7 @@ from ..view import Shown
 from .landmarks import mark
 from .layout import Rect
 from .theme import Icon, theme
-from .widgets import icon_button, tooltip
+from .widgets import fitted, icon_button, tooltip
 
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
@@ -54,6 +54,8 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
         mark(f"Menu: {t(title)}")
         if is_open:
             _draw_items(editor, names)
+            if imgui.is_key_pressed(imgui.Key.escape):
+                imgui.close_current_popup()
             imgui.end_menu()
     imgui.pop_style_var(2)
     _draw_right(editor, rect)
@@ -106,16 +108,17 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     buttons = 2 * side + theme.pt(4 + 12)
     name = editor.path.name if editor.path else editor.document.photo.name
     state = "" if editor.is_saved else t("edited")
-    if (text := imgui.calc_text_size(name).x) > rect.width * 0.4:
-        name = f"{name[:24]}…"
-        text = imgui.calc_text_size(name).x
+    name = fitted(name, rect.width * 0.28)
+    text = imgui.calc_text_size(name).x
     state_width = imgui.calc_text_size(f"{state}   ").x if state else 0.0
-    imgui.same_line(rect.width - buttons - text - state_width - theme.pt(16))
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))
     imgui.text_unformatted(name)
     if state:
         imgui.same_line(0, theme.pt(8))
         imgui.text_colored(theme.vec("secondary"), state)
-    imgui.same_line(rect.width - buttons)
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons)
     points = side / theme.scale
     for i, (icon, name) in enumerate(((Icon.UNDO, "undo"), (Icon.REDO, "redo"))):
         if i:

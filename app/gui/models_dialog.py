@@ -44,6 +44,7 @@ def _draw_model(editor: Editor, state: State) -> None:
     rule()
     imgui.push_id(weight.id)
     with bold_text():
+        imgui.align_text_to_frame_padding()
         imgui.text_unformatted(names.name)
     imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
     _draw_state(editor, state)
@@ -67,6 +68,8 @@ def _draw_state(editor: Editor, state: State) -> None:
         if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
             models.cancel()
     elif state.state == "ok":
+        across = imgui.calc_text_size(f"{Icon.CHECK}{t('Installed')}").x + theme.pt(6)
+        imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20) - across)
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.vec("accent"), Icon.CHECK)
         imgui.same_line(0, theme.pt(6))

@@ -64,7 +64,7 @@ def _draw_title(editor: Editor, has_buttons: bool) -> None:
     if not has_buttons:
         return
     end, gap = imgui.get_content_region_avail().x + imgui.get_cursor_pos_x(), theme.pt(2)
-    left = end - len(BUTTONS) * theme.pt(SIDE) - (len(BUTTONS) - 1) * gap
+    left = end - theme.pt(4) - len(BUTTONS) * theme.pt(SIDE) - (len(BUTTONS) - 1) * gap
     imgui.push_font(None, SMALL_SIZE - 1)
     for i, (icon, name) in enumerate(BUTTONS):
         imgui.same_line(left + i * (theme.pt(SIDE) + gap))

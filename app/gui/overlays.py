@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from imgui_bundle import ImVec2
 
 from ..editor import Editor
 from ..view import ToolName
+from .landmarks import mark_on_canvas
 from .layout import Rect
 from .legend import Legend
 from .overlay.canvas import Canvas
@@ -35,6 +37,8 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     view, canvas = editor.view, Canvas(editor, rect, pixel_ratio)
     end = ImVec2(rect.x + rect.width, rect.y + rect.height)
     canvas.draw.push_clip_rect(ImVec2(rect.x, rect.y), end, True)
+    if editor.photo_size is not None:
+        mark_on_canvas("Photo", *canvas.at(np.array([(0, 0), editor.photo_size], np.float64)))
     draw_pixel_grid(canvas)
     if not view.is_before:
         if view.has_points and editor.is_lifted and editor.looking.orbit is None:

@@ -19,7 +19,7 @@ from .layout import Rect
 from .panes import FLAGS
 from .recovery_list import draw_recovery, recovery_height
 from .theme import TITLE_SIZE, Icon, theme
-from .widgets import Kind, bold_text, button, tooltip
+from .widgets import Kind, bold_text, button, fitted, tooltip
 
 SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flower", "Flower"))
 COLUMN = 720.0  # points, width of everything
@@ -59,7 +59,7 @@ class StartScreen:
         self._draw_samples(editor, column)
         if recent:
             imgui.dummy(theme.size(0, 8))
-            self._draw_recent(editor, recent)
+            self._draw_recent(editor, recent, column)
         imgui.end_group()
         imgui.end()
 
@@ -130,16 +130,18 @@ class StartScreen:
             self._thumbs[name] = self._renderer.picture(np.asarray(picture))
         return self._thumbs[name]
 
-    def _draw_recent(self, editor: Editor, recent: list[Path]) -> None:
+    def _draw_recent(self, editor: Editor, recent: list[Path], column: float) -> None:
         with bold_text():
             imgui.text_unformatted(t("Recent"))
         imgui.push_style_var(imgui.StyleVar_.button_text_align, ImVec2(0, 0.5))
         for path in recent:
-            if button(f"{Icon.FILE}   {path.name}##{path}", Kind.QUIET, width=320):
+            name = fitted(path.name, column - theme.pt(56))
+            across = imgui.calc_text_size(f"{Icon.FILE}   {name}").x / theme.scale + 16
+            if button(f"{Icon.FILE}   {name}##{path}", Kind.QUIET, width=max(across, 320)):
                 if path.exists():
                     editor.filing.open(path)
                 else:
-                    editor.complain(t("{name} is not there any more", name=path.name))
+                    editor.complain(t("The file {name} is not there any more", name=path.name))
                     editor.filing.forget_recent(str(path))
             tooltip(str(path))
         imgui.pop_style_var()

@@ -84,7 +84,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     gap = theme.pt(8)
     x = right - theme.pt(16) - side
     imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
-    if icon_button(Icon.CLOSE, "cancel", t("Cancel"), None, side / theme.scale):
+    if icon_button(Icon.CLOSE, "cancel", t("Cancel the job"), None, side / theme.scale):
         (editor.jobs if isinstance(job, Job) else editor.chores).cancel(job.kind)
     x -= imgui.calc_text_size("100 %").x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
@@ -95,7 +95,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     x -= imgui.calc_text_size(text).x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
     imgui.text_unformatted(text)
-    return x - gap
+    return x - 2 * gap
 
 
 def _draw_bar(x: float, middle: float, fraction: float) -> None:
@@ -114,7 +114,7 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
     imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
     imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
     if message is None:
-        imgui.text_colored(theme.vec("secondary"), hint)
+        imgui.text_colored(theme.vec("secondary"), _whole_parts(hint, right - theme.pt(12)))
     else:
         role = "error" if message.is_error else "text"
         icon = Icon.WARNING if message.is_error else Icon.INFO
@@ -124,6 +124,13 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
         if message is editor.message and (message.is_error or message.action is not None):
             _draw_buttons(editor, message)
     imgui.pop_clip_rect()
+
+
+def _whole_parts(hint: str, room: float) -> str:
+    """As many of a hint's parts as have room, window units."""
+    while imgui.calc_text_size(hint).x > room and " · " in hint:
+        hint = hint.rpartition(" · ")[0]
+    return hint
 
 
 def _draw_buttons(editor: Editor, message: Message) -> None:

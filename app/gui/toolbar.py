@@ -22,7 +22,7 @@ TOOLS = (
     (ToolName.POSE, Icon.POSE, "pose", "Drag points of the object; it bends"),
     (ToolName.PLACE, Icon.PLACE, "place", "Move, turn and scale the whole object"),
     (ToolName.LOOK, Icon.EYE, "look", "See the object from all sides, before and after"),
-    (ToolName.COMPOSE, Icon.LAYERS, "compose", "Repair the background, join the object to it"),
+    (ToolName.COMPOSE, Icon.LAYERS, "compose", "Repair the background, blend the object in"),
 )
 
 

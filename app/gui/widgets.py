@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
@@ -16,6 +17,7 @@ from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
 GAP = 8.0  # between two that stand side by side
 STEPPER = 24.0  # points, width of a field's - and + buttons
+FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it ends a pixel before
 
 
 class Kind(Enum):
@@ -62,7 +64,7 @@ def button(
     """A text button; `why_not` greys it out and is its tooltip. `width` in points, -1 fills."""
     is_tall = kind in (Kind.PRIMARY, Kind.WAITING)
     height = PRIMARY if is_tall else FIELD
-    across = theme.pt(width) if width > 0 else width
+    across = theme.pt(width) if width > 0 else FILL
     roles = _ROLES[kind]
     columns = ("button", "button_hovered", "button_active", "text")
     for column, role in zip(columns, roles, strict=True):
@@ -122,6 +124,23 @@ def shortened(text: str, room: float) -> str:
     return f"…{text}"
 
 
+def fitted(name: str, room: float) -> str:
+    """As much of a file's name as has room (window units); its ending tells most, so it stays."""
+    if imgui.calc_text_size(name).x <= room:
+        return name
+    for kept in range(len(name) - 2, 1, -1):
+        shown = f"{name[: kept - kept // 3]}…{name[len(name) - kept // 3 :]}"
+        if imgui.calc_text_size(shown).x <= room:
+            return shown
+    return "…"
+
+
+def shown_path(path: Path) -> str:
+    """As it is read: what is in the user's home folder begins with ~."""
+    home = Path.home()
+    return str(Path("~", path.relative_to(home))) if path.is_relative_to(home) else str(path)
+
+
 def heading(text: str) -> None:
     """The title of a group in a panel."""
     with bold_text():
@@ -179,6 +198,8 @@ class Change:
 
 def number_field(number: Number, value: float) -> Change:
     """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
+    if not any(digit in "123456789" for digit in number.format % value):
+        value = 0.0  # not "-0.00"
     changed = Change(value)
     imgui.push_id(number.name)
     imgui.align_text_to_frame_padding()
@@ -209,7 +230,8 @@ def number_field(number: Number, value: float) -> Change:
 
 def _stepper(icon: str) -> bool:
     size = ImVec2(theme.pt(STEPPER), imgui.get_frame_height())
-    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    padding = ImVec2(0, imgui.get_style().frame_padding.y)  # as the field's: one baseline
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, padding)
     imgui.push_font(None, SMALL_SIZE - 3)
     is_pressed = imgui.button(icon, size)
     imgui.pop_font()
@@ -220,7 +242,13 @@ def _stepper(icon: str) -> bool:
 def checkbox(label: str, is_on: bool) -> bool:
     """A small box with a label; whether it is on now."""
     imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 1))
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, theme.pt(1) if not is_on else 0.0)
+    imgui.push_style_color(imgui.Col_.border, theme.vec("secondary", 0.8))
+    for column in ("frame_bg_hovered", "frame_bg_active"):  # or the check would be white on grey
+        role = "accent_hovered" if is_on else "hovered"
+        imgui.push_style_color(getattr(imgui.Col_, column), theme.vec(role))
     is_on = imgui.checkbox(label, is_on)[1]
     mark(label)
-    imgui.pop_style_var()
+    imgui.pop_style_color(3)
+    imgui.pop_style_var(2)
     return is_on

@@ -30,5 +30,5 @@ class LookTool:
 
     def hint(self, editor: Editor) -> str:
         if editor.looking.orbit is not None:
-            return t("Drag turns the object · Wheel zooms · Double-click goes back to the photo")
+            return t("Drag turns the object · Wheel zooms · Double-click or Esc: the photo")
         return t("Drag to see the object from all sides · Wheel zooms · Hold X for the photo")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import os
 import shutil
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import hands
 import numpy as np
 import pytest
+from hands import PATIENCE
 from PIL import Image
 
 from app.commands import run
@@ -22,7 +23,6 @@ from objectmorpher_core.document import Document
 WIDTH, HEIGHT = 180, 140  # px of the made photo
 CENTRE = (90.0, 72.0)  # px, of the ball in it
 RADII = (34.0, 44.0)
-PATIENCE = 90.0  # s; the first run compiles
 
 
 def made_photo() -> np.ndarray:
@@ -129,41 +129,14 @@ def display() -> Iterator[str]:
     """An X display of our own, 1440 x 900."""
     if shutil.which("Xvfb") is None:
         pytest.skip("Xvfb is not installed")
-    for number in range(90, 140):
-        if Path(f"/tmp/.X11-unix/X{number}").exists() or Path(f"/tmp/.X{number}-lock").exists():
-            continue
-        command = [
-            "Xvfb",
-            f":{number}",
-            "-screen",
-            "0",
-            "1440x900x24",
-            "-nolisten",
-            "tcp",
-            "-noreset",
-        ]
-        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        for _ in range(100):
-            time.sleep(0.05)
-            if Path(f"/tmp/.X11-unix/X{number}").exists() or server.poll() is not None:
-                break
-        if server.poll() is None:
-            yield f":{number}"
-            server.terminate()
-            server.wait()
-            return
-    pytest.skip("no free X display was found")
+    with hands.x_display(1440, 900) as name:
+        if name is None:
+            pytest.skip("no free X display was found")
+        yield name
 
 
 @pytest.fixture
 def window_environment(display: str, tmp_path: Path) -> dict[str, str]:
     """For a process with a window: its display, and settings of its own."""
-    settings = tmp_path / "settings.toml"
-    settings.write_text('dialogs = "built-in"\ngaussians = 3000\n', encoding="utf-8")
-    return {
-        **os.environ,
-        "DISPLAY": display,
-        "OBJECTMORPHER_SETTINGS": str(settings),
-        "OBJECTMORPHER_DATA": str(tmp_path / "data"),
-        "OBJECTMORPHER_LANDMARKS": str(tmp_path / "landmarks.json"),
-    }
+    settings = 'dialogs = "built-in"\ngaussians = 3000\n'
+    return hands.window_environment(display, tmp_path, settings)

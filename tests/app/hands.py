@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,11 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import PATIENCE
 from PIL import Image, ImageGrab
 
 ROOT = Path(__file__).parents[2]
 ACCENT = (0x5A, 0xA9, 0xFF)
+PATIENCE = 90.0  # s; the first run compiles
+NUMBERS = range(90, 140)  # of X displays
+STILL = 0.4  # s without a change: nothing moves any more
+CALM = 12  # looks without a job: what still changes then is a caret
 
 
 class Hands:
@@ -72,9 +77,43 @@ class Hands:
 
     def place(self, label: str) -> tuple[float, float]:
         """The middle of the button or field that says `label`; waits until there is one."""
-        self.wait(lambda: label in self.places(), f"showing {label}")
-        x0, y0, x1, y1 = self.places()[label]
+        x0, y0, x1, y1 = self.area(label)
         return (x0 + x1) / 2, (y0 + y1) / 2
+
+    def on_photo(self, x: float, y: float, size: tuple[int, int]) -> tuple[float, float]:
+        """Where px of the photo, which is `size` px, are on the screen."""
+        x0, y0, x1, y1 = self.area("Photo")
+        return x0 + (x1 - x0) * x / size[0], y0 + (y1 - y0) * y / size[1]
+
+    def area(self, label: str) -> tuple[float, float, float, float]:
+        """x0, y0, x1, y1 px on the screen; waits until it is there."""
+        self.wait(lambda: label in self.places(), f"showing {label}")
+        return self.places()[label]
+
+    def nudge(self) -> None:
+        """Waits until the window has seen the pointer move, and so all that came before it."""
+        x, y = self.pointer()
+        for place in ((x + 1, y), (x, y)):
+            self.xdotool("mousemove", *place)
+            self.wait(lambda seen=(*place, *place): tuple(self.area("Pointer")) == seen, "pointing")
+
+    def pointer(self) -> tuple[int, int]:
+        """Where it is, px on the screen."""
+        said = self.xdotool("getmouselocation", "--shell")
+        x, y = re.findall(r"^[XY]=(\d+)", said, re.MULTILINE)
+        return int(x), int(y)
+
+    def settle(self) -> np.ndarray:
+        """Waits until all is answered, no job runs and nothing but a caret moves; the picture."""
+        self.nudge()
+        before, end, calm = self.picture(), time.monotonic() + PATIENCE, 0
+        while calm < CALM and time.monotonic() < end:
+            time.sleep(STILL)
+            after, is_busy = self.picture(), "Cancel the job" in self.places()
+            if np.array_equal(before, after) and not is_busy:
+                break
+            before, calm = after, 0 if is_busy else calm + 1
+        return before
 
     def catch_up(self) -> None:
         """Waits until the window has answered everything: it opens and closes its help."""
@@ -125,15 +164,53 @@ class Hands:
 
 
 @contextmanager
-def opened(environment: dict[str, str], path: Path) -> Iterator[Hands]:
+def opened(environment: dict[str, str], path: Path | None, *options: str) -> Iterator[Hands]:
     """Hands on a window that shows this photo or session; skips where nobody can type."""
     if shutil.which("xdotool") is None:
         pytest.skip("xdotool is not installed")
-    command = [sys.executable, "-m", "app", str(path)]
+    command = [sys.executable, "-m", "app", *options, *([] if path is None else [str(path)])]
+    title = "ObjectMorpher" if path is None else path.name
     with subprocess.Popen(command, env=environment, cwd=ROOT) as window:
         hands = Hands(environment)
         try:
-            hands.wait(lambda: path.name in hands.title(), "opening")
+            hands.wait(lambda: title in hands.title(), "opening")
             yield hands
         finally:
             window.kill()
+
+
+@contextmanager
+def x_display(width: int, height: int) -> Iterator[str | None]:
+    """An X display of our own, or None where no number is free."""
+    for number in NUMBERS:
+        socket = Path(f"/tmp/.X11-unix/X{number}")
+        if socket.exists() or Path(f"/tmp/.X{number}-lock").exists():
+            continue
+        command = ["Xvfb", f":{number}", "-screen", "0", f"{width}x{height}x24"]
+        command += ["-nolisten", "tcp", "-noreset"]
+        server = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        for _ in range(100):
+            time.sleep(0.05)
+            if socket.exists() or server.poll() is not None:
+                break
+        if server.poll() is None:
+            try:
+                yield f":{number}"
+            finally:
+                server.terminate()
+                server.wait()
+            return
+    yield None
+
+
+def window_environment(display: str, folder: Path, settings: str) -> dict[str, str]:
+    """For a process with a window: its display, and settings and data of its own in `folder`."""
+    path = folder / "settings.toml"
+    path.write_text(settings, encoding="utf-8")
+    return {
+        **os.environ,
+        "DISPLAY": display,
+        "OBJECTMORPHER_SETTINGS": str(path),
+        "OBJECTMORPHER_DATA": str(folder / "data"),
+        "OBJECTMORPHER_LANDMARKS": str(folder / "landmarks.json"),
+    }

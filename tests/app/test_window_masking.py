@@ -21,6 +21,8 @@ def test_a_stroke_by_hand_makes_the_selection_larger(
     window_environment: dict[str, str], photo_path: Path
 ) -> None:
     with opened(window_environment, photo_path) as hands:
+        hands.area("Photo")
+        hands.settle()  # the title says the photo's name before it is drawn
         before = brightness(hands, 30.5, 18.5)
         hands.click(*screen_xy(*CENTRE))
         hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")

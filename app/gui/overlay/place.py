@@ -9,10 +9,12 @@ from objectmorpher_core.document import Placement
 
 from ...texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
+from ..landmarks import mark_on_canvas
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
 from .other import draw_other
 
+MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
 PIECES = 96  # of a ring
 COLOURS = {"yaw": "#8FE3B0", "pitch": "#FFC27A", "roll": WHITE}
 SHAFT = 5.0  # points, half the arrow's width at its near end
@@ -31,7 +33,7 @@ def draw_frame(canvas: Canvas) -> None:
     if shown.horizon is not None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)
-    canvas.polyline(corners, WHITE, width=1.0, alpha=0.7)
+    canvas.polyline(corners, WHITE, width=1.0, alpha=0.5)
     names = [name for name in TURNS if part == name or not editor.hand.is_busy]
     for name in names:
         _draw_back(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
@@ -42,6 +44,9 @@ def draw_frame(canvas: Canvas) -> None:
     for corner in corners:
         canvas.square(corner, 5, ACCENT if part == "scale" else WHITE)
     _draw_centre(canvas, shown)
+    for name, ring in shown.rings.items():
+        at = canvas.on_canvas(ring.seen(np.array([MARKED[name]])))[0]
+        mark_on_canvas(f"Ring: {name}", at, at)
     _draw_value(canvas, part)
 
 

@@ -9,6 +9,7 @@ from objectmorpher_core.document import EditObject
 
 from ...pose_view import PoseMode
 from ..fade import fades
+from ..landmarks import mark_on_canvas
 from ..theme import theme
 from .canvas import ACCENT, DARK, WHITE, Canvas
 from .other import draw_other
@@ -17,6 +18,7 @@ from .ring import draw_ring
 from .select import draw_rubber
 
 MAX_LINKED = 3  # links drawn from each control point
+APART = 11.0  # points between two marks of anchors
 MOVES = 0.02  # of the handle's way: what follows less is not marked
 COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the influence
 
@@ -56,7 +58,7 @@ def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
     assert document is not None
     pose = editor.view.pose
     if pose.has_anchors:
-        for at in canvas.on_photo(editor.derived.anchors(document, editor.current)):
+        for at in _apart(canvas.on_photo(editor.derived.anchors(document, editor.current))):
             canvas.hollow_diamond(at, 4)
     rests = np.array([h.point for h in thing.handles])
     starts = canvas.at(editor.derived.project(document, editor.current, rests))
@@ -70,6 +72,16 @@ def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
         is_hovered = h == editor.hover.handle
         is_selected = h in editor.posing.selected
         _draw_handle(canvas, end, thing.handles[h].is_pin, is_selected, is_hovered)
+        mark_on_canvas(f"Handle {h + 1}", end, end)
+
+
+def _apart(places: list[ImVec2]) -> list[ImVec2]:
+    """As many of them as do not touch: on a small object they would be one white patch."""
+    kept: list[ImVec2] = []
+    for at in places:
+        if all(np.hypot(at.x - k.x, at.y - k.y) >= theme.pt(APART) for k in kept):
+            kept.append(at)
+    return kept
 
 
 def _draw_mirror(canvas: Canvas) -> None:

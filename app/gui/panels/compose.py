@@ -126,7 +126,7 @@ def _draw_shadow(editor: Editor) -> None:
         note(t("Strength adds a shadow on the ground."))
         return
     shares = (
-        (Number(t("Length"), "%.2f x", 0.005, 0.1, 0.6, 0.0, MOST_SHADOW), "length", 1.0),
+        (Number(t("Length"), "%.2f ×", 0.005, 0.1, 0.6, 0.0, MOST_SHADOW), "length", 1.0),
         (Number(t("Softness"), "%.0f %%", 0.5, 5.0, 40.0, 0.0, 100.0), "softness", 100.0),
         (Number(t("Contact"), "%.0f %%", 0.5, 5.0, 70.0, 0.0, 100.0), "contact", 100.0),
     )
@@ -180,7 +180,7 @@ def _draw_light(editor: Editor) -> None:
 def _draw_edge(editor: Editor) -> None:
     heading(t("Edge"))
     assert editor.document is not None
-    number = Number(t("Blend"), "%.2f x", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
+    number = Number(t("Blend"), "%.2f ×", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
     change = number_field(number, editor.document.feather)
     preview = editor.composing.preview_feather
     _take(editor, change, lambda: preview(change.value), t("Blend of edge"))

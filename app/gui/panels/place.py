@@ -14,6 +14,7 @@ from ...texts import t
 from ..command_button import command_button
 from ..theme import SMALL_SIZE, Icon, theme
 from ..widgets import (
+    FILL,
     Number,
     checkbox,
     gap,
@@ -109,7 +110,7 @@ def _draw_title(editor: Editor, group: Group) -> None:
 
 def _draw_depth(editor: Editor, placement: Placement) -> None:
     """Nearer on the left, farther on the right."""
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(FILL)
     low, high = min(DEPTHS[0], placement.depth), max(DEPTHS[1], placement.depth)
     is_changed, depth = imgui.slider_float("##depth", placement.depth, low, high, "")
     tooltip(t("Nearer or farther, in diameters of the object"))

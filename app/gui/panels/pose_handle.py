@@ -114,7 +114,7 @@ def _draw_place(editor: Editor, numbers: Numbers) -> None:
     fields = (
         (Number("X", "%.1f px", PER_PX, 1.0, numbers.rest[0]), "x"),
         (Number("Y", "%.1f px", PER_PX, 1.0, numbers.rest[1]), "y"),
-        (Number(t("Depth"), "%.2f x", 0.005, 0.05), "depth"),
+        (Number(t("Depth"), "%.2f ×", 0.005, 0.05), "depth"),
     )
     for number, name in fields:
         change = number_field(number, getattr(numbers, name))

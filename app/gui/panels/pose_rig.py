@@ -45,7 +45,7 @@ def draw_modes(editor: Editor) -> None:
     if view.mode in BRUSHES or view.mode is PoseMode.GLUE:
         draw_radius(editor)
     if view.mode is PoseMode.STIFFEN:
-        stiff = Number(t("Stiffness"), "%.2f x", 0.02, 0.5, 4.0, 0.05, 50.0)
+        stiff = Number(t("Stiffness"), "%.2f ×", 0.02, 0.5, 4.0, 0.05, 50.0)
         view.stiffness = number_field(stiff, view.stiffness).value
 
 

@@ -50,7 +50,8 @@ def _draw_facts(editor: Editor) -> None:
     removes = len(prompt.clicks) - adds
     facts = []
     if mask is not None:
-        facts.append(t("{share} of the photo is selected.", share=f"{editor.selection.share:.1%}"))
+        share = f"{100 * editor.selection.share:.1f} %"
+        facts.append(t("{share} of the photo is selected.", share=share))
     if adds or removes:
         facts.append(t("{adds} added, {removes} removed by click.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from ... import __version__
 from ...editor import Editor
 from ...logs import log_path
 from ...resources import resource
 from ...texts import t
-from ..widgets import Kind, button, gap, note
+from ..widgets import Kind, button, gap, note, shown_path
 from .frame import popup
 
 SIZE = (520.0, 420.0)  # points
@@ -23,12 +23,14 @@ def draw_about(editor: Editor) -> None:
         note(t("Open a photo, click an object, drag its points in 3D, save the photo."))
         note(t("After “ObjectMorpher” (CVPR 2026). Everything runs on this computer."))
         gap(12)
-        note(t("The log is {path}", path=log_path()))
+        note(t("The log is {path}", path=shown_path(log_path())))
         if button(t("Copy the log"), Kind.PLAIN, width=200):
             imgui.set_clipboard_text(_log())
             editor.say(t("The log is in the clipboard"))
         gap(12)
+        imgui.begin_child("##licences", ImVec2(0, 0))
         note(resource("assets/licences.txt").read_text(encoding="utf-8"))
+        imgui.end_child()
 
 
 def _log() -> str:

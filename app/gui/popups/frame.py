@@ -14,6 +14,7 @@ from ..widgets import bold_text, icon_button
 
 PAD = 20.0  # points
 LEAST_AROUND = 48.0  # points of the window that stay visible around it
+SHADOW = 18  # points around it that are darker, it stands above the panels
 TITLE = 20.0  # ImGui's font size
 
 
@@ -28,9 +29,12 @@ def popup(editor: Editor, title: str, width: float, height: float) -> Iterator[N
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(PAD, PAD))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
     imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
+    imgui.push_style_color(imgui.Col_.border, theme.vec("pressed"))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
     imgui.begin(f"{title}##popup", None, flags | imgui.WindowFlags_.no_move)
+    imgui.pop_style_color()
     imgui.pop_style_var(3)
+    _draw_shadow(size)
     with bold_text(TITLE):
         imgui.align_text_to_frame_padding()
         imgui.text_unformatted(title)
@@ -40,3 +44,15 @@ def popup(editor: Editor, title: str, width: float, height: float) -> Iterator[N
     imgui.dummy(theme.size(0, 4))
     yield
     imgui.end()
+
+
+def _draw_shadow(size: ImVec2) -> None:
+    """Around the window that is being drawn: rings, weaker and weaker."""
+    draw, low = imgui.get_window_draw_list(), imgui.get_window_pos()
+    draw.push_clip_rect_full_screen()
+    for k in range(1, round(theme.pt(SHADOW)) + 1):
+        share = 1 - k / theme.pt(SHADOW)
+        start = ImVec2(low.x - k, low.y - k)
+        end = ImVec2(low.x + size.x + k, low.y + size.y + k)
+        draw.add_rect(start, end, theme.u32("#000000", 0.3 * share**2), theme.pt(10) + k, 1.5)
+    draw.pop_clip_rect()

@@ -1,0 +1,223 @@
+"""The edits of the tour, step by step. Places are px of the photo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from guide import Guide
+
+RING = 28  # px, radius of the ring around a handle at scale 1
+EMPTY = (1110.0, 60.0)  # px on the screen: on the canvas, beside every photo of the tour
+
+
+@dataclass(frozen=True)
+class Story:
+    """One edit."""
+
+    name: str
+    about: str
+    theme: str
+    scale: float
+    photo_size: tuple[int, int]  # px
+    tell: Callable[[Guide], None]
+
+
+def _tilt_head(guide: Guide) -> None:
+    """The astronaut's head, in the dark theme."""
+    guide.place("Open a photo…")
+    guide.point((1000, 720))
+    guide.shoot("Start", "Nothing is open yet: drop a photo, open one, or try a sample.")
+    guide.choose("Open a photo…")
+    guide.area("One folder up")
+    guide.settle()
+    guide.xdotool("type", "--delay", 20, "Pictures/astronaut.jpg")
+    guide.shoot("Open", "Where the desktop has no file dialog, the editor has its own.")
+    guide.press("Return")
+    guide.point(EMPTY)
+    guide.area("Photo")
+    guide.shoot("Opened", "The photo, fitted. The button at the lower right says what comes next.")
+    guide.rest(220, 80)
+    guide.shoot("Candidate", "The pointer rests: dots go around what a click would select.")
+    guide.click(*guide.at(220, 80))
+    guide.area("Lift object")
+    guide.point(EMPTY)
+    guide.shoot("Selected", "One click. The rest is veiled; the blue dot is the click.")
+    guide.choose("Tool: Refine mask")
+    guide.area("Hardness")
+    for _ in range(3):
+        guide.press("bracketleft")
+    with guide.dragging(guide.at(4, 382), guide.at(6, 508), button=3):
+        guide.shoot("Refined", "The selection took a piece of the flag along: a right drag of the "
+                    "brush takes it away.")  # fmt: skip
+    guide.choose("Lift object")
+    guide.area("Drag a point on the object")
+    guide.point(EMPTY)
+    guide.shoot("Lifted", "A second later she is a 3D shape; the dots say where it can be dragged.")
+    for x, y in ((170, 230), (300, 240), (210, 290), (100, 320), (330, 330)):
+        guide.pin(x, y)
+    guide.area("Handle 5")
+    guide.point(EMPTY)
+    guide.shoot("Pins", "Alt-clicks pin her collar and her chest: white diamonds.")
+    with guide.dragging(guide.at(228, 40), guide.at(268, 50)):
+        guide.shoot("First handle", "A point of her hair is dragged, and the head follows: the "
+                    "picture is drawn anew under the pointer.")  # fmt: skip
+    guide.drag(guide.at(222, 165), guide.at(227, 165))
+    guide.area("Handle 7")
+    guide.click(*guide.place("Handle 6"))
+    x, y = guide.place("Handle 6")
+    with guide.dragging(ring(x, y, 12), ring(x, y, 20)):
+        guide.shoot("Rotation ring", "A second handle holds the chin. The ring turns the first one "
+                    "by a few degrees more.")  # fmt: skip
+    guide.choose("Tool: Place")
+    x, y = guide.place("Ring: yaw")
+    guide.drag((x, y), (x + 20, y))
+    guide.shoot("Place", "The whole object turns by rings, scales by corners and goes into depth "
+                "by the arrow. Ctrl+Z takes this turn back.")  # fmt: skip
+    guide.press("ctrl+z")
+    guide.choose("Tool: Look")
+    with guide.dragging(guide.at(300, 420), guide.at(272, 414)):
+        guide.shoot(
+            "Look", "Around the object; a preview, which changes nothing. Esc is the photo."
+        )
+    guide.press("Escape")
+    guide.press("backslash")
+    with guide.dragging(guide.middle(), guide.at(268, 256)):
+        guide.shoot("Before and after", "A line that is dragged: the photo on its left, the edit "
+                    "on its right.")  # fmt: skip
+    guide.press("backslash")
+    guide.choose("Tool: Compose")
+    guide.choose("Harmonise")
+    guide.point(guide.at(480, 256))
+    guide.shoot("Compose", "What joins object and photo: background, shadow, light, edge. Here she "
+                "takes on the light of her new place.")  # fmt: skip
+    guide.press("b")
+    guide.area("Brush")
+    guide.drag(guide.at(110, 183), guide.at(118, 193))
+    guide.settle()
+    guide.point(guide.at(140, 240))
+    guide.shoot("Repaired", "What was filled in behind her, alone. A speck of her suit had stayed "
+                "at the left of the collar: a stroke of the brush fills it again.")  # fmt: skip
+    guide.press("b")
+    guide.press("ctrl+h")
+    guide.point(EMPTY)
+    guide.shoot("History", "Every step; a click goes back to it.")
+    guide.choose("Export photo…")
+    guide.area("Export astronaut-edited.png")
+    guide.shoot("Export", "What, how and where to. The button names the file that it will write.")
+    guide.choose("Export astronaut-edited.png")
+    guide.wait((guide.pictures / "astronaut-edited.png").exists, "exporting")
+    guide.point(EMPTY)
+    guide.shoot("Exported", "The status line says what was written.")
+
+
+def _turn_cup(guide: Guide) -> None:
+    """The cup leans and turns, in the light theme."""
+    guide.place("Coffee")
+    guide.point(guide.place("Coffee"))
+    guide.shoot("Start", "The samples; the frame is the pointer's.")
+    guide.choose("Coffee")
+    guide.point(EMPTY)
+    guide.area("Photo")
+    guide.shoot("Opened", "The same window in the light theme; what surrounds the photo stays a "
+                "neutral grey.")  # fmt: skip
+    guide.rest(300, 130)
+    guide.shoot("Candidate", "Cup, saucer and spoon are what a click here would select.")
+    guide.click(*guide.at(300, 130))
+    guide.area("Lift object")
+    guide.point(EMPTY)
+    guide.shoot("Selected", "The veil shows what is left out.")
+    guide.choose("Tool: Refine mask")
+    guide.area("Hardness")
+    for _ in range(9):
+        guide.press("bracketleft")
+    with guide.dragging(guide.at(155, 76), guide.at(183, 56), button=3):
+        guide.shoot("Refined", "A sliver of table at the saucer's upper rim is taken away by a "
+                    "right drag of the brush.")  # fmt: skip
+    guide.choose("Lift object")
+    guide.area("Drag a point on the object")
+    guide.point(EMPTY)
+    guide.shoot("Lifted", "Ready to be dragged.")
+    for x, y in ((105, 230), (150, 330), (300, 378), (440, 320), (462, 230)):
+        guide.pin(x, y)
+    guide.area("Handle 5")
+    guide.shoot("Pins", "The saucer's rim is pinned all around.")
+    with guide.dragging(guide.at(300, 112), guide.at(320, 106)):
+        guide.shoot("First handle", "The cup leans to the right; its saucer stays.")
+    x, y = guide.place("Handle 6")
+    with guide.dragging(ring(x, y, 3), ring(x, y, 20)):
+        guide.shoot("Rotation ring", "A few degrees about the line of sight.")
+    guide.choose("Tool: Place")
+    x, y = guide.place("Ring: yaw")
+    with guide.dragging((x, y), (x - 48, y)):
+        guide.shoot("Place", "All of it turns; the number beside the pointer says how far.")
+    guide.pull("Scale", 32)
+    guide.choose("Tool: Look")
+    with guide.dragging(guide.at(300, 220), guide.at(250, 200)):
+        guide.shoot("Look", "The cup from elsewhere, as far as one photo tells.")
+    guide.press("Escape")
+    guide.press("backslash")
+    with guide.dragging(guide.middle(), guide.at(280, 200)):
+        guide.shoot("Before and after", "Photo and edit.")
+    guide.press("backslash")
+    guide.choose("Tool: Compose")
+    guide.pull("Strength", 90)
+    guide.shoot("Compose", "A shadow on the table, its direction on a dial.")
+    guide.press("b")
+    guide.choose("Try 3 variants")
+    guide.settle()
+    guide.point(guide.at(560, 200))
+    guide.shoot("Variants", "Three other fillings of what the saucer hid; a click takes one.")
+    guide.press("b")
+    guide.press("ctrl+h")
+    guide.point(EMPTY)
+    guide.shoot("History", "What was done, the newest step at the end.")
+    guide.choose("Export photo…")
+    guide.area("Export coffee-edited.png")
+    guide.choose("JPEG")
+    guide.area("Export coffee-edited.jpg")
+    guide.shoot("Export", "A JPEG has a quality instead of a depth.")
+    guide.choose("Export coffee-edited.jpg")
+    guide.wait((guide.pictures / "coffee-edited.jpg").exists, "exporting")
+    guide.point(EMPTY)
+    guide.shoot("Exported", "Done.")
+
+
+def _bend_rocket(guide: Guide) -> None:
+    """The rocket, on a screen with twice as many pixels."""
+    guide.choose("Rocket")
+    guide.area("Photo")
+    guide.click(*guide.at(320, 250))
+    guide.area("Lift object")
+    guide.shoot("Selected", "At twice the scale text and lines are as large, and finer.")
+    guide.choose("Lift object")
+    guide.area("Drag a point on the object")
+    with guide.dragging(guide.at(321, 150), guide.at(372, 165)):
+        guide.shoot("First handle", "One point dragged; hollow diamonds mark the far end, which "
+                    "holds still by itself.")  # fmt: skip
+    guide.press("alt+6")
+    guide.point(guide.at(100, 60))
+    guide.shoot("Strain", "Where the pose makes it longer or shorter than in the photo.")
+    guide.press("alt+1")
+    guide.press("F1")
+    guide.area("Reset all")
+    guide.shoot("Keys", "F1: every key and gesture. A click on a key changes it.")
+
+
+def ring(x: float, y: float, degrees: float) -> tuple[float, float]:
+    """A place on the ring around a handle, clockwise from the top."""
+    angle = math.radians(degrees)
+    return x + RING * math.sin(angle), y - RING * math.cos(angle)
+
+
+STORIES = {
+    story.name: story
+    for story in (
+        Story("dark", "A head is tilted", "dark", 1.0, (512, 512), _tilt_head),
+        Story("light", "A cup leans and turns, in the light theme", "light", 1.0, (600, 400),
+              _turn_cup),
+        Story("large", "A rocket is bent, at 2880 × 1800 px", "dark", 2.0, (640, 427),
+              _bend_rocket),
+    )
+}  # fmt: skip

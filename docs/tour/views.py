@@ -1,0 +1,31 @@
+"""The pictures of the README: docs/window.jpg and docs/views.jpg."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from hands import ROOT, x_display
+
+WINDOW = "dark-*-rotation-ring.jpg"  # the step of the tour that the README shows
+EDIT = "docs/gallery/astronaut-handles.json"  # what every view shows
+
+
+def make(docs: Path) -> None:
+    """The window from the tour's pictures, the views from the gallery's edit."""
+    (window,) = (docs / "tour").glob(WINDOW)
+    shutil.copyfile(window, docs / "window.jpg")
+    with tempfile.TemporaryDirectory() as folder, x_display(1440, 900) as display:
+        assert display is not None, "no free X display was found"
+        environment = os.environ | {"DISPLAY": display, "PYTHONPATH": str(ROOT)}
+        environment["OBJECTMORPHER_SETTINGS"] = f"{folder}/settings.toml"
+        session = f"{folder}/edit.omorph"
+        edit = ("-m", "app", "edit", "--script", EDIT, "-o", f"{folder}/out.png")
+        shots = ("tests/app/shoot_views.py", folder, session, "--montage", docs / "views.jpg")
+        for arguments in ((*edit, "--session", session), shots):
+            command = [sys.executable, *map(str, arguments)]
+            subprocess.run(command, cwd=ROOT, env=environment, check=True)

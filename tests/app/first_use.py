@@ -1,0 +1,47 @@
+"""A first use of the editor: what somebody does who only follows what the window says.
+
+The test and the tour do the same steps; each is one click or one drag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from hands import Hands
+
+SAMPLE = "rocket.jpg"
+SIZE = (640, 427)  # px of it
+ROCKET = (320.0, 250.0)  # px, on it
+NOSE, ASIDE = (321.0, 150.0), (372.0, 165.0)  # px, from where to where it is dragged
+
+
+@dataclass(frozen=True)
+class Step:
+    """One click or drag: what the window says, what is done about it."""
+
+    said: str  # by a label that is shown
+    did: str
+    act: Callable[[Hands], None]
+
+
+def _select(hands: Hands) -> None:
+    hands.click(*hands.on_photo(*ROCKET, SIZE))
+
+
+def _bend(hands: Hands) -> None:
+    hands.drag(hands.on_photo(*NOSE, SIZE), hands.on_photo(*ASIDE, SIZE))
+
+
+def _choose(label: str) -> Callable[[Hands], None]:
+    return lambda hands: hands.choose(label)
+
+
+STEPS = (
+    Step("Rocket", "Click this sample", _choose("Rocket")),
+    Step("Click an object in the photo", "Click the rocket", _select),
+    Step("Lift object", "Click this button", _choose("Lift object")),
+    Step("Drag a point on the object", "Drag the rocket's nose to the right", _bend),
+    Step("Export photo…", "Click this button", _choose("Export photo…")),
+    Step("Export rocket-edited.png", "Click this button", _choose("Export rocket-edited.png")),
+)
