@@ -197,6 +197,9 @@ class Pose:
         object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
 
 
+UNMOVED = frozen(np.eye(4))
+
+
 @dataclass(frozen=True)
 class Placement:
     """Where the whole object went (DESIGN section 6): scale, then turn, then move."""
@@ -215,6 +218,8 @@ class Placement:
 
         Raises ValueError where the object would pass behind the camera.
         """
+        if self.is_identity:  # usual, and asked for a dozen times a frame
+            return UNMOVED
         centre = lifted.centre
         depth = centre[2] + self.depth * lifted.diameter * lifted.scale
         if depth <= 1e-3 * centre[2]:

@@ -60,6 +60,7 @@ class Deformer:
         self.graph: Graph = build_graph(self.points, settings, _surface(lifted), self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
         self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
+        self._last_anchors: tuple[int, I32] | None = None  # those of a single handle
         self._last_chosen: tuple[I32, F64, Binding] | None = None
         self._prepare_solver()
 
@@ -97,11 +98,17 @@ class Deformer:
         if is_said or not is_automatic:
             return np.empty(0, np.int32)
         h = handles[0].control_point
+        if self._last_anchors is None or self._last_anchors[0] != h:
+            self._last_anchors = (h, self._farthest_from(h))
+        return self._last_anchors[1]
+
+    def _farthest_from(self, h: int) -> I32:
+        """The quarter of its part that is farthest from a control point along the surface."""
         distances = self.graph.distances_from(h)
         own = np.flatnonzero(np.isfinite(distances))
         count = max(1, round(ANCHORED_SHARE * len(own)))
         farthest = own[np.argsort(-distances[own], kind="stable")[:count]]
-        return np.sort(farthest[farthest != h]).astype(np.int32)
+        return frozen(np.sort(farthest[farthest != h]), np.int32)
 
     def solve(
         self,

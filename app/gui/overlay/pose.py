@@ -77,11 +77,11 @@ def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
 
 def _apart(places: list[ImVec2]) -> list[ImVec2]:
     """As many of them as do not touch: on a small object they would be one white patch."""
-    kept: list[ImVec2] = []
-    for at in places:
-        if all(np.hypot(at.x - k.x, at.y - k.y) >= theme.pt(APART) for k in kept):
-            kept.append(at)
-    return kept
+    least, kept = theme.pt(APART) ** 2, list[tuple[float, float]]()
+    for x, y in ((at.x, at.y) for at in places):
+        if all((x - a) * (x - a) + (y - b) * (y - b) >= least for a, b in kept):
+            kept.append((x, y))
+    return [ImVec2(x, y) for x, y in kept]
 
 
 def _draw_mirror(canvas: Canvas) -> None:
