@@ -112,3 +112,8 @@ rendering: .make/test
 .PHONY: tour
 tour: .make/test
 	@$(PYTHON) docs/tour/make_tour.py $(STORIES)
+
+# Measures how the window feels, on a machine that has nothing else to do: docs/tour/feel.md.
+.PHONY: feel
+feel: .make/test
+	@$(PYTHON) docs/tour/make_feel.py

@@ -12,6 +12,7 @@ HEAD = """# A tour of the window
 
 Whole edits in the real window, every step by mouse and keyboard: `make tour` does them again and
 takes the pictures anew. The pointer is drawn in afterwards, everything else is the window's own.
+[How fast it answers](feel.md) was measured in the same window.
 """
 FIRST = """## First use
 
