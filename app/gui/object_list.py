@@ -19,6 +19,7 @@ ROW = 32.0  # points
 BETWEEN = 12.0  # points from a row to the next
 SLACK = 4.0  # points; a press that moves less is a click
 SIDE = 24.0  # of the buttons beside the title
+EYE = 32.0  # from the eye's left to the row's right
 NAME = 34.0  # from the row's left to the name
 BUTTONS = (
     (Icon.UP, "forward"), (Icon.DOWN, "backward"), (Icon.COPY, "duplicate"),
@@ -84,7 +85,9 @@ def _draw_object(editor: Editor, k: int) -> None:
     start = imgui.get_cursor_screen_pos()
     width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
     end = ImVec2(start.x + width, start.y + height)
-    is_hovered = _take_clicks(editor, k, ImVec2(width, height))
+    # Beside the eye, not below it: what may be overlapped is not pressed in the frame in which
+    # the pointer comes to it, and in a slow one that is the press itself.
+    is_hovered = _take_clicks(editor, k, ImVec2(width - theme.pt(EYE), height))
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
     fill_row(start, end, is_current, is_hovered or k == editor.objects.carried)
     middle = text_top(start, height)
@@ -96,7 +99,7 @@ def _draw_object(editor: Editor, k: int) -> None:
     else:
         _draw_name(thing.name, thing.is_visible, ImVec2(start.x + theme.pt(NAME), middle), end)
     if thing.lifted is not None:
-        imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(30), start.y + theme.pt(2)))
+        imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(EYE - 2), start.y + theme.pt(2)))
         eye = Icon.EYE if thing.is_visible else Icon.EYE_OFF
         if icon_button(eye, f"eye{k}", t("Hide or show the object")):
             editor.objects.toggle_visible(k)
@@ -131,7 +134,6 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
     if editor.objects.renaming == k:  # its field has the mouse
         imgui.dummy(size)
         return False
-    imgui.set_next_item_allow_overlap()
     if imgui.invisible_button(f"##object{k}", size) and not _is_dragged:
         editor.objects.choose(k)
     assert editor.document is not None
@@ -147,7 +149,7 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
 def _draw_name(name: str, is_visible: bool, at: ImVec2, end: ImVec2) -> None:
     """As much of it as there is room for before the eye."""
     draw = imgui.get_window_draw_list()
-    draw.push_clip_rect(at, ImVec2(end.x - theme.pt(34), end.y), True)
+    draw.push_clip_rect(at, ImVec2(end.x - theme.pt(EYE + 2), end.y), True)
     draw.add_text(at, theme.u32("text" if is_visible else "secondary"), name)
     draw.pop_clip_rect()
 
