@@ -17,7 +17,7 @@ from imgui_bundle import ImVec2, imgui
 VARIABLE = "OBJECTMORPHER_LANDMARKS"
 POINTER = "Pointer"
 
-_file = os.environ.get(VARIABLE)
+_file = os.environ.get(VARIABLE) or None
 _places: dict[str, tuple[float, float, float, float]] = {}
 _written = ""
 

@@ -126,7 +126,7 @@ def feel(sent: Places, frames: list[dict[str, Any]]) -> Feel:
 
 
 @contextmanager
-def window(path: Path, environment: dict[str, str], log: Path) -> Iterator[Mouse]:
+def window(path: Path, environment: dict[str, str], log: Path, is_saved: bool) -> Iterator[Mouse]:
     """The window with a file, ready, and the pointer; it writes its frames when it is closed."""
     command = [sys.executable, "-m", "app", str(path), "--size", "{},{}".format(*SIZE)]
     command += ["--frame-log", str(log)]
@@ -137,8 +137,7 @@ def window(path: Path, environment: dict[str, str], log: Path) -> Iterator[Mouse
         try:
             yield mouse
             mouse.do("key", "ctrl+q")
-            time.sleep(1)
-            if process.poll() is None:  # there is something to lose
+            if not is_saved:
                 hands.choose("Don't save")
             process.wait(PATIENCE)
         finally:
@@ -149,8 +148,7 @@ def window(path: Path, environment: dict[str, str], log: Path) -> Iterator[Mouse
 def drag(session: Path, environment: dict[str, str], folder: Path) -> Feel:
     """The first point of an object that is taken hold of."""
     log = folder / "frames.json"
-    quick = {k: v for k, v in environment.items() if k != "OBJECTMORPHER_LANDMARKS"}
-    with window(session, quick | {"OBJECTMORPHER_LANDMARKS": ""}, log) as mouse:
+    with window(session, environment | {"OBJECTMORPHER_LANDMARKS": ""}, log, True) as mouse:
         mouse.do("mousemove", *OBJECT)
         time.sleep(1)
         mouse.do("mousedown", 1)
@@ -166,7 +164,7 @@ def drag(session: Path, environment: dict[str, str], folder: Path) -> Feel:
 def work_beside(environment: dict[str, str], folder: Path) -> Feel:
     """The pointer moves over the photo while the worker lifts an object and fills in behind it."""
     log = folder / "frames.json"
-    with window(SAMPLE, environment, log) as mouse:
+    with window(SAMPLE, environment, log, False) as mouse:
         mouse.do("mousemove", *OBJECT)
         mouse.do("click", 1)
         time.sleep(4)
