@@ -13,15 +13,21 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.arrays import F32, F64
+from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Document
 
 from .view import View
 
 if TYPE_CHECKING:
+    from objectmorpher_core.raster.posed import PosedSplats
+
     from .derived import Derived
 
 CELL = 4  # canvas px, of the grid
 TOLERANCE = 0.25  # canvas px: a Gaussian that moved less is where it was
+PAD = 32  # cells around the canvas, for what is beside it
+FAR = 1e9  # photo px
+NOWHERE = np.empty((0, 3))
 REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one counts
 
 
@@ -32,43 +38,39 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
     from objectmorpher_core.compose.plate import hole_margin
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
-    distance = np.full((height, width), 1e9, np.float32)  # photo px to what moved
-    camera = document.photo.camera
+    distance = np.full((height, width), FAR, np.float32)  # photo px to what moved
     for k, thing in enumerate(document.objects):
         if thing.lifted is None or not thing.is_moved:
             continue
         splats = derived.draft(document, k)
-        rest = splats.rest.lifted.texture.u0.astype(np.float64)
-        now = camera.project(splats.means) if thing.is_visible else None
-        points = _moved_points(rest, now, max(composite.STILL, TOLERANCE / view.zoom))
-        if not leaves_a_hole(document.objects, k):  # a copy of it is still there
-            points = rest[:0] if now is None else now
+        world = splats.means if thing.is_visible else NOWHERE
+        # What moved leaves a hole, unless a copy of it is still there.
+        has_left = leaves_a_hole(document.objects, k)
         reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
-        if len(points):
-            distance = np.minimum(distance, _distance(points, view, (height, width)) - reach)
+        own = _distance(splats, world, document.photo.camera, view, has_left)
+        distance = np.minimum(distance, own - reach)
     margin = document.feather * hole_margin(*document.photo.size)
     ramp = (1 - composite.FEATHER_START) * margin
     blend = np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
     return np.maximum(blend, derived.lights.touched(document, view, CELL))
 
 
-def _moved_points(rest: F64, now: F64 | None, tolerance: float) -> F64:
-    """Image px (N, 2) that Gaussians moved from and to; all of `rest` where none is shown now."""
-    if now is None:
-        return rest
-    is_moved = ~(np.linalg.norm(now - rest, axis=1) <= tolerance)
-    return np.concatenate([rest[is_moved], now[is_moved]])
+def _distance(splats: PosedSplats, world: F64, camera: Camera, view: View, has_left: bool) -> F32:
+    """(h, w) photo px from each cell to what moved, on the canvas or a little beside it."""
+    from objectmorpher_core.compose import composite
 
+    from .moved_cells import mark_moved
 
-def _distance(points: F64, view: View, shape: tuple[int, int]) -> F32:
-    """(h, w) photo px from each cell to the nearest of the points on the canvas or beside it."""
-    pad = 32  # cells around the canvas, for points beside it
-    cells = np.floor(view.canvas_from_image(points) / CELL).astype(np.int64) + pad
-    height, width = shape[0] + 2 * pad, shape[1] + 2 * pad
-    inside = ((cells >= 0) & (cells < (width, height))).all(1)
-    free = np.ones((height, width), np.uint8)
-    free[cells[inside, 1], cells[inside, 0]] = 0
+    height, width = -(-view.height // CELL), -(-view.width // CELL)
+    free = np.ones((height + 2 * PAD, width + 2 * PAD), np.uint8)
+    scale = view.zoom / CELL
+    lens = (camera.focal, camera.cx, camera.cy)
+    corner = (view.left - PAD / scale, view.top - PAD / scale)
+    mark_moved(
+        free, splats.rest.lifted.texture.u0, world, lens, corner, scale,
+        max(composite.STILL, TOLERANCE / view.zoom), has_left,
+    )  # fmt: skip
     if free.all():
-        return np.full(shape, 1e9, np.float32)
-    distance = cv2.distanceTransform(free, cv2.DIST_L2, 5)
-    return distance[pad:-pad, pad:-pad] * (CELL / view.zoom)
+        return np.full((height, width), FAR, np.float32)
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5)
+    return distance[PAD:-PAD, PAD:-PAD] / np.float32(scale)

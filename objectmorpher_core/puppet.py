@@ -24,7 +24,7 @@ from .raster.thinning import thinned
 from .raster.tiles import Drawable
 from .rig import Rig
 
-DRAFT = 10_000  # solid Gaussians of a picture that must be quick
+DRAFT = 8_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual
 EXACT, CLOSE = 1e-9, 1e-6  # object units by which it may miss: at once, and after all steps
 

@@ -10,7 +10,7 @@ from ..arrays import I32, frozen
 from ..document import LiftedObject, PhotoTexture
 from ..poisson_disk import thin_to_spacing
 
-LEAST_GAIN = 1.3  # x spacing: with less, thinning is not worth it
+LEAST_GAIN = 1.2  # x spacing: with less, thinning is not worth it
 
 
 def thinned(lifted: LiftedObject, count: int) -> tuple[LiftedObject, I32] | None:
