@@ -27,7 +27,7 @@ LEAST_SHOWN = np.float32(1e-3)  # alpha, of which a share can be told
 ROUNDS = 2  # px by which the map is continued, so that it can be interpolated at the edge
 PARTS = 4  # pieces of the picture for each thread
 FULL = np.float32(255.0)
-A_ON, EIGHT, SIXTEEN, TWENTY_FOUR = (np.uint64(v) for v in (A, 8, 16, 24))
+A_ON, EIGHT = np.uint64(A), np.uint64(8)
 
 
 def sharpen(
@@ -48,7 +48,7 @@ def sharpen(
     """
     coarse = _packed(picture)
     height, width = box[3] - box[1], box[2] - box[0]
-    rgba, invented = np.empty((height, width), "<u4"), np.empty((height, width), np.uint8)
+    rgba, invented = np.zeros((height, width), "<i4"), np.zeros((height, width), np.uint8)
     level = round(math.log2(max(1 / zoom, 1.0)))
     level = min(level, len(texture.shapes) - 1)
     scale = 2.0**-level
@@ -59,7 +59,8 @@ def sharpen(
     u = (np.arange(width) + 0.5) / factor - 0.5  # where each px is among the coarse ones
     pixels = np.floor(u).clip(0, coarse.shape[1] - 1)
     inputs: tuple[Any, ...] = (
-        coarse, *(np.float32(v) for v in frame), texture.texels, texture.shapes[level],
+        coarse.reshape(len(coarse), -1), *(np.float32(v) for v in frame),
+        texture.texels, texture.shapes[level],
         (8 * pixels).astype(np.uint64), (u - pixels).clip(0, 1).astype(np.float32), rgba, invented,
     )  # fmt: skip
     in_threads(lambda first, last: _sharpen(first, last, *inputs), height, PARTS)
@@ -112,32 +113,35 @@ def _sharpen(
     first, last, coarse, factor, left, top, step, scale, texels, shape, pixels, shares,
     rgba, invented,
 ):  # fmt: skip
-    """Rows first..last of `rgba` and `invented`; `pixels`, `shares`: see `_between`."""
-    rows, columns = coarse.shape[:2]
-    row = np.empty(8 * columns, np.float32)
+    """Rows first..last of `rgba` and `invented`, all 0 before.
+
+    `coarse` (rows, 8 x columns); `pixels`, `shares`: of each column the coarse px before it, and
+    how much it takes of the next.
+    """
+    rows, numbers = coarse.shape
+    row, most = np.empty(numbers, np.float32), np.uint64(numbers - 8)
     down, across, first_texel = shape
     stride = np.uint64(4 * across)
+    right, bottom = np.float32(across - 1), np.float32(down - 1)
     for y in range(first, last):
         v = (y + HALF) / factor - HALF
         i = min(max(int(math.floor(v)), 0), rows - 1)
         t, below = min(max(v - np.float32(i), ZERO), ONE), min(i + 1, rows - 1)
-        for x in range(columns):
-            for c in range(8):
-                row[8 * x + c] = coarse[i, x, c] + t * (coarse[below, x, c] - coarse[i, x, c])
+        for c in range(numbers):
+            row[c] = coarse[i, c] + t * (coarse[below, c] - coarse[i, c])
         for x in range(rgba.shape[1]):
             one = pixels[x]
-            two = min(one + EIGHT, np.uint64(8 * (columns - 1)))
+            two = min(one + EIGHT, most)
             if row[one + A_ON] <= ZERO and row[two + A_ON] <= ZERO:
-                rgba[y, x], invented[y, x] = 0, 0
                 continue
             r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, shares[x])
-            invented[y, x] = np.uint8((ONE - share) * a * FULL + HALF)
+            invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
             if share > ZERO:
                 u = left + np.float32(x) * step + scale * shift_x
                 v = top + np.float32(y) * step + scale * shift_y
-                column, line = np.int64(math.floor(u)), np.int64(math.floor(v))
                 texel = ZERO, ZERO, ZERO, ZERO
-                if 0 <= column < across - 1 and 0 <= line < down - 1:
+                if ZERO <= u < right and ZERO <= v < bottom:
+                    column, line = np.int32(u), np.int32(v)
                     at = np.uint64(4 * (first_texel + line * across + column))
                     share_x, share_y = u - np.float32(column), v - np.float32(line)
                     texel = four_texels(texels, at, stride, share_x, share_y)
@@ -145,8 +149,8 @@ def _sharpen(
                 r, g = rest * r + alpha * texel[0], rest * g + alpha * texel[1]
                 b, a = rest * b + alpha * texel[2], rest * a + alpha
             rgba[y, x] = (
-                np.uint32(r * FULL + HALF)
-                | np.uint32(g * FULL + HALF) << EIGHT
-                | np.uint32(b * FULL + HALF) << SIXTEEN
-                | np.uint32(a * FULL + HALF) << TWENTY_FOUR
+                np.int32(r * FULL + HALF)
+                | np.int32(g * FULL + HALF) << 8
+                | np.int32(b * FULL + HALF) << 16
+                | np.int32(a * FULL + HALF) << 24
             )
