@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from statistics import median
 
 import pytest
 
@@ -18,6 +20,10 @@ HEAVY = {"torch", "onnxruntime", "patchmatch", "trimesh", "tifffile"}  # only in
 CORE_AT_IMPORT = {
     "numpy", "scipy", "numba", "llvmlite", "cv2", "PIL", "platformdirs", "objectmorpher_core",
 }  # fmt: skip
+
+WINDOW_IMPORT = "import app.cli, app.gui.window"
+RUNS = 5
+MOST_RATIO = 9.0  # it is about 6; scipy alone would add 2, torch 20
 
 
 def sources(folder: Path) -> list[Path]:
@@ -98,3 +104,27 @@ def test_importing_pulls_in_nothing_heavy(module):
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == ""
+
+
+def test_the_window_imports_in_a_few_times_what_numpy_takes():
+    """Before its first frame: what takes longer is imported when it is needed."""
+    ratios = []
+    for _ in range(RUNS):
+        bare, numpy, window = (_seconds(code) for code in ("", "import numpy", WINDOW_IMPORT))
+        ratios.append((window - bare) / (numpy - bare))
+    assert median(ratios) <= MOST_RATIO, ratios
+
+
+@pytest.mark.parametrize(
+    "module", ["scipy", "numba", "torch", "diffusers", "onnxruntime", "skimage"]
+)
+def test_the_window_is_there_before(module):
+    code = f"import sys\n{WINDOW_IMPORT}\nsys.exit({module!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+def _seconds(code: str) -> float:
+    """Of a process of its own."""
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+    return time.perf_counter() - start
