@@ -5,7 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .options import WindowOptions
 
 # One BLAS thread: the solver's matrices are small, and a second thread costs more than it helps.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -26,12 +32,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = cli.parse_window(arguments)
     if not has_display():
         return _edit_headless(options.file)
+    return _run_window(cli.window_options(options))
+
+
+def _run_window(options: WindowOptions) -> int:
+    """The driver takes as long to make a window as the imports of what is drawn in it."""
+    from .gui.glfw_window import WindowError, open_window
+    from .terminal import PROGRAM
+
+    imports = Thread(target=import_module, args=("app.gui.window",), daemon=True)
+    imports.start()
+    try:
+        handle = open_window(options)
+    except WindowError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 1
+    imports.join()
+
     from .gui.window import run_window
     from .logs import start_log
     from .settings import settings_path
 
     start_log(settings_path().parent)
-    return run_window(cli.window_options(options))
+    return run_window(options, handle)
 
 
 def has_display() -> bool:

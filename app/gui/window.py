@@ -21,7 +21,6 @@ from ..editor import Editor
 from ..filing import Filing
 from ..options import WindowOptions
 from ..render.renderer import Renderer
-from ..resources import resource
 from ..settings import read_settings, settings_path, write_settings
 from ..shortcuts import Shortcuts
 from ..texts import ENGLISH, use_language
@@ -83,16 +82,10 @@ CURSORS = {
 }
 
 
-class WindowError(RuntimeError):
-    """No window can be opened; one sentence."""
-
-
-def run_window(options: WindowOptions) -> int:
-    """Opens the editor's window and runs until it is closed; the exit code."""
-    started = time.monotonic()
-    window = Window(options)
+def run_window(options: WindowOptions, handle: Any) -> int:
+    """Runs the editor in a window (`glfw_window`) until it is closed; the exit code."""
+    window = Window(options, handle)
     try:
-        log.info("The window is there after %.2f s", time.monotonic() - started)
         window.run()
     finally:
         window.close()
@@ -102,11 +95,10 @@ def run_window(options: WindowOptions) -> int:
 class Window:
     """The GLFW window, ImGui's context, and what is drawn in them."""
 
-    def __init__(self, options: WindowOptions) -> None:
+    def __init__(self, options: WindowOptions, handle: Any) -> None:
+        """`handle`: GLFW's, its context current in this thread."""
         self._options = options
-        self._handle = _open_window(options)
-        glfw.make_context_current(self._handle)
-        glfw.swap_interval(0 if options.frames is not None else 1)
+        self._handle = handle
         self._renderer = Renderer(options.renderer)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
@@ -356,35 +348,3 @@ _IMGUI_CURSORS = {
     int(imgui.MouseCursor_.resize_ns): glfw.RESIZE_NS_CURSOR,
     int(imgui.MouseCursor_.resize_all): glfw.RESIZE_ALL_CURSOR,
 }
-
-
-def _open_window(options: WindowOptions) -> Any:
-    """A window with an OpenGL 3.3 core context."""
-    errors: list[str] = []
-    glfw.set_error_callback(lambda _code, text: errors.append(str(text)))
-    if not glfw.init():
-        raise WindowError(f"no window can be opened: {'; '.join(errors) or 'no display'}")
-    hints: tuple[tuple[int, int], ...] = (
-        (glfw.CONTEXT_VERSION_MAJOR, 3),
-        (glfw.CONTEXT_VERSION_MINOR, 3),
-        (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-        (glfw.OPENGL_FORWARD_COMPAT, glfw.TRUE),
-        (glfw.SCALE_TO_MONITOR, glfw.TRUE),
-    )
-    for hint, value in hints:
-        glfw.window_hint(hint, value)
-    scale = options.scale or 1.0
-    size = (int(options.size[0] * scale), int(options.size[1] * scale))
-    handle = glfw.create_window(*size, "ObjectMorpher", None, None)
-    if not handle:
-        glfw.terminate()
-        raise WindowError(f"OpenGL 3.3 is not available: {'; '.join(errors)}")
-    _set_icon(handle)
-    return handle
-
-
-def _set_icon(handle: Any) -> None:
-    from PIL import Image
-
-    icon: Any = Image.open(str(resource("assets/icon.png"))).convert("RGBA")
-    glfw.set_window_icon(handle, 1, [icon])

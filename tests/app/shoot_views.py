@@ -15,6 +15,7 @@ from PIL import Image
 
 from app.commands import COMMANDS
 from app.derived import Derived
+from app.gui.glfw_window import open_window
 from app.gui.window import Window
 from app.options import WindowOptions
 from app.view import Shown
@@ -87,7 +88,7 @@ class Shooter:
         self._out, self._canvas = out, size
         self._whole = (size[0] + AROUND[0], size[1] + AROUND[1])
         options = WindowOptions(renderer=renderer, size=self._whole, scale=1.0, frames=1)
-        self._window = Window(options)  # with `frames`, every picture is exact
+        self._window = Window(options, open_window(options))  # `frames`: every picture is exact
         self.gl_name = self._window._renderer.gl_name
         self.editor = self._window.editor
 

@@ -143,3 +143,12 @@ def test_closing_asks_about_unsaved_changes(hands: Hands, keys: str) -> None:
     hands.press(keys)
     left = "ObjectMorpher" if keys == "ctrl+w" else ""
     hands.wait(lambda: hands.title() == left, "closing")
+
+
+def test_without_a_screen_there_is_one_sentence(window_environment: dict[str, str]) -> None:
+    environment = window_environment | {"DISPLAY": ":9999"}
+    command = [sys.executable, "-m", "app"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("objectmorpher: no window can be opened: ")
+    assert done.stderr.count("\n") == 1
