@@ -346,11 +346,16 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...]) -> None:
         except (EOFError, OSError, KeyboardInterrupt):
             return
         try:
-            answer = function(*arguments, progress=_reporter(writer, number, stop))
-            writer.write(("done", number, answer))
+            answer = "done", number, function(*arguments, progress=_reporter(writer, number, stop))
         except Cancelled:
-            writer.write(("cancelled", number, None))
+            answer = "cancelled", number, None
         except Exception as error:
+            answer = "failed", number, JobError.of(error, function.__name__)
+        try:
+            writer.write(answer)
+        except BrokenPipeError:  # the window was killed: nobody is there to be told
+            return
+        except Exception as error:  # such as an answer that cannot be sent
             writer.write(("failed", number, JobError.of(error, function.__name__)))
 
 
