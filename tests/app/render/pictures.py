@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pytest
 
 from objectmorpher_core.arrays import F32
 from objectmorpher_core.camera import Camera
@@ -55,3 +56,17 @@ def bent(name: str, count: int, largeness: float) -> tuple[shapes.Scene, Pose]:
         shapes.handle(scene.lifted, k, move) for k, move in moves.items()
     )
     return scene, scene.puppet.deformer.solve(handles).pose
+
+
+def make_renderer(
+    context: Any, monkeypatch: pytest.MonkeyPatch, kind: str, size: tuple[int, int]
+) -> Any:
+    """A renderer whose window is a framebuffer of `size` px."""
+    import moderngl
+
+    from app.render.renderer import Renderer
+
+    window = context.framebuffer([context.texture(size, 4)])
+    monkeypatch.setattr(moderngl, "create_context", lambda **_: context)
+    monkeypatch.setattr(context, "_screen", window)
+    return Renderer(kind)

@@ -12,6 +12,7 @@ from app.layers import Layer
 from app.render.scene import Hatch, Scene
 from app.view import View
 from objectmorpher_core.document import Plate
+from tests.app.render.pictures import make_renderer
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 
@@ -25,12 +26,7 @@ ROUNDED = 2  # of 255: the shaders round after each layer
 
 @pytest.fixture
 def renderer(context, monkeypatch):
-    from app.render.renderer import Renderer
-
-    window = context.framebuffer([context.texture(SIZE, 4)])
-    monkeypatch.setattr(moderngl, "create_context", lambda **_: context)
-    monkeypatch.setattr(context, "_screen", window)
-    yield Renderer("tiles")
+    yield make_renderer(context, monkeypatch, "tiles", SIZE)
     context.finish()
 
 

@@ -17,7 +17,7 @@ from objectmorpher_core.document import Placement
 from objectmorpher_core.joining import Shadow
 from objectmorpher_core.pipeline import make_plate
 from tests import shapes
-from tests.app.render.pictures import specified
+from tests.app.render.pictures import make_renderer, specified
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 
@@ -29,13 +29,7 @@ SIZE = (shapes.WIDTH, shapes.HEIGHT)
 
 @pytest.fixture
 def renderer(context, monkeypatch):
-    """A renderer whose window is a framebuffer."""
-    from app.render.renderer import Renderer
-
-    window = context.framebuffer([context.texture(SIZE, 4)])
-    monkeypatch.setattr(moderngl, "create_context", lambda **_: context)
-    monkeypatch.setattr(context, "_screen", window)
-    yield Renderer("gl")
+    yield make_renderer(context, monkeypatch, "gl", SIZE)
     context.finish()
 
 
