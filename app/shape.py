@@ -55,17 +55,21 @@ def rehearse(photo: Photo, thing: EditObject, shape: Shape) -> None:
     from objectmorpher_core.raster import tiles
     from objectmorpher_core.raster.sharpening import sharpen
 
+    from .moved_cells import mark_moved
+
     puppet, camera = shape.puppet, photo.camera
     deformer = puppet.deformer
     trial = deformer.with_rig(deformer.rig)  # with a solver of its own
     point = deformer.points[0]
     pose = trial.solve((Handle(0, point, point),), start=trial.rest(), seconds=0.0).pose
-    drawables = [
-        tiles.prepare(draw(pose, thing.placement), camera, camera)
-        for draw in ((puppet.posed, puppet.draft) if puppet.has_draft else (puppet.posed,))
-    ]
+    splats = (puppet.draft if puppet.has_draft else puppet.posed)(pose, thing.placement)
+    whole = puppet.posed(pose, thing.placement)
+    drawables = [tiles.prepare(each, camera, camera) for each in (whole, splats)]
     picture = tiles.draw(drawables[-1], shape.texture, SMALL)
     tiles.draw_rgba(drawables[0], shape.texture, SMALL)
     sharpen(picture, shape.texture, 1, SMALL, (0.0, 0.0), 1.0)
+    free = np.ones((1, 1), np.uint8)
+    texture, world = splats.rest.lifted.texture, splats.means
+    mark_moved(free, texture.u0, world, (1.0, 0.0, 0.0), (0.0, 0.0), 1.0, 1.0, True)
     middle = np.array(camera.project(puppet.world_point(point, pose, thing.placement)))
     puppet.pick_in(drawables[0], shape.texture, (middle[0], middle[1]), pose, thing.placement)

@@ -171,12 +171,17 @@ class Window:
             self.editor.recovery.look()
             self.editor.models.look()
             self.editor.chores.start(
-                "Getting ready", lambda progress: warm_up(), kind="warm up",
+                "Getting ready", lambda progress: self._warm_up(), kind="warm up",
                 done=lambda _: None, failed=self.editor.complain_of, is_quiet=True,
             )  # fmt: skip
         while self._options.frames is not None and not self.editor.chores.is_idle:
             self.editor.poll()
             time.sleep(SOON)
+
+    def _warm_up(self) -> None:
+        """In a thread."""
+        warm_up()
+        self._renderer.rehearse()
 
     def _wait(self) -> int:
         """Sleeps until an event; how many frames to draw for it."""

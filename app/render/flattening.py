@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from objectmorpher_core.arrays import F32, U8
+from objectmorpher_core.arrays import F32, U8, frozen
 from objectmorpher_core.threads import EXACT, in_threads
 
 from ..blend import CELL
@@ -35,11 +35,19 @@ def flatten(photo: U8, back: U8, blend: F32, layers: tuple[Layer, ...], photo_bo
     see `Scene`; `photo_box`: canvas px, beyond which there is no object.
     """
     out = np.empty(photo.shape[:2], "<u4")
-    under, behind = (np.ascontiguousarray(p).view("<u4")[..., 0] for p in (photo, back))
+    under, behind, blend = _packed_pixels(photo), _packed_pixels(back), frozen(blend)
     in_threads(lambda a, b: _mix(a, b, under, behind, blend, out), len(out), PARTS)
     for layer in layers:
         _add(layer, blend, photo_box, out)
     return out.view(np.uint8).reshape(*out.shape, 4)
+
+
+def rehearse() -> None:
+    """Loads the kernels, or compiles them the first time, before somebody waits for them."""
+    some, blend = np.zeros((CELL, CELL, 4), np.uint8), np.ones((1, 1), np.float32)
+    box = (0.0, 0.0, float(CELL), float(CELL))
+    layers = Layer(box, some), Layer(box, some, is_coarse=True)
+    flatten(some, some, blend, layers, box)
 
 
 def _add(layer: Layer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
@@ -51,8 +59,7 @@ def _add(layer: Layer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
     x0, y0, x1, y1 = (math.ceil(v - 0.5) for v in (*low, *high))
     if x1 <= x0 or y1 <= y0:
         return
-    pixels = layer.rgba if layer.rgba.dtype == np.uint8 else _as_u8(layer.rgba)
-    pixels = np.ascontiguousarray(pixels).view("<u4")[..., 0]
+    pixels = _packed_pixels(layer.rgba if layer.rgba.dtype == np.uint8 else _as_u8(layer.rgba))
     gain = tuple(np.float32(g) for g in layer.gain)
     inputs: tuple[Any, ...]
     if layer.is_coarse:
@@ -62,9 +69,13 @@ def _add(layer: Layer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
         in_threads(lambda a, b: _add_coarse(a, b, *inputs), y1 - y0, PARTS)
     else:
         left, top = x0 - round(layer.box[0]), y0 - round(layer.box[1])
-        pixels = pixels[top : top + y1 - y0, left : left + x1 - x0]
-        inputs = (x0, y0, pixels, gain, blend, out)
+        inputs = (x0, y0, pixels, left, top, x1 - x0, gain, blend, out)
         in_threads(lambda a, b: _add_exact(a, b, *inputs), y1 - y0, PARTS)
+
+
+def _packed_pixels(rgba: U8) -> np.ndarray:
+    """(h, w) u32, read-only as all that a kernel reads."""
+    return frozen(np.ascontiguousarray(rgba).view("<u4")[..., 0])
 
 
 def _places(
@@ -119,16 +130,16 @@ def _mix(first, last, photo, back, blend, out):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _add_exact(first, last, left, top, pixels, gain, blend, out):
-    """Rows first..last of a layer that is px for px."""
-    height, width = len(out), pixels.shape[1]
+def _add_exact(first, last, left, top, pixels, skipped, above, width, gain, blend, out):
+    """Rows first..last of a layer that is px for px, without its first columns and rows."""
+    height = len(out)
     is_plain = gain[0] == ONE and gain[1] == ONE and gain[2] == ONE
     cells, share = np.empty(blend.shape[1] + 2, np.float32), np.empty(width, np.float32)
     for row in range(first, last):
         y = top + row
         _blend_row(blend, y, left, cells, share)
         for x in range(width):
-            p = pixels[row, x]
+            p = pixels[above + row, skipped + x]
             if p == NOTHING or share[x] == ZERO:
                 continue
             if share[x] == ONE and p >= OPAQUE and is_plain:

@@ -49,6 +49,13 @@ class Renderer:
         self._size = (1, 1)
         log.info("OpenGL by %s; objects drawn by %s", self.gl_name, self.kind)
 
+    def rehearse(self) -> None:
+        """Loads what the first drag needs; in a thread, it touches no OpenGL."""
+        if self._is_emulated:
+            from .flattening import rehearse
+
+            rehearse()
+
     def clear(self, color: Colour, size: tuple[int, int]) -> None:
         """Begins a frame of `size` px: the whole window in one colour."""
         self._surround, self._size = color, size

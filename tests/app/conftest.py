@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import os
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -135,8 +137,14 @@ def display() -> Iterator[str]:
         yield name
 
 
+@pytest.fixture(scope="session")
+def compiled() -> None:
+    """The kernels are on the disk: a window that compiles them answers nobody for a minute."""
+    subprocess.run([sys.executable, "-m", "objectmorpher_core.warm_up"], cwd=hands.ROOT, check=True)
+
+
 @pytest.fixture
-def window_environment(display: str, tmp_path: Path) -> dict[str, str]:
+def window_environment(compiled: None, display: str, tmp_path: Path) -> dict[str, str]:
     """For a process with a window: its display, and settings of its own."""
     settings = 'dialogs = "built-in"\ngaussians = 3000\n'
     return hands.window_environment(display, tmp_path, settings)
