@@ -13,7 +13,7 @@ from hands import Hands
 SAMPLE = "rocket.jpg"
 SIZE = (640, 427)  # px of it
 ROCKET = (320.0, 250.0)  # px, on it
-NOSE, ASIDE = (321.0, 150.0), (372.0, 165.0)  # px, from where to where it is dragged
+TOP, ASIDE = (321.0, 195.0), (362.0, 202.0)  # px, from where to where it is dragged
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def _select(hands: Hands) -> None:
 
 
 def _bend(hands: Hands) -> None:
-    hands.drag(hands.on_photo(*NOSE, SIZE), hands.on_photo(*ASIDE, SIZE))
+    hands.drag(hands.on_photo(*TOP, SIZE), hands.on_photo(*ASIDE, SIZE))
 
 
 def _choose(label: str) -> Callable[[Hands], None]:
@@ -41,7 +41,7 @@ STEPS = (
     Step("Rocket", "Click this sample", _choose("Rocket")),
     Step("Click an object in the photo", "Click the rocket", _select),
     Step("Lift object", "Click this button", _choose("Lift object")),
-    Step("Drag a point on the object", "Drag the rocket's nose to the right", _bend),
+    Step("Drag a point on the object", "Drag the rocket by its upper end to the right", _bend),
     Step("Export photo…", "Click this button", _choose("Export photo…")),
     Step("Export rocket-edited.png", "Click this button", _choose("Export rocket-edited.png")),
 )
