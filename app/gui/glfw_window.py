@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from imgui_bundle import imgui  # before glfw: both must use one libglfw
@@ -22,7 +23,7 @@ class WindowError(RuntimeError):
 def open_window(options: WindowOptions) -> Any:
     """A window with an OpenGL 3.3 core context, current in this thread. Raises WindowError."""
     errors: list[str] = []
-    glfw.set_error_callback(lambda _code, text: errors.append(text.decode(errors="replace")))
+    glfw.set_error_callback(lambda _code, text: errors.append(os.fsdecode(text)))
     if not glfw.init():
         raise WindowError(f"no window can be opened: {'; '.join(errors) or 'no display'}")
     hints: tuple[tuple[int, int], ...] = (
