@@ -43,8 +43,8 @@ test: .make/test
 	    ! $(PYTHON) -c 'import ctypes; ctypes.CDLL("libGL.so.1"); ctypes.CDLL("libEGL.so.1")' 2>/dev/null; then
 	    apt_install libgl1 libegl1 || echo "The editor's window needs libGL and libEGL: install the packages libgl1 and libegl1."
 	fi
-	echo "Compiling the kernels (a minute, once)"
-	$(PYTHON) -m objectmorpher_core.warm_up
+	echo "Compiling the kernels (a minute or two, once)"
+	$(PYTHON) -m app.warm_up
 	touch $@
 
 .make/test: .make/venv pyproject.toml

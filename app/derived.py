@@ -5,7 +5,6 @@ The heavy modules of the core are imported when the first object is lifted, or b
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -30,7 +29,7 @@ from .layers import Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
-from .shape import Shape, build_shape
+from .shape import Shape, Shapes, build_shape
 from .surface_facts import SurfaceFacts
 from .view import View
 
@@ -130,15 +129,15 @@ class Derived:
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
             shape = Shape(similar[2].puppet.with_rig(thing.rig), similar[2].texture)
         else:
-            shape = build_shape(photo, thing)
+            shape = build_shape(photo.camera, thing)
         self._latest = (thing.lifted, thing.deform, shape)
         return shape
 
-    def adopt(self, document: Document, shapes: Mapping[int, Shape]) -> None:
+    def adopt(self, shapes: Shapes) -> None:
         """Takes over shapes of the document's objects that were made elsewhere."""
-        for k, shape in shapes.items():
-            thing = document.objects[k]
+        for thing, shape in shapes:
             self._shapes(lambda shape=shape: shape, thing.lifted, thing.deform, thing.rig)
+            self._latest = (thing.lifted, thing.deform, shape)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""

@@ -40,6 +40,7 @@ from .job_functions import WARM
 from .jobs import RELUCTANCE, JobError, Jobs
 from .recovery import Recovery
 from .settings import Settings
+from .shape import Shapes
 from .tasks import SELECT, Tasks
 from .texts import sentence, t
 from .tools.pointer import Hand, Pointer
@@ -138,9 +139,10 @@ class Editor:
 
     # Steps
 
-    def start(self, document: Document) -> None:
-        """A photo or a session was opened."""
+    def start(self, document: Document, shapes: Shapes = ()) -> None:
+        """A photo or a session was opened; `shapes` of its objects are ready."""
         self.close_document()
+        self.derived.adopt(shapes)
         self.history = History(document, limit=self.settings.history_mb << 20)
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT

@@ -13,7 +13,7 @@ from objectmorpher_core.progress import Progress
 from .export_plan import Format
 from .jobs import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
-from .shape import Shape, build_ready
+from .shape import Shapes, build_ready
 from .texts import t
 
 if TYPE_CHECKING:
@@ -162,18 +162,17 @@ class Filing:
         editor, given_up = self._editor, self._editor.committed
         fov, seed = self._fov, self._seed
 
-        def read(progress: Progress) -> tuple[Opened, dict[int, Shape]]:
+        def read(progress: Progress) -> tuple[Opened, Shapes]:
             opened = read_document(path, fov, seed, progress)
             return opened, build_ready(opened.document)
 
-        def show(opened: Opened, shapes: dict[int, Shape]) -> None:
-            editor.start(opened.document)
-            editor.derived.adopt(opened.document, shapes)
+        def show(opened: Opened, shapes: Shapes) -> None:
+            editor.start(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(answer: tuple[Opened, dict[int, Shape]]) -> None:
+        def accept(answer: tuple[Opened, Shapes]) -> None:
             if editor.committed is given_up or editor.is_saved:
                 show(*answer)
             else:

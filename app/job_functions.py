@@ -26,6 +26,7 @@ from objectmorpher_core.document import (
 from objectmorpher_core.progress import Progress, part
 
 from .layers import Rendered, Request, render
+from .shape import build_shape, rehearse
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.repair import Patch
@@ -110,7 +111,8 @@ def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matt
         cut.pixels, cut.camera, cut.mask, choice.backend, count, stage, choice.seed
     )
     progress(0.95, "getting ready to pose")
-    _rehearse(cut, matte, lifted)
+    # What is compiled for the first drag is on the disk for the window: seconds, once.
+    rehearse(build_shape(cut.camera, EditObject("", matte=matte, lifted=lifted)), cut.camera)
     return matte, lifted
 
 
@@ -152,26 +154,6 @@ def write_coverage(selection: Selection, path: Path, progress: Progress) -> None
     from objectmorpher_core.segment.mask_edit import as_coverage
 
     write_all({path: encode_coverage(as_coverage(selection))})
-
-
-def _rehearse(cut: Cut, matte: Matte, lifted: LiftedObject) -> None:
-    """Drags the new object once, here: what is compiled for it is on the disk for the window.
-
-    Compiling takes many seconds after an installation and nothing later.
-    """
-    from objectmorpher_core.compose.lighting import object_texture
-    from objectmorpher_core.document import Handle, Placement
-    from objectmorpher_core.puppet import puppet_of
-
-    puppet = puppet_of(EditObject("", matte=matte, lifted=lifted), cut.camera)
-    texture = object_texture(matte)
-    point = lifted.control_points[0].astype(float)
-    handles = (Handle(0, point, point + 0.01),)
-    pose = puppet.deformer.solve(handles, True, None).pose
-    pose = puppet.deformer.solve(handles, True, pose).pose
-    x, y = puppet.picture_of(point, pose, Placement())
-    puppet.pick((float(x), float(y)), pose, Placement(), texture)
-    puppet.pick((float(x), float(y)), None, Placement(), texture)
 
 
 def render_exact(request: Request, progress: Progress) -> Rendered:

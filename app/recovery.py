@@ -18,7 +18,7 @@ from objectmorpher_core.session_tree import SessionError
 from .autosave import LOCK, Held, recovery_root
 from .file_lock import FileLock
 from .jobs import JobError
-from .shape import Shape, build_ready
+from .shape import Shapes, build_ready
 from .texts import t
 
 if TYPE_CHECKING:
@@ -83,16 +83,15 @@ class Recovery:
             editor.complain(t("{name} was recovered elsewhere already", name=left.name))
             return
 
-        def read(progress: Progress) -> tuple[Document, dict[int, Shape]]:
+        def read(progress: Progress) -> tuple[Document, Shapes]:
             progress(0.2, "")
             document = read_journal(left.folder)
             return document, build_ready(document)
 
-        def accept(answer: tuple[Document, dict[int, Shape]]) -> None:
+        def accept(answer: tuple[Document, Shapes]) -> None:
             document, shapes = answer
             self._forget(left)
-            editor.start(document)
-            editor.derived.adopt(document, shapes)
+            editor.start(document, shapes)
             editor.path, editor.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()

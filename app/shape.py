@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from objectmorpher_core.document import Document, EditObject, Handle, Photo
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Document, EditObject, Handle, Placement
+
+from .memo import Memo
 
 if TYPE_CHECKING:
     from objectmorpher_core.puppet import Puppet
     from objectmorpher_core.raster.texture import TextureLevels
 
+log = logging.getLogger(__name__)
+
 SMALL = (0, 0, 32, 32)  # px, of the picture that is drawn for practice
+REACH = 0.01  # object units that a point is moved for practice
 
 
 @dataclass(eq=False)
@@ -25,51 +33,60 @@ class Shape:
     is_rehearsed: bool = False  # or is being so: nobody else has to
 
 
-def build_shape(photo: Photo, thing: EditObject) -> Shape:
-    """A fraction of a second; what only a drag needs is made later."""
-    from objectmorpher_core.compose.composite import object_texture
+Shapes: TypeAlias = Sequence[tuple[EditObject, Shape]]
+
+
+def build_shape(camera: Camera, thing: EditObject) -> Shape:
+    """A fraction of a second; what only a drag needs is made later. `camera` is the photo's."""
+    from objectmorpher_core.compose.lighting import object_texture
     from objectmorpher_core.puppet import puppet_of
 
     assert thing.matte is not None
-    return Shape(puppet_of(thing, photo.camera), object_texture(thing.matte))
+    return Shape(puppet_of(thing, camera), object_texture(thing.matte))
 
 
-def build_ready(document: Document) -> dict[int, Shape]:
-    """The shapes of all lifted objects, rehearsed; those of copies are one."""
-    shapes: dict[int, Shape] = {}
-    for k, thing in enumerate(document.objects):
-        if thing.lifted is None:
-            continue
-        shape = build_shape(document.photo, thing)
+def build_ready(document: Document) -> Shapes:
+    """The shapes of all lifted objects, rehearsed; copies share one."""
+    camera, built = document.photo.camera, Memo(len(document.objects))
+
+    def build(thing: EditObject) -> Shape:
+        shape = build_shape(camera, thing)
         shape.is_rehearsed = True
-        rehearse(document.photo, thing, shape)
-        shapes[k] = shape
-    return shapes
+        try:
+            rehearse(shape, camera, thing.placement)
+        except Exception:  # it opens all the same; whoever drags it is told
+            log.exception("%s could not be made ready to be dragged", thing.name)
+        return shape
+
+    lifted = [thing for thing in document.objects if thing.lifted is not None]
+    return [(o, built(lambda o=o: build(o), o.lifted, o.deform, o.rig)) for o in lifted]
 
 
-def rehearse(photo: Photo, thing: EditObject, shape: Shape) -> None:
-    """Does once what a drag's first frame does; all that is slow about it is kept.
+def rehearse(shape: Shape, camera: Camera, placement: Placement | None = None) -> None:
+    """Does once what a drag does; all that is slow the first time is kept, or compiled.
 
-    In a thread: it changes nothing that somebody else looks at.
+    In a thread or in another process: it changes nothing that somebody else looks at. The
+    object is where `placement` puts it, in the photo of `camera`.
     """
     from objectmorpher_core.raster import tiles
     from objectmorpher_core.raster.sharpening import sharpen
 
     from .moved_cells import mark_moved
 
-    puppet, camera = shape.puppet, photo.camera
+    puppet, texture, placement = shape.puppet, shape.texture, placement or Placement()
     deformer = puppet.deformer
     trial = deformer.with_rig(deformer.rig)  # with a solver of its own
     point = deformer.points[0]
-    pose = trial.solve((Handle(0, point, point),), start=trial.rest(), seconds=0.0).pose
-    splats = (puppet.draft if puppet.has_draft else puppet.posed)(pose, thing.placement)
-    whole = puppet.posed(pose, thing.placement)
-    drawables = [tiles.prepare(each, camera, camera) for each in (whole, splats)]
-    picture = tiles.draw(drawables[-1], shape.texture, SMALL)
-    tiles.draw_rgba(drawables[0], shape.texture, SMALL)
-    sharpen(picture, shape.texture, 1, SMALL, (0.0, 0.0), 1.0)
+    handles = (Handle(0, point, point + REACH),)
+    pose = trial.solve(handles, start=trial.solve(handles, seconds=0.0).pose, seconds=0.0).pose
+    splats = (puppet.draft if puppet.has_draft else puppet.posed)(pose, placement)
+    seen = tiles.prepare(puppet.posed(pose, placement), camera, camera)
+    picture = tiles.draw(tiles.prepare(splats, camera, camera), texture, SMALL)
+    tiles.draw_rgba(seen, texture, SMALL)
+    sharpen(picture, texture, 1, SMALL, (0.0, 0.0), 1.0)
     free = np.ones((1, 1), np.uint8)
-    texture, world = splats.rest.lifted.texture, splats.means
-    mark_moved(free, texture.u0, world, (1.0, 0.0, 0.0), (0.0, 0.0), 1.0, 1.0, True)
-    middle = np.array(camera.project(puppet.world_point(point, pose, thing.placement)))
-    puppet.pick_in(drawables[0], shape.texture, (middle[0], middle[1]), pose, thing.placement)
+    on_photo = splats.rest.lifted.texture.u0
+    mark_moved(free, on_photo, splats.means, (1.0, 0.0, 0.0), (0.0, 0.0), 1.0, 1.0, True)
+    x, y = puppet.picture_of(point, pose, placement)
+    puppet.pick_in(seen, texture, (x, y), pose, placement)
+    puppet.pick((x, y), None, placement, texture)

@@ -148,20 +148,18 @@ class Tasks:
     def rehearse(self) -> None:
         """Sees to it that the current object can be dragged at once; each frame."""
         editor, document = self._editor, self._editor.committed
-        if document is None or editor.chores.is_busy(REHEARSE) or not editor.is_lifted:
+        if document is None or editor.current >= len(document.objects):
             return
-        if editor.current >= len(document.objects):
+        camera, thing = document.photo.camera, document.objects[editor.current]
+        if thing.lifted is None or editor.chores.is_busy(REHEARSE):
             return
-        photo, thing = document.photo, document.objects[editor.current]
-        if thing.lifted is None:
-            return
-        shape = editor.derived.shape(photo, thing)
+        shape = editor.derived.shape(document.photo, thing)
         if shape.is_rehearsed:
             return
         shape.is_rehearsed = True
         editor.chores.start(
-            "Getting ready", lambda progress: rehearse(photo, thing, shape), kind=REHEARSE,
-            done=lambda _: None, failed=editor.complain_of, is_quiet=True,
+            "Getting ready", lambda progress: rehearse(shape, camera, thing.placement),
+            kind=REHEARSE, done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
     def ensure_plate(self) -> bool:

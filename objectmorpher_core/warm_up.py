@@ -9,11 +9,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from .document import Document
+
 SIZE = 96  # px
 
 
-def warm_up() -> None:
-    """Half a minute the first time after an installation, a second afterwards."""
+def warm_up() -> Document:
+    """The edited picture; a minute or two the first time after an installation, a second later."""
     from .image import Picture, encode_mask, encode_picture
     from .pipeline import run_script
     from .script import EditScript, HandleMove
@@ -27,7 +29,7 @@ def warm_up() -> None:
     handle = HandleMove(middle, (middle[0] + 3, middle[1]))
     script = EditScript(gaussians=400, handle=(handle,), turn=(10.0, 0.0, 0.0))
     photo = encode_picture(Picture(pixels), ".png")
-    run_script(photo, "warm-up", script, encode_mask(mask.astype(bool)))
+    return run_script(photo, "warm-up", script, encode_mask(mask.astype(bool))).document
 
 
 if __name__ == "__main__":

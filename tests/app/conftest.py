@@ -62,7 +62,7 @@ def data_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 @pytest.fixture(scope="session")
-def shared_editor(data_folder: None) -> Iterator[Editor]:
+def shared_editor(compiled: None, data_folder: None) -> Iterator[Editor]:
     editor = Editor(Settings(gaussians=3000))
     editor.view.resize((720, 560), 1.0, None)
     yield editor
@@ -139,8 +139,8 @@ def display() -> Iterator[str]:
 
 @pytest.fixture(scope="session")
 def compiled() -> None:
-    """The kernels are on the disk: a window that compiles them answers nobody for a minute."""
-    subprocess.run([sys.executable, "-m", "objectmorpher_core.warm_up"], cwd=hands.ROOT, check=True)
+    """The kernels are on the disk: who compiles them answers nobody for a minute or two."""
+    subprocess.run([sys.executable, "-m", "app.warm_up"], cwd=hands.ROOT, check=True)
 
 
 @pytest.fixture

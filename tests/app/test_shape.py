@@ -51,10 +51,10 @@ def test_a_rehearsal_changes_nothing(ball: Document) -> None:
     handled = edits.add_handle(ball, 0, point, point + 0.1).objects[0]
     poses = []
     for is_rehearsed in (False, True):
-        shape = build_shape(ball.photo, thing)
+        shape = build_shape(ball.photo.camera, thing)
         deformer = shape.puppet.deformer
         first = deformer.solve(handled.handles)
         if is_rehearsed:
-            rehearse(ball.photo, thing, shape)
+            rehearse(shape, ball.photo.camera)
         poses.append(deformer.solve(handled.handles, start=first.pose).pose)
     np.testing.assert_array_equal(poses[0].points, poses[1].points)
