@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.arrays import U8
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Document
 
@@ -46,6 +47,11 @@ class Layer:
     is_draft: bool = False  # to be replaced by the exact picture
     is_tint: bool = False  # lies over everything, translucent
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
+
+    @property
+    def pixels(self) -> U8:
+        """(h, w, 4) u8."""
+        return self.rgba if self.rgba.dtype == np.uint8 else _as_u8(self.rgba)
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,8 +316,10 @@ def _sharp_layer(
     x0, y0, x1, y1 = (factor * v for v in box)
     covered = (x0, y0, min(x1, view.width), min(y1, view.height))
     corner = (view.left, view.top)
-    rgba, invented = sharpen(picture, texture, factor, covered, corner, view.zoom)
-    return Layer(_floats(covered), rgba, invented if part.is_marked else None, is_draft=True)
+    rgba, invented = sharpen(
+        picture, texture, factor, covered, corner, view.zoom, is_marked=part.is_marked
+    )
+    return Layer(_floats(covered), rgba, invented, is_draft=True)
 
 
 def _floats(box: Box) -> tuple[float, float, float, float]:
@@ -323,7 +331,7 @@ def _is_tint(part: Part) -> bool:
     return part.look is Shown.STRAIN
 
 
-def _as_u8(values: np.ndarray) -> np.ndarray:
+def _as_u8(values: np.ndarray) -> U8:
     return (values * 255 + 0.5).clip(0, 255).astype(np.uint8)
 
 

@@ -161,9 +161,9 @@ def _count_shares(derived: Derived, document: Document) -> Shares:
     if hole is not None:
         inpainted = cv2.resize(hole.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     lifted, through_all = np.zeros_like(inpainted), 1 - inpainted
-    for k, splats in derived.layers.order(document).items():
+    for k in derived.layers.order(document):
         texture = derived.shape(document.photo, document.objects[k]).texture
-        picture = tiles.render(splats, texture, view.camera(camera), camera)
+        picture = tiles.render(derived.draft(document, k), texture, view.camera(camera), camera)
         through = 1 - np.minimum(picture.alpha, 1)
         lifted = through * lifted + np.maximum(picture.alpha - picture.from_photo, 0)
         inpainted, through_all = through * inpainted, through * through_all

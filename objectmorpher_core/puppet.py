@@ -103,10 +103,7 @@ class Puppet:
     def draft(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The same from about `DRAFT` wider Gaussians: where the object is and where it looks."""
         assert self._draft_rest is not None, "it has few Gaussians"
-        rest, chosen = self._draft_rest
-        matrix = placement.matrix(self.lifted, self.camera)
-        motion = None if pose is None else self.deformer.gaussians_motion(pose, chosen)
-        return PosedSplats(rest, motion, matrix)
+        return self._moved(*self._draft_rest, pose, placement)
 
     @cached_property
     def _draft_rest(self) -> tuple[RestSplats, I32] | None:
@@ -118,9 +115,15 @@ class Puppet:
 
     def _posed_whole(self, pose: Pose | None, placement: Placement) -> PosedSplats:
         """The Gaussians as they were lifted, none of them split."""
+        return self._moved(self._rest, None, pose, placement)
+
+    def _moved(
+        self, rest: RestSplats, chosen: I32 | None, pose: Pose | None, placement: Placement
+    ) -> PosedSplats:
+        """`rest` are the `chosen` ones of the object's Gaussians, or all."""
         matrix = placement.matrix(self.lifted, self.camera)
-        motion = None if pose is None else self.deformer.gaussians_motion(pose)
-        return PosedSplats(self._rest, motion, matrix)
+        motion = None if pose is None else self.deformer.gaussians_motion(pose, chosen)
+        return PosedSplats(rest, motion, matrix)
 
     def _lifted_of(self, split: Split) -> LiftedObject:
         """The object of these pieces at rest; each looks where it is in the photo."""

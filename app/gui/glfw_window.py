@@ -32,6 +32,9 @@ def open_window(options: WindowOptions) -> Any:
         (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
         (glfw.OPENGL_FORWARD_COMPAT, glfw.TRUE),
         (glfw.SCALE_TO_MONITOR, glfw.TRUE),
+        (glfw.DEPTH_BITS, 0),  # nothing here needs them
+        (glfw.STENCIL_BITS, 0),
+        (glfw.ALPHA_BITS, 0),
     )
     for hint, value in hints:
         glfw.window_hint(hint, value)

@@ -86,7 +86,6 @@ class Icon:
     MINUS = "\uf068"
     CLOSE = "\uf00d"
     TRASH = "\uf1f8"
-    PIN = "\uf08d"
     CUBE = "\uf1b2"
     PERSON = "\uf007"
     WARNING = "\uf071"

@@ -40,6 +40,7 @@ from .popups import Popups
 from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
+from .surface import Surface
 from .theme import theme
 from .title import Title
 from .toolbar import draw_toolbar
@@ -98,7 +99,7 @@ class Window:
     def __init__(self, options: WindowOptions, handle: Any) -> None:
         """`handle`: GLFW's, its context current in this thread."""
         self._options = options
-        self._handle = handle
+        self._handle, self._surface = handle, Surface(handle)
         self._renderer = Renderer(options.renderer)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
@@ -199,21 +200,19 @@ class Window:
     # One frame
 
     def _frame(self) -> None:
-        size = glfw.get_framebuffer_size(self._handle)
+        size, ratio = self._surface.pixels, self._surface.ratio
         if 0 in size:  # minimised
             return
         self._adopt_look()
         is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
         fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
         imgui.backends.opengl3_new_frame()
-        imgui.backends.glfw_new_frame()
+        self._surface.begin_frame()
         imgui.new_frame()
-        display = imgui.get_io().display_size
-        ratio = size[0] / max(display.x, 1)
-        layout = lay_out(display.x, display.y, self.editor.document is not None)
+        layout = lay_out(*self._surface.size, self.editor.document is not None)
         self._resize_canvas(layout.canvas, ratio)
         self._input.update(self.editor, layout.canvas, ratio)
-        layout = lay_out(display.x, display.y, self.editor.document is not None)
+        layout = lay_out(*self._surface.size, self.editor.document is not None)
         draw_menu(self.editor, layout.menu)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
@@ -234,14 +233,16 @@ class Window:
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
-        self._renderer.clear(theme.rgb("panel"), size)
+        self._renderer.begin(theme.rgb("panel"), size)
         scene = build_scene(self.editor, self._renderer.kind)
-        if scene is not None:
-            view = self.editor.view
-            left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
-            viewport = (left, size[1] - bottom, view.width, view.height)
-            self._renderer.draw(scene, view, viewport)
-            self._read_color(viewport)
+        if scene is None:
+            self._renderer.clear()
+            return
+        view = self.editor.view
+        left, bottom = round(canvas.x * ratio), round(canvas.y * ratio) + view.height
+        viewport = (left, size[1] - bottom, view.width, view.height)
+        self._renderer.draw(scene, view, viewport)
+        self._read_color(viewport)
 
     def _read_color(self, viewport: tuple[int, int, int, int]) -> None:
         """What the picture shows under the pointer, where single pixels are looked at."""
@@ -291,9 +292,7 @@ class Window:
     def _monitor_scale(self) -> float:
         """Window units per point. Where the framebuffer is finer than the window, 1."""
         content = glfw.get_window_content_scale(self._handle)[0]
-        window = max(glfw.get_window_size(self._handle)[0], 1)
-        ratio = glfw.get_framebuffer_size(self._handle)[0] / window
-        return max(round(content / max(ratio, 1e-3) * 4) / 4, 1.0)
+        return max(round(content / max(self._surface.ratio, 1e-3) * 4) / 4, 1.0)
 
     def _set_cursor(self) -> None:
         """On the canvas the tool's cursor, elsewhere what ImGui asks for."""
@@ -335,8 +334,7 @@ class Window:
     def _write_screenshot(self, path: Path) -> None:
         from PIL import Image
 
-        size = glfw.get_framebuffer_size(self._handle)
-        Image.fromarray(self._renderer.read(size)).save(path)
+        Image.fromarray(self._renderer.read(self._surface.pixels)).save(path)
 
     def close(self) -> None:
         self.editor.shut_down()

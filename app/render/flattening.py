@@ -59,7 +59,7 @@ def _add(layer: Layer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
     x0, y0, x1, y1 = (math.ceil(v - 0.5) for v in (*low, *high))
     if x1 <= x0 or y1 <= y0:
         return
-    pixels = _packed_pixels(layer.rgba if layer.rgba.dtype == np.uint8 else _as_u8(layer.rgba))
+    pixels = _packed_pixels(layer.pixels)
     gain = tuple(np.float32(g) for g in layer.gain)
     inputs: tuple[Any, ...]
     if layer.is_coarse:
@@ -85,10 +85,6 @@ def _places(
     at = (np.arange(first, last) + 0.5 - low) / (high - low) * count - 0.5
     index = np.floor(at).clip(0, count - 1)
     return index.astype(np.int64), (at - index).clip(0, 1).astype(np.float32)
-
-
-def _as_u8(rgba: np.ndarray) -> np.ndarray:
-    return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)

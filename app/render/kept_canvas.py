@@ -7,15 +7,16 @@ move the pointer.
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import moderngl
 
 from objectmorpher_core.arrays import U8
 
 from ..memo import same
-from ..view import View
 from .scene import Colour, Scene
+
+Place: TypeAlias = tuple[Any, ...]  # where the canvas is, what part of the picture, on what colour
 
 
 class KeptCanvas:
@@ -27,11 +28,10 @@ class KeptCanvas:
         self._color: moderngl.Texture | None = None
         self.buffer: moderngl.Framebuffer | None = None
         self._scene: Scene | None = None  # what it shows, and how
-        self._place: tuple[Any, ...] = ()
+        self._place: Place = ()
 
-    def shows(self, scene: Scene, view: View, place: tuple[Any, ...]) -> bool:
-        """Whether it shows this already; `place`: where, and on what colour."""
-        place = (*place, *view.place, view.scale)
+    def shows(self, scene: Scene, place: Place) -> bool:
+        """Whether it shows this already."""
         before, self._scene = self._scene, scene
         is_there, self._place = place == self._place, place
         return is_there and before is not None and same_scene(scene, before)

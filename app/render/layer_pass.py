@@ -80,7 +80,7 @@ class LayerPass:
         """The layer's textures by their unit."""
         key = id(layer.rgba)  # it stays the same where the light changes
         if key not in self._uploaded:
-            textures = {LAYER: self._upload(_as_u8(layer.rgba))}
+            textures = {LAYER: self._upload(layer.pixels)}
             if layer.invented is not None:
                 textures[MARKS] = self._upload(layer.invented[..., None])
             near = moderngl.LINEAR if layer.is_coarse else moderngl.NEAREST
@@ -111,9 +111,3 @@ def photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
     height, width = scene.photo.shape[:2]
     (x0, y0), (x1, y1) = view.canvas_from_image(np.array([[0, 0], [width, height]]))
     return float(x0), float(y0), float(x1), float(y1)
-
-
-def _as_u8(rgba: np.ndarray) -> np.ndarray:
-    if rgba.dtype == np.uint8:
-        return rgba
-    return (rgba * 255 + 0.5).clip(0, 255).astype(np.uint8)

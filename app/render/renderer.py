@@ -12,7 +12,7 @@ from objectmorpher_core.arrays import U8
 
 from ..view import View
 from .blend_texture import BlendTexture
-from .kept_canvas import KeptCanvas
+from .kept_canvas import KeptCanvas, Place
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
@@ -56,19 +56,22 @@ class Renderer:
 
             rehearse()
 
-    def clear(self, color: Colour, size: tuple[int, int]) -> None:
-        """Begins a frame of `size` px: the whole window in one colour."""
+    def begin(self, color: Colour, size: tuple[int, int]) -> None:
+        """Begins a frame of `size` px; `color` is the window's where no scene is."""
         self._surround, self._size = color, size
         self._target = self._context.screen
-        self._begin((0, 0, *size))
-        self._target.clear(*color, 1.0)
+
+    def clear(self) -> None:
+        """The whole window in its colour."""
+        self._begin((0, 0, self._size[0], self._size[1]))
+        self._target.clear(*self._surround, 1.0)
 
     def draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
-        """The scene in `viewport` of the window that was cleared."""
-        kept, place = self._kept, (self._surround, self._size, viewport)
-        if not kept.shows(scene, view, place):
-            flat = self._flat(scene, view, viewport)
-            if flat is not None:
+        """The whole window: the scene in `viewport`, its colour around it."""
+        kept = self._kept
+        place = (self._surround, self._size, viewport, view.place, view.scale)
+        if not kept.shows(scene, place):
+            if (flat := self._flat(scene, view, viewport, place)) is not None:
                 kept.write(flat, viewport)
             else:
                 self._target = kept.begin(self._size, self._surround)
@@ -78,11 +81,10 @@ class Renderer:
         self._context.copy_framebuffer(self._target, kept.buffer)
         self._begin(viewport)
 
-    def _flat(self, scene: Scene, view: View, viewport: Viewport) -> U8 | None:
+    def _flat(self, scene: Scene, view: View, viewport: Viewport, place: Place) -> U8 | None:
         """The canvas by the processor, where that is faster; None where it is not."""
         if not self._is_emulated:
             return None
-        place = (self._surround, self._size, viewport)
         return self._still.flat(
             scene, view, place, lambda under: self._read_canvas(under, view, viewport)
         )

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from objectmorpher_core.arrays import U8
 
 from ..view import View
-from .kept_canvas import same_scene
+from .kept_canvas import Place, same_scene
 from .layer_pass import photo_box
 from .scene import Scene
 
@@ -20,16 +19,15 @@ class StillView:
     """Two pictures of a view, for `flattening`."""
 
     def __init__(self) -> None:
-        self._place: tuple[Any, ...] = ()
+        self._place: Place = ()
         self._pictures: dict[str, tuple[Scene, U8]] = {}  # with what they were drawn from
 
-    def flat(self, scene: Scene, view: View, place: tuple[Any, ...], draw: Draw) -> U8 | None:
+    def flat(self, scene: Scene, view: View, place: Place, draw: Draw) -> U8 | None:
         """The canvas, its rows from the bottom up; None where the shaders have to draw it.
 
-        That is when the view moves, and where the scene is more than an edited photo. `place`:
-        where the canvas is, and on what colour; `draw` makes a picture by the shaders.
+        That is when the view moves, and where the scene is more than an edited photo. `draw`
+        makes a picture by the shaders.
         """
-        place = (*place, *view.place, view.scale)
         is_still, self._place = place == self._place, place
         if not is_still:
             self._pictures.clear()

@@ -102,6 +102,24 @@ def _between(typing_context, numbers, first, second, share):
     return signature, generate
 
 
+def _bytes_over(typing_context, over, alpha, under, rest):
+    """alpha `over` + rest `under`, four numbers in [0, 1] each, rounded to a pixel's bytes: i32."""
+    four = types.UniTuple(types.float32, 4)
+    signature = types.int32(four, types.float32, four, types.float32)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        over, alpha, under, rest = arguments
+        over, under = _joined(builder, over), _joined(builder, under)
+        total = builder.fmul(_spread(builder, rest, FOUR), under)
+        total = builder.fadd(builder.fmul(_spread(builder, alpha, FOUR), over), total)
+        full, half = ir.Constant(FOUR, [255.0] * 4), ir.Constant(FOUR, [0.5] * 4)
+        total = builder.fadd(builder.fmul(total, full), half)
+        whole = builder.fptosi(total, ir.VectorType(LANE, 4))
+        return builder.bitcast(builder.trunc(whole, ir.VectorType(ir.IntType(8), 4)), LANE)
+
+    return signature, generate
+
+
 def _fetch(typing_context, texels, at):
     """Asks for the line of memory around `texels[at]`, without waiting for it."""
 
@@ -121,6 +139,7 @@ def _fetch(typing_context, texels, at):
 sixteen_texels: Any = intrinsic(_sixteen_texels)  # called without the typing context
 four_texels: Any = intrinsic(_four_texels)
 between: Any = intrinsic(_between)
+bytes_over: Any = intrinsic(_bytes_over)
 fetch: Any = intrinsic(_fetch)
 
 
@@ -143,6 +162,14 @@ def _spread(builder: Any, value: Any, kind: ir.VectorType) -> Any:
     one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, LANE(0))
     order = ir.Constant(ir.VectorType(LANE, kind.count), [0] * kind.count)
     return builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), order)
+
+
+def _joined(builder: Any, values: Any) -> Any:
+    """A tuple of four in the lanes of one."""
+    total = ir.Constant(FOUR, ir.Undefined)
+    for k in range(4):
+        total = builder.insert_element(total, builder.extract_value(values, k), LANE(k))
+    return total
 
 
 def _pair(builder: Any, left: Any, right: Any) -> Any:

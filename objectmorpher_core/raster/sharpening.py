@@ -12,9 +12,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from ..arrays import F32, U8
+from ..arrays import F32, I32, U8
 from ..threads import EXACT, in_threads
-from .intrinsics import between, four_texels
+from .intrinsics import between, bytes_over, four_texels
 from .reference import Picture3D
 from .singles import HALF, ONE, TWO, ZERO
 from .texture import TextureLevels
@@ -37,18 +37,22 @@ def sharpen(
     box: Box,
     corner: tuple[float, float],
     zoom: float,
-) -> tuple[U8, U8]:
-    """The part `box` (x0, y0, x1, y1 px) of a view: (h, w, 4) premultiplied, and (h, w) invented.
+    *,
+    is_marked: bool = True,
+) -> tuple[U8, U8 | None]:
+    """The part `box` (x0, y0, x1, y1 px) of a view: (h, w, 4) premultiplied; (h, w) invented.
 
     The photo is looked up bilinearly, in the halved copy that is nearest to the view's scale.
 
     `picture` is the part of the view that begins at the box's corner, with `factor` x `factor` of
     its px in one. `corner`: photo px at the view's left top; `zoom`: view px per photo px. What is
-    invented is the share of a pixel that shows the object, but nothing of the photo.
+    invented is the share of a pixel that shows the object, but nothing of the photo; None unless
+    `is_marked`.
     """
-    coarse = _packed(picture)
+    coarse, ends = _packed(picture)
     height, width = box[3] - box[1], box[2] - box[0]
-    rgba, invented = np.zeros((height, width), "<i4"), np.zeros((height, width), np.uint8)
+    rgba = np.zeros((height, width), "<i4")
+    invented = np.zeros((height, width) if is_marked else (0, 0), np.uint8)
     level = round(math.log2(max(1 / zoom, 1.0)))
     level = min(level, len(texture.shapes) - 1)
     scale = 2.0**-level
@@ -59,41 +63,51 @@ def sharpen(
     u = (np.arange(width) + 0.5) / factor - 0.5  # where each px is among the coarse ones
     pixels = np.floor(u).clip(0, coarse.shape[1] - 1)
     inputs: tuple[Any, ...] = (
-        coarse.reshape(len(coarse), -1), *(np.float32(v) for v in frame),
+        coarse.reshape(len(coarse), -1), ends, *(np.float32(v) for v in frame),
         texture.texels, texture.shapes[level],
         (8 * pixels).astype(np.uint64), (u - pixels).clip(0, 1).astype(np.float32), rgba, invented,
+        is_marked,
     )  # fmt: skip
     in_threads(lambda first, last: _sharpen(first, last, *inputs), height, PARTS)
-    return rgba.view(np.uint8).reshape(height, width, 4), invented
+    return rgba.view(np.uint8).reshape(height, width, 4), invented if is_marked else None
 
 
-def _packed(picture: Picture3D) -> F32:
-    """(h, w, 8) columns as above; the map is continued around the object."""
+def _packed(picture: Picture3D) -> tuple[F32, I32]:
+    """(h, w, 8) columns as above, the map continued around the object, and (h, 2) its ends.
+
+    Those are of each row the first px that shows something, and the one after the last.
+    """
     coarse = np.empty((*picture.alpha.shape, 8), np.float32)
-    _pack(picture.color, picture.alpha, picture.from_photo, picture.shift, coarse)
-    _continue(coarse)
-    return coarse
+    ends = np.empty((len(coarse), 2), np.int32)
+    _pack(picture.color, picture.alpha, picture.from_photo, picture.shift, coarse, ends)
+    _continue(coarse, ends)
+    return coarse, ends
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _pack(color, alpha, from_photo, shift, coarse):
+def _pack(color, alpha, from_photo, shift, coarse, ends):
     for y in range(alpha.shape[0]):
+        ends[y, 0], ends[y, 1] = alpha.shape[1], 0
         for x in range(alpha.shape[1]):
             p, a = coarse[y, x], alpha[y, x]
             p[R], p[G], p[B], p[A] = color[y, x, 0], color[y, x, 1], color[y, x, 2], a
             p[SHARE] = min(max(from_photo[y, x] / max(a, LEAST_SHOWN), ZERO), ONE)
             p[SX], p[SY] = shift[y, x, 0], shift[y, x, 1]
             p[SEEN] = ONE if a > LEAST_ALPHA and from_photo[y, x] > ZERO else ZERO
+            if a > ZERO:
+                ends[y, 0], ends[y, 1] = min(ends[y, 0], x), x + 1
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
-def _continue(coarse):
+def _continue(coarse, ends):
     """Gives each pixel around the seen ones the mean map of its seen neighbours."""
     height, width = coarse.shape[:2]
     for round in range(ROUNDS):
         done = np.float32(1 + round)  # a pixel of this round is no neighbour in it
         for y in range(height):
-            for x in range(width):
+            above, below = max(y - round - 1, 0), min(y + round + 2, height)
+            start, end = ends[above:below, 0].min(), ends[above:below, 1].max()
+            for x in range(max(start - round - 1, 0), min(end + round + 1, width)):
                 if coarse[y, x, SEEN] > ZERO:
                     continue
                 count, sx, sy = ZERO, ZERO, ZERO
@@ -110,13 +124,13 @@ def _continue(coarse):
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
 def _sharpen(
-    first, last, coarse, factor, left, top, step, scale, texels, shape, pixels, shares,
-    rgba, invented,
+    first, last, coarse, ends, factor, left, top, step, scale, texels, shape, pixels, shares,
+    rgba, invented, is_marked,
 ):  # fmt: skip
     """Rows first..last of `rgba` and `invented`, all 0 before.
 
-    `coarse` (rows, 8 x columns); `pixels`, `shares`: of each column the coarse px before it, and
-    how much it takes of the next.
+    `coarse` (rows, 8 x columns), `ends`: see `_packed`; `pixels`, `shares`: of each column the
+    coarse px before it, and how much it takes of the next.
     """
     rows, numbers = coarse.shape
     row, most = np.empty(numbers, np.float32), np.uint64(numbers - 8)
@@ -127,30 +141,27 @@ def _sharpen(
         v = (y + HALF) / factor - HALF
         i = min(max(int(math.floor(v)), 0), rows - 1)
         t, below = min(max(v - np.float32(i), ZERO), ONE), min(i + 1, rows - 1)
-        for c in range(numbers):
+        start, end = min(ends[i, 0], ends[below, 0]), max(ends[i, 1], ends[below, 1])
+        for c in range(8 * max(start - 2, 0), min(8 * (end + 2), numbers)):
             row[c] = coarse[i, c] + t * (coarse[below, c] - coarse[i, c])
-        for x in range(rgba.shape[1]):
+        start, end = int(factor) * (start - 1), int(factor) * (end + 1)
+        for x in range(max(start, 0), min(end, rgba.shape[1])):
             one = pixels[x]
             two = min(one + EIGHT, most)
             if row[one + A_ON] <= ZERO and row[two + A_ON] <= ZERO:
                 continue
             r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, shares[x])
-            invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
+            if is_marked:
+                invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
+            texel, alpha = (ZERO, ZERO, ZERO, ZERO), ZERO
             if share > ZERO:
                 u = left + np.float32(x) * step + scale * shift_x
                 v = top + np.float32(y) * step + scale * shift_y
-                texel = ZERO, ZERO, ZERO, ZERO
                 if ZERO <= u < right and ZERO <= v < bottom:
                     column, line = np.int32(u), np.int32(v)
                     at = np.uint64(4 * (first_texel + line * across + column))
                     share_x, share_y = u - np.float32(column), v - np.float32(line)
                     texel = four_texels(texels, at, stride, share_x, share_y)
-                alpha, rest = texel[3] * min(TWO * a, ONE) * share, ONE - share
-                r, g = rest * r + alpha * texel[0], rest * g + alpha * texel[1]
-                b, a = rest * b + alpha * texel[2], rest * a + alpha
-            rgba[y, x] = (
-                np.int32(r * FULL + HALF)
-                | np.int32(g * FULL + HALF) << 8
-                | np.int32(b * FULL + HALF) << 16
-                | np.int32(a * FULL + HALF) << 24
-            )
+                    alpha = texel[3] * min(TWO * a, ONE) * share
+            over = texel[0], texel[1], texel[2], ONE
+            rgba[y, x] = bytes_over(over, alpha, (r, g, b, a), ONE - share)
