@@ -138,7 +138,7 @@ def _sharpen(
     stride = np.uint64(4 * across)
     right, bottom = np.float32(across - 1), np.float32(down - 1)
     for y in range(first, last):
-        v = (y + HALF) / factor - HALF
+        v = (np.float32(y) + HALF) / factor - HALF
         i = min(max(int(math.floor(v)), 0), rows - 1)
         t, below = min(max(v - np.float32(i), ZERO), ONE), min(i + 1, rows - 1)
         start, end = min(ends[i, 0], ends[below, 0]), max(ends[i, 1], ends[below, 1])

@@ -61,7 +61,7 @@ def _shown(renderer, scene: Scene, view: View, is_emulated: bool) -> np.ndarray:
     """After another picture of the same view: only what stands still is flattened."""
     renderer._is_emulated = is_emulated
     for drawn in (Scene(scene.photo, scene.surround), scene):
-        renderer.clear((0.5, 0.5, 0.5), SIZE)
+        renderer.begin((0.5, 0.5, 0.5), SIZE)
         renderer.draw(drawn, view, VIEWPORT)
     return renderer.read(SIZE).astype(int)
 

@@ -50,7 +50,7 @@ def _object(turn: tuple[float, float, float]) -> SplatObject:
 
 
 def _window_picture(renderer, scene: Scene, view: View) -> np.ndarray:
-    renderer.clear((0.0, 0.0, 0.0), SIZE)
+    renderer.begin((0.0, 0.0, 0.0), SIZE)
     renderer.draw(scene, view, (0, 0, *SIZE))
     return renderer.read(SIZE).astype(np.float32) / 255
 
