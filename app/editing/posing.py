@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
-DRAG_SECONDS = 0.006  # of a drag's frame, for the solver; the rest when the pointer rests
+DRAG_SECONDS = 0.003  # of a drag's frame, for the solver: it lags by a px; the rest when it rests
 
 
 class Posing:

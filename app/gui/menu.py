@@ -45,7 +45,10 @@ def draw_menu(editor: Editor, rect: Rect) -> None:
     across = (rect.height - imgui.get_font_size()) / 2
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(theme.pt(8), across))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(16, 8))
+    for background in (imgui.Col_.window_bg, imgui.Col_.menu_bar_bg):
+        imgui.push_style_color(background, 0)  # the window is cleared in it
     imgui.begin_main_menu_bar()
+    imgui.pop_style_color(2)
     imgui.pop_style_var(2)
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(12, 10))

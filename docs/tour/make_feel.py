@@ -19,13 +19,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median, quantiles
-from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "app")]
 
 from hands import Hands, window_environment, x_display  # noqa: E402
+
+from objectmorpher_core.pipeline import open_photo  # noqa: E402
+from objectmorpher_core.session_file import save_session  # noqa: E402
 
 SAMPLE = ROOT / "assets" / "samples" / "astronaut.jpg"
 SCREEN = (1440, 1100)  # px
@@ -107,8 +109,12 @@ def swing(mouse: Mouse, at: tuple[float, float], seconds: float = SECONDS) -> Pl
     return sent
 
 
-def feel(sent: Places, frames: list[dict[str, Any]]) -> Feel:
-    """Of the places `sent`; a frame shows the newest place that it has seen."""
+def feel(sent: Places, log: Path, kind: str) -> Feel:
+    """Of the places `sent`, in the frames that are of a kind ("is_stroke", "job").
+
+    A frame shows the newest place that it has seen.
+    """
+    frames = json.loads(log.read_text())
     delays, behind, work, k = [], [], [], 0
     for frame in frames:
         seen = (frame["x"], frame["y"])
@@ -117,17 +123,19 @@ def feel(sent: Places, frames: list[dict[str, Any]]) -> Feel:
         if not shows:
             continue
         newest = shows[-1]
-        delays += [1000 * (frame["shown"] - sent[i][0]) for i in range(k, newest + 1)]
+        first, k = k, newest + 1
+        if not frame[kind]:
+            continue
+        delays += [1000 * (frame["shown"] - sent[i][0]) for i in range(first, newest + 1)]
         behind.append(1000 * (frame["shown"] - sent[newest][0]))
         work.append(1000 * (frame["shown"] - frame["began"]))
-        k = newest + 1
     nine_of_ten = quantiles(delays, n=10)[-1]
     return Feel(median(delays), nine_of_ten, median(behind), median(work), len(work))
 
 
 @contextmanager
-def window(path: Path, environment: dict[str, str], log: Path, is_saved: bool) -> Iterator[Mouse]:
-    """The window with a file, ready, and the pointer; it writes its frames when it is closed."""
+def window(path: Path, environment: dict[str, str], log: Path) -> Iterator[Mouse]:
+    """The window with a session, ready, and the pointer; it writes its frames when it is closed."""
     command = [sys.executable, "-m", "app", str(path), "--size", "{},{}".format(*SIZE)]
     command += ["--frame-log", str(log)]
     with subprocess.Popen(command, env=environment, cwd=ROOT) as process:
@@ -136,9 +144,9 @@ def window(path: Path, environment: dict[str, str], log: Path, is_saved: bool) -
         time.sleep(QUIET)
         try:
             yield mouse
+            mouse.do("key", "ctrl+s")
+            time.sleep(3)
             mouse.do("key", "ctrl+q")
-            if not is_saved:
-                hands.choose("Don't save")
             process.wait(PATIENCE)
         finally:
             mouse.close()
@@ -148,7 +156,7 @@ def window(path: Path, environment: dict[str, str], log: Path, is_saved: bool) -
 def drag(session: Path, environment: dict[str, str], folder: Path) -> Feel:
     """The first point of an object that is taken hold of."""
     log = folder / "frames.json"
-    with window(session, environment | {"OBJECTMORPHER_LANDMARKS": ""}, log, True) as mouse:
+    with window(session, environment, log) as mouse:
         mouse.do("mousemove", *OBJECT)
         time.sleep(1)
         mouse.do("mousedown", 1)
@@ -156,22 +164,22 @@ def drag(session: Path, environment: dict[str, str], folder: Path) -> Feel:
         sent = swing(mouse, OBJECT)
         mouse.do("mouseup", 1)
         time.sleep(1)
-        mouse.do("key", "ctrl+s")
-        time.sleep(3)
-    return feel(sent, [f for f in json.loads(log.read_text()) if f["is_stroke"]])
+    return feel(sent, log, "is_stroke")
 
 
 def work_beside(environment: dict[str, str], folder: Path) -> Feel:
     """The pointer moves over the photo while the worker lifts an object and fills in behind it."""
     log = folder / "frames.json"
-    with window(SAMPLE, environment, log, False) as mouse:
+    session = folder / "photo.omorph"
+    save_session(open_photo(SAMPLE.read_bytes(), SAMPLE.name), session)
+    with window(session, environment, log) as mouse:
         mouse.do("mousemove", *OBJECT)
         mouse.do("click", 1)
         time.sleep(4)
         mouse.do("key", "Return")
         sent = swing(mouse, OBJECT)
         time.sleep(4)
-    return feel(sent, [f for f in json.loads(log.read_text()) if f["job"]])
+    return feel(sent, log, "job")
 
 
 def start(environment: dict[str, str], folder: Path) -> float:
@@ -185,17 +193,8 @@ def start(environment: dict[str, str], folder: Path) -> float:
 
 def lift(count: int | None, path: Path) -> None:
     """A session with the lifted object of the sample photo and what is behind it."""
-    command = [
-        sys.executable,
-        "-m",
-        "app",
-        "edit",
-        str(SAMPLE),
-        "--subject",
-        "--session",
-        str(path),
-    ]
-    command += ["--move", "0.01,0", "-o", str(path.with_suffix(".png"))]
+    command = [sys.executable, "-m", "app", "edit", str(SAMPLE), "--subject"]
+    command += ["--session", str(path), "--move", "0.01,0", "-o", str(path.with_suffix(".png"))]
     command += [] if count is None else ["--gaussians", str(count)]
     subprocess.run(command, cwd=ROOT, check=True)
 
@@ -207,7 +206,8 @@ def main() -> None:
         folder = Path(name)
         if display is None:
             raise SystemExit("no free X display was found")
-        environment = window_environment(display, folder, "")
+        # Nobody asks the window where its buttons are.
+        environment = window_environment(display, folder, "") | {"OBJECTMORPHER_LANDMARKS": ""}
         starts = [start(environment, folder) for _ in range(STARTS)]
         for count in COUNTS:
             session = folder / f"{count}.omorph"
