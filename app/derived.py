@@ -127,7 +127,7 @@ class Derived:
         """Of a rig that changed, only what depends on it."""
         similar = self._latest
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
-            shape = Shape(similar[2].puppet.with_rig(thing.rig), similar[2].texture)
+            shape = similar[2].with_rig(thing.rig)
         else:
             shape = build_shape(photo.camera, thing)
         self._latest = (thing.lifted, thing.deform, shape)

@@ -5,16 +5,21 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from objectmorpher_core.arrays import F64
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, EditObject, Handle, Placement
+from objectmorpher_core.document import Document, EditObject, Handle, LiftedObject, Placement
+from objectmorpher_core.rig import Rig
 
 from .memo import Memo
 
 if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
     from objectmorpher_core.puppet import Puppet
     from objectmorpher_core.raster.texture import TextureLevels
 
@@ -24,6 +29,15 @@ SMALL = (0, 0, 32, 32)  # px, of the picture that is drawn for practice
 REACH = 0.01  # object units that a point is moved for practice
 
 
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The solid Gaussians of an object at rest, object frame."""
+
+    tree: KDTree  # of their means
+    normals: F64  # (N, 3)
+    control_normals: F64  # (M, 3) at the control points
+
+
 @dataclass(eq=False)
 class Shape:
     """What poses, draws and picks the object, and the photo that it carries."""
@@ -31,6 +45,25 @@ class Shape:
     puppet: Puppet
     texture: TextureLevels
     is_rehearsed: bool = False  # or is being so: nobody else has to
+
+    @cached_property
+    def surface(self) -> Surface:
+        return build_surface(self.puppet.lifted)
+
+    def with_rig(self, rig: Rig) -> Shape:
+        """The same object with another rig; what does not depend on it is kept."""
+        other = Shape(self.puppet.with_rig(rig), self.texture)
+        if "surface" in vars(self):
+            other.surface = self.surface
+        return other
+
+
+def build_surface(lifted: LiftedObject) -> Surface:
+    from scipy.spatial import KDTree
+
+    body = lifted.body
+    tree, normals = KDTree(body.means), body.normals.astype(np.float64)
+    return Surface(tree, normals, normals[tree.query(lifted.control_points)[1]])
 
 
 Shapes: TypeAlias = Sequence[tuple[EditObject, Shape]]
@@ -90,3 +123,4 @@ def rehearse(shape: Shape, camera: Camera, placement: Placement | None = None) -
     x, y = puppet.picture_of(point, pose, placement)
     puppet.pick_in(seen, texture, (x, y), pose, placement)
     puppet.pick((x, y), None, placement, texture)
+    shape.surface.tree.query(point)

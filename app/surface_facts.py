@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.document import Document, LiftedObject
+from objectmorpher_core.document import Document
 
 from .memo import Memo
+from .shape import Surface
 
 if TYPE_CHECKING:
-    from scipy.spatial import KDTree
-
     from objectmorpher_core.deform.symmetry import MirrorPlane
 
     from .derived import Derived
@@ -22,25 +20,15 @@ if TYPE_CHECKING:
 AROUND = 12  # Gaussians whose normals make a handle's
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """The solid Gaussians of an object at rest, object frame."""
-
-    tree: KDTree  # of their means
-    normals: F64  # (N, 3)
-    control_normals: F64  # (M, 3) at the control points
-
-
 class SurfaceFacts:
     """Each is computed when it is asked for first."""
 
     def __init__(self, derived: Derived) -> None:
         self._derived = derived
-        self._surfaces, self._seen, self._influences = Memo(), Memo(), Memo()
-        self._mirrors = Memo()
+        self._seen, self._influences, self._mirrors = Memo(), Memo(), Memo()
 
-    def surface(self, lifted: LiftedObject) -> Surface:
-        return self._surfaces(lambda: _build_surface(lifted), lifted)
+    def surface(self, document: Document, k: int) -> Surface:
+        return self._derived.shape(document.photo, document.objects[k]).surface
 
     def turn_of(self, document: Document, k: int) -> F64:
         """(3, 3) the rotation that takes directions of the object frame into the world."""
@@ -54,7 +42,7 @@ class SurfaceFacts:
         """(3,) world, unit: outward at a rest surface point (3,), as it is posed and placed."""
         thing = document.objects[k]
         assert thing.lifted is not None
-        surface = self.surface(thing.lifted)
+        surface = self.surface(document, k)
         near = surface.tree.query(point, min(AROUND, len(surface.normals)))[1]
         normal = surface.normals[np.atleast_1d(near)].sum(0)
         if thing.pose is not None:
@@ -73,7 +61,7 @@ class SurfaceFacts:
 
         thing = document.objects[k]
         assert thing.lifted is not None
-        normals = self.surface(thing.lifted).control_normals
+        normals = self.surface(document, k).control_normals
         if thing.pose is not None:
             normals = (thing.pose.rotations @ normals[..., None])[..., 0]
         points = self._derived.control_places(document, k)
@@ -106,14 +94,6 @@ class SurfaceFacts:
         thing = document.objects[k]
         assert thing.lifted is not None
         return self._mirrors(lambda: _find_mirror(document, k), thing.lifted)
-
-
-def _build_surface(lifted: LiftedObject) -> Surface:
-    from scipy.spatial import KDTree
-
-    body = lifted.body
-    tree, normals = KDTree(body.means), body.normals.astype(np.float64)
-    return Surface(tree, normals, normals[tree.query(lifted.control_points)[1]])
 
 
 def _find_mirror(document: Document, k: int) -> MirrorPlane:

@@ -98,7 +98,7 @@ class Mirroring:
         k = self._editor.current
         thing = document.objects[k]
         assert thing.lifted is not None
-        tree = self._editor.derived.facts.surface(thing.lifted).tree
+        tree = self._editor.derived.facts.surface(document, k).tree
         point = np.asarray(tree.data)[tree.query(plane.mirrored(handle.point))[1]]
         node = edits.nearest_control_point(thing.lifted, point)
         if node == handle.control_point or thing.rig.is_held(node):

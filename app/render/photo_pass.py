@@ -27,9 +27,9 @@ class PhotoPass:
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
-        self._photo.upload(scene.photo)
-        self._plate.upload(scene.plate.pixels if scene.plate else None)
-        self._mask.upload(scene.mask, scene.touched)
+        self._photo.upload(scene.photo, (), view.zoom)
+        self._plate.upload(scene.plate.pixels if scene.plate else None, (), view.zoom)
+        self._mask.upload(scene.mask, scene.touched, view.zoom)
         self._photo.use(PHOTO, view.zoom)
         self._plate.use(PLATE, view.zoom)
         self._mask.use(MASK, view.zoom)
