@@ -69,6 +69,7 @@ class Editor:
         self.composing, self.looking = Composing(self), Looking(self)
         self.candidates = Candidates(self)
         self.derived.layers.ask = self.tasks.render_exact
+        self.derived.lights.ask = self.tasks.light
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
         self.path: Path | None = None  # the session's file

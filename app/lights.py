@@ -7,6 +7,7 @@ pointer rests, it is the one that is exported.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.arrays import F32, Mask
-from objectmorpher_core.document import Document, EditObject, Placement
+from objectmorpher_core.document import Document, Placement
 
 from .layers import Layer
 from .memo import Memo, same
@@ -22,7 +23,6 @@ from .view import View
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.lighting import Lighting, Lit
-    from objectmorpher_core.raster.posed import PosedSplats
 
     from .derived import Derived
 
@@ -38,7 +38,11 @@ class _Kept:
     lit: Lit
     since: float  # s, monotonic
     is_sketch: bool
+    is_asked: bool = False  # for the exact one
     shade: Layer | None = None
+
+
+Ask = Callable[[Callable[[], "Lit"], Callable[["Lit"], None]], None]
 
 
 class Lights:
@@ -48,7 +52,9 @@ class Lights:
         self._derived = derived
         self._kept: dict[int, _Kept] = {}
         self._lightings, self._painted = Memo(), Memo()
-        self._hidden, self._rests = Memo(), Memo()
+        self._hidden = Memo()
+        self._rests = {is_coarse: Memo() for is_coarse in (True, False)}
+        self.ask: Ask | None = None  # computes elsewhere and calls back
 
     @property
     def _is_hurried(self) -> bool:
@@ -57,8 +63,8 @@ class Lights:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether an exact shadow is still to be made."""
-        return any(kept.is_sketch for kept in self._kept.values())
+        """Whether an exact shadow is still to be asked for."""
+        return any(kept.is_sketch and not kept.is_asked for kept in self._kept.values())
 
     def of(self, document: Document, k: int) -> Lit:
         """Object `k`'s light and shadow as the window shows them now."""
@@ -72,23 +78,36 @@ class Lights:
         sources = (splats, item.shadow, item.harmony, document.plate)
         kept = self._kept.get(k)
         if kept is None or not same(kept.sources, sources):
-            has_shadow = item.shadow.strength > 0
-            is_sketch = self._is_hurried and has_shadow
-            kept = _Kept(sources, self._compute(document, item, splats, is_sketch), now, is_sketch)
-        elif kept.is_sketch and now - kept.since >= STILL:
-            kept = _Kept(sources, self._compute(document, item, splats, False), now, False)
-        self._kept[k] = kept
-        return kept.lit
+            lit = self._work(document, k, self._is_hurried)()
+            kept = self._kept[k] = _Kept(sources, lit, now, self._is_hurried)
+        elif kept.is_sketch and not kept.is_asked and now - kept.since >= STILL:
+            self._make_exact(document, k, kept)
+        return self._kept[k].lit
 
-    def _compute(
-        self, document: Document, item: EditObject, splats: PosedSplats, is_sketch: bool
-    ) -> Lit:
-        shape = self._derived.shape(document.photo, item)
+    def _make_exact(self, document: Document, k: int, kept: _Kept) -> None:
+        """Replaces what is kept of object `k`, now or when it is answered."""
+        kept.is_asked = True
 
-        def rest() -> PosedSplats:
-            return self._rests(lambda: shape.puppet.posed(None, Placement()), shape.puppet)
+        def accept(lit: Lit) -> None:
+            if self._kept.get(k) is kept:
+                self._kept[k] = _Kept(kept.sources, lit, time.monotonic(), False)
 
-        return self._lighting(document).of(item, splats, rest, shape.texture, is_sketch)
+        work = self._work(document, k, is_sketch=False)
+        if self.ask is None:
+            accept(work())
+        else:
+            self.ask(work, accept)
+
+    def _work(self, document: Document, k: int, is_sketch: bool) -> Callable[[], Lit]:
+        """What computes object `k`'s light and shadow, in any thread."""
+        item, derived = document.objects[k], self._derived
+        shape, lighting = derived.shape(document.photo, item), self._lighting(document)
+        puppet = shape.puppet
+        is_coarse = is_sketch and puppet.has_draft
+        splats = (derived.draft if is_coarse else derived.posed)(document, k)
+        posed = puppet.draft if is_coarse else puppet.posed
+        rest = self._rests[is_coarse](lambda: posed(None, Placement()), puppet)
+        return lambda: lighting.of(item, splats, lambda: rest, shape.texture, is_sketch)
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.lighting import Lighting

@@ -27,6 +27,8 @@ from .texts import t
 from .view import ToolName
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.lighting import Lit
+
     from .editor import Editor
 
 REHEARSE = "rehearse"  # kind of what runs in a thread
@@ -220,6 +222,13 @@ class Tasks:
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,
             done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
+        )  # fmt: skip
+
+    def light(self, work: Callable[[], Lit], accept: Callable[[Lit], None]) -> None:
+        """Computes the exact light and shadow of an object in a thread."""
+        self._editor.chores.start(
+            "Casting the shadow", lambda progress: work(), kind=f"light {id(work)}",
+            done=accept, failed=self._editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
     def save(self, path: Path, then: Callable[[], None] | None = None) -> None:
