@@ -195,18 +195,17 @@ class Derived:
             self._blend = (document, key, build_blend(self, document, view))
         return self._blend[2]
 
-    def solved(
-        self, document: Document, k: int, start: Pose | None, seconds: float = np.inf
-    ) -> Document:
+    def solved(self, document: Document, k: int, start: Pose | None, **effort: float) -> Document:
         """The document with object `k` in the pose that its handles ask for.
 
-        `start` and few `seconds` give a drag's frame; without, the solve is complete.
+        `start` and little `effort` (`Deformer.solve`) give a drag's frame; without, the solve is
+        complete.
         """
         thing = document.objects[k]
         if not thing.handles and thing.rig.shifts is None:
             return edits.set_pose(document, k, None)
         deformer = self.shape(document.photo, thing).puppet.deformer
-        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, seconds)
+        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, **effort)
         return edits.set_pose(document, k, solution.pose)
 
     def anchors(self, document: Document, k: int) -> F64:

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
-DRAG_SECONDS = 0.003  # of a drag's frame, for the solver: it lags by a px; the rest when it rests
+# Of a drag's frame, for the solver: a compact object lags by less than a pixel, a slender one is
+# given longer. While the pointer holds still there is more time.
+DRAG = {"seconds": 0.007, "tolerance": 3e-3}
+REST = {"seconds": 0.012}
 
 
 class Posing:
@@ -213,7 +216,7 @@ class Posing:
         editor = self._editor
         assert editor.object is not None
         start = editor.object.pose
-        solved = editor.derived.solved(changed, editor.current, start, DRAG_SECONDS)
+        solved = editor.derived.solved(changed, editor.current, start, **DRAG)
         editor.preview = self._restless = solved
 
     def relax(self) -> None:
@@ -224,7 +227,7 @@ class Posing:
         document, self._restless = self._restless, None
         assert document is not None
         before = document.objects[editor.current].pose
-        after = editor.derived.solved(document, editor.current, before, DRAG_SECONDS)
+        after = editor.derived.solved(document, editor.current, before, **REST)
         changed = after.objects[editor.current]
         assert before is not None and changed.pose is not None and changed.lifted is not None
         editor.preview = after

@@ -10,6 +10,7 @@ from guide import Guide
 
 RING = 28  # px, radius of the ring around a handle at scale 1
 EMPTY = (1110.0, 60.0)  # px on the screen: on the canvas, beside every photo of the tour
+ABOVE = (1200.0, 120.0)  # the same on the large screen
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,7 @@ def _tilt_head(guide: Guide) -> None:
     guide.area("Drag a point on the object")
     guide.point(EMPTY)
     guide.shoot("Lifted", "A second later she is a 3D shape; the dots say where it can be dragged.")
-    for x, y in ((170, 230), (300, 240), (210, 290), (100, 320), (330, 330)):
-        guide.pin(x, y)
-    guide.area("Handle 5")
+    pin(guide, (170, 230), (300, 240), (210, 290), (100, 320), (330, 330))
     guide.point(EMPTY)
     guide.shoot("Pins", "Alt-clicks pin her collar and her chest: white diamonds.")
     with guide.dragging(guide.at(228, 40), guide.at(268, 50)):
@@ -82,11 +81,8 @@ def _tilt_head(guide: Guide) -> None:
             "Look", "Around the object; a preview, which changes nothing. Esc is the photo."
         )
     guide.press("Escape")
-    guide.press("backslash")
-    with guide.dragging(guide.middle(), guide.at(268, 256)):
-        guide.shoot("Before and after", "A line that is dragged: the photo on its left, the edit "
-                    "on its right.")  # fmt: skip
-    guide.press("backslash")
+    split(guide, (268, 256), "A line that is dragged: the photo on its left, the edit on its "
+          "right.")  # fmt: skip
     guide.choose("Tool: Compose")
     guide.choose("Harmonise")
     guide.point(guide.at(480, 256))
@@ -106,10 +102,7 @@ def _tilt_head(guide: Guide) -> None:
     guide.choose("Export photo…")
     guide.area("Export astronaut-edited.png")
     guide.shoot("Export", "What, how and where to. The button names the file that it will write.")
-    guide.choose("Export astronaut-edited.png")
-    guide.wait((guide.pictures / "astronaut-edited.png").exists, "exporting")
-    guide.point(EMPTY)
-    guide.shoot("Exported", "The status line says what was written.")
+    export(guide, "astronaut-edited.png", "The status line says what was written.")
 
 
 def _turn_cup(guide: Guide) -> None:
@@ -139,9 +132,7 @@ def _turn_cup(guide: Guide) -> None:
     guide.area("Drag a point on the object")
     guide.point(EMPTY)
     guide.shoot("Lifted", "Ready to be dragged.")
-    for x, y in ((105, 230), (150, 330), (300, 378), (440, 320), (462, 230)):
-        guide.pin(x, y)
-    guide.area("Handle 5")
+    pin(guide, (105, 230), (150, 330), (300, 378), (440, 320), (462, 230))
     guide.shoot("Pins", "The saucer's rim is pinned all around.")
     with guide.dragging(guide.at(300, 112), guide.at(320, 106)):
         guide.shoot("First handle", "The cup leans to the right; its saucer stays.")
@@ -157,10 +148,7 @@ def _turn_cup(guide: Guide) -> None:
     with guide.dragging(guide.at(300, 220), guide.at(250, 200)):
         guide.shoot("Look", "The cup from elsewhere, as far as one photo tells.")
     guide.press("Escape")
-    guide.press("backslash")
-    with guide.dragging(guide.middle(), guide.at(280, 200)):
-        guide.shoot("Before and after", "Photo and edit.")
-    guide.press("backslash")
+    split(guide, (280, 200), "Photo and edit.")
     guide.choose("Tool: Compose")
     guide.pull("Strength", 90)
     guide.shoot("Compose", "A shadow on the table, its direction on a dial.")
@@ -178,31 +166,88 @@ def _turn_cup(guide: Guide) -> None:
     guide.choose("JPEG")
     guide.area("Export coffee-edited.jpg")
     guide.shoot("Export", "A JPEG has a quality instead of a depth.")
-    guide.choose("Export coffee-edited.jpg")
-    guide.wait((guide.pictures / "coffee-edited.jpg").exists, "exporting")
-    guide.point(EMPTY)
-    guide.shoot("Exported", "Done.")
+    export(guide, "coffee-edited.jpg", "Done.")
 
 
 def _bend_rocket(guide: Guide) -> None:
     """The rocket, on a screen with twice as many pixels."""
+    guide.place("Rocket")
+    guide.point(guide.place("Rocket"))
+    guide.shoot("Start", "At twice the scale text and lines are as large, and finer.")
     guide.choose("Rocket")
     guide.area("Photo")
+    guide.point(ABOVE)
+    guide.shoot("Opened", "The photo, fitted.")
+    guide.rest(320, 250)
+    guide.shoot("Candidate", "What a click here would select.")
     guide.click(*guide.at(320, 250))
     guide.area("Lift object")
-    guide.shoot("Selected", "At twice the scale text and lines are as large, and finer.")
+    guide.point(ABOVE)
+    guide.shoot("Selected", "One click.")
+    guide.choose("Tool: Refine mask")
+    guide.area("Hardness")
+    guide.point(guide.at(360, 180))
+    guide.shoot("Refined", "The brush shows how far it reaches, and its soft rim.")
     guide.choose("Lift object")
     guide.area("Drag a point on the object")
+    guide.point(ABOVE)
+    guide.shoot("Lifted", "Two seconds later.")
+    pin(guide, (320, 395), (320, 310))
+    guide.shoot("Pins", "Foot and middle are pinned.")
     with guide.dragging(guide.at(321, 150), guide.at(372, 165)):
-        guide.shoot("First handle", "One point dragged; hollow diamonds mark the far end, which "
-                    "holds still by itself.")  # fmt: skip
+        guide.shoot("First handle", "One point dragged: the rocket bends.")
     guide.press("alt+6")
     guide.point(guide.at(100, 60))
     guide.shoot("Strain", "Where the pose makes it longer or shorter than in the photo.")
     guide.press("alt+1")
+    guide.choose("Tool: Place")
+    x, y = guide.place("Ring: roll")
+    with guide.dragging((x, y), (x + 30, y + 10)):
+        guide.shoot("Place", "All of it turns about the line of sight.")
+    guide.press("ctrl+z")
+    guide.choose("Tool: Look")
+    with guide.dragging(guide.at(320, 250), guide.at(280, 240)):
+        guide.shoot("Look", "From the side, as far as one photo tells.")
+    guide.press("Escape")
+    split(guide, (345, 213), "Photo and edit.")
+    guide.choose("Tool: Compose")
+    guide.point(ABOVE)
+    guide.shoot("Compose", "Background, shadow, light and edge.")
+    guide.press("ctrl+h")
+    guide.point(ABOVE)
+    guide.shoot("History", "Every step.")
+    guide.press("ctrl+h")
     guide.press("F1")
     guide.area("Reset all")
     guide.shoot("Keys", "F1: every key and gesture. A click on a key changes it.")
+    guide.press("Escape")
+    guide.choose("Export photo…")
+    guide.area("Export rocket-edited.png")
+    guide.shoot("Export", "What, how and where to.")
+    export(guide, "rocket-edited.png", "The status line says what was written.", ABOVE)
+
+
+def pin(guide: Guide, *places: tuple[float, float]) -> None:
+    """Pins points of the object."""
+    for x, y in places:
+        guide.pin(x, y)
+    guide.area(f"Handle {len(places)}")
+
+
+def split(guide: Guide, place: tuple[float, float], about: str) -> None:
+    """Drags the line between photo and edit to a place."""
+    guide.press("backslash")
+    with guide.dragging(guide.middle(), guide.at(*place)):
+        guide.shoot("Before and after", about)
+    guide.press("backslash")
+
+
+def export(guide: Guide, name: str, about: str, pointer: tuple[float, float] = EMPTY) -> None:
+    """Writes the file that the export dialog names."""
+    guide.choose(f"Export {name}")
+    guide.wait((guide.pictures / name).exists, "exporting")
+    guide.point(pointer)
+    guide.shoot("Exported", about)
 
 
 def ring(x: float, y: float, degrees: float) -> tuple[float, float]:

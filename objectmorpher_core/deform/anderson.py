@@ -8,7 +8,7 @@ import numpy as np
 from ..arrays import F64, frozen
 from ..threads import FAST
 
-WINDOW = 8  # previous steps that are combined
+WINDOW = 12  # previous steps that are combined
 RIDGE = 1e-12  # on the normalised Gram matrix of the steps: float64 squared leaves no more
 
 
@@ -27,6 +27,10 @@ class Anderson:
     def forget(self) -> None:
         """Drops the steps: they led uphill."""
         self._count = self._next = 0
+
+    def resume(self) -> None:
+        """The map has changed a little: what was learnt of it counts, where it was does not."""
+        self._last = None
 
     def mix(self, value: F64, residual: F64) -> F64:
         """The next x from `value` = g(x) and `residual` = g(x) - x, of any one shape."""

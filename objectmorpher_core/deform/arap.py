@@ -16,6 +16,7 @@ from .constraints import Constraints, HeldResponse, Patch, Targets
 from .links import Links, in_single
 from .response import build_response, product
 
+TOLERANCE = 1e-4  # see `minimise`
 NOISE = 1e-14  # x the weights' squares: what rounding may add to the energy
 SLACK = 1e-9  # x the energy: what a step may seem to rise by without being taken back
 LAST = 0.7  # x an iteration: what the plain step at the end takes
@@ -224,8 +225,9 @@ def minimise(
     solver: ArapSolver,
     rotations: F64,
     iterations: int,
-    tolerance: float = 1e-4,
+    tolerance: float = TOLERANCE,
     seconds: float = np.inf,
+    history: Anderson | None = None,
 ) -> Minimum:
     """Local-global iteration with Anderson acceleration from warm `rotations` (M, 3, 3).
 
@@ -233,12 +235,16 @@ def minimise(
     the positions and falls back to the plain step whenever the energy would rise, so the energy
     never rises. Ends after `iterations` or when the positions moved by less than `tolerance` x
     the object's size times 0.01, and begins no iteration that would end after `seconds`, judged
-    by the longest so far.
+    by the longest so far. `history`: what the acceleration learnt of the same constraints with
+    other targets; it is learnt anew where there is none.
     """
     begun = time.perf_counter()
     end, longest = begun + seconds, 0.0
     limit = tolerance * 0.01 * solver.scale
-    history = Anderson(solver.points.size)
+    if history is None:
+        history = Anderson(solver.points.size)
+    else:
+        history.resume()
     rotations = solver.turned(rotations)
     positions = solver.positions(rotations)
     rotations, energy = solver.fit(positions, rotations)

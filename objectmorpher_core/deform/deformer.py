@@ -12,7 +12,8 @@ from ..arrays import F64, I32, frozen
 from ..document import DeformSettings, Handle, LiftedObject, Pose
 from ..rig import Rig
 from ..rotations import matrix_from_vector
-from .arap import ArapSolver, Minimum, iterate, minimise
+from .anderson import Anderson
+from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
 from .graph import Graph, Surface, build_graph
@@ -78,6 +79,7 @@ class Deformer:
         weights = _weighed(self.graph.weights, self.rig.stiffness)
         self._solver = ArapSolver(self.points, weights, self.rig.bodies)
         self._constrained: tuple[object, ...] = ()  # what the solver is prepared for
+        self._history = Anderson(self.points.size)  # what a drag's frames have learnt of it
 
     def rest(self) -> Pose:
         """The pose of the photo."""
@@ -116,12 +118,14 @@ class Deformer:
         has_auto_anchors: bool = True,
         start: Pose | None = None,
         seconds: float = np.inf,
+        tolerance: float = TOLERANCE,
     ) -> Solution:
         """The pose in which every handle is at its target, but for those on frozen control points.
 
-        With `start` the solve continues from there (a drag), for about so many `seconds`; without,
-        large moves are made in sub-steps from rest, so the result is a function of the handles
-        alone. Raises ValueError for handles that are not finite.
+        With `start` the solve continues from there (a drag), for about so many `seconds` or until
+        `tolerance` is met, see `minimise`; without, large moves are made in sub-steps from rest,
+        so the result is a function of the handles alone. Raises ValueError for handles that are
+        not finite.
         """
         numbers = [v for h in handles for v in (h.point, h.target, h.turn) if v is not None]
         if not np.isfinite(np.concatenate([*numbers, np.zeros(1)])).all():
@@ -131,7 +135,7 @@ class Deformer:
             return Solution(self.rest(), (0.0,))
         if (rigid := self._rigid(handles)) is not None:
             return Solution(rigid, (0.0,))
-        solution = self._solved(handles, has_auto_anchors, start, seconds)
+        solution = self._solved(handles, has_auto_anchors, start, seconds, tolerance)
         if self.settings.stretch_limit is None or self._is_allowed(solution.pose):
             return solution
         return self._limited(handles, has_auto_anchors, seconds)
@@ -191,6 +195,7 @@ class Deformer:
         has_auto_anchors: bool,
         start: Pose | None,
         seconds: float,
+        tolerance: float = TOLERANCE,
     ) -> Solution:
         anchors = self.anchors(handles, has_auto_anchors)
         self._constrain(handles, anchors)
@@ -202,7 +207,11 @@ class Deformer:
         else:
             if start is None:
                 rotations = self._approach(handles, rotations)
-            minimum = minimise(self._solver, rotations, ITERATIONS, seconds=seconds)
+            is_hurried = start is not None and np.isfinite(seconds)
+            history = self._history if is_hurried else None
+            minimum = minimise(
+                self._solver, rotations, ITERATIONS, tolerance, seconds, history
+            )  # fmt: skip
         positions, rotations = self._follow(minimum.positions, minimum.rotations)
         return Solution(Pose(positions, rotations), minimum.energies)
 
@@ -287,7 +296,7 @@ class Deformer:
             grasp = self._grasp(handles, points)
             self._hold = Hold.of(handles, grasp, self.points, anchors, self._frozen)
             self._solver.constrain(self._hold.constraints, hands)
-            self._constrained = key
+            self._constrained, self._history = key, Anderson(self.points.size)
         self._solver.aim(self._hold.targets(handles))
 
     def _grasp(self, handles: tuple[Handle, ...], points: F64) -> Grasp:
