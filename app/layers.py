@@ -25,6 +25,7 @@ from .view import Shown, View
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
+    from objectmorpher_core.raster.reference import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 
@@ -114,7 +115,10 @@ class Layers:
         self._derived = derived
         self._works: dict[Part, _Work] = {}  # its last picture
         self._drawn: list[_Work] = []  # in the last frame
-        self._rates: dict[tuple[Shown, bool], float] = {}  # s per px, exact or draft; measured
+        self._rates: dict[
+            tuple[Shown, bool], float
+        ] = {}  # s per px, exact or draft
+        self._sharpening = 0.0  # s per px of the view, of a draft; measured
         self.frame_time = FRAME  # s; infinite where only the last frame counts
         self.ask: Ask | None = None  # renders elsewhere and calls back
 
@@ -213,11 +217,14 @@ class Layers:
         pixels = float(sides.prod())
         if pixels * self._rates.get((part.look, False), FIRST_RATE) <= seconds:
             return 1
-        excess = pixels * self._rates.get((part.look, True), FIRST_RATE) / seconds
+        left = seconds - pixels * self._sharpening  # which takes as long at any factor
+        excess = pixels * self._rates.get((part.look, True), FIRST_RATE) / max(left, 1e-9)
         return int(np.clip(math.ceil(math.sqrt(excess)), 2, COARSEST))
 
     def _draw(self, document: Document, part: Part, view: View, factor: int) -> Layer | None:
         """The picture of a part, or None where nothing of it is on the canvas."""
+        from objectmorpher_core.raster import tiles
+
         derived, camera, k = self._derived, document.photo.camera, part.k
         texture = derived.shape(document.photo, document.objects[k]).texture
         start = time.perf_counter()
@@ -234,14 +241,20 @@ class Layers:
         box = drawable.box()
         if box is None:
             return None
+        pixels, sharpened = (box[2] - box[0]) * (box[3] - box[1]), 0.0
         if factor == 1:
             layer = _layer(box, _rendered(drawable, texture, part, box), part)
         elif part.is_painted:
             layer = _coarse_layer(drawable, texture, part, box, factor)
         else:
-            layer = _sharp_layer(drawable, texture, part, box, factor, view)
-        pixels = (box[2] - box[0]) * (box[3] - box[1])
-        self._learn((part.look, factor > 1), time.perf_counter() - start, pixels)
+            picture = tiles.draw(drawable, texture, box)
+            drawn = time.perf_counter()
+            layer = _sharp_layer(picture, texture, part, box, factor, view)
+            sharpened = time.perf_counter() - drawn
+            self._sharpening = _mean_rate(self._sharpening, sharpened, factor**2 * pixels)
+        seconds = time.perf_counter() - start - sharpened
+        kind = (part.look, factor > 1)
+        self._rates[kind] = _mean_rate(self._rates.get(kind, FIRST_RATE), seconds, pixels)
         return layer
 
     def _want_exact(self, work: _Work) -> None:
@@ -257,11 +270,11 @@ class Layers:
 
         self.ask(work.request, accept)
 
-    def _learn(self, kind: tuple[Shown, bool], seconds: float, pixels: float) -> None:
-        """A moving average, so that one disturbed frame decides little."""
-        rate = seconds / max(pixels, 1.0)
-        mean = 0.7 * self._rates.get(kind, FIRST_RATE) + 0.3 * rate
-        self._rates[kind] = float(np.clip(mean, 1e-9, 1e-5))
+
+def _mean_rate(before: float, seconds: float, pixels: float) -> float:
+    """A moving average of s per px, so that one disturbed frame decides little."""
+    mean = 0.7 * before + 0.3 * seconds / max(pixels, 1.0)
+    return float(np.clip(mean, 1e-9, 1e-5))
 
 
 def render(request: Request) -> Rendered:
@@ -306,13 +319,11 @@ def _coarse_layer(
 
 
 def _sharp_layer(
-    drawable: Drawable, texture: TextureLevels, part: Part, box: Box, factor: int, view: View
+    picture: Picture3D, texture: TextureLevels, part: Part, box: Box, factor: int, view: View
 ) -> Layer:
     """An object that shows the photo, see `sharpening`; `box` as above."""
-    from objectmorpher_core.raster import tiles
     from objectmorpher_core.raster.sharpening import sharpen
 
-    picture = tiles.draw(drawable, texture, box)
     x0, y0, x1, y1 = (factor * v for v in box)
     covered = (x0, y0, min(x1, view.width), min(y1, view.height))
     corner = (view.left, view.top)

@@ -10,7 +10,7 @@ from ..render.scene import Hatch, Scene, SplatObject
 from ..view import Shown, ToolName
 from .theme import theme
 
-VEIL = 0.45  # share of black outside the selection, while selecting
+VEIL = 0.25  # share of black outside the selection, while selecting
 MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)

@@ -20,7 +20,8 @@ from PIL import Image
 from app.commands import run
 from app.editor import Editor
 from app.settings import Settings
-from objectmorpher_core.document import Document
+from app.view import ToolName
+from objectmorpher_core.document import Document, Placement
 
 WIDTH, HEIGHT = 180, 140  # px of the made photo
 CENTRE = (90.0, 72.0)  # px, of the ball in it
@@ -124,6 +125,15 @@ def lift_ball(editor: Editor) -> Document:
     assert editor.document is not None
     assert editor.document.plate is not None
     return editor.document
+
+
+def duplicate(editor: Editor, document: Document, *move: float) -> None:
+    """Opens the document; a copy of its object, moved by so many px, becomes the current one."""
+    editor.start(document)
+    editor.view.tool = ToolName.PLACE
+    run(editor, "duplicate")
+    editor.placing.move_to(Placement(move=(move[0], move[1])))
+    editor.commit("Move object")
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs
+from conftest import duplicate, wait_for_jobs
 from PIL import Image
 
 from app.commands import run, why_not
@@ -21,11 +21,7 @@ from objectmorpher_core.session_file import decode_session, encode_session
 @pytest.fixture
 def copied(editor: Editor, ball: Document) -> Editor:
     """The ball, and a copy of it that was moved to the right."""
-    editor.start(ball)
-    editor.view.tool = ToolName.PLACE
-    run(editor, "duplicate")
-    editor.placing.move_to(Placement(move=(30.0, 0.0)))
-    editor.commit("Move object")
+    duplicate(editor, ball, 30.0, 0.0)
     return editor
 
 

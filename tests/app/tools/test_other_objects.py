@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import duplicate
 
 from app.commands import run
 from app.editor import Editor
@@ -11,7 +12,7 @@ from app.tools.pointer import Button, Pointer, Shape, Tool
 from app.tools.registry import TOOLS
 from app.view import ToolName
 from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.document import Document
 
 FIRST, BOTH, SECOND, BESIDE = (75.0, 100.0), (115.0, 75.0), (155.0, 72.0), (12.0, 12.0)  # px
 LEFT = (-40.0, -10.0)  # px that the objects are moved
@@ -20,11 +21,7 @@ LEFT = (-40.0, -10.0)  # px that the objects are moved
 @pytest.fixture
 def two(editor: Editor, ball: Document) -> Editor:
     """The ball, and before it a copy that was moved to the right; the ball is current."""
-    editor.start(ball)
-    editor.view.tool = ToolName.PLACE
-    run(editor, "duplicate")
-    editor.placing.move_to(Placement(move=(50.0, 0.0)))
-    editor.commit("Move object")
+    duplicate(editor, ball, 50.0, 0.0)
     editor.objects.choose(0)
     return editor
 
