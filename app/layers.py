@@ -115,9 +115,7 @@ class Layers:
         self._derived = derived
         self._works: dict[Part, _Work] = {}  # its last picture
         self._drawn: list[_Work] = []  # in the last frame
-        self._rates: dict[
-            tuple[Shown, bool], float
-        ] = {}  # s per px, exact or draft
+        self._rates: dict[tuple[Shown, bool], float] = {}  # s per px, exact or draft
         self._sharpening = 0.0  # s per px of the view, of a draft; measured
         self.frame_time = FRAME  # s; infinite where only the last frame counts
         self.ask: Ask | None = None  # renders elsewhere and calls back

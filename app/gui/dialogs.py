@@ -54,11 +54,13 @@ class Dialogs:
             editor.filing.wanted = None
             self._open(editor, wanted)
         self._poll_native(editor)
+        if editor.filing.question is not None:  # before all others, which come back after it
+            self._draw_question(editor)
+            return
         self._chooser.draw(editor)
         if not self.is_open:  # one at a time; the export waits for the file that is chosen for it
             draw_export(editor)
             draw_models(editor)
-        self._draw_question(editor)
 
     def _open(self, editor: Editor, dialog: Dialog) -> None:
         suggestion = editor.filing.suggestion(dialog)

@@ -14,7 +14,17 @@ from ..texts import t
 from .modal import modal
 from .segmented import Choice, segmented
 from .theme import FIELD, PRIMARY, theme
-from .widgets import FILL, Kind, button, fitted, note, shortened, shown_path, tooltip
+from .widgets import (
+    FILL,
+    Kind,
+    bold_text,
+    button,
+    fitted,
+    note,
+    shortened,
+    shown_path,
+    tooltip,
+)
 
 WIDTH = 480.0  # points
 LABELS = 88.0  # width of the names left of the fields
@@ -38,10 +48,11 @@ def draw_export(editor: Editor) -> None:
         if not is_shown:
             return
         if exporting.draft is not None:
+            is_unfolded = imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id)
             _draw_what(exporting)
             _draw_how(exporting)
             is_entered = _draw_where(editor)
-            _draw_foot(exporting, is_entered)
+            _draw_foot(exporting, is_entered, is_unfolded)
         # Its document may also have been closed, by a file that was dropped on the window.
         if exporting.draft is None or editor.filing.wanted is not None:
             imgui.close_current_popup()
@@ -107,8 +118,11 @@ def _draw_where(editor: Editor) -> bool:
     return is_entered
 
 
-def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
-    """What is wrong, or what will be replaced; Cancel and the button that does it."""
+def _draw_foot(exporting: Exporting, is_entered: bool, is_unfolded: bool) -> None:
+    """What is wrong, or what will be replaced; Cancel and the button that does it.
+
+    `is_unfolded`: a list was when the frame began, and Esc is for it.
+    """
     problem = exporting.problem
     imgui.dummy(theme.size(0, 4))
     warning = t("{name} is there already.", name=exporting.path.name)
@@ -123,11 +137,16 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     is_cancelled = button(t("Cancel"), width=BROWSE)
     imgui.same_line()
     imgui.set_cursor_pos_y(top)
-    label = f"{fitted(exporting.label, theme.pt(WIDTH - 4 * 20 - BROWSE - 16))}###go"
+    room = imgui.get_content_region_avail().x - 2 * imgui.get_style().frame_padding.x
+    with bold_text():
+        label = f"{fitted(exporting.label, room)}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
-    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
+    # The key that opened it is still down in its first frame.
+    is_enter = not imgui.is_window_appearing() and any(
+        imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
+    )
     is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
-    if is_cancelled or is_escape:
+    if is_cancelled or (is_escape and not is_unfolded):
         exporting.close()
     elif is_pressed or is_entered or (is_enter and not imgui.is_any_item_active()):
         exporting.confirm()

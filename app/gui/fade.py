@@ -1,4 +1,4 @@
-"""What comes and goes does so within 120 ms, and the window stays awake no longer for it."""
+"""What comes or goes gradually does so within 120 ms; the window stays awake no longer for it."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ class Fades:
     def begin(self, now: float, is_on: bool) -> None:
         """A frame at `now` s; where not `is_on`, everything is there or gone at once."""
         self._before, self._now, self._is_on = self._now, now, is_on
+        # What was not asked for in the last frame is out of sight, and is not held.
+        self._kept = {n: kept for n, kept in self._kept.items() if kept[2] >= self._before}
         self._moving.clear()
 
     @property
@@ -31,8 +33,6 @@ class Fades:
     def shown(self, name: str, thing: T | None) -> tuple[T | None, float]:
         """What to draw, and how opaque in [0, 1]: `thing`, or what was there and is going."""
         before, share, since = self._kept.get(name, (None, 0.0, self._now))
-        if since < self._before:  # not asked for in the last frame: it was out of sight
-            before, share = None, 0.0
         is_coming = thing is not None
         if is_coming and thing is not before:
             before, share, since = thing, 0.0, self._now

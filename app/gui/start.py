@@ -68,7 +68,7 @@ class StartScreen:
         low = imgui.get_cursor_screen_pos()
         high = ImVec2(low.x + column, low.y + theme.pt(DROP_HEIGHT))
         draw.add_rect_filled(low, high, theme.u32("panel"), theme.pt(12))
-        draw.add_rect(low, high, theme.u32("pressed"), theme.pt(12), theme.pt(1.5))
+        draw.add_rect(low, high, theme.u32("pressed"), theme.pt(12), thickness=theme.pt(1.5))
         middle = low.x + column / 2
         _draw_centred(Icon.IMAGE, middle, low.y + theme.pt(40), "secondary", TITLE_SIZE)
         with bold_text():
@@ -111,7 +111,7 @@ class StartScreen:
         zero, one = ImVec2(0, 0), ImVec2(1, 1)
         draw.add_image_rounded(picture, low, high, zero, one, white, theme.pt(8))
         if is_hovered:
-            draw.add_rect(low, high, theme.u32("accent"), theme.pt(8), theme.pt(2))
+            draw.add_rect(low, high, theme.u32("accent"), theme.pt(8), thickness=theme.pt(2))
         imgui.text_colored(theme.vec("text" if is_hovered else "secondary"), t(title))
         imgui.end_group()
 

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, imgui  # before glfw: both must use one libglfw
 # isort: split
 import glfw
 
+BUTTONS = (glfw.MOUSE_BUTTON_LEFT, glfw.MOUSE_BUTTON_RIGHT, glfw.MOUSE_BUTTON_MIDDLE)
 LEAST_STEP = 1e-4  # s between two frames; ImGui asks for more than none
 
 
@@ -24,7 +25,11 @@ class Surface:
         """`handle`: GLFW's window."""
         self.size: tuple[int, int] = glfw.get_window_size(handle)  # window units
         self.pixels: tuple[int, int] = glfw.get_framebuffer_size(handle)
+        self._handle = handle
         self._time = time.perf_counter()
+        self._is_pointer_inside = True
+        take_pointer: Any = self._take_pointer
+        glfw.set_cursor_enter_callback(handle, take_pointer)  # before ImGui's, which calls it too
         take_size: Any = self._take_size
         take_pixels: Any = self._take_pixels
         glfw.set_window_size_callback(handle, take_size)
@@ -42,6 +47,13 @@ class Surface:
         io.display_framebuffer_scale = ImVec2(self.ratio, self.pixels[1] / max(self.size[1], 1))
         io.delta_time = max(now - self._time, LEAST_STEP)
         self._time = now
+        if not self._is_pointer_inside and any(
+            glfw.get_mouse_button(self._handle, button) for button in BUTTONS
+        ):  # to ImGui it is nowhere, but a stroke goes on there
+            io.add_mouse_pos_event(*glfw.get_cursor_pos(self._handle))
+
+    def _take_pointer(self, _window: object, is_inside: int) -> None:
+        self._is_pointer_inside = bool(is_inside)
 
     def _take_size(self, _window: object, width: int, height: int) -> None:
         self.size = (width, height)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import glfw
-
 from objectmorpher_core.document import Document
 
 from ..editor import Editor
@@ -19,16 +15,14 @@ class Title:
         self._text = ""
         self._changed: tuple[Document | None, int] = (None, 0)  # px that a document changes
 
-    def write(self, editor: Editor, handle: Any, is_quiet: bool) -> None:
-        """Once a frame; `is_quiet`: nothing has happened for a moment."""
+    def changed(self, editor: Editor, is_quiet: bool) -> str | None:
+        """Once a frame: the new one, or None; `is_quiet`: nothing has happened for a moment."""
         if is_quiet and editor.preview is None and editor.committed is not self._changed[0]:
             document = editor.committed
             count = 0 if document is None else editor.derived.painter.count_changed(document)
             self._changed = (document, count)
-        text = self._text_for(editor)
-        if text != self._text:
-            self._text = text
-            glfw.set_window_title(handle, text)
+        before, self._text = self._text, self._text_for(editor)
+        return self._text if self._text != before else None
 
     def _text_for(self, editor: Editor) -> str:
         document = editor.committed

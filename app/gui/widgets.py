@@ -198,8 +198,8 @@ class Change:
 
 def number_field(number: Number, value: float) -> Change:
     """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
-    if not any(digit in "123456789" for digit in number.format % value):
-        value = 0.0  # not "-0.00"
+    is_nothing = not any(digit in "123456789" for digit in number.format % value)
+    shown = 0.0 if is_nothing else value  # not "-0.00"
     changed = Change(value)
     imgui.push_id(number.name)
     imgui.align_text_to_frame_padding()
@@ -212,7 +212,7 @@ def number_field(number: Number, value: float) -> Change:
     imgui.set_next_item_width(field)
     flags = imgui.SliderFlags_.always_clamp if number.low < number.high else 0
     is_changed, new = imgui.drag_float(
-        "##value", value, number.speed, number.low, number.high, number.format, int(flags)
+        "##value", shown, number.speed, number.low, number.high, number.format, int(flags)
     )
     mark(number.name)
     if is_changed or imgui.is_item_deactivated_after_edit():

@@ -136,11 +136,11 @@ class Window:
             lively = SETTLE if has_news else lively - 1
             if self._frame_log is not None:
                 self._frame_log.begin()
-            self._frame()
-            if fades.is_moving:
-                lively = max(lively, 1)
-            if len(imgui.get_current_context().input_events_queue):
-                lively = SETTLE  # ImGui takes one key or button of a kind a frame
+            if self._frame():
+                if fades.is_moving:
+                    lively = max(lively, 1)
+                if len(imgui.get_current_context().input_events_queue):
+                    lively = SETTLE  # ImGui takes one key or button of a kind a frame
             drawn += 1
             if self._is_over(drawn):
                 break
@@ -199,10 +199,11 @@ class Window:
 
     # One frame
 
-    def _frame(self) -> None:
+    def _frame(self) -> bool:
+        """Draws everything; whether there was anything to draw on."""
         size, ratio = self._surface.pixels, self._surface.ratio
         if 0 in size:  # minimised
-            return
+            return False
         self._adopt_look()
         is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
         fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
@@ -224,12 +225,14 @@ class Window:
         self._popups.draw(self.editor)
         self._dialogs.draw(self.editor)
         self._set_cursor()
-        self._title.write(self.editor, self._handle, self._is_quiet)
+        if (title := self._title.changed(self.editor, self._is_quiet)) is not None:
+            glfw.set_window_title(self._handle, title)
         imgui.render()
         self._draw(layout.canvas, ratio, size)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         landmarks.write()
         self._save_settings()
+        return True
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
@@ -313,6 +316,8 @@ class Window:
         """Names the chord while the modifiers are what they were when the key went down."""
         if action not in (glfw.PRESS, glfw.REPEAT):
             return
+        if action == glfw.REPEAT and key in (glfw.KEY_ENTER, glfw.KEY_KP_ENTER):
+            return  # one press is one step
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
         if name:
             held = [word for word, bit in MODIFIERS if mods & bit]

@@ -43,7 +43,7 @@ PATIENCE = 60.0  # s
 
 HEAD = """# How the window feels
 
-Made by `make feel`: {machine}, OpenGL emulated on the same two cores (llvmpipe), load {load:.1f}
+Made by `make feel`: {machine}, OpenGL emulated on the same cores (llvmpipe), load {load:.1f}
 when it began. A real pointer moves 60 times a second over a canvas of 1024 x 1024 px; the window
 writes down when each frame was on the screen and which place of the pointer it shows.
 

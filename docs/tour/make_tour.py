@@ -42,8 +42,6 @@ def home() -> Iterator[Path]:
 
 def tell(story: stories.Story) -> None:
     """One edit, and a picture of each of its steps."""
-    for old in HERE.glob(f"{story.name}-*.jpg"):
-        old.unlink()
     width, height = (round(side * story.scale) for side in SIZE)
     with home() as folder, x_display(width, height) as display:
         if display is None:
@@ -59,6 +57,10 @@ def tell(story: stories.Story) -> None:
         with opened(environment, None, *options):
             guide = Guide(environment, HERE, story.name, story.photo_size, folder / PICTURES)
             story.tell(guide)
+    pictures = {caption.name for caption in guide.captions}
+    for old in HERE.glob(f"{story.name}-*.jpg"):
+        if old.name not in pictures:
+            old.unlink()
     write_captions(HERE, story.name, guide.captions)
 
 

@@ -89,7 +89,7 @@ def _tilt_head(guide: Guide) -> None:
     guide.shoot("Compose", "What joins object and photo: background, shadow, light, edge. Here she "
                 "takes on the light of her new place.")  # fmt: skip
     guide.press("b")
-    guide.area("Brush")
+    guide.area("Radius")
     guide.drag(guide.at(110, 183), guide.at(118, 193))
     guide.settle()
     guide.point(guide.at(140, 240))

@@ -12,7 +12,7 @@ from test_window import POSE_TOOL, PRIMARY, screen_xy
 pytestmark = pytest.mark.window
 
 
-def test_enter_takes_the_next_step_and_the_title_counts_what_it_changed(
+def test_enter_takes_every_step_and_the_title_counts_what_changed(
     window_environment: dict[str, str], photo_path: Path
 ) -> None:
     with opened(window_environment, photo_path) as hands:
@@ -28,3 +28,10 @@ def test_enter_takes_the_next_step_and_the_title_counts_what_it_changed(
         hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
         hands.drag((x, y - 100), (x + 60, y - 120))
         hands.wait(lambda: "edited, about" in hands.title(), "counting")
+        hands.press("Return")  # the large button exports; the same key must not confirm at once
+        hands.area("Export ball-edited.png")
+        hands.settle()
+        assert "Export ball-edited.png" in hands.places()
+        assert not list(photo_path.parent.glob("*-edited*"))
+        hands.press("Return")
+        hands.wait(lambda: bool(list(photo_path.parent.glob("*-edited.png"))), "exporting")

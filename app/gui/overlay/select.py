@@ -58,7 +58,7 @@ def draw_rubber(canvas: Canvas) -> None:
     x0, y0, x1, y1 = canvas.editor.rubber
     low, high = canvas.on_canvas(np.array([[x0, y0], [x1, y1]]))
     canvas.draw.add_rect_filled(low, high, theme.u32(ACCENT, 0.12))
-    canvas.draw.add_rect(low, high, theme.u32(ACCENT), 0.0, theme.pt(1.5))
+    canvas.draw.add_rect(low, high, theme.u32(ACCENT), thickness=theme.pt(1.5))
 
 
 def _draw_lasso(canvas: Canvas, path: list[np.ndarray]) -> None:

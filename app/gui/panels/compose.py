@@ -108,7 +108,7 @@ def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> Non
     is_chosen = editor.document is not None and editor.document.plate is variant.plate
     if is_chosen or is_hovered:
         role = "accent" if is_chosen else "secondary"
-        draw.add_rect(start, end, theme.u32(role), corner, theme.pt(2))
+        draw.add_rect(start, end, theme.u32(role), corner, thickness=theme.pt(2))
 
 
 def _draw_shadow(editor: Editor) -> None:

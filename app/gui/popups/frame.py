@@ -49,10 +49,12 @@ def popup(editor: Editor, title: str, width: float, height: float) -> Iterator[N
 def _draw_shadow(size: ImVec2) -> None:
     """Around the window that is being drawn: rings, weaker and weaker."""
     draw, low = imgui.get_window_draw_list(), imgui.get_window_pos()
+    alpha = imgui.get_style().alpha
     draw.push_clip_rect_full_screen()
     for k in range(1, round(theme.pt(SHADOW)) + 1):
         share = 1 - k / theme.pt(SHADOW)
         start = ImVec2(low.x - k, low.y - k)
         end = ImVec2(low.x + size.x + k, low.y + size.y + k)
-        draw.add_rect(start, end, theme.u32("#000000", 0.3 * share**2), theme.pt(10) + k, 1.5)
+        ink = theme.u32("#000000", 0.3 * share**2 * alpha)
+        draw.add_rect(start, end, ink, theme.pt(10) + k, thickness=1.5)
     draw.pop_clip_rect()
