@@ -11,6 +11,7 @@ from ..view import Shown, ToolName
 from .theme import theme
 
 VEIL = 0.25  # share of black outside the selection, while selecting
+PAINTED_VEIL = 0.45  # while it is painted: a stroke in progress has no outline
 MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
@@ -72,9 +73,10 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     """The photo as it was, veiled where it is not selected."""
     selection, painting = editor.masking.shown, editor.masking.painting
     is_veiled = selection is not None and not editor.view.is_before
+    strength = PAINTED_VEIL if editor.view.tool is ToolName.MASK else VEIL
     return Scene(
         document.photo.pixels, theme.rgb("surround"), mask=selection,
-        touched=painting.touched if painting else (), veil=VEIL if is_veiled else 0.0,
+        touched=painting.touched if painting else (), veil=strength if is_veiled else 0.0,
     )  # fmt: skip
 
 

@@ -57,7 +57,7 @@ def tell(story: stories.Story) -> None:
         with opened(environment, None, *options):
             guide = Guide(environment, HERE, story.name, story.photo_size, folder / PICTURES)
             story.tell(guide)
-    pictures = {caption.name for caption in guide.captions}
+    pictures = {caption.file for caption in guide.captions}
     for old in HERE.glob(f"{story.name}-*.jpg"):
         if old.name not in pictures:
             old.unlink()
