@@ -19,7 +19,7 @@ from PIL import Image, ImageGrab
 
 ROOT = Path(__file__).parents[2]
 ACCENT = (0x5A, 0xA9, 0xFF)
-PATIENCE = 300.0  # s, of a machine that has much else to do
+PATIENCE = 180.0  # s, of a machine that has much else to do
 NUMBERS = range(90, 140)  # of X displays
 STILL = 0.4  # s without a change: nothing moves any more
 CALM = 12  # looks without a job: what still changes then is a caret

@@ -26,7 +26,7 @@ def test_a_stroke_by_hand_makes_the_selection_larger(
         before = brightness(hands, 30.5, 18.5)
         hands.click(*screen_xy(*CENTRE))
         hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
-        hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.7 * before, "veiling")
+        hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.8 * before, "veiling")
         hands.press("2")
         hands.drag(screen_xy(20, 18), screen_xy(60, 18))
         hands.wait(lambda: brightness(hands, 30.5, 18.5) > 0.95 * before, "painting")
