@@ -362,7 +362,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...]) -> None:
 def _lower_priority() -> None:
     """A drag must not stutter because a lift runs."""
     if hasattr(os, "nice"):
-        os.nice(10)
+        os.nice(15)
 
 
 def _reporter(writer: Writer, number: int, stop: Any) -> Callable[[float, str], None]:
