@@ -107,6 +107,14 @@ ablations: .make/test
 rendering: .make/test
 	@$(PYTHON) docs/rendering/make_rendering.py $(PAGES)
 
+# Makes the pages about selection, matting, lifting, registration and formats anew, which measure
+# against known truths; PAGES="matting lifting" makes some of them.
+.PHONY: evidence
+evidence: .make/test
+	@for page in $(or $(PAGES),selection matting lifting registration formats); do
+	    $(PYTHON) docs/$$page/make_$$page.py
+	done
+
 # Does the edits of docs/tour again in a window of their own, and takes the pictures of it and of
 # the README; STORIES="dark views" does some of them.
 .PHONY: tour

@@ -19,7 +19,7 @@ from .terminal import PROGRAM
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
-COMMANDS = ("edit", "select", "replay", "info", "models", "bench")
+COMMANDS = ("edit", "select", "replay", "info", "convert", "models", "bench")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,6 +60,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_select(commands.add_parser("select", help="write the mask of the chosen object"))
     _add_replay(commands.add_parser("replay", help="render a saved session again"))
     _add_info(commands.add_parser("info", help="what a session holds"))
+    _add_convert(commands.add_parser("convert", help="turn splat and mesh files into each other"))
     _add_bench(commands.add_parser("bench", help="measure, on objects it makes itself"))
     _add_models(commands.add_parser("models", help="list, get and check learned weights"))
     return parser
@@ -115,9 +116,17 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--lift", metavar="NAME", help="auto or relief")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
     add("--refine", metavar="NAME", help="auto or none")
-    add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
-    add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
+    add = parser.add_argument_group("the object's shape").add_argument
+    add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
+    add("--thickness", type=float, metavar="S", help="times what its outline says, default 1")
+    add("--back", metavar="KIND", help="auto, mirrored or continued: the side that is not seen")
+    add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
+    add("--floating", action="store_true", default=None,
+        help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
+    add("--hidden", metavar="M.png", help="a mask of what of it is hidden behind something")
+    add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
+    add("--flip", action="store_true", default=None, help="that file stands on its head")
     add = parser.add_argument_group("deforming").add_argument
     add("--pin", action="append", type=_list(2, 2), metavar="X,Y", help="a point that stays")
     add("--handle", action="append", type=_handle, metavar="X,Y:X2,Y2[,DZ]",
@@ -143,7 +152,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-mask", type=Path, metavar="FILE")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
-    add("--save-splats", type=Path, metavar="FILE", help="the edited object as 3DGS .ply")
+    add("--save-splats", type=Path, metavar="FILE",
+        help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
     add("--report", type=Path, metavar="R.json")
     parser.set_defaults(run=_lazily("edit"))
 
@@ -166,6 +176,18 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", type=Path, metavar="SESSION")
     parser.add_argument("--json", action="store_true", help="as one JSON object")
     parser.set_defaults(run=_lazily("info"))
+
+
+def _add_convert(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Reads and writes what the files' endings say."
+    add = parser.add_argument
+    add("source", type=Path, metavar="IN",
+        help=".ply .compressed.ply .splat .spz, or a mesh: .glb .gltf .obj .stl .off")  # fmt: skip
+    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz")
+    add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
+    add("--flip", action="store_true",
+        help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
+    parser.set_defaults(run=_lazily("convert"))
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:

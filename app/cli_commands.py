@@ -23,22 +23,26 @@ from objectmorpher_core.script import (
     parse_scripts,
     script_from,
 )
+from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
+from objectmorpher_core.splat_files import encode as encode_splats
 
 from .terminal import PROGRAM, UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and the endings each may have
     "session": (".omorph",), "save_mask": (".png",), "save_plate": ENDINGS,
-    "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": (".ply",),
+    "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": SPLAT_ENDINGS,
     "report": (".json",),
 }  # fmt: skip
+LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
 def run_edit(options: argparse.Namespace) -> None:
     """`objectmorpher edit`"""
     items = _items(options)
-    read = [i.photo for i in items] + [i.script.mask for i in items] + [options.script]
-    inputs = [Path(name) for name in read if name]
+    scripts = [i.script for i in items]
+    named = [name for s in scripts for name in (s.mask, s.hidden, s.splats)]
+    inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
     outputs: dict[Path, bytes] = {}
     for item in items:
         photo, out = Path(item.photo or ""), Path(item.out or "")
@@ -88,10 +92,8 @@ def _extra(name: str, edited: Edited, path: Path) -> bytes:
         cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
         picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
         return encode_picture(picture, path.suffix)
-    from objectmorpher_core.splat_files.ply import encode_ply
-
     item = document.objects[0]
-    return encode_ply(edited.puppet.posed_gaussians(item.pose, item.placement))
+    return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
 
 
 def run_select(options: argparse.Namespace) -> None:
@@ -166,6 +168,19 @@ def describe(document: Document) -> dict[str, Any]:
         "has_plate": document.plate is not None,
         "objects": objects,
     }  # fmt: skip
+
+
+def run_convert(options: argparse.Namespace) -> None:
+    """`objectmorpher convert`"""
+    count = COUNT if options.count is None else options.count
+    if not LEAST_COUNT <= count <= MOST_COUNT:
+        raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")
+    _check_outputs([options.source], {options.out: SPLAT_ENDINGS})
+    with progress_bar("Converting") as progress:
+        gaussians = read(options.source, count, options.flip)
+        progress(0.7, "Writing")
+        data = encode_splats(gaussians, options.out)
+    write_all({options.out: data})
 
 
 def run_bench(options: argparse.Namespace) -> None:
@@ -287,4 +302,12 @@ def _line(value: Any) -> str:
     return str(value)
 
 
-__all__ = ["PROGRAM", "run_edit", "run_info", "run_models", "run_replay", "run_select"]
+__all__ = [
+    "PROGRAM",
+    "run_convert",
+    "run_edit",
+    "run_info",
+    "run_models",
+    "run_replay",
+    "run_select",
+]

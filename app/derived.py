@@ -1,6 +1,6 @@
 """What is computed from the document and never saved; remembered by identity (ARCHITECTURE 1).
 
-The heavy modules of the core are imported when the first object is lifted, or by `warm_up`.
+The heavy modules of the core are imported when the first object is lifted, or by `import_core`.
 """
 
 from __future__ import annotations
@@ -326,7 +326,7 @@ def _outlines(mask: Mask) -> tuple[F32, ...]:
     return tuple(outlines)
 
 
-def warm_up() -> None:
+def import_core() -> None:
     """Imports what the first lift needs, in a quiet moment."""
     from objectmorpher_core import puppet
 

@@ -33,6 +33,7 @@ from .editing.placing import Placing
 from .editing.posing import Posing
 from .editing.rigging import Rigging
 from .editing.selection import Selection
+from .editing.shaping import Shaping
 from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
 from .history import History
@@ -62,7 +63,7 @@ class Editor:
         self.tasks = Tasks(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
-        self.masking = Masking(self)
+        self.masking, self.shaping = Masking(self), Shaping(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.exporting, self.models = Exporting(self), Models(self)

@@ -12,7 +12,7 @@ from objectmorpher_core.progress import Progress
 
 from .export_plan import Format
 from .jobs import JobError
-from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, read_document
+from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document
 from .shape import Shapes, build_ready
 from .texts import t
 
@@ -32,11 +32,12 @@ class Dialog(Enum):
     EXPORT = "Export to"
     MASK_OPEN = "Import mask"
     MASK_SAVE = "Export mask"
+    SHAPE_OPEN = "Use 3D file"
 
     @property
     def is_opening(self) -> bool:
         """Whether it asks for a file that is there."""
-        return self in (Dialog.OPEN, Dialog.MASK_OPEN)
+        return self in (Dialog.OPEN, Dialog.MASK_OPEN, Dialog.SHAPE_OPEN)
 
 
 class Filing:
@@ -55,8 +56,14 @@ class Filing:
         self.guard(lambda: self._open(path, lambda: self._remember(path)))
 
     def drop(self, paths: Sequence[Path]) -> None:
-        """Files were dropped on the window: the first that can be opened is."""
+        """Files were dropped on the window: the first that can be opened is.
+
+        A 3D object takes the place of what is selected.
+        """
         if not paths:
+            return
+        if self._editor.mask is not None and is_object(paths[0]):
+            self._editor.shaping.open_file(paths[0])
             return
         kinds = (*PHOTO_ENDINGS, SESSION_ENDING)
         usable = [p for p in paths if p.suffix.lower() in kinds and not p.is_dir()]
@@ -110,6 +117,8 @@ class Filing:
             self.save_as(path if path.suffix else path.with_suffix(SESSION_ENDING))
         elif dialog is Dialog.MASK_OPEN:
             self._editor.masking.open_file(path)
+        elif dialog is Dialog.SHAPE_OPEN:
+            self._editor.shaping.open_file(path)
         elif dialog is Dialog.MASK_SAVE:
             self._editor.masking.write_file(path if path.suffix else path.with_suffix(".png"))
         elif self._editor.exporting.draft is not None:

@@ -19,6 +19,7 @@ from objectmorpher_core.document import (
     Document,
     EditObject,
     LiftedObject,
+    LiftSettings,
     Matte,
     Plate,
     Prompt,
@@ -30,6 +31,9 @@ from .shape import build_shape, rehearse
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.repair import Patch
+    from objectmorpher_core.gaussians import Gaussians
+    from objectmorpher_core.importing import Import, Scene
+    from objectmorpher_core.lift.placement import Proposal
     from objectmorpher_core.pipeline import Reading
     from objectmorpher_core.segment import Segmenter
 
@@ -102,18 +106,57 @@ def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) 
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
 
-def lift(cut: Cut, choice: Choice, count: int, progress: Progress) -> tuple[Matte, LiftedObject]:
-    """The masked object's soft cut-out and its 3D Gaussians, about `count` of them."""
+def lift(
+    cut: Cut, choice: Choice, shape: LiftSettings, progress: Progress
+) -> tuple[Matte, LiftedObject]:
+    """The masked object's soft cut-out and its 3D Gaussians."""
     from objectmorpher_core.pipeline import lift_mask
 
     stage = part(progress, 0.0, 0.95)
     matte, lifted = lift_mask(
-        cut.pixels, cut.camera, cut.mask, choice.backend, count, stage, choice.seed
+        cut.pixels, cut.camera, cut.mask, choice.backend, shape, stage, choice.seed
     )
     progress(0.95, "getting ready to pose")
     # What is compiled for the first drag is on the disk for the window: seconds, once.
     rehearse(build_shape(cut.camera, EditObject("", matte=matte, lifted=lifted)), cut.camera)
     return matte, lifted
+
+
+def import_object(
+    path: Path, scene: Scene, seed: int, progress: Progress
+) -> tuple[Import, Matte, LiftedObject]:
+    """An object's file registered to the photo, and in the best pose textured with it."""
+    from objectmorpher_core.importing import Source, place_import, register_file
+
+    try:
+        found = register_file(Source(path), scene, part(progress, 0.0, 0.8), seed)
+    except OSError as error:
+        from objectmorpher_core.splat_files import SplatFileError
+
+        reason = error.strerror or str(error)
+        raise SplatFileError(f"{path.name} cannot be opened: {reason}") from error
+    best, rest = found.registration.best, part(progress, 0.8, 1.0)
+    return found, *place_import(scene, found.gaussians, best, rest, seed)
+
+
+def place_object(
+    scene: Scene, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
+) -> tuple[Matte, LiftedObject]:
+    """An object's Gaussians in a proposed pose, textured with the photo."""
+    from objectmorpher_core.importing import place_import
+
+    return place_import(scene, gaussians, proposal, progress, seed)
+
+
+def fit_object(
+    scene: Scene, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
+) -> tuple[Import, Matte, LiftedObject]:
+    """The best pose near `start` (4, 4 world from object), textured with the photo."""
+    from objectmorpher_core.importing import fit_near, place_import
+
+    found = fit_near(scene, gaussians, start, part(progress, 0.0, 0.5), seed)
+    rest = part(progress, 0.5, 1.0)
+    return found, *place_import(scene, gaussians, found.registration.best, rest, seed)
 
 
 def candidate(

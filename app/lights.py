@@ -42,7 +42,7 @@ class _Kept:
     shade: Layer | None = None
 
 
-Ask = Callable[[Callable[[], "Lit"], Callable[["Lit"], None]], None]
+Ask = Callable[[int, Callable[[], "Lit"], Callable[["Lit"], None]], None]
 
 
 class Lights:
@@ -52,9 +52,8 @@ class Lights:
         self._derived = derived
         self._kept: dict[int, _Kept] = {}
         self._lightings, self._painted = Memo(), Memo()
-        self._hidden = Memo()
-        self._rests = {is_coarse: Memo() for is_coarse in (True, False)}
-        self.ask: Ask | None = None  # computes elsewhere and calls back
+        self._hidden, self._rests = Memo(), Memo()
+        self.ask: Ask | None = None  # computes an object's elsewhere and calls back
 
     @property
     def _is_hurried(self) -> bool:
@@ -96,7 +95,7 @@ class Lights:
         if self.ask is None:
             accept(work())
         else:
-            self.ask(work, accept)
+            self.ask(k, work, accept)
 
     def _work(self, document: Document, k: int, is_sketch: bool) -> Callable[[], Lit]:
         """What computes object `k`'s light and shadow, in any thread."""
@@ -106,7 +105,7 @@ class Lights:
         is_coarse = is_sketch and puppet.has_draft
         splats = (derived.draft if is_coarse else derived.posed)(document, k)
         posed = puppet.draft if is_coarse else puppet.posed
-        rest = self._rests[is_coarse](lambda: posed(None, Placement()), puppet)
+        rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
         return lambda: lighting.of(item, splats, lambda: rest, shape.texture, is_sketch)
 
     def _lighting(self, document: Document) -> Lighting:

@@ -10,9 +10,7 @@ from objectmorpher_core.progress import Progress
 
 SESSION_ENDING = ".omorph"
 PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
-OBJECT_ENDINGS = (
-    ".ply", ".splat", ".ksplat", ".spz", ".sog", ".obj", ".glb", ".gltf", ".fbx", ".stl",
-)  # fmt: skip
+OBJECT_ENDINGS = (".ply", ".splat", ".spz", ".obj", ".glb", ".gltf", ".stl", ".off")
 ZIP_MAGIC = b"PK\x03\x04"
 MAX_BYTES = 4 << 30  # of a file; no photo and no session is larger
 BLOCK = 1 << 24  # bytes read at a time
@@ -30,12 +28,19 @@ class Opened:
     is_session: bool
 
 
+def is_object(path: Path) -> bool:
+    """Whether the file's name is that of a 3D object."""
+    return path.suffix.lower() in OBJECT_ENDINGS
+
+
 def read_document(path: Path, fov: float | None, seed: int, progress: Progress) -> Opened:
     """The document in a file; `fov` (degrees) and `seed` are for photos. Raises OpeningError."""
     if path.is_dir():
         raise OpeningError(f"{path.name} is a folder; choose a photo in it")
-    if path.suffix.lower() in OBJECT_ENDINGS:
-        raise OpeningError(f"{path.name} is a 3D object, which cannot be placed in a photo yet")
+    if is_object(path):
+        raise OpeningError(
+            f"{path.name} is a 3D object: open a photo, select what it stands for, then drop it"
+        )
     try:
         data = _read(path, progress)
         progress(0.35, "")

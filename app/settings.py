@@ -10,7 +10,7 @@ from pathlib import Path
 
 import platformdirs
 
-from objectmorpher_core.lift import GAUSSIANS
+from objectmorpher_core.document import GAUSSIANS
 
 log = logging.getLogger(__name__)
 

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
-from objectmorpher_core.document import Document, LiftedObject, Matte, Photo, Plate, Prompt
+from objectmorpher_core.document import (
+    Document,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Photo,
+    Plate,
+    Prompt,
+)
 
 from . import job_functions
 from .feedback import Action
@@ -119,33 +127,42 @@ class Tasks:
     def _drop_question(self) -> None:
         self.question = None
 
-    def lift(self) -> None:
-        """Asks for the current object in 3D."""
+    def lift(self, shape: LiftSettings | None = None, label: str = "") -> None:
+        """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
         editor, document = self._editor, self._editor.document
-        mask, k = editor.mask, editor.current
-        selection = editor.object.selection if editor.object else None
-        if document is None or selection is None:
+        thing, k = editor.object, editor.current
+        if document is None or thing is None or thing.selection is None:
             return
         editor.message = None
-        photo, settings = document.photo, editor.settings
+        photo, settings, mask = document.photo, editor.settings, thing.mask
+        wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
             current = editor.document
             if current is None or k >= len(current.objects) or current.objects[k].mask is not mask:
                 return
-            matte, lifted = answer
-            changed = edits.set_lifted(current, k, matte, lifted)
-            editor.posing.select(None)
-            editor.apply(t("Lift object"), changed)
-            editor.view.tool = ToolName.POSE
-            count = f"{len(lifted.gaussians):,}"
-            editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
+            if shape is None:
+                self._take_lift(edits.set_lifted(current, k, *answer, wanted), k)
+            elif not editor.hand.is_busy:
+                changed = edits.reshape(current, k, *answer, wanted)
+                editor.posing.select(None)
+                editor.apply(label, editor.derived.solved(changed, k, None))
 
         editor.jobs.start(
-            t("Lifting the object"), job_functions.lift, Cut(photo.pixels, photo.camera, selection),
-            Choice(settings.backends.lift, document.seed), settings.gaussians,
+            t("Lifting the object"), job_functions.lift,
+            Cut(photo.pixels, photo.camera, thing.selection),
+            Choice(settings.backends.lift, document.seed), wanted,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
+
+    def _take_lift(self, changed: Document, k: int) -> None:
+        editor, lifted = self._editor, changed.objects[k].lifted
+        assert lifted is not None
+        editor.posing.select(None)
+        editor.apply(t("Lift object"), changed)
+        editor.view.tool = ToolName.POSE
+        count = f"{len(lifted.gaussians):,}"
+        editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
 
     def rehearse(self) -> None:
         """Sees to it that the current object can be dragged at once; each frame."""
@@ -224,10 +241,10 @@ class Tasks:
             done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
         )  # fmt: skip
 
-    def light(self, work: Callable[[], Lit], accept: Callable[[Lit], None]) -> None:
-        """Computes the exact light and shadow of an object in a thread."""
+    def light(self, k: int, work: Callable[[], Lit], accept: Callable[[Lit], None]) -> None:
+        """Computes the exact light and shadow of object `k` in a thread."""
         self._editor.chores.start(
-            "Casting the shadow", lambda progress: work(), kind=f"light {id(work)}",
+            "Casting the shadow", lambda progress: work(), kind=f"light {k}",
             done=accept, failed=self._editor.complain_of, is_quiet=True,
         )  # fmt: skip
 

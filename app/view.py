@@ -42,6 +42,14 @@ class SelectMode(Enum):
     LASSO = "Lasso"
 
 
+class Painted(Enum):
+    """What the Mask tool's brush paints."""
+
+    SELECTION = "Selection"
+    DEPTH = "Depth"
+    HIDDEN = "Hidden"
+
+
 @dataclass(eq=False)
 class Selecting:
     """What the Select and the Mask tool are set to."""
@@ -50,6 +58,7 @@ class Selecting:
     level: str = "object"  # of document.LEVELS: what a new click means
     reach: float = 4.0  # px of the photo, by which an edge is moved, smoothed or softened
     is_erasing: bool = False  # the brush takes away
+    painted: Painted = Painted.SELECTION
 
 
 class Shown(Enum):

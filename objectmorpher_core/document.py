@@ -111,7 +111,41 @@ class PhotoTexture:
             object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
 
 
-SPLATTINGS = ("surface", "mip", "classic")  # see raster/rules.py
+GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
+BACKS = ("auto", "mirrored", "continued")  # what the side looks like that the photo does not show
+LEAST_THICKNESS, MOST_THICKNESS = 0.05, 3.0  # x what the silhouette says
+
+
+@dataclass(frozen=True, eq=False)
+class LiftSettings:
+    """What the user says about an object's shape; the defaults are what its picture says."""
+
+    count: int = GAUSSIANS
+    thickness: float = 1.0  # x what the silhouette says
+    is_standing: bool = True  # whether it is turned as its feet on the ground tell
+    is_symmetric: bool | None = None  # left and right; None: as it looks
+    back: str = "auto"  # of BACKS
+    hidden: Mask | None = None  # (H, W) of the photo where something stands before the object
+    nearness: F32 | None = None  # (h, w) x its size, towards the camera; stretched over the photo
+    horizon: float | None = None  # px, the row of the photo it lies in; None: not known
+
+    def __post_init__(self) -> None:
+        if self.back not in BACKS:
+            raise ValueError(f"a back is {self.back!r}, not one of {', '.join(BACKS)}")
+        if not LEAST_THICKNESS <= self.thickness <= MOST_THICKNESS:
+            raise ValueError(
+                f"a thickness of {self.thickness:g} is not between {LEAST_THICKNESS:g} and"
+                f" {MOST_THICKNESS:g}"
+            )
+        if self.hidden is not None:
+            object.__setattr__(self, "hidden", frozen(self.hidden, np.bool_))
+        if self.nearness is not None:
+            object.__setattr__(self, "nearness", frozen(self.nearness, np.float32))
+
+
+AS_SEEN = LiftSettings()
+
+SPLATTINGS = ("surface", "solid", "mip", "classic")  # see raster/rules.py
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +158,14 @@ class LiftedObject:
     world_from_object: F64  # (4, 4) similarity at rest: the registration to the photo
     spacing: float  # object units, mean distance of neighbouring Gaussians on the surface
     backend: str
-    splatting: str = "surface"  # how its Gaussians become a picture: "surface", "mip", "classic"
+    splatting: str = "surface"  # how its Gaussians become a picture: of SPLATTINGS
+    # (N, 3) world: depth of the middle sheet on each Gaussian's ray, and how it changes per px of
+    # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
+    middle: F32 | None = None
 
     def __post_init__(self) -> None:
+        if self.middle is not None:
+            object.__setattr__(self, "middle", frozen(self.middle, np.float32))
         object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
         object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
         if self.splatting not in SPLATTINGS:
@@ -265,6 +304,7 @@ class EditObject:
     found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
     shadow: Shadow = field(default_factory=Shadow)
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
+    shape: LiftSettings = field(default_factory=LiftSettings)
 
     @property
     def is_moved(self) -> bool:
@@ -292,11 +332,17 @@ class EditObject:
         return EditObject(
             self.name, prompt=prompt, mask=mask, coverage=coverage,
             found=None if found is None else frozen(found, np.bool_), deform=self.deform,
+            shape=self.shape,
         )  # fmt: skip
 
-    def with_lifted(self, matte: Matte, lifted: LiftedObject) -> EditObject:
+    def with_lifted(
+        self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
+    ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
-        return replace(self, matte=matte, lifted=lifted, handles=(), rig=Rig(), pose=None)
+        return replace(
+            self, matte=matte, lifted=lifted, shape=shape or self.shape, handles=(), rig=Rig(),
+            pose=None,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import Mask, Selection
+from .camera import Camera
 from .document import (
     DeformSettings,
     Document,
     EditObject,
     Handle,
     LiftedObject,
+    LiftSettings,
     Matte,
     Placement,
     Plate,
@@ -86,10 +88,56 @@ def _with_mask(document: Document, k: int, changed: EditObject) -> Document:
     return document.with_object(k, changed)
 
 
-def set_lifted(document: Document, k: int, matte: Matte, lifted: LiftedObject) -> Document:
-    """The 3D shape of object `k`; its handles and pose are gone."""
-    changed = document.with_object(k, document.objects[k].with_lifted(matte, lifted))
+def set_lifted(
+    document: Document,
+    k: int,
+    matte: Matte,
+    lifted: LiftedObject,
+    shape: LiftSettings | None = None,
+) -> Document:
+    """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
+    changed = document.with_object(k, document.objects[k].with_lifted(matte, lifted, shape))
     return changed.with_backend("lift", lifted.backend)
+
+
+def reshape(
+    document: Document, k: int, matte: Matte, lifted: LiftedObject, shape: LiftSettings
+) -> Document:
+    """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
+    from .lift.carrying import carried_over
+
+    changed = carried_over(document.objects[k], matte, lifted, shape)
+    return document.with_object(k, changed).with_backend("lift", lifted.backend)
+
+
+def set_thickness(document: Document, k: int, thickness: float) -> Document:
+    """Object `k` as thick as `thickness` times what its silhouette says; no pose."""
+    from .lift.rethicken import with_thickness
+
+    item = document.objects[k]
+    if item.lifted is None or item.matte is None:
+        raise EditError("lift the object before changing its thickness")
+    shape = replace(item.shape, thickness=thickness)
+    factor = thickness / item.shape.thickness
+    lifted = with_thickness(item.lifted, document.photo.camera, factor)
+    return reshape(document, k, item.matte, lifted, shape)
+
+
+def set_shape(document: Document, k: int, shape: LiftSettings) -> Document:
+    """How object `k`, which is not lifted yet, is to be lifted."""
+    return document.with_object(k, replace(document.objects[k], shape=shape))
+
+
+def set_camera(document: Document, camera: Camera, k: int) -> Document:
+    """The photo was taken by `camera`: its focal length became known from object `k`.
+
+    Raises EditError where other objects were lifted with another one.
+    """
+    if camera == document.photo.camera:
+        return document
+    if any(item.lifted is not None for i, item in enumerate(document.objects) if i != k):
+        raise EditError("the camera cannot change under objects that are lifted already")
+    return replace(document, photo=replace(document.photo, camera=camera))
 
 
 def nearest_control_point(lifted: LiftedObject, point: np.ndarray) -> int:

@@ -8,6 +8,7 @@ as the command line does.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,13 @@ from .camera import Camera
 from .compose.composite import Composite, composite, object_texture
 from .compose.plate import build_plate, plate_cover
 from .document import (
+    AS_SEEN,
+    GAUSSIANS,
     Click,
     DeformSettings,
     Document,
     LiftedObject,
+    LiftSettings,
     Matte,
     Photo,
     Placement,
@@ -29,7 +33,7 @@ from .document import (
     Prompt,
 )
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
-from .lift import GAUSSIANS
+from .importing import Scene, Source, place_import, register_file
 from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
@@ -37,6 +41,7 @@ from .script import EditScript, ScriptError
 from .segment import Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
+from .splat_files import COUNT
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
 
@@ -77,6 +82,10 @@ class Reading:
         mask = self.segmenter.segment(self.rgb, prompt, self.embedding, progress, seed)
         return mask, self.segmenter.name
 
+    def confidence(self, prompt: Prompt) -> float | None:
+        """How sure the segmenter is of its answer: the overlap with what is meant to expect."""
+        return self.segmenter.confidence(self.rgb, prompt, self.embedding)
+
 
 def read_photo(pixels: Pixels, segmenter: Segmenter, progress: Progress = silent) -> Reading:
     """The photo as a segmenter sees it. Raises SelectionError where it cannot run."""
@@ -89,17 +98,17 @@ def lift_mask(
     camera: Camera,
     mask: Selection,
     backend: str = "auto",
-    count: int = GAUSSIANS,
+    settings: LiftSettings = AS_SEEN,
     progress: Progress = silent,
     seed: int = 0,
 ) -> tuple[Matte, LiftedObject]:
-    """The object under `mask` (H, W), bool or soft u8, as a cut-out and as `count` Gaussians."""
+    """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians."""
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
     margin = int(np.ceil(MATTE_MARGIN * band_width(camera.width, camera.height))) + 8
     matte = build_matte(pixels, mask, margin)
-    progress_rest = part(progress, 0.3, 1.0)
-    return matte, lifter.lift(pixels, is_selected(mask), matte, camera, count, progress_rest, seed)
+    subject = lift.Subject(pixels, camera, is_selected(mask), matte)
+    return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
 
 
 def make_plate(
@@ -195,14 +204,8 @@ def run_script(
     with stopwatch.stage("load"):
         document = open_photo(data, name, script.fov, script.seed)
     document = select(document, script, mask, part(progress, 0.0, 0.3), stopwatch)
-    chosen = document.objects[0].mask
-    assert chosen is not None, "select() has chosen it"
     with stopwatch.stage("lift"):
-        lifted = lift_mask(
-            document.photo.pixels, document.photo.camera, chosen,
-            script.lift, script.gaussians or GAUSSIANS, part(progress, 0.3, 0.5), script.seed,
-        )  # fmt: skip
-        document = edits.set_lifted(document, 0, *lifted)
+        document = _lift(document, script, part(progress, 0.3, 0.5))
     if script.nodes is not None:
         document = edits.resample(document, 0, script.nodes)
     settings = DeformSettings(
@@ -223,6 +226,43 @@ def run_script(
             plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
             document = edits.set_plate(document, plate)
     return _finished(document, puppet, energies, progress, stopwatch)
+
+
+def lift_settings(document: Document, script: EditScript) -> LiftSettings:
+    """What the script says about the object's shape. Raises ImageError."""
+    hidden = None
+    if script.hidden is not None:
+        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
+    return LiftSettings(
+        count=script.gaussians or GAUSSIANS,
+        thickness=script.thickness,
+        is_standing=not script.floating,
+        is_symmetric={"auto": None, "yes": True, "no": False}[script.symmetry],
+        back=script.back,
+        hidden=hidden,
+        horizon=document.horizon,
+    )
+
+
+def _lift(document: Document, script: EditScript, progress: Progress) -> Document:
+    """The chosen object in 3D: lifted, or out of the script's file."""
+    photo, mask = document.photo, document.objects[0].selection
+    assert mask is not None, "select() has chosen it"
+    if script.splats is None:
+        settings = lift_settings(document, script)
+        made = lift_mask(
+            photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
+        )
+        return edits.set_lifted(document, 0, *made, settings)
+    is_free = script.fov is None and not photo.picture.focal_35mm
+    scene = Scene(photo.pixels, photo.camera, mask, is_free)
+    source = Source(Path(script.splats), script.gaussians or COUNT, script.flip)
+    found = register_file(source, scene, part(progress, 0.0, 0.8), script.seed)
+    best = found.registration.best
+    document = edits.set_camera(document, best.camera, 0)
+    rest = part(progress, 0.8, 1.0)
+    made = place_import(scene, found.gaussians, best, rest, script.seed)
+    return edits.set_lifted(document, 0, *made)
 
 
 def replay(document: Document, progress: Progress = silent) -> Edited:
@@ -249,8 +289,6 @@ def refuse_missing(script: EditScript) -> None:
     for kind, name, known in chosen:  # also where the stage will not run
         if name != "auto" and name not in known:
             raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
-    if script.splats is not None:
-        raise ScriptError("--splats: the registration of imported objects is not installed")
     if script.refine not in ("auto", "none"):
         raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: none")
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from .document import BACKS, LEAST_THICKNESS, MOST_THICKNESS
+
 XY = tuple[float, float]
 
 
@@ -41,7 +43,13 @@ class EditScript:
     inpaint: str = "auto"
     refine: str = "auto"
     splats: str | None = None  # file
+    flip: bool = False  # that file's object stands on its head
     gaussians: int | None = None
+    thickness: float = 1.0  # x what the silhouette says
+    back: str = "auto"
+    symmetry: str = "auto"
+    floating: bool = False  # not turned as its feet on the ground tell
+    hidden: str | None = None  # file
     pin: tuple[XY, ...] = ()
     handle: tuple[HandleMove, ...] = ()
     move: tuple[float, float, float] | None = None  # px, px, diameters
@@ -187,7 +195,9 @@ def _between(least: float, most: float) -> Callable[[str, Any], float]:
 PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "click": _points, "not_click": _points, "box": _numbers(4, 4), "subject": _flag,
     "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
-    "splats": _text, "gaussians": _whole(100, 2_000_000), "pin": _points, "handle": _handles,
+    "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
+    "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
+    "hidden": _text, "gaussians": _whole(100, 2_000_000), "pin": _points, "handle": _handles,
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),

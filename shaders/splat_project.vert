@@ -29,6 +29,8 @@ uniform vec2 limits;        // |x / z| and |y / z|, see posed.view_limits
 uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
+uniform bool has_colors;
+uniform bool is_layered;    // see PosedSplats
 uniform float tail;
 uniform float least;
 uniform float ridge;        // rules.Rules
@@ -90,7 +92,7 @@ vec4 axes(vec3 covariance, float det, float cut) {
 }
 
 void main() {
-    float opacity = place.w, seen = normal.w, solidity = look.z, zoom = paint.w;
+    float opacity = place.w, seen = normal.w, zoom = paint.w;
     // where it is now, and how its surroundings have moved
     vec3 shift;
     mat3 grown;
@@ -134,21 +136,21 @@ void main() {
     float stretch = smallest * j / zoom * pow(volume, 1.0 / 3.0) * scale;
 
     // the rules that decide weights and shares
+    float solidity = is_layered ? look.z : 1.0;  // no brim where no photo is carried
     float cosine = facing(f, at);
     float fdet = area + low_pass * (sxx + syy) + low_pass * low_pass;
     float fxx = sxx + low_pass, fyy = syy + low_pass;
     float weight = opacity * (is_compensated ? sqrt(area / fdet) : 1.0);
     float photo = ramp(stretch, streak_end, streak_start);
-    float body = (1.0 - photo) * solidity;
-    if (is_surface) {
-        float front = clamp((cosine - facing_ramp * (1.0 - seen)) / facing_ramp + 1.0, 0.0, 1.0);
-        float brim = ramp(abs(cosine), brim_end, brim_start);
-        weight *= solidity * front + (1.0 - solidity) * brim;
-    } else {
+    float front = 1.0, brim = ramp(abs(cosine), brim_end, brim_start);
+    if (is_surface)
+        front = clamp((cosine - facing_ramp * (1.0 - seen)) / facing_ramp + 1.0, 0.0, 1.0);
+    weight *= solidity * front + (1.0 - solidity) * brim;
+    if (has_colors) {
         photo *= seen;
-        body = 1.0 - photo;
-        seen = solidity = 1.0;
+        seen = 1.0;
     }
+    float body = (1.0 - photo) * solidity;
     float ends = tail + least / max(weight, 1e-30), both = photo + body;
     bool is_there = at.z > nearest && weight * both > 0.0 && ends < 1.0 && weight < 1e30;
     float cut = is_there ? -2.0 * log(ends) : 0.0;

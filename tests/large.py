@@ -20,6 +20,7 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate import hole_margin
 from objectmorpher_core.document import (
+    GAUSSIANS,
     Document,
     EditObject,
     Matte,
@@ -30,7 +31,6 @@ from objectmorpher_core.document import (
     Pose,
 )
 from objectmorpher_core.image import Picture, encode_picture, read_picture
-from objectmorpher_core.lift import GAUSSIANS
 from objectmorpher_core.pixels import unit_pixels
 from objectmorpher_core.puppet import puppet_of
 from objectmorpher_core.report import peak_memory_mb

@@ -22,6 +22,7 @@ from objectmorpher_core.document import (
     EditObject,
     Handle,
     LiftedObject,
+    LiftSettings,
     Matte,
     Photo,
     PhotoTexture,
@@ -31,10 +32,12 @@ from objectmorpher_core.document import (
 from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.pixels import crop
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
 from objectmorpher_core.rotations import matrices_from_quats, quats_along
+from objectmorpher_core.segment.matte import extended_mask, frame_extension
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
 PLACEMENTS = {  # of an object that is drawn
@@ -48,7 +51,8 @@ PLACEMENTS = {  # of an object that is drawn
     "small": Placement(scale=0.05, turn=(50.0, 0.0, 0.0)),
 }
 KINDS = [  # of splatting, and whether the photo is shown
-    ("surface", True), ("mip", True), ("classic", True), ("mip", False), ("classic", False),
+    ("surface", True), ("solid", True), ("mip", True), ("classic", True),
+    ("mip", False), ("classic", False),
 ]  # fmt: skip
 MASKS = ("disc", "ellipse", "thin", "frame", "parts", "ring", "star")
 
@@ -305,6 +309,16 @@ class Scene:
         whole = whole[pad : pad + height, pad : pad + width]
         return whole[..., :3], whole[..., 3]
 
+    def with_plain_edge(self) -> Scene:
+        """The scene whose matte is the mask, a pixel soft, however the picture is cut out."""
+        x0, y0, x1, y1 = self.matte.box
+        whole = frame_extension(self.mask)
+        outline = extended_mask(self.mask, whole).astype(np.float32)
+        soft = cv2.GaussianBlur(outline, (0, 0), 0.7)
+        own = (-whole[2], -whole[0], soft.shape[1] - whole[2], soft.shape[0] - whole[0])
+        matte = replace(self.matte, alpha=crop(soft, own, (x0, y0, x1, y1)))
+        return replace(self, matte=matte, texture=object_texture(matte))
+
     def document(self) -> Document:
         """The document in which the object is lifted, at rest, before a plain grey plate."""
         photo = Photo(Picture(self.pixels), self.camera, png(self.pixels), "made.png")
@@ -323,7 +337,7 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     """`inside` of the photo `pixels` lifted by the relief, to about `count` Gaussians."""
     height, width = inside.shape
     view = camera(width, height)
-    matte, lifted = lift_mask(pixels, view, inside, "relief", count, seed=seed)
+    matte, lifted = lift_mask(pixels, view, inside, "relief", LiftSettings(count), seed=seed)
     texture = object_texture(matte)
     puppet = Puppet(lifted, DeformSettings(), view)
     return Scene(pixels, inside, view, matte, lifted, texture, puppet)

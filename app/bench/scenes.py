@@ -16,6 +16,7 @@ from objectmorpher_core.document import (
     DeformSettings,
     Handle,
     LiftedObject,
+    LiftSettings,
     PhotoTexture,
     Placement,
     Pose,
@@ -114,7 +115,7 @@ def lift_scene(count: int, view: int = VIEW) -> Scene:
     """Half of a photo of view x view px, lifted by the embedded default."""
     camera = Camera.from_fov(view, view)
     mask = made_mask(view)
-    matte, lifted = lift_mask(made_photo(view, mask), camera, mask, "relief", count)
+    matte, lifted = lift_mask(made_photo(view, mask), camera, mask, "relief", LiftSettings(count))
     return _dragged("lift", lifted, object_texture(matte), camera)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
-from .command import Command, asks_for, cannot_lift, no_selection
+from ..view import Painted
+from .command import Command, asks_for, cannot_lift, no_lift, no_selection
 
 
 def _no_soft_edge(editor: Editor) -> str | None:
@@ -13,6 +14,17 @@ def _no_soft_edge(editor: Editor) -> str | None:
     return no_selection(editor) or (
         None if is_soft else t("The edge is found in the photo already")
     )
+
+
+def _not_a_file(editor: Editor) -> str | None:
+    is_file = editor.shaping.why_fixed is not None
+    return no_lift(editor) or (None if is_file else t("It was lifted where it is seen"))
+
+
+def _nothing_painted(editor: Editor) -> str | None:
+    shape, painted = editor.shaping.settings, editor.view.selecting.painted
+    field = shape.hidden if painted is Painted.HIDDEN else shape.nearness
+    return no_selection(editor) or (None if field is not None else t("Nothing is painted"))
 
 
 COMMANDS: dict[str, Command] = {
@@ -30,4 +42,9 @@ COMMANDS: dict[str, Command] = {
     "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),
     "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),
+    "import_shape": Command("Use a 3D file…", "", asks_for(Dialog.SHAPE_OPEN), no_selection),
+    "fit_again": Command("Fit to the photo", "", lambda e: e.shaping.fit_again(), _not_a_file),
+    "clear_painted": Command(
+        "Clear what is painted", "", lambda e: e.shaping.clear_painted(), _nothing_painted
+    ),
 }

@@ -79,7 +79,7 @@ class Selection:
         elif before.is_empty and not is_foreground:
             editor.say(t("Click the object first; then right-click what does not belong to it"))
         elif is_foreground and self._is_repeated(before, click):
-            self.set_level(LEVELS[(LEVELS.index(before.level) + 1) % len(LEVELS)])
+            self.set_level(LEVELS[LEVELS.index(before.level) - 1])  # the part first, then the group
         else:
             label = _label(Combine.ADDED if is_foreground else Combine.REMOVED)
             level = before.level if before.clicks else editor.view.selecting.level

@@ -12,6 +12,7 @@ from imgui_bundle import portable_file_dialogs as pfd
 
 from ..editor import Editor
 from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog, Filing
+from ..opening import OBJECT_ENDINGS
 from ..texts import t
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
@@ -28,6 +29,7 @@ FILTERS = {
     Dialog.EXPORT: EXPORT_ENDINGS,
     Dialog.MASK_OPEN: PHOTO_ENDINGS,
     Dialog.MASK_SAVE: (".png",),
+    Dialog.SHAPE_OPEN: OBJECT_ENDINGS,
 }
 
 

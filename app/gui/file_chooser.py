@@ -17,7 +17,7 @@ WIDTH, HEIGHT = 640.0, 480.0  # points
 ROW = 28.0
 VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
-    Dialog.MASK_OPEN: "Import", Dialog.MASK_SAVE: "Export",
+    Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
 }  # fmt: skip
 
 

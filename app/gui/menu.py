@@ -26,7 +26,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         "-", "import_mask", "export_mask",
     ),
     "Object": (
-        "lift", "-", "rename", "duplicate", "remove_object", "-",
+        "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "remove_object", "-",
         "forward", "backward", "to_front", "to_back", "-", "ground", "-",
         "bare", "fill_again", "shadow",
     ),

@@ -73,9 +73,12 @@ def _selecting(editor: Editor, document: Document) -> Scene:
     """The photo as it was, veiled where it is not selected."""
     selection, painting = editor.masking.shown, editor.masking.painting
     is_veiled = selection is not None and not editor.view.is_before
-    strength = PAINTED_VEIL if editor.view.tool is ToolName.MASK else VEIL
+    is_painted = editor.view.tool is ToolName.MASK
+    strength = PAINTED_VEIL if is_painted else VEIL
+    tint = editor.shaping.painted_layer() if is_painted else None
     return Scene(
-        document.photo.pixels, theme.rgb("surround"), mask=selection,
+        document.photo.pixels, theme.rgb("surround"), layers=() if tint is None else (tint,),
+        mask=selection,
         touched=painting.touched if painting else (), veil=strength if is_veiled else 0.0,
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from imgui_bundle import imgui  # before glfw: both must use one libglfw
 import glfw
 
 from ..commands import run
-from ..derived import warm_up
+from ..derived import import_core
 from ..editor import Editor
 from ..filing import Filing
 from ..options import WindowOptions
@@ -40,10 +40,10 @@ from .popups import Popups
 from .scenes import build_scene
 from .start import StartScreen
 from .status import draw_status
-from .surface import Surface
 from .theme import theme
 from .title import Title
 from .toolbar import draw_toolbar
+from .window_size import WindowSize
 
 log = logging.getLogger(__name__)
 
@@ -99,7 +99,7 @@ class Window:
     def __init__(self, options: WindowOptions, handle: Any) -> None:
         """`handle`: GLFW's, its context current in this thread."""
         self._options = options
-        self._handle, self._surface = handle, Surface(handle)
+        self._handle, self._size = handle, WindowSize(handle)
         self._renderer = Renderer(options.renderer)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
@@ -181,7 +181,7 @@ class Window:
 
     def _warm_up(self) -> None:
         """In a thread."""
-        warm_up()
+        import_core()
         self._renderer.rehearse()
 
     def _wait(self) -> int:
@@ -201,19 +201,19 @@ class Window:
 
     def _frame(self) -> bool:
         """Draws everything; whether there was anything to draw on."""
-        size, ratio = self._surface.pixels, self._surface.ratio
+        size, ratio = self._size.pixels, self._size.ratio
         if 0 in size:  # minimised
             return False
         self._adopt_look()
         is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
         fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
         imgui.backends.opengl3_new_frame()
-        self._surface.begin_frame()
+        self._size.begin_frame()
         imgui.new_frame()
-        layout = lay_out(*self._surface.size, self.editor.document is not None)
+        layout = lay_out(*self._size.size, self.editor.document is not None)
         self._resize_canvas(layout.canvas, ratio)
         self._input.update(self.editor, layout.canvas, ratio)
-        layout = lay_out(*self._surface.size, self.editor.document is not None)
+        layout = lay_out(*self._size.size, self.editor.document is not None)
         draw_menu(self.editor, layout.menu)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
@@ -295,7 +295,7 @@ class Window:
     def _monitor_scale(self) -> float:
         """Window units per point. Where the framebuffer is finer than the window, 1."""
         content = glfw.get_window_content_scale(self._handle)[0]
-        return max(round(content / max(self._surface.ratio, 1e-3) * 4) / 4, 1.0)
+        return max(round(content / max(self._size.ratio, 1e-3) * 4) / 4, 1.0)
 
     def _set_cursor(self) -> None:
         """On the canvas the tool's cursor, elsewhere what ImGui asks for."""
@@ -339,7 +339,7 @@ class Window:
     def _write_screenshot(self, path: Path) -> None:
         from PIL import Image
 
-        Image.fromarray(self._renderer.read(self._surface.pixels)).save(path)
+        Image.fromarray(self._renderer.read(self._size.pixels)).save(path)
 
     def close(self) -> None:
         self.editor.shut_down()

@@ -27,8 +27,8 @@ class PhotoPass:
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
-        self._photo.upload(scene.photo, (), view.zoom)
-        self._plate.upload(scene.plate.pixels if scene.plate else None, (), view.zoom)
+        self._photo.upload(scene.photo, zoom=view.zoom)
+        self._plate.upload(scene.plate.pixels if scene.plate else None, zoom=view.zoom)
         self._mask.upload(scene.mask, scene.touched, view.zoom)
         self._photo.use(PHOTO, view.zoom)
         self._plate.use(PLATE, view.zoom)

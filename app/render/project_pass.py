@@ -123,7 +123,7 @@ def _uniforms(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Unif
     at_rest, placed = rest.world_from_object, splats.world_from_object
     added = placed - at_rest
     return {
-        **kind._asdict(), "low_pass": kind.filter,
+        **kind._asdict(), "low_pass": kind.filter, "is_layered": splats.is_layered,
         "rest_linear": _columns(at_rest), "rest_offset": tuple(at_rest[:3, 3]),
         "linear": _columns(placed), "turn": _columns(added), "slide": tuple(added[:3, 3]),
         "scale": splats.scale, "nearest": RULES.near * splats.gap,

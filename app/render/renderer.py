@@ -63,7 +63,7 @@ class Renderer:
 
     def clear(self) -> None:
         """The whole window in its colour."""
-        self._begin((0, 0, self._size[0], self._size[1]))
+        self._use((0, 0, self._size[0], self._size[1]))
         self._target.clear(*self._surround, 1.0)
 
     def draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
@@ -79,7 +79,7 @@ class Renderer:
                 self._target = self._context.screen
         assert kept.buffer is not None
         self._context.copy_framebuffer(self._target, kept.buffer)
-        self._begin(viewport)
+        self._use(viewport)
 
     def _flat(self, scene: Scene, view: View, viewport: Viewport, place: Place) -> U8 | None:
         """The canvas by the processor, where that is faster; None where it is not."""
@@ -99,14 +99,14 @@ class Renderer:
 
     def _draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
         """Into the target."""
-        self._begin(viewport)
+        self._use(viewport)
         self._blend.use(scene)
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
             picture = self._render(item, view)
             if picture is not None:
-                self._begin(viewport)
+                self._use(viewport)
                 self._blend.use(scene)
                 self._layer_pass.draw_picture(picture, item, scene, view)
         if self._splat_pass is not None:
@@ -141,7 +141,7 @@ class Renderer:
         data = self._context.screen.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
         return data[0], data[1], data[2]
 
-    def _begin(self, viewport: Viewport) -> None:
+    def _use(self, viewport: Viewport) -> None:
         self._target.use()
         self._context.viewport = viewport
         self._context.enable_only(moderngl.NOTHING)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..texts import t
-from .pointer import Button, Pointer, Shape, Stroke
+from ..view import Painted
+from .pointer import Button, Pointer, Shape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -16,6 +17,12 @@ class MaskTool:
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         is_erasing = erases(editor, pointer)
+        if editor.view.selecting.painted is not Painted.SELECTION:
+            is_painting = editor.shaping.start_stroke(is_erasing)
+            return _shape(editor, pointer) if is_painting else ignore()
+        return self._select(editor, pointer, is_erasing)
+
+    def _select(self, editor: Editor, pointer: Pointer, is_erasing: bool) -> Stroke:
         editor.masking.start_stroke(pointer, is_erasing)
         try:
             while (pointer := (yield)).is_down:
@@ -31,11 +38,27 @@ class MaskTool:
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:
             return t("Esc takes the stroke back")
+        painted = editor.view.selecting.painted
+        if painted is Painted.DEPTH:
+            return t("Drag brings nearer · Right-drag or Alt pushes back · [ ] size")
+        if painted is Painted.HIDDEN:
+            return t("Paint where something hides the object · Right-drag or Alt erases · [ ] size")
         if editor.is_lifted:
             return t("After a stroke the object will be lifted anew · Undo brings it back")
         if editor.view.selecting.is_erasing:
             return t("Drag erases · Right-drag or Alt paints · Shift-click draws a line · [ ] size")
         return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")
+
+
+def _shape(editor: Editor, pointer: Pointer) -> Stroke:
+    """A stroke that tells about the shape."""
+    try:
+        editor.shaping.paint(pointer.xy)
+        while (pointer := (yield)).is_down:
+            editor.shaping.paint(pointer.xy)
+        editor.shaping.end_stroke()
+    finally:  # Esc closes the stroke where it waits
+        editor.shaping.drop_stroke()
 
 
 def erases(editor: Editor, pointer: Pointer) -> bool:

@@ -14,8 +14,7 @@ from plain import fitted_colors, lifted_colors
 from objectmorpher_core.arrays import F32, Mask
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import DeformSettings, Placement
-from objectmorpher_core.lift import GAUSSIANS
+from objectmorpher_core.document import GAUSSIANS, DeformSettings, LiftSettings, Placement
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
@@ -76,7 +75,9 @@ def compare(subject: Subject, path: Path) -> list[Row]:
     shown: dict[tuple[str, int], Labelled] = {}
     for count in (GAUSSIANS, MANY * GAUSSIANS):
         pixels = np.round(subject.pixels * 255).astype(np.uint8)
-        matte, lifted = lift_mask(pixels, subject.camera, subject.mask, "relief", count)
+        matte, lifted = lift_mask(
+            pixels, subject.camera, subject.mask, "relief", LiftSettings(count)
+        )
         texture = object_texture(matte)
         puppet = Puppet(lifted, DeformSettings(), subject.camera)
         rest, turned = puppet.posed(None, Placement()), puppet.posed(None, TURN)

@@ -75,12 +75,8 @@ def _tilt_head(guide: Guide) -> None:
     guide.shoot("Place", "The whole object turns by rings, scales by corners and goes into depth "
                 "by the arrow. Ctrl+Z takes this turn back.")  # fmt: skip
     guide.press("ctrl+z")
-    guide.choose("Tool: Look")
-    with guide.dragging(guide.at(300, 420), guide.at(272, 414)):
-        guide.shoot(
-            "Look", "Around the object; a preview, which changes nothing. Esc is the photo."
-        )
-    guide.press("Escape")
+    look(guide, (300, 420), (272, 414), "Around the object; a preview, which changes nothing. Esc "
+         "is the photo.")  # fmt: skip
     split(guide, (268, 256), "A line that is dragged: the photo on its left, the edit on its "
           "right.")  # fmt: skip
     guide.choose("Tool: Compose")
@@ -144,10 +140,7 @@ def _turn_cup(guide: Guide) -> None:
     with guide.dragging((x, y), (x - 48, y)):
         guide.shoot("Place", "All of it turns; the number beside the pointer says how far.")
     guide.pull("Scale", 32)
-    guide.choose("Tool: Look")
-    with guide.dragging(guide.at(300, 220), guide.at(250, 200)):
-        guide.shoot("Look", "The cup from elsewhere, as far as one photo tells.")
-    guide.press("Escape")
+    look(guide, (300, 220), (250, 200), "The cup from elsewhere, as far as one photo tells.")
     split(guide, (280, 200), "Photo and edit.")
     guide.choose("Tool: Compose")
     guide.pull("Strength", 90)
@@ -205,10 +198,7 @@ def _bend_rocket(guide: Guide) -> None:
     with guide.dragging((x, y), (x + 30, y + 10)):
         guide.shoot("Place", "All of it turns about the line of sight.")
     guide.press("ctrl+z")
-    guide.choose("Tool: Look")
-    with guide.dragging(guide.at(320, 250), guide.at(280, 240)):
-        guide.shoot("Look", "From the side, as far as one photo tells.")
-    guide.press("Escape")
+    look(guide, (320, 250), (280, 240), "From the side, as far as one photo tells.")
     split(guide, (345, 213), "Photo and edit.")
     guide.choose("Tool: Compose")
     guide.point(ABOVE)
@@ -232,6 +222,14 @@ def pin(guide: Guide, *places: tuple[float, float]) -> None:
     for x, y in places:
         guide.pin(x, y)
     guide.area(f"Handle {len(places)}")
+
+
+def look(guide: Guide, start: tuple[float, float], end: tuple[float, float], about: str) -> None:
+    """Goes around the object, and back to the photo's view."""
+    guide.choose("Tool: Look")
+    with guide.dragging(guide.at(*start), guide.at(*end)):
+        guide.shoot("Look", about)
+    guide.press("Escape")
 
 
 def split(guide: Guide, place: tuple[float, float], about: str) -> None:

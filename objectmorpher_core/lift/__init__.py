@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol
 
 from ..arrays import Mask, Pixels
 from ..camera import Camera
-from ..document import LiftedObject, Matte
+from ..document import LiftedObject, LiftSettings, Matte
 from ..progress import Progress
-
-GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
 
 
 class LiftError(ValueError):
     """The object cannot be lifted; one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What is to be lifted: an object as the photo shows it."""
+
+    pixels: Pixels  # (H, W, 3) the photo
+    camera: Camera
+    mask: Mask  # (H, W)
+    matte: Matte
 
 
 class Lifter(Protocol):
@@ -27,17 +36,13 @@ class Lifter(Protocol):
         ...
 
     def lift(
-        self,
-        pixels: Pixels,
-        mask: Mask,
-        matte: Matte,
-        camera: Camera,
-        count: int,
-        progress: Progress,
-        seed: int = 0,
+        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
-        """About `count` Gaussians of the object under `mask` (H, W), with its control points."""
-        ...  # fmt: skip
+        """About `settings.count` Gaussians of the subject, with its control points.
+
+        Raises LiftError: one sentence.
+        """
+        ...
 
 
 BACKENDS = {"relief": "objectmorpher_core.lift.relief:ReliefLifter"}  # imported when chosen

@@ -169,19 +169,17 @@ def weigh_textured(s, rest, base, scale, rules, kind):
         r, o = base + k, OUT * LANES + k
         seen, solidity = rest[r + VISIBILITY * LANES], rest[r + SOLIDITY * LANES]
         cosine, volume = s[FACING * LANES + k], s[VOLUME * LANES + k]
-        if kind.is_surface:
-            s[o + p.WEIGHT * LANES] *= facing_weight(cosine, seen, solidity, rules)
+        s[o + p.WEIGHT * LANES] *= facing_weight(cosine, seen, solidity, rules, kind.is_surface)
         photo = matted = 1.0
         stretch = s[SMALLEST * LANES + k] * scale
         if stretch * stretch * stretch * volume < whole * whole * whole:
             stretch *= volume ** (1.0 / 3.0)
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
-        body = (1.0 - photo) * solidity
-        if not kind.is_surface:
+        if kind.has_colors:
             photo *= seen
-            body = 1.0 - photo
-            seen = solidity = 1.0
+            seen = 1.0
+        body = (1.0 - photo) * solidity
         turned = cosine - rest[r + COSINE * LANES]
         matted *= ramp(turned, rules.turned_end, rules.turned_start)
         s[o + p.PHOTO * LANES], s[o + p.BODY * LANES] = photo, body

@@ -2,7 +2,7 @@
 
 1. Each Gaussian is projected (EWA, Zwicker et al. 2002). Its alpha on a pixel is
    w (exp(-q/2) - tail), q the squared Mahalanobis distance and w its opacity, times the facing
-   weight of a surface; `rules.SPLATTINGS` says what differs between kinds of assets: the screen
+   weight; `rules.SPLATTINGS` says what differs between kinds of assets: the screen
    filter, the tail, the least and most alpha.
 2. From the same covariances follows the affine map that says which point of the photo it shows
    at a pixel: u0 + A d, A = J0 Sigma F^T J1^T (J1 F Sigma F^T J1^T)^-1 (DESIGN section 3).
@@ -101,16 +101,16 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     seen = texture.visibility[index].astype(np.float64)
     cosine = _cosines(rest.normals[index], motion, means)
     solidity = texture.solidity[index].astype(np.float64)
-    photo, body = carried, (1 - carried) * solidity
-    facing = np.ones(len(index))
+    if not splats.is_layered:  # no brim where no photo is carried
+        solidity = np.ones(len(index))
+    ramp, front = RULES.facing_ramp, np.ones(len(index))
     if kind.is_surface:
-        ramp = RULES.facing_ramp
         front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
-        brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
-        facing = solidity * front + (1 - solidity) * brim
-    else:
-        photo, body = seen * carried, 1 - seen * carried
-        seen = np.ones(len(index))
+    brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
+    facing = solidity * front + (1 - solidity) * brim
+    photo = seen * carried if kind.has_colors else carried
+    body = (1 - photo) * solidity
+    seen = np.ones(len(index)) if kind.has_colors else seen
     weight = gaussians.opacities[index] * facing * compensation
     centre = camera.project(means)
     ratio = photo_camera.focal / camera.focal  # photo px per view px
@@ -132,7 +132,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         body=body,
         matted=_ramp(stretch, RULES.matte_end, RULES.matte_start)
         * _ramp(cosine - rest.cosines[index], RULES.turned_end, RULES.turned_start),
-        solidity=solidity if kind.is_surface else np.ones(len(index)),
+        solidity=solidity,
         seen=seen,
         color=gaussians.colors[index].astype(np.float64),
     )

@@ -29,6 +29,7 @@ class Splatting(NamedTuple):
     is_surface: bool  # photo-textured surface: coverage from the kernels' sum; else 1 - prod(1 - a)
     filter: float  # px^2, added to the screen covariance: the screen's own low-pass
     is_compensated: bool  # whether a Gaussian that the filter enlarges loses opacity by it
+    has_colors: bool  # of its own, where the photo has shown nothing
     tail: float = 0.0  # subtracted: the kernel ends without a step
     most: float = 0.99  # alpha
     least: float = 1 / 255  # alpha
@@ -37,11 +38,13 @@ class Splatting(NamedTuple):
 SPLATTINGS = {
     # The photo is looked up, so a filter blurs nothing; this much keeps Gaussians that are smaller
     # than a pixel from falling between pixels.
-    "surface": Splatting(True, 0.15, True, math.exp(-CUTOFF / 2), 1e30, 0.0),
+    "surface": Splatting(True, 0.15, True, False, math.exp(-CUTOFF / 2), 1e30, 0.0),
+    # The same of a whole object, whose other side the photo has not seen.
+    "solid": Splatting(True, 0.15, True, True, math.exp(-CUTOFF / 2), 1e30, 0.0),
     # Mip-Splatting (Yu et al. 2024), with which TRELLIS was trained
-    "mip": Splatting(False, 0.1, True),
+    "mip": Splatting(False, 0.1, True, True),
     # 3D Gaussian Splatting (Kerbl et al. 2023)
-    "classic": Splatting(False, 0.3, False),
+    "classic": Splatting(False, 0.3, False, True),
 }
 
 
@@ -75,8 +78,8 @@ class Rules(NamedTuple):
 
     # Where the rim has turned towards the camera it is no silhouette any more, and the matte's
     # edge would become a slit: from turned_start on the surface's own edge takes over, likewise.
-    turned_start: float = 0.15  # of the cosine, more than at rest
-    turned_end: float = 0.40
+    turned_start: float = 0.08  # of the cosine, more than at rest
+    turned_end: float = 0.25
 
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.
@@ -105,10 +108,14 @@ def ramp(value, zero, one):
 
 
 @numba.njit(nogil=True)
-def facing_weight(cosine, is_seen, solidity, rules):
-    """Weight of a surface's Gaussian whose normal makes this cosine with the way to the camera."""
-    width = rules.facing_ramp
-    front = min(max((cosine - width * (1.0 - is_seen)) / width + 1.0, 0.0), 1.0)
+def facing_weight(cosine, is_seen, solidity, rules, is_surface=True):
+    """Weight of a Gaussian whose normal makes this cosine with the way to the camera.
+
+    A cloud has no normals, but its soft edge has.
+    """
+    width, front = rules.facing_ramp, 1.0
+    if is_surface:
+        front = min(max((cosine - width * (1.0 - is_seen)) / width + 1.0, 0.0), 1.0)
     brim = ramp(abs(cosine), rules.brim_end, rules.brim_start)
     return solidity * front + (1.0 - solidity) * brim
 

@@ -39,6 +39,13 @@ class Segmenter(Protocol):
         """
         ...
 
+    def confidence(self, rgb: RGB, prompt: Prompt, embedding: Any) -> float | None:
+        """The overlap (IoU) of `segment`'s answer with what is meant that is to be expected.
+
+        In [0, 1]; None where the backend cannot tell. Cheap after `segment` of the same.
+        """
+        ...
+
 
 BACKENDS = {
     "dino": "objectmorpher_core.segment.dino_walk:DinoWalk",

@@ -1,12 +1,11 @@
-"""Clicks -> object by a random walk over DINOv2's patch tokens (Oquab et al., arXiv 2304.07193).
+"""Clicks -> object by a random walk over pieces of the photo and DINOv2's patch tokens there.
 
-Tokens of one object are alike, so a walk from the click stays on it; the subject map, where its
-weights are here, says how far a whole object extends.
+Tokens (Oquab et al., arXiv 2304.07193) of one object are alike, so a walk from the click stays on
+it; the subject map, where its weights are here, says how far a whole object extends.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -16,40 +15,30 @@ from .. import models
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
 from ..progress import Progress, part, silent
-from .choice import guess
-from .edges import cut
-from .level import at_level
-from .selection import SelectionError, check_prompt
+from .piece_features import main_directions
+from .pieces import Pieces
+from .selection import SelectionError, box_mask, check_mask, check_prompt
 from .subject import DEVIATION, MEAN, SubjectNet
-from .walk import Walk
+from .view import PhotoView, Tokens
 
 WEIGHT = "dinov2-vits14"
 IMAGES = "input_image"
 TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
 PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
+TILE_PATCHES = 900  # of a tile of a large photo
 SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
-TEMPERATURE = 0.15  # of 1 - cosine; crosses from part to part of an object
-STRICT_TEMPERATURE = 0.03  # stops at the borders of parts too
-
-
-@dataclass(frozen=True, eq=False)
-class Tokens:
-    """What a photo is made of, patch by patch."""
-
-    tokens: F32  # (h, w, 384) unit length, the photo's mean token removed
-    salience: F32 | None  # (320, 320) in [0, 1]; None without the subject network's weights
 
 
 class DinoWalk:
-    """Segmenter: DINOv2 tokens, a walk, GrabCut."""
+    """Segmenter: DINOv2 tokens, a walk, closed-form edges."""
 
     name = "dino"
 
     def __init__(self) -> None:
         self._session: Any = None
         self._subject = SubjectNet()
-        self._walks: tuple[Tokens, Walk, Walk] | None = None  # on the last photo
+        self._view: PhotoView | None = None  # of the last photo
 
     def missing(self) -> str | None:
         """Why this backend cannot run here, or None."""
@@ -66,8 +55,10 @@ class DinoWalk:
         tokens = self._tokens(rgb)
         progress(0.75, "looking for the subject")
         salience = self._subject.salience(rgb) if self._subject.missing() is None else None
+        progress(0.95, "cutting the photo into pieces")
+        pieces = Pieces(rgb, tokens)
         progress(1.0, "read the photo")
-        return Tokens(tokens, salience)
+        return Tokens(tokens, salience, pieces)
 
     def segment(
         self,
@@ -77,37 +68,34 @@ class DinoWalk:
         progress: Progress = silent,
         seed: int = 0,
     ) -> Mask:
-        """(H, W) bool: the object that clicks, box or subject mean."""
+        """(H, W) bool: the object that clicks, box or subject mean. Nothing here is random."""
         check_prompt(rgb, prompt)
         if embedding is None:
             embedding = self.encode(rgb, part(progress, 0.0, 0.7))
         if prompt.is_subject and embedding.salience is None:
             raise SelectionError(f"the subject cannot be found: {self._subject.missing()}")
         progress(0.7, "walking from the clicks")
-        walks, salience = self._walks_on(embedding, progress), embedding.salience
-
-        def find(meant: Prompt) -> Mask:
-            progress(0.8, "looking for its outline")
-            soft = guess(*walks, rgb, meant, salience)
-            progress(0.9, "cutting out the object")
-            return cut(rgb, soft, meant, seed)
-
-        mask = at_level(prompt, find)
+        mask, _ = self._view_of(rgb, embedding).find(prompt, part(progress, 0.7, 1.0))
+        mask = mask & box_mask(rgb.shape, prompt)
+        for click in prompt.clicks:
+            mask[int(click.y), int(click.x)] = click.is_foreground
         progress(1.0, "cut out the object")
-        return mask
+        return check_mask(mask)
 
-    def _walks_on(self, embedding: Tokens, progress: Progress) -> tuple[Walk, Walk]:
-        """The walk and the strict walk over a photo: the same for every click on it."""
-        if self._walks is None or self._walks[0] is not embedding:
-            walk = Walk(embedding.tokens, TEMPERATURE)
-            progress(0.75, "walking from the clicks")
-            self._walks = embedding, walk, Walk(embedding.tokens, STRICT_TEMPERATURE)
-        return self._walks[1:]
+    def confidence(self, rgb: RGB, prompt: Prompt, embedding: Tokens) -> float:
+        """The overlap of `segment`'s mask with what is meant that is to be expected, in [0, 1]."""
+        return self._view_of(rgb, embedding).find(prompt, silent)[1]
 
-    def _tokens(self, rgb: RGB) -> F32:
-        """(h, w, 384) for a photo (H, W, 3)."""
+    def _view_of(self, rgb: RGB, embedding: Tokens) -> PhotoView:
+        """The photo in pieces: the same for every click on it."""
+        if self._view is None or self._view.embedding is not embedding:
+            self._view = PhotoView(rgb, embedding, lambda crop: self._tokens(crop, TILE_PATCHES))
+        return self._view
+
+    def _tokens(self, rgb: RGB, patches: int = PATCHES) -> F32:
+        """(h, w, 64) for a photo (H, W, 3)."""
         height, width = rgb.shape[:2]
-        scale = min((PATCHES / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
+        scale = min((patches / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
         h, w = max(1, round(height * scale)), max(1, round(width * scale))
         shrinks = h * PATCH < height
         small = cv2.resize(
@@ -117,9 +105,7 @@ class DinoWalk:
         )
         pixels = ((small.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
         tokens = self._open().run([TOKENS], {IMAGES: pixels})[0][0, 1:].reshape(h, w, -1)
-        tokens = tokens - tokens.mean((0, 1))
-        lengths = np.linalg.norm(tokens, axis=2, keepdims=True)
-        return np.ascontiguousarray(tokens / np.maximum(lengths, 1e-6), np.float32)
+        return main_directions(np.asarray(tokens, np.float32))
 
     def _open(self) -> Any:
         """The network, opened so that it gives its patch tokens and takes any size."""

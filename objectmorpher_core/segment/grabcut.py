@@ -71,6 +71,9 @@ class GrabCut:
         progress(1.0, "cut out the object")
         return mask
 
+    def confidence(self, rgb: RGB, prompt: Prompt, embedding: None = None) -> None:
+        """None: colours do not tell how sure they are."""
+
     def _walks_on(self, rgb: RGB, progress: Progress) -> tuple[Walk, Walk]:
         """The walk and the strict walk over a photo: the same for every click on it."""
         if self._walks is None or self._walks[0] is not rgb:

@@ -18,6 +18,8 @@ FULL = 255
 FINE = 4  # bits of a px that corners are given to
 EXACT = 1e-4  # px, rounding of distances
 LARGEST_SMOOTHING = 127.0  # px; what OpenCV's median takes
+ISLAND = 0.02  # x the largest piece: what is smaller is an island
+WIDE_REACH = 40.0  # px from which on shades are found at half the size
 LARGEST_REACH = 500.0  # px that an edge is moved or softened at once
 
 
@@ -102,6 +104,28 @@ def fill_holes(selection: Selection) -> Selection:
     return changed
 
 
+def remove_islands(selection: Selection, share: float = ISLAND) -> Selection:
+    """Without the pieces that are smaller than `share` of the largest; 1 leaves that one alone.
+
+    Pieces that touch at a corner are one. The soft rim of a piece goes with it.
+    """
+    changed = selection.copy()
+    window = _around(selection, 1)
+    if window is None:
+        return changed
+    part = np.ascontiguousarray(selection[window])
+    found = cv2.connectedComponentsWithStats(is_selected(part).view(np.uint8), connectivity=8)
+    labels, sizes = np.asarray(found[1], np.int32), found[2][:, cv2.CC_STAT_AREA].astype(np.float64)
+    sizes[0] = np.inf  # what is not selected
+    is_island = sizes < share * sizes[1:].max(initial=0)
+    if is_island.any():
+        away = is_island[labels]
+        if part.dtype != np.bool_:
+            away |= _rims(part, labels, is_island)
+        changed[window] = np.where(away, part.dtype.type(0), part)
+    return changed
+
+
 def invert(selection: Selection) -> Selection:
     """What was not selected."""
     return ~selection  # of u8 it is 255 - c
@@ -112,7 +136,7 @@ def feather(selection: Selection, px: float) -> U8:
 
     What is selected stays the same: the half line stays on the edge.
     """
-    from .matte import signed_distance  # its module needs scipy; the window starts without
+    from .matte import signed_distance  # its module needs numba; the window starts without
 
     mask = is_selected(selection)
     coverage = np.zeros(mask.shape, np.uint8)
@@ -149,6 +173,26 @@ def _grown_everywhere(part: Selection, px: float) -> Selection:
 
 
 def _dilated(coverage: U8, px: float) -> U8:
+    """Largest value within a disc; of a wide one, found at half the size.
+
+    What is full, what is selected and what is anything is exact even then: only the shades between
+    are the smaller picture's.
+    """
+    if px <= WIDE_REACH:
+        return _dilated_by_rows(coverage, px)
+    height, width = coverage.shape
+    half = cv2.resize(coverage, ((width + 1) // 2, (height + 1) // 2), interpolation=cv2.INTER_AREA)
+    small = _dilated(np.asarray(half, np.uint8), px / 2)
+    shades = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
+    full, mask, any_ = (
+        _grown_everywhere(coverage >= level, px) for level in (np.uint8(FULL), np.uint8(HALF), 1)
+    )
+    most = np.where(mask, np.maximum(shades, HALF), np.clip(shades, 1, HALF - 1))
+    most[full], most[~any_] = FULL, 0
+    return most.astype(np.uint8)
+
+
+def _dilated_by_rows(coverage: U8, px: float) -> U8:
     """Largest value within a disc: of each of its rows, which OpenCV does in one go."""
     height = len(coverage)
     most = coverage.copy()
@@ -158,6 +202,22 @@ def _dilated(coverage: U8, px: float) -> U8:
         np.maximum(most[dy:], wide[: height - dy], out=most[dy:])
         np.maximum(most[: height - dy], wide[dy:], out=most[: height - dy])
     return most
+
+
+def _rims(coverage: U8, labels: np.ndarray, is_island: np.ndarray) -> Mask:
+    """(H, W) what is faintly covered, hangs together with an island and is nearest to it."""
+    faint = (labels == 0).view(np.uint8)
+    nearest = np.asarray(
+        cv2.distanceTransformWithLabels(faint, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)[1],
+        np.int32,
+    )
+    of_island = np.zeros(int(nearest.max()) + 1, np.bool_)
+    of_island[nearest[labels > 0]] = is_island[labels[labels > 0]]
+    _, found = cv2.connectedComponents((coverage > 0).view(np.uint8), connectivity=8)
+    pieces = np.asarray(found, np.int32)
+    holds_island = np.zeros(int(pieces.max()) + 1, np.bool_)
+    holds_island[pieces[is_island[labels]]] = True
+    return (coverage > 0) & (labels == 0) & of_island[nearest] & holds_island[pieces]
 
 
 def _closed_in(outside: Mask, meant: Mask) -> Mask:

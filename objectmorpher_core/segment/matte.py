@@ -1,27 +1,30 @@
 """From a hard mask to a soft cut-out: alpha and the object's own colours at its edge.
 
-In a narrow band about the mask's edge each pixel is a mixture of a colour of the object and one
-of the background. Alpha comes from closed-form matting (Levin et al. 2008), solved on the band
-alone; the object's colour is what remains when the background's share is taken out, as far as it
-is near what stands beside it. Where the artist drew a soft edge, that edge is alpha.
+About the mask's edge each pixel may be a mixture of a colour of the object and one of the
+background: alpha says how much of it is the object (`soft_edge`), and the object's colour is what
+remains when the background's share is taken out (`unmix`). Where the artist drew a soft edge, that
+edge is alpha; what was drawn half covered throughout is seen through (`veil`).
 """
 
 from __future__ import annotations
 
-import cv2
+from dataclasses import replace
+
 import numpy as np
 
-from ..arrays import F32, Mask, Pixels, Selection
+from ..arrays import F32, U8, Mask, Pixels, Selection
 from ..document import Matte
 from ..pixels import unit_pixels
-from .closed_form import solve_alpha
 from .mask_edit import FULL, grow, is_selected, is_soft
+from .soft_edge import find_alpha
+from .soft_edge import signed_distance as signed_distance
+from .unmix import Unmixed, unmixed
+from .veil import colour_at, unveiled, veil, veil_colour
 
-BAND = 0.0040  # x the photo's diagonal: half-width of the band where alpha may be soft
+BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
 MIN_BAND = 2.0  # px
-REACH = 2.5  # x band: how far the colours of object and background are gathered
+REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
 EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
-TRUST = 0.2  # sRGB: how far an unmixed colour may be from the object's colour beside it
 
 
 def band_width(width: int, height: int) -> float:
@@ -47,7 +50,9 @@ def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
 
 
 def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndarray:
-    """`image` (H, W, ...) continued past its frame by mirroring."""
+    """`image` (H, W, ...) continued past its frame by mirroring; no copy where it is not."""
+    if not any(extension):
+        return image
     top, bottom, left, right = extension
     pads = [(top, bottom), (left, right)] + [(0, 0)] * (image.ndim - 2)
     return np.pad(image, pads, mode="reflect")
@@ -58,6 +63,8 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
 
     What merely stands near the frame must not come back as its own mirror image.
     """
+    if not any(extension):
+        return mask
     top, bottom, left, right = extension
     whole = extended(mask, extension)
     height, width = whole.shape
@@ -87,38 +94,36 @@ def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
     left, top = max(columns[0] - margin, 0), max(rows[0] - margin, 0)
     right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
     window = (slice(top, bottom), slice(left, right))
-    rgb = unit_pixels(extended(pixels, extension)[window])
-    alpha, foreground = _soft_edge(rgb, mask[window], band)
-    return Matte(int(left) - extension[2], int(top) - extension[0], alpha, foreground)
+    alpha, colours = soft_cutout(extended(pixels, extension)[window], mask[window], band)
+    return Matte(int(left) - extension[2], int(top) - extension[0], alpha, colours.foreground)
 
 
-def _soft_edge(rgb: F32, selection: Selection, band: float) -> tuple[F32, F32]:
-    """Alpha (h, w) and foreground (h, w, 3) for a crop."""
-    mask = is_selected(selection)
-    distance = signed_distance(mask)  # px, > 0 inside
-    # A limb thinner than the band has its ridge for what is certain.
-    ridge = mask & (distance >= cv2.dilate(distance, np.ones((3, 3))) - 0.25)
-    inner = (distance > band) | (ridge & (distance > 0.75))
-    outer = distance < -band
+def soft_cutout(pixels: Pixels, selection: Selection, band: float) -> tuple[F32, Unmixed]:
+    """Alpha (h, w) and the colours of a photo's crop (h, w, 3) in which an object is selected."""
     drawn = _drawn(selection, band)
-    prior = np.clip(0.5 + distance / band, 0, 1)
-    alpha = solve_alpha(rgb, inner | (drawn & mask), outer | (drawn & ~mask), prior)
-    alpha = np.where(drawn, selection / np.float32(FULL), alpha).astype(np.float32)
-    sure = inner & (alpha > 0.98)
-    inside = _gather(rgb, (sure if sure.any() else mask).astype(np.float32), REACH * band)
-    outside = _gather(rgb, (outer & (alpha < 0.02)).astype(np.float32), REACH * band)
-    # The colour that explains a mixed pixel, as far as it is near what stands beside it: the
-    # thinner the pixel's share of the object, the less it says.
-    share = alpha[..., None]
-    unmixed = (rgb - (1 - share) * outside) / np.maximum(share, 1e-3)
-    room = TRUST * share**2
-    mixed = np.clip(unmixed, inside - room, inside + room)
-    foreground = np.where(share < 1.0, mixed, rgb)
-    if drawn.any():
-        # There the photo is no mixture: what is inside the line is the object's own colour.
-        own = drawn[..., None] * np.clip(2 * share - 1, 0, 1)
-        foreground += own * (rgb - foreground)
-    return alpha, np.clip(foreground, 0, 1).astype(np.float32)
+    alpha = find_alpha(pixels, selection, drawn, band, REACH * band)
+    if not drawn.any():
+        return alpha, unmixed(pixels, alpha)
+    # Of an edge that was drawn the photo is no mixture: what is inside it is the object's own.
+    through = veil(selection)
+    is_edge = drawn & ~through
+    share = np.where(is_edge, is_selected(selection), alpha).astype(np.float32)
+    colours = unmixed(pixels, share)
+    return alpha, _unveiled(pixels, selection, through, colours) if through.any() else colours
+
+
+def _unveiled(pixels: Pixels, coverage: U8, through: Mask, colours: Unmixed) -> Unmixed:
+    """`colours` with those of a veil where `through` (h, w)."""
+    small = veil_colour(pixels, coverage, through)
+    there = through[colours.rows, colours.columns]
+    rows, columns = colours.rows[there], colours.columns[there]
+    alpha = coverage[rows, columns] * np.float32(1 / FULL)
+    own = colour_at(small, through.shape, rows, columns)
+    fore, behind = unveiled(unit_pixels(pixels[rows, columns]), alpha, own)
+    foreground, background = colours.foreground, colours.background
+    foreground[rows, columns] = fore
+    background[there] = behind
+    return replace(colours, foreground=foreground, background=background)
 
 
 def _drawn(selection: Selection, band: float) -> Mask:
@@ -126,48 +131,3 @@ def _drawn(selection: Selection, band: float) -> Mask:
     if selection.dtype == np.bool_:
         return np.zeros(selection.shape, np.bool_)
     return grow(is_soft(selection), band)
-
-
-def signed_distance(mask: Mask) -> F32:
-    """Distance in px (H, W) to the mask's edge, positive inside; the photo's frame is no edge."""
-    padded = np.pad(mask, 1, mode="edge").astype(np.uint8)
-    inside = cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
-    outside = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return np.where(mask, inside - 0.5, 0.5 - outside).astype(np.float32)
-
-
-def _gather(rgb: F32, weights: F32, reach: float) -> F32:
-    """Mean colour (h, w, 3) of the weighted pixels nearby, everywhere.
-
-    Normalised convolution over widening windows: the narrowest window that saw anything decides,
-    so detail near the edge stays local and far pixels still get a colour.
-    """
-    colour = np.zeros_like(rgb)
-    known = np.zeros(rgb.shape[:2], np.float32)
-    premultiplied = rgb * weights[..., None]
-    sigma = max(reach / 2, 1.0)
-    largest = float(max(rgb.shape[:2]))
-    while True:
-        window = (0, 0)
-        total = _blur(weights, sigma, window)
-        mean = _blur(premultiplied, sigma, window) / np.maximum(total, 1e-12)[..., None]
-        share = np.clip(total / 0.02, 0, 1) * (1 - known)
-        colour += mean * share[..., None]
-        known += share
-        if known.min() > 0.999 or sigma > largest:
-            break
-        sigma *= 2.5
-    missing = np.maximum(known, 1e-6)[..., None]
-    return (colour / missing).astype(np.float32)
-
-
-def _blur(image: np.ndarray, sigma: float, window: tuple[int, int]) -> np.ndarray:
-    """Gaussian blur; wide ones on a reduced picture, which nobody can tell apart."""
-    if sigma <= 6:
-        return cv2.GaussianBlur(image, window, sigma)
-    factor = 2 ** int(np.floor(np.log2(sigma / 3)))
-    height, width = image.shape[:2]
-    small_size = (max(1, width // factor), max(1, height // factor))
-    small = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA)
-    small = cv2.GaussianBlur(small, window, sigma / factor)
-    return cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)

@@ -95,6 +95,9 @@ class Subject:
         progress(1.0, "cut out the subject")
         return mask
 
+    def confidence(self, rgb: RGB, prompt: Prompt, embedding: SubjectMap | None = None) -> None:
+        """None: what stands out most may not be what is meant."""
+
 
 def subject_guess(rgb: RGB, prompt: Prompt, salience: F32) -> F32:
     """(320, 320) guess: salience inside the box; SelectionError where there is no subject."""

@@ -20,7 +20,7 @@ from app.gui.window import Window
 from app.options import WindowOptions
 from app.view import Shown
 from objectmorpher_core import edits, pipeline
-from objectmorpher_core.document import Document, Placement, Prompt
+from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.image import Picture, encode_picture
 from objectmorpher_core.session_file import decode_session
 
@@ -55,7 +55,9 @@ def made_document() -> Document:
     document = edits.add_object(document)
     document = edits.set_mask(document, 0, mask, Prompt())
     photo = document.photo
-    matte, lifted = pipeline.lift_mask(photo.pixels, photo.camera, mask, "relief", GAUSSIANS)
+    matte, lifted = pipeline.lift_mask(
+        photo.pixels, photo.camera, mask, "relief", LiftSettings(GAUSSIANS)
+    )
     document = edits.set_lifted(document, 0, matte, lifted)
     plate = pipeline.make_plate(photo.pixels, mask, "telea")
     return _bent(edits.set_plate(document, plate))

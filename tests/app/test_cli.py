@@ -372,7 +372,7 @@ FAILURES = {
     "unknown inpainter": ([*EDIT, "--inpaint", "magic", *TURN], "'magic'"),
     "unknown inpainter, not needed": ([*EDIT, "--inpaint", "magic"], "'magic'"),
     "unknown refiner": ([*EDIT, "--refine", "magic"], "'magic'"),
-    "no import of splats": ([*EDIT, "--splats", "x.ply"], "--splats"),
+    "no such object": ([*EDIT, "--splats", "x.pdf"], "x.pdf has none of the endings"),
     "unknown deformation": ([*EDIT, "--deform", "jelly"], "jelly"),
     "unknown links": ([*EDIT, "--links", "magic"], "magic"),
     "unknown shadow": ([*EDIT, "--shadow", "dark"], "dark"),

@@ -276,7 +276,7 @@ def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
         wait_for_jobs(editor)
         levels.append(editor.selection.prompt.level)
         assert len(editor.selection.prompt.clicks) == 1
-    assert levels == ["group", "part", "object"]
+    assert levels == ["part", "group", "object"]
     editor.selection.set_level("part")
     wait_for_jobs(editor)
     assert editor.selection.prompt.level == "part"

@@ -256,7 +256,7 @@ def test_empty_and_full_masks_are_refused(inside, error):
     ({"handle": [{"at": [500, 5], "to": [9, 9]}]}, "--handle 500,5 is outside the photo of 160"),
     ({"pin": [[5, 5]]}, "--pin 5,5 misses the object"),
     ({"handle": [{"at": [78, 62], "to": [9, 9], "dz": -50}]}, "behind the camera"),
-    ({"splats": "x.ply"}, "--splats"),
+    ({"splats": "x.pdf"}, "x.pdf has none of the endings"),
     ({"refine": "dream"}, "'dream' is not installed"),
     ({"inpaint": "magic"}, "'magic'"), ({"lift": "magic"}, "'magic'"),
     ({"move": [0, 0, -80]}, "behind the camera"),

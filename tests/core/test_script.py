@@ -23,6 +23,8 @@ FULL = {
     "move": [1, -2, 0.5], "turn": [10, 20, 30], "scale": 1.5, "deform": "laplacian",
     "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5, "stretch-limit": 1.5,
     "split": True, "shadow": "none", "fov": 60, "seed": 7,
+    "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
+    "hidden": "h.png",
 }  # fmt: skip
 
 

@@ -17,7 +17,7 @@ ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
     "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
     "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT, "harden": Icon.IMAGE,
-    "subject": Icon.PERSON,
+    "subject": Icon.PERSON, "import_shape": Icon.CUBE,
 }  # fmt: skip
 
 
@@ -61,6 +61,9 @@ def _hint(name: str) -> str:
         "smooth": t("Straighten the edge: teeth and specks go"),
         "feather": t("Make the edge soft by this many pixels to each side"),
         "fill_holes": t("Select what the selection encloses"),
+        "import_shape": t(
+            "A splat or mesh file takes the object's place, where it is in the photo"
+        ),
         "harden": t("Make the edge hard again: lifting finds it in the photo"),
     }
     return hints.get(name, "")

@@ -13,6 +13,7 @@ from ..command_button import command_button
 from ..rows import end_row, fill_row, text_top
 from ..theme import Icon, theme
 from ..widgets import checkbox, gap, heading, note, small_text, tooltip
+from .shape import draw_shape
 
 ROW = 28.0  # points
 ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "800 %"))
@@ -20,6 +21,7 @@ ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "8
 
 def draw_look(editor: Editor) -> None:
     """In the inspector."""
+    draw_shape(editor)
     heading(t("View"))
     for shown in Shown:
         _draw_view(editor, shown)

@@ -62,5 +62,6 @@ def _draw_facts(editor: Editor) -> None:
         note(t("Left click adds what belongs to the object, right click removes what does not."))
     elif mask is not None and not editor.is_lifted:
         note(t("Right-click what does not belong to the object, then lift it."))
+        draw_command(editor, "import_shape")
     draw_lift_warning(editor)
     draw_offer(editor)

@@ -10,14 +10,17 @@ import pytest
 from scipy.spatial import cKDTree
 
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftedObject
+from objectmorpher_core.document import LiftedObject, LiftSettings
 from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.lift import BACKENDS, LiftError, load
-from objectmorpher_core.lift.relief import Inflation
+from objectmorpher_core.lift.body import BACK, FRONT, Body
+from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.lift.thickness import FULLNESS, RIM_SLOPE
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.progress import Cancelled
 from objectmorpher_core.segment.matte import signed_distance
 from tests import shapes
+from tests.core.lift.standing_things import Box, View
 
 PIXEL = 1e-3  # px: u0 and means are float32
 
@@ -27,15 +30,18 @@ masks = pytest.mark.parametrize("name", shapes.MASKS)
 def _lift(inside: np.ndarray, count: int = 800, seed: int = 0) -> LiftedObject:
     height, width = inside.shape
     camera = Camera.from_fov(width, height)
-    return lift_mask(shapes.picture(inside), camera, inside, "relief", count, seed=seed)[1]
+    return lift_mask(
+        shapes.picture(inside), camera, inside, "relief", LiftSettings(count), seed=seed
+    )[1]
 
 
 def _heights(scene: shapes.Scene) -> np.ndarray:
-    """(N,) px above the middle plane, positive towards the camera."""
-    world = scene.lifted.world_points(scene.lifted.gaussians.means.astype(np.float64))
-    brim = scene.lifted.texture.solidity < 0.5
-    depth = np.median(world[brim, 2])  # the brim lies in the middle plane
-    return (depth - world[:, 2]) * scene.camera.focal / depth
+    """(N,) px in front of the middle sheet."""
+    lifted = scene.lifted
+    assert lifted.middle is not None
+    world = lifted.world_points(lifted.gaussians.means.astype(np.float64))
+    unit = 1 / Silhouette.of(scene.mask).extent  # world units per px: the object is 1 wide
+    return (lifted.middle[:, 0] - world[:, 2]) / unit
 
 
 @masks
@@ -83,7 +89,7 @@ def test_the_front_faces_the_camera_and_the_back_does_not(name):
 
 
 @masks
-def test_front_and_back_are_mirror_images_about_the_middle_plane(name):
+def test_front_and_back_are_mirror_images_about_the_middle_sheet(name):
     scene = shapes.scene(name, 2000)
     height = _heights(scene)
     body = scene.lifted.texture.solidity > 0.5
@@ -102,48 +108,11 @@ def test_there_are_no_spikes_at_the_rim(name):
     near = is_in.copy()
     near[is_in] = distance[row[is_in], column[is_in]] < 4
     widest = signed_distance(scene.mask).max()
-    # a surface of slope 3 at most near the edge, one grid cell of slack
-    assert (height[near] <= 3 * (np.maximum(distance[row[near], column[near]], 0) + 1.5)).all()
-    assert height.max() <= 1.6 * widest + 1
-
-
-def _middle_height(inside: np.ndarray) -> float:
-    shape = Inflation.of(inside)
-    rows, columns = np.nonzero(inside)
-    middle = np.array([[columns.mean() + 0.5, rows.mean() + 0.5]])
-    return float(shape.sample(middle)[0][0])
-
-
-def test_a_strip_becomes_a_limb_about_as_thick_as_wide():
-    """Width 2 r: sqrt(2 u) is r in the middle; the crease at the rim takes up to a third."""
-    inside = np.zeros((120, 400), bool)
-    inside[50:70, 20:380] = True
-    assert 0.65 * 10 <= _middle_height(inside) <= 1.05 * 10
-
-
-def test_a_disc_becomes_a_body_half_as_deep_as_wide():
-    """Radius R: sqrt(2 u) is 0.707 R in the middle; crease and flattening take up to a third."""
-    y, x = np.mgrid[:220, :220] - 109.5
-    assert 0.65 * 0.707 * 80 <= _middle_height(np.hypot(x, y) < 80) <= 1.05 * 0.707 * 80
-
-
-def test_a_wide_limb_is_thicker_than_a_narrow_one():
-    heights = []
-    for half in (5, 10, 20):
-        inside = np.zeros((120, 600), bool)
-        inside[60 - half : 60 + half, 20:580] = True
-        heights.append(_middle_height(inside))
-    assert heights[0] * 1.6 < heights[1]
-    assert heights[1] * 1.6 < heights[2]
-
-
-def test_the_same_object_at_twice_the_resolution_has_the_same_shape():
-    small, large = shapes.mask("star"), shapes.mask("star", 320, 240)
-    a, b = Inflation.of(small), Inflation.of(large)
-    xy = shapes.scene("star").lifted.texture.u0.astype(np.float64)
-    inside = signed_distance(small)[tuple(np.floor(xy).astype(int).T[::-1])] > 3
-    one, two = a.sample(xy[inside])[0], b.sample(2 * xy[inside])[0] / 2
-    assert np.abs(one - two).max() < 1.5  # px of 30: the coarser grid's staircase
+    # the slope at the rim, one grid cell of slack
+    steepest = 1.1 * FULLNESS * RIM_SLOPE
+    allowed = np.minimum(distance[row[near], column[near]] + 1.5, widest)
+    assert (height[near] <= steepest * np.maximum(allowed, 0) + 1).all()
+    assert height.max() <= 1.1 * widest + 1
 
 
 def test_the_same_seed_gives_the_same_object_and_another_seed_another():
@@ -190,13 +159,6 @@ def test_parts_of_the_mask_become_parts_of_the_object():
     assert scene.puppet.deformer.graph.component_count == 2
 
 
-def test_where_the_object_leaves_the_photo_it_does_not_close():
-    """At the frame the body is as thick as a little further in."""
-    shape = Inflation.of(shapes.mask("frame"))
-    at_frame, inner = shape.sample(np.array([[130.0, 119.0], [130.0, 105.0]]))[0]
-    assert at_frame > 0.7 * inner
-
-
 def test_an_object_that_fills_one_row_less_than_the_photo_lifts():
     inside = np.ones((60, 80), bool)
     inside[0] = False
@@ -226,14 +188,16 @@ def test_cancelling_ends_the_lift():
 
     inside = shapes.mask("disc")
     with pytest.raises(Cancelled):
-        lift_mask(shapes.picture(inside), shapes.camera(), inside, "relief", 300, stop)
+        lift_mask(
+            shapes.picture(inside), shapes.camera(), inside, "relief", LiftSettings(300), stop
+        )
 
 
 def test_progress_runs_from_nothing_towards_one():
     told: list[float] = []
     inside = shapes.mask("disc")
     lift_mask(
-        shapes.picture(inside), shapes.camera(), inside, "relief", 300,
+        shapes.picture(inside), shapes.camera(), inside, "relief", LiftSettings(300),
         lambda fraction, note: told.append(fraction),
     )  # fmt: skip
     assert told == sorted(told)
@@ -245,3 +209,114 @@ def test_an_unknown_lifter_is_refused_by_name():
     with pytest.raises(LiftError, match="'magic' is not installed; installed: relief"):
         load("magic")
     assert load("auto").name in BACKENDS
+
+
+@masks
+def test_the_brim_lies_in_the_middle_sheet(name):
+    scene = shapes.scene(name)
+    brim = scene.lifted.texture.solidity < 0.5
+    assert np.abs(_heights(scene)[brim]).max() < 1e-3  # px
+
+
+@masks
+def test_the_middle_sheet_changes_as_it_says(name):
+    """Depth and slope of neighbours agree: they are of one sheet."""
+    lifted = shapes.scene(name).lifted
+    assert lifted.middle is not None
+    middle, u0 = lifted.middle.astype(np.float64), lifted.texture.u0.astype(np.float64)
+    pairs = cKDTree(u0).query_pairs(4.0, output_type="ndarray")
+    a, b = pairs.T
+    step = ((u0[b] - u0[a]) * 0.5 * (middle[a, 1:] + middle[b, 1:])).sum(1)
+    gap = np.abs(middle[b, 0] - middle[a, 0] - step)
+    assert gap.max() < 0.02 * np.ptp(middle[:, 0]) + 1e-4
+
+
+def _box() -> np.ndarray:
+    view = View(Camera.from_fov(640, 480), 15.0)
+    return view.hull(Box(view.ahead, angle=30.0).points)
+
+
+def test_a_box_has_walls_and_a_back_of_its_own():
+    lifted = _lift(_box(), 4000)
+    texture, gaussians = lifted.texture, lifted.gaussians
+    body = texture.solidity > 0.5
+    unseen = body & (texture.visibility < 0.5)
+    world = lifted.world_points(gaussians.means.astype(np.float64))
+    cosine = (gaussians.normals * world).sum(1) / np.linalg.norm(world, axis=1)
+    is_wall = unseen & (np.abs(cosine) < 0.2)
+    assert 0.05 * body.sum() < is_wall.sum() < 0.5 * body.sum()
+    assert (unseen & (cosine > 0.5)).sum() > 0.2 * body.sum()
+
+
+@pytest.mark.parametrize("name", [name for name in shapes.MASKS if name != "frame"])
+def test_what_is_round_has_hardly_any_walls(name):
+    texture = shapes.scene(name, 3000).lifted.texture
+    outline = Silhouette.of(shapes.mask(name))
+    body = Body.of(outline, shapes.camera(), LiftSettings())
+    middles, _ = outline.contour
+    size = shapes.mask(name).shape[::-1]
+    middles = middles[((middles > 0) & (middles < size)).all(1)]  # not where the frame cuts it
+    walls = body.sample(middles, FRONT)[0] - body.sample(middles, BACK)[0]
+    assert walls.mean() < 0.12 * outline.extent
+    assert texture.visibility[texture.solidity > 0.5].mean() > 0.35
+
+
+def test_a_profile_is_mirrored_and_a_face_goes_on():
+    """What is wide and stands is seen from the side; what is alike left and right, from before."""
+    mask = np.zeros((240, 320), bool)
+    mask[100:160, 60:260] = True
+    mask[150:210, 80:110] = mask[150:210, 200:230] = True  # legs
+    mask[60:120, 220:290] = True  # a head
+    assert _lift(mask).splatting == "surface"
+    assert _lift(shapes.mask("disc", 320, 240)).splatting == "solid"
+
+
+@pytest.mark.parametrize(("back", "splatting"), [("mirrored", "surface"), ("continued", "solid")])
+def test_the_user_says_what_the_back_is(back, splatting):
+    inside = shapes.mask("ellipse")
+    settings = LiftSettings(800, back=back)
+    lifted = lift_mask(shapes.picture(inside), shapes.camera(), inside, "relief", settings)[1]
+    assert lifted.splatting == splatting
+
+
+def test_what_is_hidden_belongs_to_the_shape_and_carries_no_photo():
+    inside = shapes.mask("ellipse", 320, 240)
+    hidden = np.zeros_like(inside)
+    hidden[:, 150:175] = True
+    hidden &= inside
+    settings = LiftSettings(2000, hidden=hidden)
+    camera = shapes.camera(320, 240)
+    lifted = lift_mask(shapes.picture(inside), camera, inside & ~hidden, "relief", settings)[1]
+    x, y = np.floor(lifted.texture.u0).astype(int).T
+    body = lifted.texture.solidity > 0.5
+    there = hidden[np.clip(y, 0, 239), np.clip(x, 0, 319)]
+    assert (there & body).sum() > 100
+    assert not lifted.texture.visibility[there].any()
+    assert (there & ~body).sum() == 0, "no edge of the photo is there"
+    whole = _lift(inside, 2000)
+    assert np.ptp(lifted.texture.u0, axis=0) == pytest.approx(
+        np.ptp(whole.texture.u0, axis=0), rel=0.05
+    )
+
+
+def test_painted_nearness_brings_a_part_nearer():
+    inside = shapes.mask("ellipse", 320, 240)
+    near = np.zeros((24, 32), np.float32)
+    near[:, 20:] = 0.3
+    camera = shapes.camera(320, 240)
+    lifted = lift_mask(
+        shapes.picture(inside), camera, inside, "relief", LiftSettings(2000, nearness=near)
+    )[1]
+    assert lifted.middle is not None
+    x, z = lifted.texture.u0[:, 0], lifted.middle[:, 0]
+    assert np.median(z[x < 150]) - np.median(z[x > 220]) == pytest.approx(0.3, abs=0.05)
+
+
+def test_the_shape_is_the_same_far_from_and_near_the_start_of_a_huge_photo():
+    """Where the object is in the photo does not matter, but for the perspective."""
+    small = shapes.mask("star")
+    large = np.zeros((700, 900), bool)
+    large[290:410, 370:530] = small
+    near, far = Silhouette.of(small), Silhouette.of(large)
+    assert np.array_equal(near.inside, far.inside)
+    assert (far.left - near.left, far.top - near.top) == (370, 290)

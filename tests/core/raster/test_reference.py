@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from objectmorpher_core.document import Placement
 from objectmorpher_core.raster import reference
+from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.rules import RULES, coverage, facing_weight, ramp
 from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes
@@ -104,6 +107,28 @@ def test_gaussians_behind_the_camera_are_left_out():
 
 
 # ---- the small formulas ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("splatting", ["surface", "solid"])
+def test_only_a_solid_has_colours_where_the_photo_has_shown_nothing(splatting):
+    scene = shapes.scene("disc", 300)
+    lifted = scene.lifted
+    blue = np.tile(np.array([0, 0, 1], np.float32), (len(lifted.gaussians), 1))
+    unseen = replace(lifted.texture, visibility=np.zeros(len(blue), np.float32))
+    gaussians = replace(lifted.gaussians, colors=blue)
+    own = replace(lifted, gaussians=gaussians, texture=unseen, splatting=splatting)
+    splats = PosedSplats(RestSplats(own, scene.camera), None, np.eye(4))
+    drawn = reference.render(splats, scene.texture, scene.camera, scene.camera)
+    inside = drawn.alpha > 0.99
+    is_blue = np.abs(drawn.color[inside] - [0, 0, 1]).max(1) < 0.02
+    assert inside.sum() > 500
+    assert is_blue.all() if splatting == "solid" else not is_blue.any()
+
+
+def test_a_cloud_has_no_normals_but_its_brim_has():
+    assert facing_weight(-0.9, 1.0, 1.0, RULES, False) == 1.0
+    assert facing_weight(0.9, 1.0, 0.0, RULES, False) == 0.0
+    assert facing_weight(0.0, 1.0, 0.0, RULES, False) == 1.0
 
 
 def test_a_ramp_runs_from_zero_to_one_either_way():

@@ -44,7 +44,7 @@ def test_a_draft_is_nearly_the_exact_picture(name: str, factor: int, zoom: float
     draft, exact = _draft(scene, placement, factor, zoom), _exact(scene, placement, zoom)
     difference = np.abs(draft - exact)[exact[..., 3] > 0]
     assert difference.mean() < SOFT
-    assert np.abs(draft[..., 3] - exact[..., 3]).mean() < 0.03  # at the edge
+    assert np.abs(draft[..., 3] - exact[..., 3]).mean() < 0.04  # at the edge
 
 
 def test_at_rest_a_pixel_is_that_of_the_photo() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import numpy as np
 import pytest
 
@@ -13,17 +15,23 @@ from objectmorpher_core.segment.mask_edit import (
     invert,
     is_selected,
     is_soft,
+    remove_islands,
     shrink,
     smooth,
 )
 from tests import shapes
+
+LARGE = (4000, 6000)  # px: the photo that times are asked of
+MOST_SECONDS = 6.0  # of the process, for each; on an idle core it is less than half
 
 PIXEL_ROUNDING = 0.03  # share of a disc's area
 CHANGES = {
     "grow": lambda s: grow(s, 4.5),
     "shrink": lambda s: shrink(s, 4.5),
     "smooth": lambda s: smooth(s, 3),
+    "grow far": lambda s: grow(s, 47),
     "fill": fill_holes,
+    "islands": remove_islands,
     "invert": invert,
 }
 changes = pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
@@ -158,3 +166,91 @@ def test_smoothing_takes_specks_and_teeth_and_keeps_the_rest():
     assert not smoothed[10, 10]
     assert smoothed[80, 80]
     assert (smoothed ^ mask).mean() < 0.002
+
+
+def archipelago() -> np.ndarray:
+    """A large piece, one of a tenth of it that touches the frame, specks, and holes in all."""
+    mask = disc(45) & ~disc(8)
+    mask[:24, :24] = True
+    mask[4:8, 4:8] = False
+    mask[150:153, 10:13], mask[5, 150], mask[6, 151] = True, True, True
+    return mask
+
+
+def test_islands_are_what_is_small_beside_the_largest_piece():
+    mask = archipelago()
+    kept = remove_islands(mask)
+    assert not kept[150:153, 10:13].any()
+    assert not kept[5:7, 150:152].any()
+    np.testing.assert_array_equal(kept[:140, :140], mask[:140, :140])
+    assert not remove_islands(mask, 1.0)[:24, :24].any()
+    np.testing.assert_array_equal(remove_islands(mask, 0.0), mask)
+
+
+def test_an_island_goes_with_its_soft_rim_and_leaves_that_of_others():
+    soft = feather(archipelago(), 4)
+    kept = remove_islands(soft)
+    assert not kept[140:, :20].any()
+    np.testing.assert_array_equal(kept[:140, :140], soft[:140, :140])
+    faint = np.where(disc(30), 90, 0).astype(np.uint8)  # glass: nothing of it is selected
+    np.testing.assert_array_equal(remove_islands(faint), faint)
+
+
+@pytest.mark.parametrize("change", [fill_holes, remove_islands])
+def test_filling_and_removing_again_changes_nothing(change):
+    for selection in (archipelago(), soft_picture(), feather(archipelago(), 4)):
+        once = change(selection)
+        np.testing.assert_array_equal(change(once), once)
+
+
+@pytest.mark.parametrize("change", [fill_holes, remove_islands])
+@pytest.mark.parametrize("times", [2, 5])
+def test_holes_and_islands_are_the_same_at_any_size(change, times):
+    mask = archipelago()
+    large = np.kron(mask, np.ones((times, times), bool))
+    np.testing.assert_array_equal(
+        change(large), np.kron(change(mask), np.ones((times, times), bool))
+    )
+
+
+@pytest.mark.parametrize("change", [grow, shrink])
+def test_an_edge_moves_as_far_at_any_size(change):
+    """In a photo of four times the size by four times the px: to a px and its diagonal."""
+    mask, block = archipelago(), np.ones((4, 4), bool)
+    large = change(np.kron(mask, block), 4 * 5.5)
+    small = change(mask, 5.5)
+    assert large[np.kron(shrink(small, 1.5), block)].all()
+    assert not large[~np.kron(grow(small, 1.5), block)].any()
+
+
+@pytest.mark.parametrize(("px", "count"), [(1, 5), (1.2, 5), (1.42, 9), (2, 13), (2.24, 21)])
+def test_a_fraction_of_a_pixel_counts(px, count):
+    dot = np.zeros((9, 9), bool)
+    dot[4, 4] = True
+    assert grow(dot, px).sum() == count
+    assert grow(mask_edit.as_coverage(dot), px).sum() == 255 * count
+    assert (~shrink(~dot, px)).sum() == count
+
+
+def test_a_soft_edge_that_grows_far_stays_as_soft():
+    """What is farther than WIDE_REACH is found at half the size."""
+    soft = feather(disc(30, 400), 12)
+    far = grow(soft, 60)
+    expected = mask_edit._dilated_by_rows(soft, 60)
+    assert np.abs(far.astype(int) - expected).max() < 255 * 1.5 / 12, "a px and a half of its ramp"
+    np.testing.assert_array_equal(far == 255, expected == 255)
+    np.testing.assert_array_equal(far == 0, expected == 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_soft_edge", [False, True])
+def test_every_change_of_a_photo_of_24_mp_is_quick(is_soft_edge):
+    y, x = np.ogrid[: LARGE[0], : LARGE[1]]
+    mask = (x - 3000) ** 2 + (y - 2000) ** 2 < 1500**2
+    mask[1900:1950, 2900:3000], mask[50:90, 50:90] = False, True
+    selection = feather(mask, 60) if is_soft_edge else mask
+    more = {"far": lambda s: grow(s, 300), "widely": lambda s: smooth(s, 120)}
+    for name, change in (CHANGES | more).items():
+        start = process_time()
+        change(selection)
+        assert process_time() - start < MOST_SECONDS, name

@@ -14,7 +14,7 @@ BUTTONS = (glfw.MOUSE_BUTTON_LEFT, glfw.MOUSE_BUTTON_RIGHT, glfw.MOUSE_BUTTON_MI
 LEAST_STEP = 1e-4  # s between two frames; ImGui asks for more than none
 
 
-class Surface:
+class WindowSize:
     """As GLFW told of it last.
 
     ImGui's own backend asks for it in every frame, and X answers when it has shown the last one:

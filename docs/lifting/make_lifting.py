@@ -1,0 +1,51 @@
+"""Writes docs/lifting/README.md: how much of the third dimension one photo gives.
+
+python docs/lifting/make_lifting.py [figures]
+
+`figures` prints, as JSON, the means over the solids for which nothing has to be fetched.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from motorcycle import results
+from page import write_page
+from pictures import draw_backs, draw_real, draw_solids, draw_thickness
+from solids import MADE, SOLIDS
+from turning import Row, make_scene, means, measured, row_of
+
+FOLDER = Path(__file__).resolve().parent
+sys.path.append(str(FOLDER.parent))
+from meshes import fetched  # noqa: E402  # beside this folder: other pages have them, too
+
+PICTURED = ("duck", "bunny", "ring", "brick", "figure", "mug")
+
+
+def figures() -> None:
+    rows = [row_of(name, measured(make_scene(name, FOLDER))) for name in MADE]
+    print(json.dumps({f"{way} {a}": (s.iou, s.psnr) for (a, way), s in means(rows).items()}))
+
+
+def main() -> None:
+    meshes = fetched()
+    rows: list[Row] = []
+    shown = []
+    for name in SOLIDS:
+        scene = make_scene(name, meshes)
+        found = measured(scene)
+        rows.append(row_of(name, found))
+        print(rows[-1], flush=True)
+        if name in PICTURED:
+            shown.append((scene, {way: found[35, way][0] for way in ("relief", "card")}))
+    draw_solids(FOLDER / "solids.jpg", shown)
+    draw_real(FOLDER / "photos.jpg")
+    draw_backs(FOLDER / "backs.jpg")
+    draw_thickness(FOLDER / "thickness.jpg")
+    (FOLDER / "README.md").write_text(write_page(rows, results()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    figures() if "figures" in sys.argv else main()

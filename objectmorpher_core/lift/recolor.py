@@ -1,0 +1,87 @@
+"""The colours of an object from elsewhere, brought into the light of the photo it stands in.
+
+One exposure for each channel is fitted where the photo shows the object. What is left of the
+difference there continues over what the photo does not show, and fades with the distance: the two
+meet without a seam.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..arrays import F32, F64
+from ..camera import Camera
+from ..document import LiftedObject, Matte
+from ..pixels import bilinear
+from .colours import BLUR
+
+SURE = 0.5  # visibility of a Gaussian that tells something about the light
+OPAQUE = 0.95  # alpha of the matte, likewise
+LEAST = 12  # such Gaussians
+GAINS = 0.4, 2.5  # a larger change of exposure is no light but another colour
+OFFSET_PRIOR = 0.3  # x the evidence, for no veil
+TOGETHER = 0.05  # x the evidence, for an exposure that is the same in all channels
+ROUNDS, UNBELIEVED = 4, 0.12  # of the fit; sRGB beyond which a difference is not one of light
+GLANCE = 4.0  # what is seen at a glance only has the photo's colour all the same
+CARRIED = 0.10  # object units: how far what is left of the difference is carried on
+TELLING = 20_000  # Gaussians that are asked at most: the difference is smooth
+NEAREST = 12  # Gaussians that it is the mean of
+
+
+def recolored(lifted: LiftedObject, seen: F32, matte: Matte, camera: Camera) -> F32:
+    """(N, 3) colours: the photo's where it is `seen` (N,), else the object's in its light."""
+    spacing_px = lifted.spacing * lifted.scale * camera.focal / float(lifted.centre[2])
+    at = lifted.texture.u0.astype(np.float64) - [matte.left + 0.5, matte.top + 0.5]
+    blurred = cv2.GaussianBlur(matte.foreground, (0, 0), max(BLUR * spacing_px, 0.5))
+    photo = bilinear(blurred, at)
+    alpha = bilinear(cv2.erode(matte.alpha, np.ones((3, 3), np.uint8)), at)
+    inside = ((at > 0) & (at < [matte.alpha.shape[1] - 1, matte.alpha.shape[0] - 1])).all(1)
+    sure = (seen > SURE) & (alpha > OPAQUE) & inside
+    own = lifted.gaussians.colors.astype(np.float64)
+    if sure.sum() < LEAST:
+        return lifted.gaussians.colors
+    lit = _in_light(own, own[sure], photo[sure])
+    points = lifted.gaussians.means.astype(np.float64)
+    lit += _carried_on(points, points[sure], (photo - lit)[sure])
+    share = np.where(inside & (alpha > OPAQUE), np.minimum(GLANCE * seen, 1), 0.0)[:, None]
+    return np.clip(lit + share * (photo - lit), 0, 1).astype(np.float32)
+
+
+def _in_light(colors: F64, own: F64, photo: F64) -> F64:
+    """`colors` (N, 3) under the exposures that make `own` (n, 3) most like `photo` (n, 3).
+
+    A channel that the object hardly has says nothing about the light: it follows the others.
+    """
+    result = np.empty_like(colors)
+    usual = float(np.clip((own * photo).sum() / max((own * own).sum(), 1e-9), *GAINS))
+    level = TOGETHER * float((own * own).mean()) + 1e-4
+    for c in range(3):
+        weight = np.ones(len(own))
+        gain, offset = 1.0, 0.0
+        for _ in range(ROUNDS):
+            total, x, y = weight.sum(), own[:, c], photo[:, c]
+            square = float((weight * x * x).sum()) + level * total
+            a = np.array([[square, (weight * x).sum()], [(weight * x).sum(), total]])
+            a[1, 1] += OFFSET_PRIOR * total
+            b = np.array([(weight * x * y).sum() + level * total * usual, (weight * y).sum()])
+            gain, offset = np.linalg.solve(a, b)
+            if not GAINS[0] <= gain <= GAINS[1]:
+                gain = float(np.clip(gain, *GAINS))
+                offset = float((weight * (y - gain * x)).sum() / ((1 + OFFSET_PRIOR) * total))
+            weight = 1 / (1 + ((gain * x + offset - y) / UNBELIEVED) ** 2)
+        result[:, c] = gain * colors[:, c] + offset
+    return np.clip(result, 0, 1)
+
+
+def _carried_on(points: F64, known: F64, rest: F64) -> F64:
+    """(N, 3) `rest` (n, 3) at the `known` points (n, 3), continued to `points` (N, 3)."""
+    step = len(known) // TELLING + 1
+    known, rest = known[::step], rest[::step]
+    count = min(NEAREST, len(known))
+    distance, near = KDTree(known).query(points, k=count)
+    width = np.maximum(distance[:, -1:], 1e-9)
+    weight = np.maximum(1 - (distance / (1.01 * width)) ** 2, 0)
+    mean = (rest[near] * weight[..., None]).sum(1) / weight.sum(1, keepdims=True)
+    return mean * np.exp(-((distance[:, :1] / CARRIED) ** 2))

@@ -1,0 +1,135 @@
+"""Points spread evenly over a body: its front, its back, the walls between, and a brim around.
+
+The brim carries the matte's soft edge. Each sheet is spread apart: in a thin limb the back lies
+closer to the front than one spacing, and at the rim the front is seen edge-on and leaves the brim
+to cover it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import cv2
+import numpy as np
+
+from ..arrays import F64, Mask
+from ..poisson_disk import thin_to_spacing
+from .body import BACK, FRONT, MIDDLE, Body
+from .silhouette import Silhouette
+
+OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
+PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
+BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
+MIN_SPACING = 1.0  # px: more points than pixels carry nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Points on a closed surface, in relief coordinates: photo px and height in px."""
+
+    xy: F64  # (N, 2) photo px
+    height: F64  # (N,) px towards the camera
+    normals: F64  # (N, 3) outward, relief coordinates (x, y, height), unit
+    is_front: Mask  # (N,) on the side of the camera
+    is_seen: Mask  # (N,) by the photo
+    is_brim: Mask  # (N,) outside the silhouette
+
+    def select(self, index: np.ndarray) -> Surface:
+        return Surface(*(getattr(self, f.name)[index] for f in fields(self)))
+
+
+def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tuple[Surface, float]:
+    """About `count` points and their mean spacing in px.
+
+    `band`: how far outside the silhouette the matte covers something, px. Candidates are drawn in
+    proportion to the true area, then thinned to one spacing in 3D.
+    """
+    areas = [_area(body, side) for side in (FRONT, BACK)]
+    wall = _wall_area(body)
+    total = sum(area.sum() for area in areas) + wall.sum()
+    spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
+    density = OVERSAMPLING / spacing**2  # candidates per px^2
+    sheets = [
+        _sheet(body, _draw(body.silhouette, area * density, rng), side)
+        for area, side in zip(areas, (FRONT, BACK), strict=True)
+    ]
+    sheets.append(_wall(body, wall * density, rng))
+    sheets.append(_brim(body, band + BRIM * spacing, density, rng))
+    return _joined([_thinned(sheet, spacing, rng) for sheet in sheets]), spacing
+
+
+def _thinned(sheet: Surface, spacing: float, rng: np.random.Generator) -> Surface:
+    if len(sheet.xy) == 0:
+        return sheet
+    points = np.column_stack([sheet.xy, sheet.height])
+    order = rng.permutation(len(points))
+    return sheet.select(thin_to_spacing(points, spacing * np.sqrt(PACKING), order))
+
+
+def _joined(sheets: list[Surface]) -> Surface:
+    return Surface(
+        *(np.concatenate([getattr(sheet, f.name) for sheet in sheets]) for f in fields(Surface))
+    )
+
+
+def _area(body: Body, side: float) -> F64:
+    """(h, w) px^2 of a sheet's true surface over each cell of the silhouette."""
+    outline = body.silhouette
+    rows, columns = np.nonzero(outline.inside)
+    xy = outline.photo_xy(np.column_stack([columns, rows]).astype(np.float64))
+    _, gradient = body.sample(xy, side)
+    area = np.zeros(outline.shape)
+    area[rows, columns] = outline.cell**2 * np.sqrt(1 + (gradient**2).sum(1))
+    return area
+
+
+def _draw(outline: Silhouette, expected: F64, rng: np.random.Generator) -> F64:
+    """Photo px (N, 2) of random points, `expected` (h, w) of them per cell."""
+    counts = np.floor(expected + rng.random(expected.shape)).astype(int)
+    rows, columns = np.nonzero(counts)
+    repeat = counts[rows, columns]
+    cells = np.column_stack([np.repeat(columns, repeat), np.repeat(rows, repeat)])
+    return outline.photo_xy(cells + rng.random((len(cells), 2)) - 0.5)
+
+
+def _sheet(body: Body, xy: F64, side: float) -> Surface:
+    """The front, or the back, at photo px (N, 2)."""
+    height, gradient = body.sample(xy, side)
+    normals = side * np.column_stack([-gradient, np.ones(len(xy))])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    is_front = np.full(len(xy), side == FRONT)
+    return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool))
+
+
+def _wall_area(body: Body) -> F64:
+    """(n,) px^2 between the sheets at each stretch of the outline."""
+    middles, offsets = body.silhouette.contour
+    front, _ = body.sample(middles, FRONT)
+    back, _ = body.sample(middles, BACK)
+    return np.linalg.norm(offsets, axis=1) * (front - back)
+
+
+def _wall(body: Body, expected: F64, rng: np.random.Generator) -> Surface:
+    """What joins the sheets where they do not meet at the outline, `expected` (n,) a stretch."""
+    middles, offsets = body.silhouette.contour
+    counts = np.floor(expected + rng.random(len(expected))).astype(int)
+    xy = np.repeat(middles, counts, axis=0)
+    xy = xy + np.repeat(offsets, counts, axis=0) * (rng.random((len(xy), 1)) - 0.5)
+    height, _ = body.sample(xy, rng.uniform(BACK, FRONT, len(xy)))
+    normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
+    no = np.zeros(len(xy), bool)
+    return Surface(xy, height, normals, no, no, no)
+
+
+def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) -> Surface:
+    """Around the silhouette, as far as `reach` px, at the height of its middle."""
+    outline = body.silhouette
+    pad = int(np.ceil(reach / outline.cell)) + 1
+    inside = np.pad(outline.inside, pad).astype(np.uint8)
+    distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5) * outline.cell
+    ring = (inside == 0) & (distance < reach)
+    xy = _draw(outline, np.where(ring, density * outline.cell**2, 0.0), rng) - pad * outline.cell
+    height, _ = body.sample(xy, MIDDLE)
+    normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])
+    yes = np.ones(len(xy), bool)
+    return Surface(xy, height, normals, yes, yes, yes)

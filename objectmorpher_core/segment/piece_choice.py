@@ -1,0 +1,348 @@
+"""Which region of pieces is meant: by a first click, a box or the subject, and by a correction.
+
+Regions grow around the click; the best has strong contrast across its outline, agrees with the
+subject map, leaves the photo's frame free, and has the click near its middle. A first click on a
+part means the whole; a correction means the part around it that the outline got wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import F32, F64, Mask
+from ..document import Click, Prompt
+from .pieces import Pieces
+from .selection import SelectionError, box_mask
+
+CENTRED_WHOLE = 0.3  # exponent: how much a click is in the middle of the whole that it means
+CENTRED_PART = 3.0  # the same of a part, and of a correction
+MINOR_PART = 0.5  # exponent: how much a part is meant to be smaller than its whole
+SMALLEST_PART = 0.01  # x object's area; less is texture
+SMALLEST_PIECES = 2  # the same in pieces
+MINOR_CORRECTION = 0.4  # how much a correction is meant to leave something
+LARGER_CORRECTION = 0.05  # exponent: how much a larger correction is preferred
+SHARP_WHOLE = 6.0  # exponent: how much more a better region is likely to be meant than another
+SHARP_PART = 20.0
+SHARP_CORRECTION = 6.0
+OFF_CENTRE = 0.05  # least that counts for being in the middle
+ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
+AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
+LARGER = 0.03  # exponent: how much a larger region is preferred
+FREE_FRAME = 4.0  # exponent: how much what is not the subject should leave the frame free
+SURE_SALIENCE = 0.9
+SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
+LARGER_GROUP = 1.15  # x object's area: what is smaller is still the object
+WORTH_A_GROUP = 0.85  # x object's score: a larger outline that stands out less is no group
+LIKENESS = 0.95  # share of the object's own pieces that are typical of it
+ALIKE = 2.0  # x how far a typical piece is from the object's mean: another is like it
+LIKE_AREA = (0.05, 1.5)  # x object's area: less is a coincidence, more is what it stands on
+SEEDS_IN_BOX = ((0.5, 0.5), (0.5, 0.3), (0.5, 0.7), (0.3, 0.5), (0.7, 0.5))  # x its size
+SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller box
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Pieces that may be meant."""
+
+    pieces: Mask  # (n,)
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Pieces that are meant, and what else might have been."""
+
+    pieces: Mask  # (n,)
+    others: tuple[Region, ...]  # the best first
+
+
+@dataclass(frozen=True)
+class _Taste:
+    """Exponents of what a part leaves of its whole, and of what it takes."""
+
+    minor: float
+    larger: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A photo to choose from."""
+
+    pieces: Pieces
+    salience: F32 | None  # (h, w) subject map at the pieces' size
+
+    def inside(self, prompt: Prompt) -> Mask:
+        """(n,) pieces most of which are in the prompt's box, and those of positive clicks."""
+        pieces = self.pieces
+        if prompt.box is None:
+            return np.ones(pieces.count, bool)
+        shape, photo = pieces.shape, pieces.photo_shape
+        fine = box_mask(photo, prompt).astype(np.float32)
+        small = cv2.resize(fine, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+        inside = pieces.mean(small) > 0.5
+        for click in prompt.clicks:
+            if click.is_foreground:
+                inside[pieces.at(click.x, click.y)] = True
+        return inside
+
+
+def choose(ground: Ground, prompt: Prompt) -> Choice:
+    """What the prompt means before its further clicks: by the first, its box, or the subject."""
+    inside = ground.inside(prompt)
+    first = next((c for c in prompt.clicks if c.is_foreground), None)
+    if prompt.is_subject:
+        return _subjects(ground, inside)
+    if first is None:
+        return _in_box(ground, inside)
+    whole = _around_click(ground, first, inside)
+    if prompt.level == "part":
+        return _part(ground, first, whole)
+    if prompt.level == "group":
+        group = _group(ground, first, whole.pieces) & inside
+        return Choice(group, (*whole.others, Region(group, whole.others[0].score)))
+    return whole
+
+
+def correct(ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...]) -> Choice:
+    """The part of the pieces `allowed` (n,) that a click on a wrong place means.
+
+    It holds none of `walls`, the pieces of clicks that say the contrary.
+    """
+    regions = _parts(ground, click, allowed, walls, _Taste(MINOR_CORRECTION, LARGER_CORRECTION))
+    regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
+    return Choice(regions[0].pieces, tuple(regions))
+
+
+def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
+    """The whole object that a click is on."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    growth = pieces.grow(piece)
+    masks = [pieces.region(growth, k) & inside for k in growth.peaks()]
+    subject = _subject_around(ground, piece)
+    if subject is not None:
+        subject = subject * inside
+        masks.append(subject > 0.5)
+    regions = [
+        Region(mask, _score(ground, mask, subject) * _centred(pieces, mask, click) ** CENTRED_WHOLE)
+        for mask in masks
+        if mask[piece] and not mask.all()
+    ]
+    if not regions:
+        raise SelectionError("nothing stands out there: draw a box or add clicks")
+    regions = _likeliest(pieces, regions, SHARP_WHOLE)
+    chosen = regions[0].pieces
+    if subject is not None:
+        settled = _settle(pieces, chosen, subject)
+        chosen = settled if settled[piece] else chosen
+    return Choice(chosen, tuple(regions))
+
+
+def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
+    """The part of a whole that a click is on; the whole where it has none."""
+    pieces = ground.pieces
+    least = max(SMALLEST_PART * pieces.share(whole.pieces), SMALLEST_PIECES / pieces.count)
+    regions = _parts(ground, click, whole.pieces, (), _Taste(MINOR_PART, 0.0))
+    regions = [region for region in regions if pieces.share(region.pieces) > least]
+    if not regions:
+        return whole
+    regions = _likeliest(pieces, regions, SHARP_PART)
+    return Choice(regions[0].pieces, tuple(regions))
+
+
+def _parts(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """The parts of `allowed` (n,) around a click."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    allowed = allowed.copy()
+    allowed[piece] = True
+    growth = pieces.grow(piece, allowed, tuple(w for w in walls if w != piece))
+    total = pieces.area[allowed].sum()
+    regions = []
+    for k in growth.peaks():
+        mask = pieces.region(growth, k)
+        contrast, left = growth.contrast[k], 1 - growth.area[k] / total
+        if growth.is_closed[k]:
+            contrast, left = ALL_OF_IT, 1.0
+        centred = _centred(pieces, mask, click) ** CENTRED_PART
+        size = (growth.area[k] / total) ** taste.larger * max(left, 1e-3) ** taste.minor
+        regions.append(Region(mask, float(contrast * centred * size)))
+    return regions
+
+
+def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:
+    """The regions, those first whose overlap (IoU) with what is meant is expected to be largest.
+
+    Each may be meant, the more the better its score: a region like several good ones is a safer
+    answer than the best one that none is like.
+    """
+    masks = np.array([region.pieces for region in regions], np.float64)
+    weights = np.array([region.score for region in regions]) + 1e-12
+    weights = (weights / weights.max()) ** sharpness
+    both = (masks * pieces.area) @ masks.T
+    areas = np.diag(both)
+    overlaps = both / np.maximum(areas[:, None] + areas - both, 1e-9)
+    expected = overlaps @ weights
+    return [regions[k] for k in np.argsort(-expected, kind="stable")]
+
+
+def _group(ground: Ground, click: Click, whole: Mask) -> Mask:
+    """(n,) `whole` with what it stands with, and with what is like it elsewhere in the photo."""
+    pieces = ground.pieces
+    growth = pieces.grow(pieces.at(click.x, click.y))
+    larger = [pieces.region(growth, k) | whole for k in growth.peaks()]
+    larger = [m for m in larger if pieces.share(m) > LARGER_GROUP * pieces.share(whole)]
+    plain = Ground(pieces, None)
+    scored = [(_score(plain, mask, None), k) for k, mask in enumerate(larger) if not mask.all()]
+    best, k = max(scored, default=(0.0, -1))
+    group = larger[k] if best > WORTH_A_GROUP * _score(plain, whole, None) else whole
+    gap = np.square(pieces.features - pieces.features[whole].mean(0)).sum(-1)
+    like = (gap <= ALIKE * np.quantile(gap[whole], LIKENESS)) & ~whole
+    for island in _islands(pieces, like):
+        if LIKE_AREA[0] < pieces.share(island) / pieces.share(whole) < LIKE_AREA[1]:
+            group = group | island
+    return group
+
+
+def _subjects(ground: Ground, inside: Mask) -> Choice:
+    """The photo's subject: what hangs together with the inmost place of each of its pieces."""
+    if ground.salience is None or ground.salience.max() <= 0.5:
+        raise SelectionError("no subject stands out in this photo: click the object")
+    salient = (ground.salience > 0.5) & ground.pieces.paint(inside)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(salient.astype(np.uint8))
+    if count == 1:
+        raise SelectionError("no subject stands out in the box: click the object")
+    largest = stats[1:, cv2.CC_STAT_AREA].max()
+    (height, width), (tall, wide) = ground.pieces.shape, ground.pieces.photo_shape
+    choices = []
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] >= SMALLEST_SUBJECT * largest:
+            depth = _depth(labels == k)
+            row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+            place = (float(column) + 0.5) * wide / width, (float(row) + 0.5) * tall / height
+            choices.append(_around_click(ground, Click(*place), inside))
+    together = np.any([choice.pieces for choice in choices], axis=0)
+    others = choices[0].others if len(choices) == 1 else (Region(together, 1.0),)
+    return Choice(together, others)
+
+
+def _in_box(ground: Ground, inside: Mask) -> Choice:
+    """The object that a box encloses: it reaches the box's sides and does not go beyond them."""
+    pieces = ground.pieces
+    if not inside.any():
+        raise SelectionError("the box is too small to hold an object: draw a larger one")
+    box = _extent(pieces, inside)
+    subject = None if ground.salience is None else pieces.mean(ground.salience) * inside
+    candidates: list[tuple[float, Mask]] = []  # leak, pieces
+    smallest = SMALLEST_IN_BOX * pieces.share(inside)
+    if subject is not None and pieces.share(subject > 0.5) > smallest:
+        candidates.append((0.0, subject > 0.5))
+    else:
+        subject = None
+    for across, down in SEEDS_IN_BOX:
+        place = box[0] + across * (box[2] - box[0]), box[1] + down * (box[3] - box[1])
+        seed = int(pieces.labels[int(place[1]), int(place[0])])
+        for growth in (pieces.grow(seed), pieces.grow(seed, inside | _only(pieces, seed))):
+            for k in growth.peaks():
+                region = pieces.region(growth, k)
+                within = region & inside
+                if pieces.share(within) > smallest and not within.all():
+                    leak = 1 - pieces.share(within) / pieces.share(region)
+                    candidates.append((leak, within))
+
+    def score(leak: float, mask: Mask) -> float:
+        left, top, right, bottom = _extent(pieces, mask)
+        reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
+        return (1 - leak) * reach**0.5 * _score(ground, mask, subject, is_boxed=True)
+
+    regions = [Region(mask, score(leak, mask)) for leak, mask in candidates]
+    if not regions:
+        return Choice(inside, (Region(inside, 1.0),))
+    regions.sort(key=lambda region: -region.score)
+    chosen = regions[0].pieces
+    if subject is not None:
+        chosen = _settle(pieces, chosen, subject)
+    return Choice(chosen, tuple(regions))
+
+
+def _score(ground: Ground, mask: Mask, subject: F64 | None, is_boxed: bool = False) -> float:
+    """How much pieces (n,) are one whole object. `subject` (n,): the one that was clicked."""
+    pieces = ground.pieces
+    contrast = pieces.contrast(mask)
+    if subject is not None:
+        both = (np.minimum(mask, subject) * pieces.area).sum()
+        either = (np.maximum(mask, subject) * pieces.area).sum()
+        return float(contrast * (both / max(either, 1e-6)) ** AGREEMENT)
+    share, frame = pieces.share(mask), pieces.frame[mask].sum()
+    score = contrast * (1 - frame) ** FREE_FRAME * (1 - share**2) * share**LARGER
+    if ground.salience is not None and not is_boxed:  # another subject is not meant
+        other = pieces.mean(ground.salience) * pieces.area
+        score *= 1 - other[mask].sum() / max(other.sum(), 1.0)
+    return float(score)
+
+
+def _settle(pieces: Pieces, chosen: Mask, subject: F64) -> Mask:
+    """(n,) the chosen pieces, decided anew where the subject map (n,) does not agree."""
+    is_object = chosen & (subject > SURE_SALIENCE)
+    is_ground = ~chosen & (subject < 1 - SURE_SALIENCE)
+    if not (is_object.any() and is_ground.any()):
+        return chosen
+    return pieces.settle(is_object, is_ground) > 0.5
+
+
+def _subject_around(ground: Ground, piece: int) -> F64 | None:
+    """(n,) the subject map without what does not hang together with a piece; None off it."""
+    pieces, salience = ground.pieces, ground.salience
+    here = pieces.labels == piece
+    if salience is None or salience[here].mean() <= 0.5:
+        return None
+    _, labels = cv2.connectedComponents((salience > 0.5).astype(np.uint8))
+    found = np.bincount(labels[here & (labels > 0)])
+    if not found.size:
+        return None
+    own = (labels == found.argmax()).astype(np.uint8)
+    fringe = cv2.dilate(own, np.ones((9, 9), np.uint8)) > 0
+    other = (labels > 0) & (own == 0)
+    return pieces.mean(np.where(fringe & ~other, salience, np.where(other, 0, salience * 0.5)))
+
+
+def _centred(pieces: Pieces, mask: Mask, click: Click) -> float:
+    """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
+    depth = _depth(pieces.paint(mask)[::2, ::2])
+    column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
+    near = depth[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    here = near.max() if near.size else 0.0
+    return max(float(here / max(depth.max(), 1e-6)), OFF_CENTRE)
+
+
+def _depth(mask: Mask) -> F32:
+    """(h, w) px to the edge of a mask; the frame is one."""
+    framed = np.pad(mask, 1).astype(np.uint8)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
+
+
+def _islands(pieces: Pieces, mask: Mask) -> list[Mask]:
+    """The connected sets (n,) of pieces in a mask (n,)."""
+    linked = mask[pieces.left] & mask[pieces.right]
+    ends = (pieces.left[linked], pieces.right[linked])
+    graph = coo_array((np.ones(int(linked.sum())), ends), (pieces.count, pieces.count))
+    _, labels = connected_components(graph, directed=False)
+    return [(labels == k) & mask for k in np.unique(labels[mask])]
+
+
+def _only(pieces: Pieces, piece: int) -> Mask:
+    alone = np.zeros(pieces.count, bool)
+    alone[piece] = True
+    return alone
+
+
+def _extent(pieces: Pieces, mask: Mask) -> tuple[int, int, int, int]:
+    """left, top, right, bottom px of the reduced photo that pieces (n,) reach."""
+    painted = pieces.paint(mask)
+    rows, columns = np.flatnonzero(painted.any(1)), np.flatnonzero(painted.any(0))
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1

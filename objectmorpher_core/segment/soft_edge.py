@@ -1,0 +1,243 @@
+"""Alpha at the edge of a hard mask, found from coarse to fine.
+
+How wide the edge is nobody knows beforehand: a sharp one is two pixels, hair may be a hundred. So
+the band is as wide as hair, and the farther a pixel is from the mask's edge, the more the picture
+must say before it leaves its side, and the more yet where the colours on both sides are alike. That
+is solved where the photo is small; at each larger size only what was found soft is looked at again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, Mask, Pixels, Selection
+from ..threads import in_threads
+from .closed_form import Expected, affine, solve_alpha
+from .halving import doubled, halved, halved_pixels, unit
+from .mask_edit import FULL, is_selected
+
+COARSEST = 2.0  # px of band from which on it is not halved any more
+WHOLE = 4.0  # px of band up to which all of it is solved for
+ASTRAY = 0.7  # x band: how far a mask's edge may be from the true one
+TUNED = 2.9  # px of band at which the weights below hold
+BESIDE = 1e-3  # weight of the mask within ASTRAY of its edge
+FAR = 0.3  # and at the band's end
+CLEAR = 20.0  # variances that colours are apart: then the mask counts half as much
+WINDOW = 3.0  # px, deviation of the window they are gathered in, at the size that takes
+LEAST_SPREAD = 1e-4  # a variance of sRGB: a hundredth is never told apart
+RIDGE = 1.75  # px: half-width from which on the middle of a limb is certain
+TAIL = 0.02  # alpha that is as good as none
+POLISHED = 12.0  # px of band up to which the larger picture is solved for once more
+HAZE = 0.5  # alpha that may be chance where the mask is clear about a pixel
+PLAIN = 0.3  # alpha on the mask's other side that is no chance
+BEYOND = 1.0  # x band: from which on it is the other side
+NEARBY = 2.0  # x band: how far such a pixel vouches for those around it
+KEPT = 0.01  # weight of what the smaller picture gave
+THIN = 5  # px: narrower parts may have been lost in the smaller picture
+ROUNDS = (120, 60, 4)  # of conjugate gradients: coarsest size, whole band, fine sizes
+TILE = 256  # px
+OVERLAP = 12  # px that a tile sees around itself
+
+Window = tuple[slice, slice]
+
+
+@dataclass(frozen=True, eq=False)
+class _Size:
+    """A crop at one of its sizes, and what is known of it."""
+
+    pixels: np.ndarray  # (h, w, 3) the photo's own, or in [0, 1]
+    band: float  # px: how far the mask's edge may be off, about
+    mask: Mask  # (h, w)
+    drawn: Mask  # (h, w) where alpha is the artist's
+    coverage: np.ndarray  # (h, w) that alpha, u8 or in [0, 1]
+
+    def rgb(self, window: Window) -> F32:
+        """A part of it, in [0, 1]."""
+        return unit(self.pixels[window])
+
+    def drawn_alpha(self) -> F32:
+        if self.coverage.dtype == np.float32:
+            return self.coverage
+        return self.coverage * np.float32(1 / FULL)
+
+    def half(self) -> _Size:
+        pixels = halved_pixels(self.pixels)
+        # What is thin stays, however small the picture.
+        share, thin = (halved(m.astype(np.float32)) for m in (self.mask, _thin(self.mask, 3)))
+        mask = (share >= 0.5) | (thin >= 0.25)
+        if not self.drawn.any():
+            nothing = np.zeros_like(mask)
+            return _Size(pixels, self.band / 2, mask, nothing, nothing.astype(np.float32))
+        drawn = halved(self.drawn.astype(np.float32)) >= 0.5
+        return _Size(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha()))
+
+
+def find_alpha(
+    pixels: Pixels, selection: Selection, drawn: Mask, band: float, reach: float
+) -> F32:  # fmt: skip
+    """Alpha (h, w) of what is selected in a crop (h, w, 3).
+
+    `band` px is what the mask's edge may be off, about; within `reach` px of it alpha may be soft.
+    Where it is `drawn` (h, w), alpha is the selection's own.
+    """
+    coverage = selection if drawn.any() else np.zeros(drawn.shape, np.uint8)
+    sizes = [_Size(pixels, band, is_selected(selection), drawn, coverage)]
+    while sizes[-1].band > COARSEST and min(drawn.shape) >> len(sizes) > 2 * THIN:
+        sizes.append(sizes[-1].half())
+    alpha: F32 | None = None
+    small: _Size | None = None
+    for k in reversed(range(len(sizes))):
+        size = sizes.pop()
+        if alpha is None or small is None or size.band <= WHOLE:
+            alpha = _whole_band(size, reach * 0.5**k, alpha)
+        else:
+            alpha = _sharper(size, alpha, small)
+        small = size
+    assert alpha is not None, "there is at least one size"
+    return alpha
+
+
+def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
+    """Alpha (h, w) of a small picture; `before` is that of half its size."""
+    band = size.band
+    distance = signed_distance(size.mask)
+    ridge = distance >= cv2.dilate(distance, np.ones((3, 3), np.uint8)) - 0.25
+    away = np.abs(distance)
+    unknown = (away < reach) & ~(ridge & (distance > RIDGE)) & ~size.drawn
+    astray = ASTRAY * band
+    window = (slice(None), slice(None))
+    clearness = _clearness(size.rgb(window), distance, reach)
+    doubt = 1 / (1 + (clearness / CLEAR) ** 2)
+    weight = BESIDE + FAR * doubt * np.clip((away - astray) / max(reach - astray, 0.5), 0, 1)
+    weight *= (TUNED / band) ** 2  # the same influence, over more pixels
+    likely = np.clip(0.5 + distance / (2 * astray), 0, 1)
+    alpha = np.where(unknown, likely, size.mask).astype(np.float32)
+    alpha[size.drawn] = size.drawn_alpha()[size.drawn]
+    start = alpha if before is None else doubled(before, alpha.shape)
+    rounds = ROUNDS[0] if before is None else ROUNDS[1]
+    expected = Expected(alpha, weight.astype(np.float32))
+    solved = solve_alpha(size.rgb(window), unknown, expected, start, rounds)
+    clear = _cleared(solved, distance, astray, band)
+    return _cleaned(np.where(unknown, clear, solved), unknown)
+
+
+def _clearness(rgb: F32, distance: F32, reach: float) -> F32:
+    """(h, w) how far apart the colours of object and background are nearby.
+
+    In their variances, along the line between their means. Hair before a plain sky is told from
+    it whatever the mask says; before a shelf it is not.
+    """
+    height, width = distance.shape
+    scale = min(WINDOW / reach, 1.0)
+    size = (max(round(width * scale), 1), max(round(height * scale), 1))
+    means, spreads = [], []
+    for there in (distance > 0.5 * reach, distance < -reach):
+        share = np.maximum(_near(there.astype(np.float32), size), 1e-9)[..., None]
+        mean = _near(rgb * there[..., None], size) / share
+        square = _near(rgb * rgb * there[..., None], size) / share
+        means.append(mean)
+        spreads.append(np.maximum(square - mean * mean, 0))
+    apart = (means[0] - means[1]) ** 2
+    length = apart.sum(2)
+    spread = (apart * (spreads[0] + spreads[1])).sum(2) / np.maximum(length, 1e-9)
+    clearness = length / (spread + LEAST_SPREAD)
+    return np.asarray(cv2.resize(clearness, (width, height)), np.float32)
+
+
+def _near(image: F32, size: tuple[int, int]) -> F32:
+    """Mean of the surroundings, at a smaller `size`; where there is nothing, of what is farther."""
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    near, far = (cv2.GaussianBlur(small, (0, 0), k * WINDOW) for k in (1, 4))
+    return np.asarray(near + 1e-6 * far, np.float32)
+
+
+def _cleared(alpha: F32, distance: F32, astray: float, band: float) -> F32:
+    """`alpha` (h, w) without the haze that chance likenesses leave beside a sharp edge.
+
+    Where hair stands, or a blur, something nearby is surely on the mask's other side; haze is
+    faint all over. `distance` (h, w) px is the mask's, `astray` px what its edge may be off.
+    """
+    away = np.abs(distance)
+    strayed = np.where(away > BEYOND * band, np.abs(alpha - (distance > 0)), 0).astype(np.float32)
+    square = np.ones((2 * round(NEARBY * band) + 1,) * 2, np.uint8)
+    strongest = cv2.blur(cv2.dilate(strayed, square), square.shape)
+    is_haze = np.clip(2 * (1 - strongest / PLAIN), 0, 1)
+    haze = HAZE * is_haze * np.clip((away - astray) / band, 0, 1)
+    return np.clip(np.where(distance < 0, alpha - haze, alpha) / (1 - haze), 0, 1)
+
+
+def _sharper(size: _Size, before: F32, small: _Size) -> F32:
+    """Alpha (h, w), from that of half the size, `small`."""
+    soft = ((before > 0) & (before < 1)).astype(np.uint8)
+    soft = cv2.dilate(soft, np.ones((3, 3), np.uint8))
+    shape = size.mask.shape
+    thin = cv2.dilate(_thin(size.mask, THIN).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    unknown = np.repeat(np.repeat(soft, 2, 0), 2, 1)[: shape[0], : shape[1]] > 0
+    unknown = (unknown | thin) & ~size.drawn
+    alpha = np.ascontiguousarray(doubled(before, shape))
+    np.copyto(alpha, size.mask, where=thin)
+    np.copyto(alpha, alpha >= 0.5, where=~unknown)
+    if size.drawn.any():
+        alpha[size.drawn] = size.drawn_alpha()[size.drawn]
+    found: dict[int, F32] = {}
+    tiles = [tile for tile in _tiles(shape) if unknown[tile].any()]
+
+    def solve(first: int, last: int) -> None:
+        for k in range(first, last):
+            found[k] = _sharper_tile(size, (alpha, unknown), (small, before), tiles[k])
+
+    in_threads(solve, len(tiles), parts=4)
+    for k, tile in enumerate(tiles):  # not sooner: tiles look at what is around them
+        alpha[tile] = found[k]
+    return alpha
+
+
+def _sharper_tile(
+    size: _Size, now: tuple[F32, Mask], half: tuple[_Size, F32], tile: Window
+) -> F32:  # fmt: skip
+    """One tile of `_sharper`: alpha and what is unknown `now`, and the picture of half the size."""
+    (alpha, unknown), (small, before) = now, half
+    rows, columns = (slice(max(s.start - OVERLAP, 0), s.stop + OVERLAP) for s in tile)
+    around = (rows, columns)
+    inner = tuple(slice(s.start - a.start, s.stop - a.start)
+                  for s, a in zip(tile, around, strict=True))  # fmt: skip
+    coarse = (slice(rows.start // 2, (rows.stop + 1) // 2),
+              slice(columns.start // 2, (columns.stop + 1) // 2))  # fmt: skip
+    rgb, is_open = size.rgb(around), unknown[around]
+    functions = doubled(affine(small.rgb(coarse), before[coarse]), rgb.shape)
+    start = np.einsum("hwc,hwc->hw", functions[..., :3], rgb) + functions[..., 3]
+    start = np.where(is_open, np.clip(start, 0, 1), alpha[around]).astype(np.float32)
+    if size.band <= POLISHED:
+        expected = Expected(alpha[around], np.full(start.shape, KEPT, np.float32))
+        start = solve_alpha(rgb, is_open, expected, start, ROUNDS[2])
+    return _cleaned(start, is_open)[inner[0], inner[1]]
+
+
+def _cleaned(alpha: F32, unknown: Mask) -> F32:
+    """`alpha` (h, w) without traces: what is next to nothing is nothing."""
+    clean = np.clip((alpha - TAIL) / (1 - 2 * TAIL), 0, 1)
+    return np.where(unknown, clean, alpha).astype(np.float32)
+
+
+def _thin(mask: Mask, px: int) -> Mask:
+    """(h, w) the parts of a mask that are narrower than `px`."""
+    square = np.ones((px, px), np.uint8)
+    return mask & ~cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, square).view(np.bool_)
+
+
+def _tiles(shape: tuple[int, ...]) -> Iterator[Window]:
+    for y in range(0, shape[0], TILE):
+        for x in range(0, shape[1], TILE):
+            yield slice(y, min(y + TILE, shape[0])), slice(x, min(x + TILE, shape[1]))
+
+
+def signed_distance(mask: Mask) -> F32:
+    """Distance in px (H, W) to the mask's edge, positive inside; the photo's frame is no edge."""
+    padded = np.pad(mask, 1, mode="edge").astype(np.uint8)
+    inside = cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    outside = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    return np.where(mask, inside - 0.5, 0.5 - outside).astype(np.float32)

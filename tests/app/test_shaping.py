@@ -1,0 +1,213 @@
+"""What is said about a shape, before and after the lift; objects out of files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CENTRE, lift_ball, wait_for_jobs
+from strokes import stroke
+
+from app.commands import COMMANDS, run, why_not
+from app.editor import Editor
+from app.tools.mask_tool import MaskTool
+from app.view import Painted, Selecting, ToolName
+from objectmorpher_core import edits, splat_files
+from objectmorpher_core.brush import Brush
+from objectmorpher_core.document import LiftedObject, Placement
+from objectmorpher_core.session_file import decode_session, encode_session
+from tests import shapes
+
+
+@pytest.fixture
+def editor(editor: Editor) -> Iterator[Editor]:
+    editor.view.selecting, editor.view.brush = Selecting(), Brush(10.0, 1.0)
+    yield editor
+    editor.view.selecting, editor.view.brush = Selecting(), Brush()
+
+
+def lifted_of(editor: Editor) -> LiftedObject:
+    assert editor.object is not None and editor.object.lifted is not None, editor.message
+    return editor.object.lifted
+
+
+def depth_range(editor: Editor) -> float:
+    """World units, of the body."""
+    lifted = lifted_of(editor)
+    return float(np.ptp(lifted.world_points(lifted.body.means)[:, 2])) / lifted.scale
+
+
+def paint(editor: Editor, kind: Painted, *places: tuple[float, float], **held: bool) -> None:
+    editor.view.tool, editor.view.selecting.painted = ToolName.MASK, kind
+    stroke(editor, MaskTool(), *editor.view.canvas_from_image(np.array(places)), **held)
+    wait_for_jobs(editor)
+
+
+def test_the_thickness_is_live_and_one_step(editor: Editor) -> None:
+    lift_ball(editor)
+    document, before = editor.document, depth_range(editor)
+    for share in (1.2, 1.5, 0.5):
+        editor.shaping.preview_thickness(share)
+        assert editor.jobs.is_idle, "nothing is asked of the worker"
+    assert editor.committed is document
+    assert depth_range(editor) < 0.75 * before
+    editor.commit("Thickness")
+    assert editor.shaping.settings.thickness == 0.5
+    run(editor, "undo")
+    assert editor.document is document
+    assert editor.shaping.settings.thickness == 1.0
+
+
+def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor) -> None:
+    lift_ball(editor)
+    assert editor.document is not None
+    here = editor.posing.surface_at(editor.view.canvas_from_image(np.array(CENTRE)))
+    assert here is not None
+    target = here.rest + np.array([0.2, 0.0, 0.0])
+    changed = edits.add_handle(editor.document, editor.current, here.rest, target)
+    scale = lifted_of(editor).scale
+    editor.apply("Move handle", editor.derived.solved(changed, editor.current, None))
+    editor.shaping.preview_thickness(0.6)
+    editor.commit("Thickness")
+    thing = editor.object
+    assert thing is not None and thing.pose is not None and thing.lifted is not None
+    (handle,) = thing.handles
+    world = thing.lifted.world_points(handle.point)
+    assert np.abs(editor.document.photo.camera.project(world) - CENTRE).max() < 2.0
+    dragged = (handle.target - handle.point) * thing.lifted.scale
+    assert dragged[0] == pytest.approx(0.2 * scale, rel=1e-6), "as far as before"
+    reached = (
+        thing.pose.points[handle.control_point] - thing.lifted.control_points[handle.control_point]
+    )
+    assert reached[0] * thing.lifted.scale == pytest.approx(0.2 * scale, rel=0.2)
+
+
+def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
+    lift_ball(editor)
+    first = lifted_of(editor)
+    editor.shaping.say("Other side", back="mirrored")
+    wait_for_jobs(editor)
+    assert lifted_of(editor) is not first
+    assert editor.history is not None and editor.history.undo_label == "Other side"
+    assert lifted_of(editor).splatting == "surface"
+    editor.shaping.say("Other side", back="continued")
+    wait_for_jobs(editor)
+    assert lifted_of(editor).splatting == "solid"
+
+
+def test_what_is_painted_nearer_comes_nearer(editor: Editor) -> None:
+    lift_ball(editor)
+    x, y = CENTRE
+    paint(editor, Painted.DEPTH, (x, y), (x + 4, y))
+    nearness = editor.shaping.settings.nearness
+    assert nearness is not None and nearness.max() > 0.05
+    near = lifted_of(editor)
+    paint(editor, Painted.DEPTH, (x, y), (x + 4, y), alt=True)
+    assert editor.shaping.settings.nearness is None, "as much back as forth"
+
+    def depth(lifted: LiftedObject) -> float:
+        gaps = ((lifted.texture.u0 - CENTRE) ** 2).sum(1)
+        seen = (lifted.texture.visibility > 0.5) & (lifted.texture.solidity > 0.5)
+        k = int(np.where(seen, gaps, np.inf).argmin())
+        return float(lifted.world_points(lifted.gaussians.means)[k, 2])
+
+    assert depth(near) < depth(lifted_of(editor)) - 0.02
+
+
+def test_words_before_the_lift_count_at_the_lift(editor: Editor) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    rows, columns = np.nonzero(editor.mask)
+    beside = (float(columns.max()) + 4, float(np.median(rows)))
+    paint(editor, Painted.HIDDEN, beside, (beside[0] + 3, beside[1]))
+    assert not editor.is_lifted
+    assert editor.shaping.settings.hidden is not None
+    run(editor, "lift")
+    wait_for_jobs(editor)
+    assert lifted_of(editor).texture.u0[:, 0].max() > beside[0]
+    text = encode_session(editor.document)  # type: ignore[arg-type]
+    again = decode_session(text).objects[0].shape
+    assert again.hidden is not None
+    assert (again.hidden == editor.shaping.settings.hidden).all()
+
+
+def test_escape_takes_a_painted_stroke_back(editor: Editor) -> None:
+    lift_ball(editor)
+    document = editor.document
+    editor.view.selecting.painted = Painted.HIDDEN
+    assert editor.shaping.start_stroke(is_inverse=False)
+    editor.shaping.paint(np.array(editor.view.canvas_from_image(np.array(CENTRE))))
+    assert editor.shaping.painted_layer() is not None
+    editor.shaping.drop_stroke()
+    assert editor.document is document
+    assert editor.shaping.painted_layer() is None
+
+
+def test_nothing_is_painted_about_a_shape_without_a_selection(editor: Editor) -> None:
+    editor.view.selecting.painted = Painted.DEPTH
+    assert not editor.shaping.start_stroke(is_inverse=False)
+    assert editor.message is not None and "Select an object" in editor.message.text
+
+
+@pytest.fixture
+def figure(tmp_path: Path) -> Path:
+    """An object's file: the ball of a test scene."""
+    path = tmp_path / "figure.ply"
+    path.write_bytes(splat_files.encode(shapes.scene("ellipse", 1500).lifted.body, path))
+    return path
+
+
+def test_an_object_out_of_a_file_takes_the_place_of_what_is_selected(
+    editor: Editor, figure: Path
+) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    editor.filing.drop([figure])
+    wait_for_jobs(editor)
+    assert lifted_of(editor).middle is None, editor.message
+    assert editor.message is not None and "agrees" in editor.message.text
+    fitting = editor.shaping.fitting
+    assert fitting is not None and fitting.chosen.iou > 0.8
+    assert why_not(editor, "fit_again") is None
+    editor.shaping.preview_thickness(0.5)
+    assert editor.preview is None, "a file's shape has no thickness"
+
+
+def test_placed_by_hand_it_is_fitted_from_there(editor: Editor, figure: Path) -> None:
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    editor.shaping.open_file(figure)
+    wait_for_jobs(editor)
+    fitting = editor.shaping.fitting
+    assert fitting is not None
+    editor.placing.move_to(Placement(move=(3.0, 2.0), scale=1.05))
+    editor.commit("Move object")
+    run(editor, "fit_again")
+    wait_for_jobs(editor)
+    again = editor.shaping.fitting
+    assert again is not None and again is not fitting
+    assert again.chosen.score >= fitting.chosen.score - 0.02
+    assert editor.object is not None and editor.object.placement.is_identity
+
+
+@pytest.mark.parametrize("name", ["missing.glb", "damaged.ply"])
+def test_a_bad_file_is_a_sentence_and_nothing_is_lost(
+    editor: Editor, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / name
+    if name.startswith("damaged"):
+        path.write_bytes(b"ply\nnothing")
+    lift_ball(editor)
+    document = editor.document
+    editor.shaping.open_file(path)
+    wait_for_jobs(editor)
+    assert editor.message is not None and editor.message.is_error
+    assert name in editor.message.text.lower()
+    assert editor.document is document
+
+
+def test_every_word_has_a_command_or_a_field() -> None:
+    assert {"import_shape", "fit_again", "clear_painted"} <= set(COMMANDS)

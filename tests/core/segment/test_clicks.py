@@ -1,0 +1,214 @@
+"""Each click is obeyed, helps where it is, and changes nothing far from it: on real photos."""
+
+from __future__ import annotations
+
+import pickle
+import time
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from objectmorpher_core import segment
+from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.progress import silent
+from tests.core.segment.simulated_user import Step, boundary_f, inmost, overlap, use
+from tests.core.segment.truth_masks import TRUTHS, draw_mask, truth, truth_mask
+from tests.photos import photo
+
+HELPS = 0.01  # IoU that a click in the middle of the largest error may cost
+FEW = ("astronaut", "coffee", "dahlia", "spoon")
+RANDOM_CLICKS = 6
+LATENCY = 0.3  # x the time of encoding: a click's, once the photo is encoded
+
+
+@cache
+def dino() -> segment.Segmenter:
+    backend = segment.load("dino")
+    for reason in (backend.missing(), segment.load("subject").missing()):
+        if reason is not None:
+            pytest.skip(reason)
+    return backend
+
+
+@cache
+def embedding(name: str) -> Any:
+    return dino().encode(photo(name), silent)
+
+
+def select(name: str, *clicks: tuple, level: str = "object") -> np.ndarray:
+    """The mask of clicks x, y, is_foreground on a photo."""
+    asked = Prompt(tuple(Click(*click) for click in clicks), level=level)
+    return dino().segment(photo(name), asked, embedding(name), silent)
+
+
+@cache
+def steps(name: str) -> list[Step]:
+    """What three clicks of the simulated user give."""
+    each = truth(name)
+    rgb, known = photo(each.photo), embedding(each.photo)
+    return use(
+        lambda prompt: dino().segment(rgb, prompt, known, silent),
+        truth_mask(name), 3, each.kind == "part",
+    )  # fmt: skip
+
+
+# The truth ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [each.name for each in TRUTHS])
+def test_a_reference_mask_is_what_its_outline_draws(name):
+    np.testing.assert_array_equal(truth_mask(name), draw_mask(name))
+    assert truth_mask(name).shape == photo(truth(name).photo).shape[:2]
+
+
+def test_a_third_of_the_objects_is_held_out():
+    held = sum(each.is_held_out for each in TRUTHS)
+    assert len(TRUTHS) <= 3 * held + 2
+    assert sum(each.kind == "part" for each in TRUTHS) >= 4
+    assert sum(each.kind == "whole" for each in TRUTHS) >= 10
+
+
+def test_the_measures_tell_a_shifted_outline():
+    mask = truth_mask("dahlia")
+    assert boundary_f(mask, mask) == overlap(mask, mask) == 1
+    assert boundary_f(np.roll(mask, 1, axis=1), mask) > 0.99
+    assert boundary_f(np.roll(mask, 8, axis=1), mask) < 0.7
+    x, y = inmost(mask)
+    assert mask[int(y), int(x)]
+
+
+# Clicks ---------------------------------------------------------------------------------------
+
+
+def test_three_clicks_select_what_is_meant():
+    found = {name: steps(name) for name in FEW}
+    wholes = [found[name] for name in FEW if truth(name).kind == "whole"]
+    parts = [found[name] for name in FEW if truth(name).kind == "part"]
+    assert np.mean([each[0].iou for each in wholes]) > 0.9
+    assert np.mean([each[-1].iou for each in wholes]) > 0.95
+    assert np.mean([each[-1].boundary for each in wholes]) > 0.8
+    assert np.mean([each[-1].iou for each in parts]) > 0.85
+
+
+@pytest.mark.slow
+def test_all_objects_but_the_held_out_ones_are_selected():
+    tuned = [steps(each.name) for each in TRUTHS if not each.is_held_out and each.kind == "whole"]
+    assert np.mean([each[0].iou for each in tuned]) > 0.83
+    assert np.mean([each[-1].iou for each in tuned]) > 0.91
+    assert np.mean([each[-1].boundary for each in tuned]) > 0.79
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_further_click_helps(name):
+    ious = [step.iou for step in steps(name)]
+    assert min(np.diff(ious), default=0) > -HELPS
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_every_click_is_obeyed(name):
+    for step in steps(name):
+        for click in step.prompt.clicks:
+            assert step.mask[int(click.y), int(click.x)] == click.is_foreground
+
+
+def test_a_correction_changes_nothing_that_hangs_not_together_with_it():
+    before = select("astronaut", (193, 350))
+    after = select("astronaut", (193, 350), (15, 494, False))
+    rows, columns = np.nonzero(before != after)
+    assert rows.size > 0
+    assert columns.max() < 120
+    assert rows.min() > 350
+
+
+def test_the_order_of_later_clicks_is_the_users():
+    clicks = [(180, 440), (400, 430, False), (15, 494, False)]
+    fresh = select("astronaut", *clicks)
+    select("astronaut", (300, 60))  # another question in between
+    np.testing.assert_array_equal(fresh, select("astronaut", *clicks))
+
+
+def test_a_second_instance_answers_the_same_at_once():
+    clicks = [(180, 440), (400, 430, False)]
+    kept = pickle.loads(pickle.dumps(embedding("astronaut")))
+    asked = Prompt(tuple(Click(*click) for click in clicks))
+    other = segment.load("dino").segment(photo("astronaut"), asked, kept, silent)
+    np.testing.assert_array_equal(other, select("astronaut", *clicks))
+
+
+def test_a_click_anywhere_selects_what_it_is_on_part_in_object_in_group():
+    name = "coffee"
+    rng = np.random.default_rng(0)
+    height, width = photo(name).shape[:2]
+    for _ in range(RANDOM_CLICKS):
+        x, y = rng.uniform(0, width), rng.uniform(0, height)
+        whole = select(name, (x, y))
+        part, group = (select(name, (x, y), level=level) for level in ("part", "group"))
+        assert part[int(y), int(x)]
+        assert not (part & ~whole).any()
+        assert not (whole & ~group).any()
+
+
+def test_nothing_outside_a_box_is_chosen_and_a_box_is_enough():
+    mask = truth_mask("dahlia")
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    box = float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
+    found = dino().segment(photo("flower"), Prompt(box=box), embedding("flower"), silent)
+    outside = np.ones_like(found)
+    outside[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = False
+    assert not (found & outside).any()
+    assert overlap(found, mask) > 0.85
+
+
+def test_a_thin_thing_is_not_lost_at_its_edges():
+    image = np.full((200, 240, 3), 60, np.uint8)
+    cv2.line(image, (30, 100), (210, 96), (220, 210, 200), 5)
+    image += np.random.default_rng(0).integers(0, 6, image.shape, dtype=np.uint8)
+    drawn = np.zeros(image.shape[:2], np.uint8)
+    cv2.line(drawn, (30, 100), (210, 96), (1,), 5)
+    found = dino().segment(image, Prompt((Click(120, 98),)), None, silent)
+    assert overlap(found, drawn > 0) > 0.7
+
+
+# How sure, how fast, how large ----------------------------------------------------------------
+
+
+def test_it_is_less_sure_of_what_is_less_right():
+    told, true = [], []
+    for name in FEW:
+        each = truth(name)
+        for step in steps(name):
+            rgb, known = photo(each.photo), embedding(each.photo)
+            sureness = dino().confidence(rgb, step.prompt, known)
+            assert sureness is not None
+            assert 0 <= sureness <= 1
+            if each.kind == "whole" or step.prompt.level == "part":
+                told.append(sureness)
+                true.append(step.iou)
+    assert abs(np.mean(told) - np.mean(true)) < 0.1
+    assert segment.load("grabcut").confidence(photo("coffee"), Prompt(), None) is None
+
+
+def test_a_click_on_an_encoded_photo_is_much_faster_than_encoding():
+    start = time.process_time()
+    fresh = dino().encode(photo("coins"), silent)
+    encoding = time.process_time() - start
+    asked = [Prompt((Click(x, 190),)) for x in (100, 210, 270)]
+    seconds = []
+    for prompt in asked:
+        start = time.process_time()
+        dino().segment(photo("coins"), prompt, fresh, silent)
+        seconds.append(time.process_time() - start)
+    assert np.median(seconds) < LATENCY * encoding
+
+
+@pytest.mark.slow
+def test_a_small_thing_in_a_large_photo_is_found_in_its_tile():
+    large = cv2.resize(photo("camera"), (4096, 4096), interpolation=cv2.INTER_CUBIC)
+    mask = cv2.resize(truth_mask("tower").astype(np.float32), (4096, 4096)) > 0.5
+    known = dino().encode(large, silent)
+    found = use(lambda prompt: dino().segment(large, prompt, known, silent), mask, 3, False)
+    assert found[-1].iou > 0.6
+    assert found[-1].iou > found[0].iou
