@@ -56,8 +56,10 @@ def by_processor(splats: PosedSplats, camera) -> F32:
 
 def compare(project_pass, splats: PosedSplats, camera) -> None:
     gpu, processor = by_gpu(project_pass, splats, camera), by_processor(splats, camera)
-    shown = processor[:, p.WEIGHT] > 0
-    np.testing.assert_array_equal(gpu[:, COLUMNS.index(p.WEIGHT)] > 0, shown)
+    weights = gpu[:, COLUMNS.index(p.WEIGHT)], processor[:, p.WEIGHT]
+    # Backs begin at grazing: walls, which are there exactly at rest, are just shown or just not.
+    shown = np.maximum(*weights) > NEARLY_NOTHING
+    assert (np.minimum(*weights)[shown] > 0).all()
     for k in USED:
         column = COLUMNS[k]
         size = np.abs(processor[shown][:, column]).max()
