@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import F32, F64, Mask
 from ..camera import Camera
+from ..distances import distance_inside
 from ..document import LiftedObject, Matte
 from ..pixels import bilinear, crop
 from ..poisson_disk import thin_to_spacing
@@ -115,7 +116,7 @@ def _far_outside(lifted: LiftedObject, matte: Matte) -> Mask:
     """(N,) which Gaussians the photo shows background for, and not only beside the object."""
     there = (matte.alpha > SOFTEST).astype(np.uint8)
     pad = 2 + int(CUT * max(there.shape))
-    distance = cv2.distanceTransform(1 - np.pad(there, pad), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distance = distance_inside(1 - np.pad(there, pad))
     at = lifted.texture.u0 - [matte.left - pad, matte.top - pad]
     column, row = np.floor(at).astype(int).T
     height, width = distance.shape

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from ..arrays import F64, Mask
+from ..distances import distance_inside
 from ..pixels import bilinear
 from ..segment.matte import extended_mask, frame_extension
 
@@ -79,7 +80,7 @@ class Silhouette:
         reach = max(self.shape)
         h, w = self.shape
         box = self.continued(self.inside, reach).astype(np.uint8)
-        far = cv2.distanceTransform(box, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        far = distance_inside(box)
         far = far[reach : reach + h, reach : reach + w]
         return np.where(self.inside, np.maximum(far - 0.5, 0.25), 0.0) * self.cell
 
@@ -130,9 +131,7 @@ class Silhouette:
         at, (h, w) = self.grid_xy(xy), self.shape
         beyond = np.maximum(-at, at - [w - 1, h - 1]).max(initial=0)
         pad = int(np.ceil(beyond)) + 2
-        distance = cv2.distanceTransform(
-            1 - np.pad(self.inside, pad).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-        )
+        distance = distance_inside(~np.pad(self.inside, pad))
         dy, dx = np.gradient(cv2.GaussianBlur(distance, (0, 0), 1.0))
         direction = bilinear(np.stack([dx, dy], -1), at + pad)
         length = np.linalg.norm(direction, axis=1, keepdims=True)
