@@ -1,0 +1,1 @@
+"""Endless made-up objects whose whole shape is known, drawn over photographs."""
