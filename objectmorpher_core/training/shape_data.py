@@ -1,0 +1,158 @@
+"""Samples for the shape network: made in processes, kept in files, read as batches."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, RGB, Mask
+from .shapes.sample import SIDE, Sample, make_sample
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+SHARD = 32  # samples in a file
+NORMAL_STEPS = 127.0  # a normal's coordinate is kept in a byte
+OUTLINE_SCALE = 0.25  # crop's side, of the distance to the outline
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Tensors (n, ., s, s) float32 for `shape_net.ShapeNet` and its losses."""
+
+    planes: Tensor  # (n, 7, s, s)
+    tokens: Tensor  # (n, 384, g, g)
+    mask: Tensor  # (n, 1, s, s), as are the next four
+    front: Tensor
+    thickness: Tensor
+    depth: Tensor
+    edge: Tensor
+    normal: Tensor  # (n, 3, s, s)
+    rays: Tensor  # (n, 3, s, s) unit
+    away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
+
+
+def planes_of(rgb: RGB, mask: Mask, tangents: F32) -> F32:
+    """(7, s, s) what the network sees of a crop besides its tokens."""
+    side = len(mask)
+    distance = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    steps = ((np.arange(side, dtype=np.float32) + 0.5) / side - 0.5) * tangents[2]
+    x, y = np.meshgrid(steps + tangents[0], steps + tangents[1])
+    colours = rgb.transpose(2, 0, 1).astype(np.float32) / 255 - 0.45
+    own = [mask.astype(np.float32), distance / (OUTLINE_SCALE * side), x, y]
+    return np.concatenate([colours * 4, np.stack(own)]).astype(np.float32)
+
+
+def write_shards(folder: Path, first: int, count: int, families: tuple[str, ...] | None) -> None:
+    """Files of samples with the seeds first.., those that are not there yet, in all cores."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = [
+        (folder / f"{seed:08d}.npz", seed, families)
+        for seed in range(first, first + count, SHARD)
+        if not (folder / f"{seed:08d}.npz").exists()
+    ]
+    with ProcessPoolExecutor(os.cpu_count(), initializer=_begin) as pool:
+        for number, _ in enumerate(pool.map(_write, wanted), 1):
+            print(f"{number * SHARD} of {len(wanted) * SHARD} samples", flush=True)
+
+
+def _begin() -> None:
+    cv2.setNumThreads(1)
+
+
+def _write(job: tuple[Path, int, tuple[str, ...] | None]) -> None:
+    file, seed, families = job
+    samples = [make_sample(k, families=families) for k in range(seed, seed + SHARD)]
+    arrays = packed(samples)
+    arrays["tokens"] = _tokens(np.stack([s.rgb for s in samples]))
+    partial = file.with_suffix(".part")
+    with partial.open("wb") as out:
+        np.savez(out, **arrays)
+    partial.rename(file)
+
+
+def packed(samples: list[Sample]) -> dict[str, np.ndarray]:
+    """Arrays (n, ...) of samples, small."""
+    arrays: dict[str, np.ndarray] = {}
+    for field in fields(Sample):
+        values = [getattr(sample, field.name) for sample in samples]
+        array = np.array(values)
+        if field.name == "normal":
+            array = np.rint(array * NORMAL_STEPS).astype(np.int8)
+        elif field.name in ("front", "thickness", "depth"):
+            array = array.astype(np.float16)
+        arrays[field.name] = array
+    return arrays
+
+
+_ENCODER: list[Any] = []
+
+
+def _tokens(rgb: np.ndarray) -> np.ndarray:
+    """(n, 384, g, g) float16 of crops (n, s, s, 3)."""
+    from ..lift.shape_tokens import TokenNet
+
+    if not _ENCODER:
+        _ENCODER.append(TokenNet(threads=1))
+    return np.concatenate([_ENCODER[0].tokens(one)[None] for one in rgb]).astype(np.float16)
+
+
+def batches(files: list[Path], size: int, rng: np.random.Generator) -> Iterator[Batch]:
+    """All samples of the files, mixed within some files at a time, half of them mirrored."""
+    order = rng.permutation(len(files))
+    for begin in range(0, len(order), 8):
+        chosen = [dict(np.load(files[k])) for k in order[begin : begin + 8]]
+        joined = {name: np.concatenate([c[name] for c in chosen]) for name in chosen[0]}
+        mixed = rng.permutation(len(joined["mask"]))
+        for start in range(0, len(mixed) - size + 1, size):
+            rows = mixed[start : start + size]
+            picked = {name: array[rows] for name, array in joined.items()}
+            yield batch_of(picked, rng)
+
+
+def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = None) -> Batch:
+    """Of packed samples; with `rng`, their masks are made a little wrong, as a click's are."""
+    import torch
+
+    count = len(arrays["mask"])
+    masks = [m if rng is None else _worn(m, rng) for m in arrays["mask"]]
+    planes = [
+        planes_of(arrays["rgb"][k], masks[k], arrays["tangents"][k]) for k in range(count)
+    ]
+
+    def image(name: str) -> Tensor:
+        return torch.from_numpy(arrays[name].astype(np.float32))[:, None]
+
+    normal = torch.from_numpy(arrays["normal"].astype(np.float32) / NORMAL_STEPS)
+    stacked = torch.from_numpy(np.stack(planes))
+    x, y = stacked[:, 5:6], stacked[:, 6:7]
+    ways = torch.cat([x, y, torch.ones_like(x)], 1)
+    tangents = torch.from_numpy(arrays["tangents"])
+    away = (1 + tangents[:, 0] ** 2 + tangents[:, 1] ** 2).sqrt() / tangents[:, 2]
+    return Batch(
+        stacked, torch.from_numpy(arrays["tokens"].astype(np.float32)), image("mask"),
+        image("front"), image("thickness"), image("depth"), image("edge"),
+        normal.permute(0, 3, 1, 2), ways / ways.norm(dim=1, keepdim=True),
+        away[:, None, None, None],
+    )  # fmt: skip
+
+
+def _worn(mask: Mask, rng: np.random.Generator) -> Mask:
+    """A mask whose outline is up to two px off, smoothly."""
+    if rng.random() < 0.5:
+        return mask
+    noise = cv2.GaussianBlur(rng.normal(0, 1, mask.shape).astype(np.float32), (0, 0), 6)
+    noise *= rng.uniform(0, 2) / max(float(noise.std()), 1e-6)
+    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
+    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
+    return inside - outside + noise.clip(-2, 2) > 0
+
+
+__all__ = ["SIDE", "Batch", "batch_of", "batches", "planes_of", "write_shards"]

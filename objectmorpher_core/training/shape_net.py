@@ -1,0 +1,83 @@
+"""The decoder: DINOv2's tokens of a crop, its pixels and its mask -> the surface that is seen.
+
+A U-Net (Ronneberger et al. 2015) from the pixels, which takes in the frozen tokens where it is as
+coarse as they are. Everything is in crop units (`shapes.sample`).
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+SIDE = 224  # px of a crop
+GRID = 16  # tokens across
+WIDTH = 384  # of a token (DINOv2 ViT-S/14)
+PLANES = 7  # red, green, blue, mask, distance to the outline, and the ray's two tangents
+OUTPUTS = 9  # front, thickness, depth, normal (3), edge, spread of front, spread of thickness
+CHANNELS = (24, 48, 96, 160)  # from half the size to a sixteenth
+MIXED = 256  # at a sixteenth, with the tokens
+FINE = 24  # at the full size
+
+
+class Block(nn.Module):
+    """Two convolutions beside the way straight on (He et al. 2016)."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.first, self.second = _conv(width, width), _conv(width, width, is_active=False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return F.relu(x + self.second(self.first(x)))
+
+
+class ShapeNet(nn.Module):
+    """(n, PLANES, s, s) and tokens (n, WIDTH, g, g) -> (n, OUTPUTS, s, s)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        a, b, c, d = CHANNELS
+        self.down1 = _conv(PLANES, a, stride=2)
+        self.down2 = nn.Sequential(_conv(a, b, stride=2), Block(b))
+        self.down3 = nn.Sequential(_conv(b, c, stride=2), Block(c))
+        self.down4 = nn.Sequential(_conv(c, d, stride=2), Block(d))
+        self.tokens = nn.Conv2d(WIDTH, d, 1)
+        self.tokens_fine = nn.Conv2d(WIDTH, c // 2, 1)
+        self.middle = nn.Sequential(_conv(2 * d, MIXED, size=1), Block(MIXED), Block(MIXED))
+        self.up3 = nn.Sequential(_conv(MIXED + c + c // 2, 128), Block(128))
+        self.up2 = nn.Sequential(_conv(128 + b, 64), Block(64))
+        self.up1 = nn.Sequential(_conv(64 + a, 40), Block(40))
+        self.up0 = nn.Sequential(_conv(40 + PLANES, FINE), _conv(FINE, FINE))
+        self.head = nn.Conv2d(FINE, OUTPUTS, 1)
+
+    def forward(self, planes: Tensor, tokens: Tensor) -> Tensor:
+        x1 = self.down1(planes)
+        x2 = self.down2(x1)
+        x3 = self.down3(x2)
+        x4 = self.down4(x3)
+        coarse = _resized(self.tokens(tokens), x4)
+        y = self.middle(torch.cat([x4, coarse], 1))
+        y = self.up3(torch.cat([_resized(y, x3), x3, _resized(self.tokens_fine(tokens), x3)], 1))
+        y = self.up2(torch.cat([_resized(y, x2), x2], 1))
+        y = self.up1(torch.cat([_resized(y, x1), x1], 1))
+        y = self.up0(torch.cat([_resized(y, planes), planes], 1))
+        raw = self.head(y)
+        thick = F.softplus(raw[:, 1:3] - 2.0)  # never negative; about 0.13 before training
+        normal = raw[:, 3:6]
+        normal = normal / normal.square().sum(1, keepdim=True).add(1e-6).sqrt()
+        spread = raw[:, 7:9].clamp(-7.0, 2.0)
+        return torch.cat([raw[:, :1], thick, normal, raw[:, 6:7], spread], 1)
+
+
+def _conv(
+    inputs: int, outputs: int, size: int = 3, stride: int = 1, is_active: bool = True
+) -> nn.Sequential:
+    layers: list[nn.Module] = [
+        nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
+        nn.BatchNorm2d(outputs),
+    ]
+    return nn.Sequential(*layers, *([nn.ReLU()] if is_active else []))
+
+
+def _resized(x: Tensor, like: Tensor) -> Tensor:
+    return F.interpolate(x, size=like.shape[-2:], mode="bilinear", align_corners=False)
