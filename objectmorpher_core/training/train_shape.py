@@ -1,0 +1,179 @@
+"""`objectmorpher train shape`: samples, training, figures and the weights that are shipped.
+
+Everything is kept in one folder; called again it goes on where it was stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ..progress import Progress, silent
+from .shape_data import SHARD, Batch, batch_of, batches, write_shards
+from .shape_eval import Score, Surfaces, relief_surfaces, score
+from .shape_losses import losses
+from .shape_net import ShapeNet
+from .shapes.families import FAMILIES
+
+UNSEEN = 50_000_000  # the first seed that is never trained on
+CHECKED = 8 * SHARD  # unseen samples
+WARM_UP = 0.04  # share of the steps, during which the rate rises
+MEMORY = 0.999  # of the mean of weights that is kept and shipped
+SAVED = 120.0  # s between two checkpoints
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to train; the same plan gives the same weights, but for rounding."""
+
+    samples: int = 8192
+    passes: float = 4.0  # over all samples
+    size: int = 16  # samples at a time
+    rate: float = 1.5e-3
+    decay: float = 0.02
+    held_out: tuple[str, ...] = ()  # families
+    seed: int = 0
+
+    @property
+    def steps(self) -> int:
+        return max(1, int(self.passes * self.samples / self.size))
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        return tuple(name for name in FAMILIES if name not in self.held_out)
+
+
+def train(folder: Path, plan: Plan, minutes: float | None = None, progress: Progress = silent) -> Path:  # fmt: skip
+    """Trains in `folder`, for so many minutes at most; the path of the checkpoint."""
+    files = _samples(folder / "samples", 0, plan.samples, plan.families)
+    _samples(folder / "unseen", UNSEEN, CHECKED, None)
+    state = _State.resumed(folder, plan)
+    start, saved = time.monotonic(), time.monotonic()
+    for batch in _endless(files, plan, state.step):
+        if state.step >= plan.steps or (minutes and time.monotonic() - start > 60 * minutes):
+            break
+        state.learn(batch)
+        progress(state.step / plan.steps, f"loss {state.recent():.3f}")
+        if time.monotonic() - saved > SAVED:
+            state.save()
+            saved = time.monotonic()
+    state.save()
+    return state.file
+
+
+def _samples(folder: Path, first: int, count: int, families: tuple[str, ...] | None) -> list[Path]:
+    write_shards(folder, first, count, families)
+    return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
+
+
+def _endless(files: list[Path], plan: Plan, done: int) -> Iterator[Batch]:
+    number = done * plan.size // max(plan.samples, 1)
+    while True:
+        yield from batches(files, plan.size, np.random.default_rng([plan.seed, number, done]))
+        number += 1
+
+
+class _State:
+    """The network, what trains it, and how far it is."""
+
+    def __init__(self, file: Path, plan: Plan) -> None:
+        torch.manual_seed(plan.seed)
+        self.file, self.plan, self.step = file, plan, 0
+        self.net = ShapeNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
+        self.optimiser = torch.optim.AdamW(
+            self.net.parameters(), plan.rate, weight_decay=plan.decay
+        )
+        self.history: list[dict[str, float]] = []
+
+    @staticmethod
+    def resumed(folder: Path, plan: Plan) -> _State:
+        """As it was saved last, with the same plan; fresh where it was not."""
+        state = _State(folder / "checkpoint.pt", plan)
+        if state.file.exists():
+            kept = torch.load(state.file, weights_only=True)
+            state.net.load_state_dict(kept["net"])
+            state.optimiser.load_state_dict(kept["optimiser"])
+            state.mean, state.step, state.history = kept["mean"], kept["step"], kept["history"]
+        return state
+
+    def learn(self, batch: Batch) -> None:
+        """One step."""
+        self.net.train()
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.plan.rate * _schedule(self.step / self.plan.steps)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            planes = batch.planes.contiguous(memory_format=torch.channels_last)
+            found = self.net(planes, batch.tokens)
+        parts = losses(found.float(), batch)
+        self.optimiser.zero_grad(set_to_none=True)
+        parts["all"].backward()
+        torch.nn.utils.clip_grad_norm_(self.net.parameters(), 1.0)
+        self.optimiser.step()
+        self.step += 1
+        kept = min(MEMORY, (1 + self.step) / (10 + self.step))
+        for name, value in self.net.state_dict().items():
+            if value.is_floating_point():
+                self.mean[name].lerp_(value, 1 - kept)
+            else:
+                self.mean[name].copy_(value)
+        self.history.append({k: round(float(v.detach()), 5) for k, v in parts.items()})
+
+    def recent(self) -> float:
+        return float(np.mean([row["all"] for row in self.history[-50:]]))
+
+    def save(self) -> None:
+        partial = self.file.with_suffix(".part")
+        kept = {
+            "net": self.net.state_dict(), "mean": self.mean, "step": self.step,
+            "optimiser": self.optimiser.state_dict(), "history": self.history,
+            "plan": json.dumps(asdict(self.plan)),
+        }  # fmt: skip
+        torch.save(kept, partial)
+        os.replace(partial, self.file)
+
+
+def _schedule(share: float) -> float:
+    """Up, and down along a cosine."""
+    if share < WARM_UP:
+        return share / WARM_UP
+    return 0.5 * (1 + np.cos(np.pi * min((share - WARM_UP) / (1 - WARM_UP), 1.0))) + 0.01
+
+
+def trained(checkpoint: Path) -> ShapeNet:
+    """The mean of the weights, ready to predict."""
+    net = ShapeNet()
+    net.load_state_dict(torch.load(checkpoint, weights_only=True)["mean"])
+    return net.eval()
+
+
+@torch.inference_mode()
+def check(net: ShapeNet, files: list[Path]) -> dict[str, dict[str, Score]]:
+    """Mean scores by family, of the network and of the relief."""
+    rows: dict[str, dict[str, list[Score]]] = {}
+    for file in files:
+        arrays = dict(np.load(file))
+        batch = batch_of(arrays)
+        found = net(batch.planes, batch.tokens).numpy().astype(np.float64)
+        for k, family in enumerate(arrays["family"]):
+            mask = arrays["mask"][k]
+            true = Surfaces(arrays["front"][k].astype(float), arrays["depth"][k].astype(float))
+            ways = {
+                "network": Surfaces(found[k, 0], found[k, 2]),
+                "relief": relief_surfaces(mask, arrays["tangents"][k]),
+                "inflation": relief_surfaces(mask, arrays["tangents"][k], is_standing=False),
+            }
+            for way, surfaces in ways.items():
+                row = rows.setdefault(str(family), {}).setdefault(way, [])
+                row.append(score(surfaces, true, mask))
+    return {
+        family: {way: Score(*np.mean(scores, 0)) for way, scores in ways.items()}
+        for family, ways in rows.items()
+    }
