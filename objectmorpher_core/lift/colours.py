@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import F32, F64, Mask
 from ..document import Matte
-from ..pixels import bilinear
+from .bilinear import bilinear
 from .growing import grown
 from .mirror import MirrorAxis
 from .silhouette import Silhouette

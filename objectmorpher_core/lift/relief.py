@@ -18,11 +18,12 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ..gaussians import Gaussians
-from ..pixels import bilinear, crop
+from ..pixels import crop
 from ..progress import Progress
 from ..rotations import quats_along
 from ..segment.matte import band_width, signed_distance
 from . import LiftError, Subject
+from .bilinear import bilinear
 from .body import MIDDLE, Body
 from .colours import Colouring, colouring
 from .mirror import MirrorAxis, find_axis

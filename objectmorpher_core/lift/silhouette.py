@@ -14,8 +14,8 @@ import numba
 import numpy as np
 
 from ..arrays import F64, Mask
-from ..pixels import bilinear
 from ..segment.matte import extended_mask, frame_extension
+from .bilinear import bilinear
 
 GRID = 256  # cells on the longer side of the box
 STEEP = 0.9  # growth of the depth per cell, from which a farther disc covers this one
