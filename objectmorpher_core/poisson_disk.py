@@ -12,7 +12,9 @@ from .arrays import F64, frozen
 OPPOSED = -0.3  # cosine of two normals, below which they are of different surfaces
 CAPACITY = 1024  # cells that the table of kept points has room for at first
 # A point's own cell and those around it, nearest first: most points are turned down there.
-AROUND = frozen(sorted(product((-1, 0, 1), repeat=3), key=lambda cell: sum(map(abs, cell))))
+AROUND = frozen(
+    np.array(sorted(product((-1, 0, 1), repeat=3), key=lambda cell: sum(map(abs, cell))))
+)
 
 
 def thin_to_spacing(

@@ -67,12 +67,12 @@ class _Size:
     def half(self) -> _Size:
         pixels = halved_pixels(self.pixels)
         # What is thin stays, however small the picture.
-        share, thin = (halved(m.astype(np.float32)) for m in (self.mask, _thin(self.mask, 3)))
+        share, thin = (halved(m.view(np.uint8)) for m in (self.mask, _thin(self.mask, 3)))
         mask = (share >= 0.5) | (thin >= 0.25)
         if not self.drawn.any():
             nothing = np.zeros_like(mask)
             return _Size(pixels, self.band / 2, mask, nothing, nothing.astype(np.float32))
-        drawn = halved(self.drawn.astype(np.float32)) >= 0.5
+        drawn = halved(self.drawn.view(np.uint8)) >= 0.5
         return _Size(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha()))
 
 
