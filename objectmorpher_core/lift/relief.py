@@ -21,7 +21,7 @@ from ..gaussians import Gaussians
 from ..pixels import crop
 from ..progress import Progress
 from ..rotations import quats_along
-from ..segment.matte import band_width, signed_distance
+from ..segment.matte import band_width
 from . import LiftError, Subject
 from .bilinear import bilinear
 from .body import MIDDLE, Body
@@ -33,6 +33,7 @@ from .spreading import Surface, spread
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
 SOFTEST = 0.15  # x extent: a drawn soft edge that reaches farther out is cut there
+SOFTNESS_SIDE = 1024  # px of the extent that a soft edge is measured in
 LEAST_AREA = 25  # px
 SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is carried
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
@@ -53,8 +54,9 @@ class ReliefLifter:
     ) -> LiftedObject:
         """See `Lifter`. Raises LiftError for an object of fewer than about 25 pixels."""
         mask, camera, matte = subject.mask, subject.camera, subject.matte
-        if mask.sum() < LEAST_AREA:
-            raise LiftError(f"the object is only {int(mask.sum())} pixels, too small to lift")
+        area = int(np.count_nonzero(mask))
+        if area < LEAST_AREA:
+            raise LiftError(f"the object is only {area} pixels, too small to lift")
         progress(0.0, "Inflating the silhouette")
         hidden = None if settings.hidden is None else settings.hidden & ~mask
         outline = Silhouette.of(mask if hidden is None else mask | hidden)
@@ -147,8 +149,21 @@ def _softness(mask: Mask, matte: Matte, extent: float) -> float:
     """How far outside the mask (H, W), in px, the matte still covers something."""
     x0, y0, x1, y1 = matte.box  # it holds the mask and what is around it
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, mask.shape[1]), min(y1, mask.shape[0])
-    distance = crop(signed_distance(mask[y0:y1, x0:x1]), (x0, y0, x1, y1), matte.box)
-    return min(-float(distance[matte.alpha > 0].min(initial=0.0)), SOFTEST * extent)
+    alpha = matte.alpha[y0 - matte.top : y1 - matte.top, x0 - matte.left : x1 - matte.left]
+    step = max(1, int(extent / SOFTNESS_SIDE))
+    inside, covered = (_touched(part, step) for part in (mask[y0:y1, x0:x1], alpha))
+    away = cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, 5)
+    farthest = float(away[covered & ~inside].max(initial=0.5)) - 0.5
+    return min(step * farthest, SOFTEST * extent)
+
+
+def _touched(share: np.ndarray, step: int) -> Mask:
+    """Which blocks (h, w) of `step` px to a side hold some of `share` (H, W)."""
+    height, width = (max(n // step, 1) for n in share.shape)
+    if share.dtype == np.bool_:
+        share = share.view(np.uint8) * np.uint8(255)
+    part = share[: height * step, : width * step]
+    return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)) > 0
 
 
 def _assemble(
