@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64, Mask
-from ..document import Matte
+from ..arrays import F32, F64
+from .canvas import Canvas
 
 SIDE = 96  # px, longer side of the reduced picture in which the axis is looked for
 ANGLES = np.radians(np.arange(-40, 41, 5.0))  # of the axis from the upright
@@ -37,18 +37,19 @@ class MirrorAxis:
         return xy - 2 * ((xy @ normal)[..., None] - self.offset) * normal
 
 
-def find_axis(matte: Matte, hidden: Mask | None = None) -> MirrorAxis:
-    """The best axis of the object of `matte`; of it belong to it also `hidden` (h, w) parts.
+def find_axis(canvas: Canvas) -> MirrorAxis:
+    """The best axis of the object; what is hidden of it belongs to it.
 
     The axis is upright within 40 degrees. Colours count where they are shown.
     """
-    left, top = matte.left, matte.top
-    scale = SIDE / max(matte.alpha.shape)
-    size = max(2, round(matte.alpha.shape[1] * scale)), max(2, round(matte.alpha.shape[0] * scale))
-    whole = matte.alpha if hidden is None else np.maximum(matte.alpha, hidden.astype(np.float32))
-    solid = np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
-    shown = np.asarray(cv2.resize(matte.alpha, size, interpolation=cv2.INTER_AREA), np.float32)
-    small = cv2.resize(matte.foreground, size, interpolation=cv2.INTER_AREA)
+    left, top = canvas.corner
+    scale = SIDE / max(canvas.alpha.shape)
+    size = tuple(max(2, round(n * scale)) for n in canvas.alpha.shape[::-1])
+    area = cv2.INTER_AREA
+    solid = np.asarray(cv2.resize(canvas.whole, size, interpolation=area), np.float32)
+    shown = np.asarray(cv2.resize(canvas.alpha, size, interpolation=area), np.float32)
+    small = cv2.resize(canvas.foreground, size, interpolation=area)
+    scale /= canvas.step
     colour = np.asarray(cv2.GaussianBlur(small, (0, 0), 1.0), np.float32)
     picture = np.dstack([colour, shown])
     y, x = np.mgrid[: size[1], : size[0]] + 0.5

@@ -18,14 +18,14 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ..gaussians import Gaussians
-from ..pixels import crop
 from ..progress import Progress
 from ..rotations import quats_along
 from ..segment.matte import band_width
 from . import LiftError, Subject
 from .bilinear import bilinear
 from .body import MIDDLE, Body
-from .colours import Colouring, colouring
+from .canvas import Canvas
+from .colours import FINENESS, Colouring, colouring
 from .mirror import MirrorAxis, find_axis
 from .silhouette import Silhouette
 from .spreading import Surface, spread
@@ -33,6 +33,7 @@ from .spreading import Surface, spread
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
 SOFTEST = 0.15  # x extent: a drawn soft edge that reaches farther out is cut there
+PIXELS = 2.0  # of the canvas, at least, to one of a colour field
 SOFTNESS_SIDE = 1024  # px of the extent that a soft edge is measured in
 LEAST_AREA = 25  # px
 SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is carried
@@ -60,8 +61,8 @@ class ReliefLifter:
         progress(0.0, "Inflating the silhouette")
         hidden = None if settings.hidden is None else settings.hidden & ~mask
         outline = Silhouette.of(mask if hidden is None else mask | hidden)
-        canvas, own_hidden = _canvas(matte, hidden)
-        axis = _axis(canvas, own_hidden, settings)
+        canvas = _canvas(matte, hidden, area, settings.count)
+        axis = _axis(canvas, settings)
         body = Body.of(outline, camera, settings, axis)
         if settings.nearness is not None:
             body = body.nearer(_nearness(subject, settings.nearness, outline))
@@ -80,28 +81,17 @@ class ReliefLifter:
         return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
 
 
-def _canvas(matte: Matte, hidden: Mask | None) -> tuple[Matte, Mask | None]:
-    """The matte on a crop that holds what is `hidden` (H, W), too; and that (h, w) on it."""
-    if hidden is None or not hidden.any():
-        return matte, None
-    rows, columns = np.flatnonzero(hidden.any(1)), np.flatnonzero(hidden.any(0))
-    x0, y0, x1, y1 = matte.box
-    box = (
-        min(x0, int(columns[0]) - 1), min(y0, int(rows[0]) - 1),
-        max(x1, int(columns[-1]) + 2), max(y1, int(rows[-1]) + 2),
-    )  # fmt: skip
-    pads = [(y0 - box[1], box[3] - y1), (x0 - box[0], box[2] - x1)]
-    alpha = np.pad(matte.alpha, pads)
-    foreground = np.pad(matte.foreground, [*pads, (0, 0)], mode="edge")
-    height, width = hidden.shape
-    return Matte(box[0], box[1], alpha, foreground), crop(hidden, (0, 0, width, height), box)
+def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> Canvas:
+    """The cut-out, fine enough for `count` Gaussians on an object of `area` px."""
+    spacing = np.sqrt(2 * area / count)  # at least: it has a front and a back
+    return Canvas.of(matte, hidden, float(spacing / (FINENESS * PIXELS)))
 
 
-def _axis(matte: Matte, hidden: Mask | None, settings: LiftSettings) -> MirrorAxis | None:
+def _axis(canvas: Canvas, settings: LiftSettings) -> MirrorAxis | None:
     """Of an object that looks the same left and right."""
     if settings.is_symmetric is False:
         return None
-    axis = find_axis(matte, hidden)
+    axis = find_axis(canvas)
     return axis if settings.is_symmetric or axis.is_sure else None
 
 

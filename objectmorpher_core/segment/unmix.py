@@ -107,14 +107,6 @@ class _Size:
         _halve_sure(self.rgb, self.alpha, sure)
         return _Size(rgb, alpha, sure)
 
-    def sure_at(self, rows: I32, columns: I32) -> F32:
-        """(N, 8) `sure` at pixels (N,)."""
-        if self.sure is not None:
-            return self.sure[rows, columns]
-        alpha, rgb = self.alpha[rows, columns, None], self.rgb[rows, columns]
-        one, other = alpha == 1, alpha == 0
-        return np.concatenate([one, other, one * rgb, other * rgb], 1, dtype=np.float32)
-
 
 def coarse_colours(rgb: F32, alpha: F32) -> tuple[F32, F32]:
     """F and B (h, w, 3) of a small picture (h, w, 3) from all of its sizes."""
@@ -186,7 +178,9 @@ def _relaxed(size: _Size, fore: F32, back: F32, rounds: int) -> bool:
     places = _settle(size.rgb, size.alpha, fore, back)
     if len(places[0]) == 0:
         return False
-    _relax(size.rgb, size.alpha, places, size.sure_at(*places), (fore, back), rounds)
+    sure = np.empty((0, 0, 8), np.float32) if size.sure is None else size.sure
+    _relax(size.rgb, size.alpha, places, _weighed(size.rgb, size.alpha, places, sure),
+           (fore, back), rounds)  # fmt: skip
     return True
 
 
@@ -239,43 +233,65 @@ def _settle(rgb: F32, alpha: F32, fore: F32, back: F32) -> tuple[I32, I32]:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
+def _weighed(rgb: F32, alpha: F32, places: tuple[I32, I32], sure: F32) -> F32:
+    """(N, 13) what does not change from round to round, of places (N,).
+
+    Weights of the neighbours below, above, right and left; one over the sums of what F and B
+    follow; one over what an error is shared by; and what holds F and B, times its weight. An
+    empty `sure` says what alpha says.
+    """
+    (rows, columns), (height, width) = places, alpha.shape
+    table = np.zeros((len(rows), 13), np.float32)
+    for n in range(len(rows)):
+        y, x = rows[n], columns[n]
+        a, row = alpha[y, x], table[n]
+        total = 0.0
+        for k in range(4):
+            i, j = y + (k == 0) - (k == 1), x + (k == 2) - (k == 3)
+            if i >= 0 and j >= 0 and i < height and j < width:
+                row[k] = SMOOTHNESS + AT_EDGES * abs(a - alpha[i, j])
+                total += row[k]
+        held = (1.0 if a == 1 else 0.0, 1.0 if a == 0 else 0.0)
+        if sure.size > 0:
+            held = (float(sure[y, x, 0]), float(sure[y, x, 1]))
+        for side in range(2):
+            row[4 + side] = 1 / max(total + ANCHOR * held[side], 1e-12)
+            for c in range(3):
+                own = sure[y, x, 2 + 3 * side + c] if sure.size > 0 else held[side] * rgb[y, x, c]
+                row[7 + 3 * side + c] = ANCHOR * own
+        row[6] = 1 / (1 + a * a * row[4] + (1 - a) * (1 - a) * row[5])
+    return table
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _relax(
-    rgb: F32, alpha: F32, places: tuple[I32, I32], known: F32, colours: tuple[F32, F32], rounds: int
+    rgb: F32, alpha: F32, places: tuple[I32, I32], table: F32, colours: tuple[F32, F32], rounds: int
 ) -> None:  # fmt: skip
     """`rounds` Jacobi steps at rows, columns (N,): the same in whichever order they are."""
     (rows, columns), (fore, back) = places, colours
     height, width = alpha.shape
     new = np.empty((len(rows), 6), np.float32)
-    mean = np.empty(6)
+    zero, one = np.float32(0), np.float32(1)
     for _ in range(rounds):
         for n in range(len(rows)):
-            y, x = rows[n], columns[n]
+            y, x, row = rows[n], columns[n], table[n]
             a = alpha[y, x]
-            b = 1 - a
-            weights = 0.0
-            mean[:] = 0
-            for k in range(4):
-                i = y + (k == 0) - (k == 1)
-                j = x + (k == 2) - (k == 3)
-                if i < 0 or j < 0 or i >= height or j >= width:
-                    continue
-                weight = SMOOTHNESS + AT_EDGES * abs(a - alpha[i, j])
-                weights += weight
-                for c in range(3):
-                    mean[c] += weight * fore[i, j, c]
-                    mean[c + 3] += weight * back[i, j, c]
-            one = 1 / max(weights + ANCHOR * known[n, 0], 1e-12)
-            other = 1 / max(weights + ANCHOR * known[n, 1], 1e-12)
-            gain_one, gain_other = a * one, b * other
-            share = 1 / (1 + a * gain_one + b * gain_other)
+            b = one - a
+            below, above = min(y + 1, height - 1), max(y - 1, 0)
+            right, left = min(x + 1, width - 1), max(x - 1, 0)
             for c in range(3):
-                own = (mean[c] + ANCHOR * known[n, c + 2]) * one
-                behind = (mean[c + 3] + ANCHOR * known[n, c + 5]) * other
-                rest = (rgb[y, x, c] - a * own - b * behind) * share
-                own += gain_one * rest
-                behind += gain_other * rest
-                new[n, c] = rgb[y, x, c] if a == 1 else min(max(own, 0), 1)
-                new[n, c + 3] = rgb[y, x, c] if a == 0 else min(max(behind, 0), 1)
+                own = (row[0] * fore[below, x, c] + row[1] * fore[above, x, c]
+                       + row[2] * fore[y, right, c] + row[3] * fore[y, left, c]
+                       + row[7 + c]) * row[4]  # fmt: skip
+                behind = (row[0] * back[below, x, c] + row[1] * back[above, x, c]
+                          + row[2] * back[y, right, c] + row[3] * back[y, left, c]
+                          + row[10 + c]) * row[5]  # fmt: skip
+                colour = rgb[y, x, c]
+                rest = (colour - a * own - b * behind) * row[6]
+                own += a * row[4] * rest
+                behind += b * row[5] * rest
+                new[n, c] = colour if a == one else min(max(own, zero), one)
+                new[n, c + 3] = colour if b == one else min(max(behind, zero), one)
         for n in range(len(rows)):
             for c in range(3):
                 fore[rows[n], columns[n], c] = new[n, c]
