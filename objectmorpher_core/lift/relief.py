@@ -143,8 +143,8 @@ def _softness(mask: Mask, matte: Matte, extent: float) -> float:
     step = max(1, int(extent / SOFTNESS_SIDE))
     inside, covered = (_touched(part, step) for part in (mask[y0:y1, x0:x1], alpha))
     away = cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, 5)
-    farthest = float(away[covered & ~inside].max(initial=0.5)) - 0.5
-    return min(step * farthest, SOFTEST * extent)
+    farthest = float(away[covered & ~inside].max(initial=0.0))
+    return min(max(step * farthest - 0.5, 0.0), SOFTEST * extent)
 
 
 def _touched(share: np.ndarray, step: int) -> Mask:
