@@ -13,7 +13,7 @@ import cv2
 import numba
 import numpy as np
 
-from ..arrays import F64, Mask
+from ..arrays import F64, U8, Mask
 from ..segment.matte import extended_mask, frame_extension
 from .bilinear import bilinear
 
@@ -81,7 +81,7 @@ class Silhouette:
         reach = max(self.shape)
         h, w = self.shape
         box = self.continued(self.inside, reach).astype(np.uint8)
-        far = cv2.distanceTransform(box, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        far = _distance(box)
         far = far[reach : reach + h, reach : reach + w]
         return np.where(self.inside, np.maximum(far - 0.5, 0.25), 0.0) * self.cell
 
@@ -132,13 +132,21 @@ class Silhouette:
         at, (h, w) = self.grid_xy(xy), self.shape
         beyond = np.maximum(-at, at - [w - 1, h - 1]).max(initial=0)
         pad = int(np.ceil(beyond)) + 2
-        distance = cv2.distanceTransform(
-            1 - np.pad(self.inside, pad).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-        )
+        distance = _distance(1 - np.pad(self.inside, pad).astype(np.uint8))
         dy, dx = np.gradient(cv2.GaussianBlur(distance, (0, 0), 1.0))
         direction = bilinear(np.stack([dx, dy], -1), at + pad)
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         return np.where(length > 1e-6, direction / np.maximum(length, 1e-6), [0.0, -1.0])
+
+
+def _distance(picture: U8) -> F64:
+    """(h, w) cells to the nearest 0.
+
+    Exactly: the last digit of what OpenCV finds depends on where its arrays lie in memory, and
+    the same photo would not be lifted the same way twice.
+    """
+    found = cv2.distanceTransform(picture, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.sqrt(np.rint(np.asarray(found, np.float64) ** 2))
 
 
 def lower_hull(x: F64, y: F64) -> list[int]:
