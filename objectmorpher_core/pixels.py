@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .arrays import F32, F64, Pixels
+from .arrays import F32, Pixels
 
 
 class Samples(Protocol):
@@ -44,16 +44,3 @@ def crop(
             top - own[1] : bottom - own[1], left - own[0] : right - own[0]
         ]
     return result
-
-
-def bilinear(field: np.ndarray, xy: F64) -> F64:
-    """`field` (h, w, ...) at positions (N, 2) in its pixel indices, clamped to it."""
-    height, width = field.shape[:2]
-    x = np.clip(xy[:, 0], 0, width - 1.001)
-    y = np.clip(xy[:, 1], 0, height - 1.001)
-    j, i = x.astype(int), y.astype(int)
-    shape = (-1,) + (1,) * (field.ndim - 2)
-    s, t = (x - j).reshape(shape), (y - i).reshape(shape)
-    j1, i1 = np.minimum(j + 1, width - 1), np.minimum(i + 1, height - 1)
-    upper = field[i, j] * (1 - s) + field[i, j1] * s
-    return upper * (1 - t) + (field[i1, j] * (1 - s) + field[i1, j1] * s) * t

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numba
 import numpy as np
 
 from .arrays import F64, frozen
 
 OPPOSED = -0.3  # cosine of two normals, below which they are of different surfaces
+CAPACITY = 1024  # cells that the table of kept points has room for at first
+# A point's own cell and those around it, nearest first: most points are turned down there.
+AROUND = frozen(
+    np.array(sorted(product((-1, 0, 1), repeat=3), key=lambda cell: sum(map(abs, cell))))
+)
 
 
 def thin_to_spacing(
@@ -19,58 +26,84 @@ def thin_to_spacing(
     hash grid, Bridson 2007's neighbourhood test). With `normals` (N, 3) only one whose normal is
     not opposed counts: two surfaces that touch are thinned each by itself.
     """
-    normals = np.zeros((1, 3)) if normals is None else normals
-    cells = np.floor((points - points.min(0)) / spacing).astype(np.int64)
-    size = cells.max(0) + 3
-    keys = ((cells[:, 0] + 1) * size[1] + cells[:, 1] + 1) * size[2] + cells[:, 2] + 1
-    unique, inverse = np.unique(keys, return_inverse=True)
-    near = np.array(
-        [(dx * size[1] + dy) * size[2] + dz
-         for dx in (-1, 0, 1) for dy in (-1, 0, 1) for dz in (-1, 0, 1)]
-    )  # fmt: skip
-    neighbours = near[:, None] + unique[None]  # ascending rows: searched in half the time
-    found = np.searchsorted(unique, neighbours)
-    found[(found == len(unique)) | (unique[np.minimum(found, len(unique) - 1)] != neighbours)] = -1
-    inputs = [frozen(a) for a in (order, inverse, found.T)]
-    surface = frozen(points, np.float64), frozen(normals, np.float64)
-    return np.flatnonzero(_thin(*surface, float(spacing), *inputs))
+    if len(points) == 0:
+        return np.empty(0, np.int64)
+    sides = np.zeros((1, 3)) if normals is None else normals
+    surface = frozen(points, np.float64), frozen(sides, np.float64)
+    return np.flatnonzero(_thin(*surface, float(spacing), frozen(order, np.int64), AROUND))
 
 
-@numba.njit(cache=True)
-def _thin(points, normals, spacing, order, cell_of, neighbours):
-    # Cells are one spacing wide, so a cell holds at most eight kept points, sixteen on two sides.
-    sides = 2 if len(normals) == len(points) else 1
-    slots = np.full((len(neighbours), 8 * sides), -1)
+@numba.njit(cache=True, nogil=True)
+def _thin(points, normals, spacing, order, around):
+    """Which points (N,) are kept. Only those are in the table, so that it stays small."""
+    keys, firsts = np.zeros(CAPACITY, np.int64), np.full(CAPACITY, -1)  # of cells
+    others = np.full(len(points), -1)  # that were kept before in the same cell
     kept = np.zeros(len(points), np.bool_)
+    place, cell = np.empty(3), np.empty(3, np.int64)
+    used = 0
     for i in order:
-        cell = cell_of[i]
-        is_free = True
-        for n in range(neighbours.shape[1]):
-            other = neighbours[cell, n]
-            if other < 0:
-                continue
-            for s in range(slots.shape[1]):
-                j = slots[other, s]
-                if j < 0:
-                    break
-                if sides == 2:
-                    dot = 0.0
-                    for a in range(3):
-                        dot += normals[i, a] * normals[j, a]
-                    if dot < OPPOSED:
-                        continue
-                dx = points[i, 0] - points[j, 0]
-                dy = points[i, 1] - points[j, 1]
-                dz = points[i, 2] - points[j, 2]
-                if dx * dx + dy * dy + dz * dz < spacing * spacing:
-                    is_free = False
-                    break
-            if not is_free:
-                break
-        if is_free:
-            for s in range(slots.shape[1]):
-                if slots[cell, s] < 0:
-                    slots[cell, s] = i
-                    kept[i] = True
-                    break
+        for a in range(3):
+            place[a] = points[i, a] / spacing
+            cell[a] = np.int64(np.floor(place[a]))
+            place[a] -= cell[a]
+        if _is_near_kept(points, normals, spacing, i, place, cell, around, keys, firsts, others):
+            continue
+        key = _key(cell[0], cell[1], cell[2])
+        slot = _slot(keys, firsts, key)
+        used += firsts[slot] < 0
+        kept[i], keys[slot], others[i], firsts[slot] = True, key, firsts[slot], i
+        if 2 * used > len(keys):
+            keys, firsts = _enlarged(keys, firsts)
     return kept
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_near_kept(points, normals, spacing, i, place, cell, around, keys, firsts, others):
+    """Whether a kept point is near point `i`, which is at `place` (3,), in cells, in its cell."""
+    for n in range(len(around)):
+        beyond = 0.0  # squared distance of that cell
+        for a in range(3):
+            step = around[n, a]
+            beyond += 0.0 if step == 0 else place[a] ** 2 if step < 0 else (1 - place[a]) ** 2
+        if beyond > 1 + 1e-9:
+            continue
+        key = _key(cell[0] + around[n, 0], cell[1] + around[n, 1], cell[2] + around[n, 2])
+        j = firsts[_slot(keys, firsts, key)]
+        while j >= 0:
+            apart = dot = 0.0
+            for a in range(3):
+                apart += (points[i, a] - points[j, a]) ** 2
+            if len(normals) == len(points):
+                for a in range(3):
+                    dot += normals[i, a] * normals[j, a]
+            if apart < spacing * spacing and dot >= OPPOSED:
+                return True
+            j = others[j]
+    return False
+
+
+@numba.njit(cache=True, nogil=True)
+def _key(x, y, z):
+    """A number for a cell. Should two share one, that costs time and nothing else."""
+    key = x * 73856093 + y * 19349663 + z * 83492791
+    return key * 2654435761
+
+
+@numba.njit(cache=True, nogil=True)
+def _slot(keys, firsts, key):
+    """Where the cell is in the table, or would be."""
+    slot = (key >> 16) & (len(keys) - 1)
+    while firsts[slot] >= 0 and keys[slot] != key:
+        slot = (slot + 1) & (len(keys) - 1)
+    return slot
+
+
+@numba.njit(cache=True, nogil=True)
+def _enlarged(keys, firsts):
+    """The table with twice the room."""
+    more, heads = np.zeros(2 * len(keys), np.int64), np.full(2 * len(keys), -1)
+    for slot in range(len(keys)):
+        if firsts[slot] >= 0:
+            other = _slot(more, heads, keys[slot])
+            more[other], heads[other] = keys[slot], firsts[slot]
+    return more, heads

@@ -19,9 +19,12 @@ def warm_up() -> Document:
     from .image import Picture, encode_mask, encode_picture
     from .pipeline import run_script
     from .script import EditScript, HandleMove
-    from .segment.closed_form import affine
+    from .segment.closed_form import affine, applied
+    from .segment.halving import halved_pixels
 
-    affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))  # of large photos only
+    rgb, alpha = np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)
+    applied(affine(rgb, alpha), rgb, alpha == 0, alpha)  # of large photos only
+    halved_pixels(rgb.astype(np.uint16))
     rng = np.random.default_rng(0)
     pixels = cv2.GaussianBlur(rng.integers(0, 255, (SIZE, SIZE, 3), np.uint8), (0, 0), 2)
     pixels = pixels.astype(np.uint8)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import F64
 from ..camera import Camera
 from ..document import LiftSettings
-from ..pixels import bilinear
+from .bilinear import bilinear
 from .mirror import MirrorAxis
 from .prism import Prism
 from .silhouette import Silhouette
@@ -66,8 +67,7 @@ class Body:
         `side`: FRONT, BACK, or any share (N,) of the thickness in front of the middle sheet.
         """
         cell, grid_xy = self.silhouette.cell, self.silhouette.grid_xy(xy)
-        dy, dx = np.gradient(self.middle, cell)
-        fields = bilinear(np.stack([self.middle, dx, dy], -1), grid_xy)
+        fields = bilinear(self._middle_fields, grid_xy)
         gradient = fields[:, 1:].copy()
         beyond = grid_xy - np.clip(grid_xy, 0, np.array(self.middle.shape[::-1]) - 1)
         height = fields[:, 0] + cell * (beyond * gradient).sum(1)  # the sheet goes on
@@ -77,6 +77,18 @@ class Body:
             height[is_there] += share[is_there] * half
             gradient[is_there] += share[is_there, None] * slope
         return height, gradient
+
+    def height(self, xy: F64, side: float) -> F64:
+        """Height (N,) px of the FRONT or the BACK alone, at photo px (N, 2) inside."""
+        grid_xy = self.silhouette.grid_xy(xy)
+        thickness = self.front if side > 0 else self.back
+        return bilinear(self.middle, grid_xy) + side * thickness.half(grid_xy)
+
+    @cached_property
+    def _middle_fields(self) -> F64:
+        """(h, w, 3) the middle sheet and its gradient."""
+        dy, dx = np.gradient(self.middle, self.silhouette.cell)
+        return np.stack([self.middle, dx, dy], -1)
 
 
 def _nearer(prism: Prism, xy: F64) -> F64:

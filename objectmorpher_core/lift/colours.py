@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, F64, Mask
-from ..document import Matte
-from ..pixels import bilinear
+from .bilinear import bilinear
+from .canvas import Canvas
 from .growing import grown
 from .mirror import MirrorAxis
 from .silhouette import Silhouette
@@ -30,7 +30,7 @@ SURE = 0.95  # alpha from which a pixel is the object's
 
 @dataclass(frozen=True, eq=False)
 class Colouring:
-    """Colour fields over the matte's crop, on pixels of their own."""
+    """Colour fields over the canvas, on pixels of their own."""
 
     corner: F64  # (2,) px in the photo
     step: F64  # (2,) px of the photo per px of the fields
@@ -45,19 +45,20 @@ class Colouring:
 
 
 def colouring(
-    matte: Matte, silhouette: Silhouette, spacing: float, is_mirrored: bool, axis: MirrorAxis | None
-) -> Colouring:
+    canvas: Canvas, silhouette: Silhouette, spacing: float, is_mirrored: bool,
+    axis: MirrorAxis | None,
+) -> Colouring:  # fmt: skip
     """`spacing`: of the Gaussians, px. `axis`: of an object that looks the same left and right."""
-    height, width = matte.alpha.shape
-    scale = min(1.0, FINENESS / spacing)
+    height, width = canvas.alpha.shape
+    scale = min(1.0, FINENESS * canvas.step / spacing)
     size = max(1, round(scale * width)), max(1, round(scale * height))
-    step = np.array([width, height]) / size
-    corner = np.array([matte.left, matte.top], np.float64)
-    shown = (_resized(matte.alpha, size) > SURE).astype(np.float32)
+    step = canvas.step * np.array([width, height]) / size
+    corner = canvas.corner
+    shown = (_resized(canvas.alpha, size) > SURE).astype(np.float32)
     cells = np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), -1)
     xy = (cells + 0.5) * step + corner
     depth = _depth(silhouette, xy)
-    front = _continued(_resized(matte.foreground, size), shown, depth, xy, axis)
+    front = _continued(_resized(canvas.foreground, size), shown, depth, xy, axis)
     spacing = spacing / float(step.mean())
     blurred = _blurred(front, BLUR * spacing)
     if is_mirrored:

@@ -51,9 +51,9 @@ def grown(rgb: F32, source: Mask, hole: Mask, seed: int = 0) -> F32:
             picture, settled = _copied(image, known, unknown, places), known | unknown
         rows, columns = np.nonzero(known)
         offered = rng.integers(0, len(rows), (PASSES, *known.shape, tries), dtype=np.int32)
-        offered = np.stack([rows, columns], -1).astype(np.int32)[offered]
+        choice = np.stack([rows, columns], -1).astype(np.int32)
         guide = _smooth(image, known | unknown)
-        inputs = [frozen(a) for a in (image, guide, known, unknown, offered)]
+        inputs = [frozen(a) for a in (image, guide, known, unknown, offered, choice)]
         picture = np.ascontiguousarray(picture, np.float32).copy()
         _correct(picture, places, settled.copy(), *inputs)
         tries = TRIES
@@ -95,11 +95,12 @@ def _doubled(places: np.ndarray, height: int, width: int) -> np.ndarray:
     return 2 * coarse + np.stack([row % 2, column % 2], -1)
 
 
-@numba.njit(cache=True)
-def _correct(picture, places, settled, image, guide, source, hole, offered):
+@numba.njit(cache=True, nogil=True)
+def _correct(picture, places, settled, image, guide, source, hole, offered, choice):
     """Each pixel of the hole copied from the best place found.
 
-    `picture`, `places` and `settled`, which pixels of it say something, change.
+    `picture`, `places` and `settled`, which pixels of it say something, change. `offered` are
+    numbers of `choice` (n, 2).
     """
     height, width = hole.shape
     for p in range(len(offered)):
@@ -116,12 +117,17 @@ def _correct(picture, places, settled, image, guide, source, hole, offered):
                         continue
                     si, sj = places[a, b, 0] + i - a, places[a, b, 1] + j - b
                 else:
-                    si, sj = offered[p, i, j, n - 9, 0], offered[p, i, j, n - 9, 1]
+                    si, sj = choice[offered[p, i, j, n - 9]]
                 if si < 0 or sj < 0 or si >= height or sj >= width or not source[si, sj]:
                     continue
-                gap = _gap(picture, settled, image, source, i, j, si, sj)
+                if si == bi and sj == bj:
+                    continue  # neighbours mostly agree
+                apart = 0.0
                 for c in range(3):
-                    gap += GUIDE * (guide[i, j, c] - guide[si, sj, c]) ** 2
+                    apart += GUIDE * (guide[i, j, c] - guide[si, sj, c]) ** 2
+                if apart >= best:
+                    continue
+                gap = apart + _gap(picture, settled, image, source, i, j, si, sj, best - apart)
                 if gap < best:
                     best, bi, bj = gap, si, sj
             if bi >= 0:
@@ -131,20 +137,24 @@ def _correct(picture, places, settled, image, guide, source, hole, offered):
                     picture[i, j, c] = image[bi, bj, c]
 
 
-@numba.njit(cache=True)
-def _gap(picture, settled, image, source, i, j, si, sj):
-    """Mean squared difference of two patches, where both are of the object."""
+@numba.njit(cache=True, nogil=True)
+def _gap(picture, settled, image, source, i, j, si, sj, enough):
+    """Mean squared difference of two patches, where both are of the object.
+
+    At least that, if it is more than `enough`.
+    """
     total, count = 0.0, 0
     height, width = source.shape
-    for di in range(-REACH, REACH + 1):
-        for dj in range(-REACH, REACH + 1):
+    most = enough * (2 * REACH + 1) ** 2
+    for di in range(max(-REACH, -i, -si), min(REACH, height - 1 - max(i, si)) + 1):
+        for dj in range(max(-REACH, -j, -sj), min(REACH, width - 1 - max(j, sj)) + 1):
             a, b, s, t = i + di, j + dj, si + di, sj + dj
-            if min(a, b, s, t) < 0 or max(a, s) >= height or max(b, t) >= width:
-                continue
             if not source[s, t] or not settled[a, b]:
                 continue
             for c in range(3):
                 d = picture[a, b, c] - image[s, t, c]
                 total += d * d
             count += 1
+        if total > most:
+            return np.inf
     return total / count if count > 0 else 0.0

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from ..arrays import F32, F64
 from ..camera import Camera
 from ..document import LiftedObject, Matte
-from ..pixels import bilinear
+from .bilinear import bilinear
 from .colours import BLUR
 
 SURE = 0.5  # visibility of a Gaussian that tells something about the light

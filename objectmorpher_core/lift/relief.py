@@ -18,13 +18,14 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ..gaussians import Gaussians
-from ..pixels import bilinear, crop
 from ..progress import Progress
 from ..rotations import quats_along
-from ..segment.matte import band_width, signed_distance
+from ..segment.matte import band_width
 from . import LiftError, Subject
+from .bilinear import bilinear
 from .body import MIDDLE, Body
-from .colours import Colouring, colouring
+from .canvas import Canvas
+from .colours import FINENESS, Colouring, colouring
 from .mirror import MirrorAxis, find_axis
 from .silhouette import Silhouette
 from .spreading import Surface, spread
@@ -32,6 +33,8 @@ from .spreading import Surface, spread
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
 SOFTEST = 0.15  # x extent: a drawn soft edge that reaches farther out is cut there
+PIXELS = 2.0  # of the canvas, at least, to one of a colour field
+SOFTNESS_SIDE = 1024  # px of the extent that a soft edge is measured in
 LEAST_AREA = 25  # px
 SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is carried
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
@@ -52,13 +55,14 @@ class ReliefLifter:
     ) -> LiftedObject:
         """See `Lifter`. Raises LiftError for an object of fewer than about 25 pixels."""
         mask, camera, matte = subject.mask, subject.camera, subject.matte
-        if mask.sum() < LEAST_AREA:
-            raise LiftError(f"the object is only {int(mask.sum())} pixels, too small to lift")
+        area = int(np.count_nonzero(mask))
+        if area < LEAST_AREA:
+            raise LiftError(f"the object is only {area} pixels, too small to lift")
         progress(0.0, "Inflating the silhouette")
         hidden = None if settings.hidden is None else settings.hidden & ~mask
         outline = Silhouette.of(mask if hidden is None else mask | hidden)
-        canvas, own_hidden = _canvas(matte, hidden)
-        axis = _axis(canvas, own_hidden, settings)
+        canvas = _canvas(matte, hidden, area, settings.count)
+        axis = _axis(canvas, settings)
         body = Body.of(outline, camera, settings, axis)
         if settings.nearness is not None:
             body = body.nearer(_nearness(subject, settings.nearness, outline))
@@ -77,28 +81,17 @@ class ReliefLifter:
         return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
 
 
-def _canvas(matte: Matte, hidden: Mask | None) -> tuple[Matte, Mask | None]:
-    """The matte on a crop that holds what is `hidden` (H, W), too; and that (h, w) on it."""
-    if hidden is None or not hidden.any():
-        return matte, None
-    rows, columns = np.flatnonzero(hidden.any(1)), np.flatnonzero(hidden.any(0))
-    x0, y0, x1, y1 = matte.box
-    box = (
-        min(x0, int(columns[0]) - 1), min(y0, int(rows[0]) - 1),
-        max(x1, int(columns[-1]) + 2), max(y1, int(rows[-1]) + 2),
-    )  # fmt: skip
-    pads = [(y0 - box[1], box[3] - y1), (x0 - box[0], box[2] - x1)]
-    alpha = np.pad(matte.alpha, pads)
-    foreground = np.pad(matte.foreground, [*pads, (0, 0)], mode="edge")
-    height, width = hidden.shape
-    return Matte(box[0], box[1], alpha, foreground), crop(hidden, (0, 0, width, height), box)
+def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> Canvas:
+    """The cut-out, fine enough for `count` Gaussians on an object of `area` px."""
+    spacing = np.sqrt(2 * area / count)  # at least: it has a front and a back
+    return Canvas.of(matte, hidden, float(spacing / (FINENESS * PIXELS)))
 
 
-def _axis(matte: Matte, hidden: Mask | None, settings: LiftSettings) -> MirrorAxis | None:
+def _axis(canvas: Canvas, settings: LiftSettings) -> MirrorAxis | None:
     """Of an object that looks the same left and right."""
     if settings.is_symmetric is False:
         return None
-    axis = find_axis(matte, hidden)
+    axis = find_axis(canvas)
     return axis if settings.is_symmetric or axis.is_sure else None
 
 
@@ -146,8 +139,21 @@ def _softness(mask: Mask, matte: Matte, extent: float) -> float:
     """How far outside the mask (H, W), in px, the matte still covers something."""
     x0, y0, x1, y1 = matte.box  # it holds the mask and what is around it
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, mask.shape[1]), min(y1, mask.shape[0])
-    distance = crop(signed_distance(mask[y0:y1, x0:x1]), (x0, y0, x1, y1), matte.box)
-    return min(-float(distance[matte.alpha > 0].min(initial=0.0)), SOFTEST * extent)
+    alpha = matte.alpha[y0 - matte.top : y1 - matte.top, x0 - matte.left : x1 - matte.left]
+    step = max(1, int(extent / SOFTNESS_SIDE))
+    inside, covered = (_touched(part, step) for part in (mask[y0:y1, x0:x1], alpha))
+    away = cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, 5)
+    farthest = float(away[covered & ~inside].max(initial=0.0))
+    return min(max(step * farthest - 0.5, 0.0), SOFTEST * extent)
+
+
+def _touched(share: np.ndarray, step: int) -> Mask:
+    """Which blocks (h, w) of `step` px to a side hold some of `share` (H, W)."""
+    height, width = (max(n // step, 1) for n in share.shape)
+    if share.dtype == np.bool_:
+        share = share.view(np.uint8) * np.uint8(255)
+    part = share[: height * step, : width * step]
+    return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)) > 0
 
 
 def _assemble(

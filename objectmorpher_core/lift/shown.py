@@ -11,11 +11,12 @@ from ..arrays import F32, F64, Mask
 from ..camera import Camera
 from ..distances import distance_inside
 from ..document import LiftedObject, Matte
-from ..pixels import bilinear, crop
+from ..pixels import crop
 from ..poisson_disk import thin_to_spacing
 from ..raster import tiles
 from ..raster.posed import PosedSplats, RestSplats
 from ..raster.texture import build_levels
+from .bilinear import bilinear
 from .spreading import BRIM, OVERSAMPLING, PACKING
 
 LONGEST = 1024  # px, longer side of the picture whose depths tell what hides what

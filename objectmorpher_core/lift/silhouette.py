@@ -15,10 +15,12 @@ import numpy as np
 
 from ..arrays import F64, Mask
 from ..distances import distance_inside
-from ..pixels import bilinear
 from ..segment.matte import extended_mask, frame_extension
+from .bilinear import bilinear
 
 GRID = 256  # cells on the longer side of the box
+FINENESS = 4.0  # px to a cell, at least, at which the outline is looked at
+SMOOTHING = 0.4  # cells: the outline is smoothed by so much
 STEEP = 0.9  # growth of the depth per cell, from which a farther disc covers this one
 TOUCHING = 0.03  # x extent: how far above its lower hull an outline still touches the ground
 
@@ -155,10 +157,17 @@ def lower_hull(x: F64, y: F64) -> list[int]:
 def _reduced(crop: Mask, cell: float) -> Mask:
     """The crop (H, W) on cells (h, w) of `cell` px; never empty."""
     grid = tuple(int(np.ceil(n / cell)) for n in crop.shape)
-    whole = np.zeros((round(grid[0] * cell) + 1, round(grid[1] * cell) + 1), np.float32)
-    whole[: crop.shape[0], : crop.shape[1]] = crop
+    step = max(1, int(cell / FINENESS))
+    size = [(round(n * cell) + 1 + step - 1) // step for n in grid]
+    padded = np.zeros((size[0] * step, size[1] * step), np.uint8)
+    np.multiply(crop, 255, out=padded[: crop.shape[0], : crop.shape[1]], dtype=np.uint8)
+    blocks = cv2.resize(padded, (size[1], size[0]), interpolation=cv2.INTER_AREA)
+    whole = np.asarray(blocks, np.float32) * np.float32(1 / 255)
     if cell > 1.0:
-        whole = cv2.GaussianBlur(whole, (0, 0), 0.4 * cell)
+        # A block has averaged a little already.
+        spread = np.sqrt((SMOOTHING * cell) ** 2 - (step**2 - 1) / 12) / step
+        whole = cv2.GaussianBlur(whole, (0, 0), float(spread))
+    cell /= step
     warp = np.array([[1, 0, 0.5], [0, 1, 0.5]]) / cell - [0, 0, 0.5]
     inside = cv2.warpAffine(whole, warp, (grid[1], grid[0]), flags=cv2.INTER_LINEAR) > 0.5
     return inside if inside.any() else np.ones(grid, bool)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import F64, Mask
 from ..poisson_disk import thin_to_spacing
+from ..threads import in_threads
 from .body import BACK, FRONT, MIDDLE, Body
 from .silhouette import Silhouette
 
@@ -49,21 +50,34 @@ def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tup
     total = sum(area.sum() for area in areas) + wall.sum()
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
-    sheets = [
-        _sheet(body, _draw(body.silhouette, area * density, rng), side)
-        for area, side in zip(areas, (FRONT, BACK), strict=True)
+    drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
+    around = [
+        _wall(body, wall * density, rng),
+        _brim(body, band + BRIM * spacing, density, rng),
     ]
-    sheets.append(_wall(body, wall * density, rng))
-    sheets.append(_brim(body, band + BRIM * spacing, density, rng))
-    return _joined([_thinned(sheet, spacing, rng) for sheet in sheets]), spacing
+    # Most candidates of the sheets are dropped: their normals are found when that is done.
+    clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
+    clouds += [(surface.xy, surface.height) for surface in around]
+    front, back, *others = _thinned(clouds, spacing, rng)
+    sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
+    sheets += [surface.select(kept) for surface, kept in zip(around, others, strict=True)]
+    return _joined(sheets), spacing
 
 
-def _thinned(sheet: Surface, spacing: float, rng: np.random.Generator) -> Surface:
-    if len(sheet.xy) == 0:
-        return sheet
-    points = np.column_stack([sheet.xy, sheet.height])
-    order = rng.permutation(len(points))
-    return sheet.select(thin_to_spacing(points, spacing * np.sqrt(PACKING), order))
+def _thinned(
+    clouds: list[tuple[F64, F64]], spacing: float, rng: np.random.Generator
+) -> list[np.ndarray]:  # fmt: skip
+    """Which points of each cloud, xy (N, 2) and height (N,), are kept."""
+    orders = [rng.permutation(len(xy)) for xy, _ in clouds]
+    kept = [np.empty(0, np.int64)] * len(clouds)
+
+    def thin(first: int, last: int) -> None:
+        for k in range(first, last):
+            points = np.column_stack(clouds[k])
+            kept[k] = thin_to_spacing(points, spacing * np.sqrt(PACKING), orders[k])
+
+    in_threads(thin, len(clouds), parts=len(clouds))
+    return kept
 
 
 def _joined(sheets: list[Surface]) -> Surface:

@@ -9,13 +9,14 @@ found is the half-thickness squared, which is smooth where the thickness itself 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numba
 import numpy as np
 
 from ..arrays import F64
-from ..pixels import bilinear
+from .bilinear import bilinear
 from .silhouette import Silhouette, is_covered
 
 FULL_BODY = 0.6  # x extent: radius of the disc that becomes a ball 0.7 times as deep as wide
@@ -76,12 +77,25 @@ class Thickness:
 
     def sample(self, grid_xy: F64, cell: float) -> tuple[F64, F64]:
         """Half-thickness (N,) px and its gradient (N, 2) at grid coordinates (N, 2)."""
-        (qdy, qdx), (cdy, cdx) = (np.gradient(f, cell) for f in (self.square, self.crease))
-        fields = np.stack([self.square, self.crease, qdx, qdy, cdx, cdy], -1)
-        q, c, qx, qy, cx, cy = bilinear(fields, grid_xy).T
-        root = np.sqrt(np.maximum(q, 0) + np.maximum(c, 1e-3) ** 2)
+        q, c, qx, qy, cx, cy = bilinear(self._fields, grid_xy).T
+        root = _root(q, c)
         slope = [(0.5 * dq + c * dc) / root - dc for dq, dc in ((qx, cx), (qy, cy))]
-        return FULLNESS * np.maximum(root - c, 0.0), FULLNESS * np.stack(slope, -1)
+        return FULLNESS * np.maximum(root - c, 0.0), (FULLNESS / cell) * np.stack(slope, -1)
+
+    def half(self, grid_xy: F64) -> F64:
+        """Half-thickness (N,) px alone."""
+        q, c = bilinear(self._fields[..., :2], grid_xy).T
+        return FULLNESS * np.maximum(_root(q, c) - c, 0.0)
+
+    @cached_property
+    def _fields(self) -> F64:
+        """(h, w, 6) q, c and what both grow by from cell to cell, across and down."""
+        (qdy, qdx), (cdy, cdx) = (np.gradient(f) for f in (self.square, self.crease))
+        return np.stack([self.square, self.crease, qdx, qdy, cdx, cdy], -1)
+
+
+def _root(square: F64, crease: F64) -> F64:
+    return np.sqrt(np.maximum(square, 0) + np.maximum(crease, 1e-3) ** 2)
 
 
 def _mirrored(field: F64, inside: np.ndarray) -> F64:

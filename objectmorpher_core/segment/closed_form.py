@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numba
 import numpy as np
 
@@ -190,29 +191,28 @@ def affine(rgb: F32, alpha: F32) -> F32:
     """(h, w, 4) alpha as a function of colour: what its windows' affine functions are on average.
 
     It holds for the same picture at twice the size, too, where it brings out what is too fine
-    for this one.
+    for this one: see `applied`.
     """
     around = [np.pad(image, ((2, 2), (2, 2)) + ((0, 0),) * (image.ndim - 2), mode="edge")
               for image in (rgb, alpha)]  # fmt: skip
-    functions = np.zeros((*alpha.shape, 4), np.float32)
+    functions = np.zeros((alpha.shape[0] + 2, alpha.shape[1] + 2, 4), np.float32)
     _fit_windows(around[0], around[1], SMOOTHNESS, functions)
-    return functions
+    return np.asarray(cv2.blur(functions, (3, 3))[1:-1, 1:-1], np.float32)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _fit_windows(rgb: F32, alpha: F32, smoothness: float, functions: F32) -> None:
-    """`functions` (h, w, 4) of a picture (h + 4, w + 4, 3) and its alpha."""
-    height, width = functions.shape[:2]
+    """`functions` (h, w, 4) of the windows of a picture (h + 2, w + 2, 3) and its alpha."""
+    height, width = alpha.shape
     colours, whitened = np.empty((9, 3), np.float32), np.empty((9, 3), np.float32)
-    fit = np.empty(4, np.float32)
-    for y in range(1, height + 3):
-        for x in range(1, width + 3):
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
             total, spread = np.float32(0), False
             for k in range(9):
                 own = alpha[y + k // 3 - 1, x + k % 3 - 1]
                 spread |= own != alpha[y, x]
                 total += own
-            fit[:] = 0
+            fit = functions[y - 1, x - 1]
             fit[3] = total / np.float32(9)
             if spread:
                 _whiten(rgb, y, x, smoothness / 9, colours, whitened)
@@ -222,7 +222,31 @@ def _fit_windows(rgb: F32, alpha: F32, smoothness: float, functions: F32) -> Non
                 for c in range(3):
                     fit[c] /= np.float32(9)
                     fit[3] -= fit[c] * (rgb[y, x, c] - colours[4, c])
-            for i in range(max(y - 3, 0), min(y, height)):
-                for j in range(max(x - 3, 0), min(x, width)):
-                    for c in range(4):
-                        functions[i, j, c] += fit[c] * np.float32(1 / 9)
+
+
+def applied(functions: F32, rgb: F32, where: Mask, alpha: F32) -> F32:
+    """`alpha` (h, w), and `where` (h, w) what `functions` of half the size make of a picture."""
+    changed = alpha.copy()
+    _apply(np.ascontiguousarray(functions), np.ascontiguousarray(rgb), where, changed)
+    return changed
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _apply(functions: F32, rgb: F32, where: Mask, alpha: F32) -> None:
+    height, width = functions.shape[:2]
+    near, far = np.float32(0.75), np.float32(0.25)
+    for y in range(alpha.shape[0]):
+        i = min(y // 2, height - 1)
+        other = min(max(i + 2 * (y % 2) - 1, 0), height - 1)
+        for x in range(alpha.shape[1]):
+            if not where[y, x]:
+                continue
+            j = min(x // 2, width - 1)
+            beside = min(max(j + 2 * (x % 2) - 1, 0), width - 1)
+            total = np.float32(0)
+            for c in range(4):
+                upper = near * functions[i, j, c] + far * functions[i, beside, c]
+                lower = near * functions[other, j, c] + far * functions[other, beside, c]
+                value = near * upper + far * lower
+                total += value * rgb[y, x, c] if c < 3 else value
+            alpha[y, x] = min(max(total, np.float32(0)), np.float32(1))

@@ -58,6 +58,28 @@ def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndar
     return np.pad(image, pads, mode="reflect")
 
 
+def extended_part(
+    image: np.ndarray, extension: tuple[int, int, int, int], window: tuple[slice, slice]
+) -> np.ndarray:
+    """`extended(image, extension)[window]`, without all the rest of it."""
+    if not any(extension):
+        return image[window]
+    kept, pads, inner = [], [], []
+    for part, before, size in zip(
+        window, (extension[0], extension[2]), image.shape[:2], strict=True
+    ):
+        start, stop = part.start - before, part.stop - before  # px of the image
+        low, high = max(-start, 0), max(stop - size, 0)
+        # What is mirrored is kept, too, however narrow the window.
+        first = max(min(start, size - 1 - high if high else start), 0)
+        last = min(max(stop, low + 1), size)
+        kept.append(slice(first, last))
+        pads.append((low, high))
+        inner.append(slice(start + low - first, stop + low - first))
+    pads += [(0, 0)] * (image.ndim - 2)
+    return np.pad(image[kept[0], kept[1]], pads, mode="reflect")[inner[0], inner[1]]
+
+
 def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Selection:
     """`mask` (H, W), bool or u8, continued like `extended`, but only where it touches the frame.
 
@@ -94,7 +116,8 @@ def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
     left, top = max(columns[0] - margin, 0), max(rows[0] - margin, 0)
     right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
     window = (slice(top, bottom), slice(left, right))
-    alpha, colours = soft_cutout(extended(pixels, extension)[window], mask[window], band)
+    part = extended_part(pixels, extension, window)
+    alpha, colours = soft_cutout(part, mask[window], band)
     return Matte(int(left) - extension[2], int(top) - extension[0], alpha, colours.foreground)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels, Selection
 from ..threads import in_threads
-from .closed_form import Expected, affine, solve_alpha
+from .closed_form import Expected, affine, applied, solve_alpha
 from .halving import doubled, halved, halved_pixels, unit
 from .mask_edit import FULL, is_selected
 
@@ -40,9 +40,11 @@ KEPT = 0.01  # weight of what the smaller picture gave
 THIN = 5  # px: narrower parts may have been lost in the smaller picture
 ROUNDS = (120, 60, 4)  # of conjugate gradients: coarsest size, whole band, fine sizes
 TILE = 256  # px
-OVERLAP = 12  # px that a tile sees around itself
+OVERLAP = 12  # px, even, that a tile sees around itself
+MARGIN = 8  # px, even, around that, in which it is found out what is open
 
 Window = tuple[slice, slice]
+WHOLE_PICTURE = (slice(None), slice(None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,21 +61,20 @@ class _Size:
         """A part of it, in [0, 1]."""
         return unit(self.pixels[window])
 
-    def drawn_alpha(self) -> F32:
-        if self.coverage.dtype == np.float32:
-            return self.coverage
-        return self.coverage * np.float32(1 / FULL)
+    def drawn_alpha(self, window: Window) -> F32:
+        part = self.coverage[window]
+        return part if part.dtype == np.float32 else part * np.float32(1 / FULL)
 
     def half(self) -> _Size:
         pixels = halved_pixels(self.pixels)
         # What is thin stays, however small the picture.
-        share, thin = (halved(m.astype(np.float32)) for m in (self.mask, _thin(self.mask, 3)))
+        share, thin = (halved(m.view(np.uint8)) for m in (self.mask, _thin(self.mask, 3)))
         mask = (share >= 0.5) | (thin >= 0.25)
         if not self.drawn.any():
             nothing = np.zeros_like(mask)
             return _Size(pixels, self.band / 2, mask, nothing, nothing.astype(np.float32))
-        drawn = halved(self.drawn.astype(np.float32)) >= 0.5
-        return _Size(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha()))
+        drawn = halved(self.drawn.view(np.uint8)) >= 0.5
+        return _Size(pixels, self.band / 2, mask, drawn, halved(self.drawn_alpha(WHOLE_PICTURE)))
 
 
 def find_alpha(
@@ -109,18 +110,17 @@ def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
     away = np.abs(distance)
     unknown = (away < reach) & ~(ridge & (distance > RIDGE)) & ~size.drawn
     astray = ASTRAY * band
-    window = (slice(None), slice(None))
-    clearness = _clearness(size.rgb(window), distance, reach)
+    clearness = _clearness(size.rgb(WHOLE_PICTURE), distance, reach)
     doubt = 1 / (1 + (clearness / CLEAR) ** 2)
     weight = BESIDE + FAR * doubt * np.clip((away - astray) / max(reach - astray, 0.5), 0, 1)
     weight *= (TUNED / band) ** 2  # the same influence, over more pixels
     likely = np.clip(0.5 + distance / (2 * astray), 0, 1)
     alpha = np.where(unknown, likely, size.mask).astype(np.float32)
-    alpha[size.drawn] = size.drawn_alpha()[size.drawn]
+    alpha[size.drawn] = size.drawn_alpha(WHOLE_PICTURE)[size.drawn]
     start = alpha if before is None else doubled(before, alpha.shape)
     rounds = ROUNDS[0] if before is None else ROUNDS[1]
     expected = Expected(alpha, weight.astype(np.float32))
-    solved = solve_alpha(size.rgb(window), unknown, expected, start, rounds)
+    solved = solve_alpha(size.rgb(WHOLE_PICTURE), unknown, expected, start, rounds)
     clear = _cleared(solved, distance, astray, band)
     return _cleaned(np.where(unknown, clear, solved), unknown)
 
@@ -172,49 +172,55 @@ def _cleared(alpha: F32, distance: F32, astray: float, band: float) -> F32:
 
 def _sharper(size: _Size, before: F32, small: _Size) -> F32:
     """Alpha (h, w), from that of half the size, `small`."""
-    soft = ((before > 0) & (before < 1)).astype(np.uint8)
-    soft = cv2.dilate(soft, np.ones((3, 3), np.uint8))
-    shape = size.mask.shape
-    thin = cv2.dilate(_thin(size.mask, THIN).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    unknown = np.repeat(np.repeat(soft, 2, 0), 2, 1)[: shape[0], : shape[1]] > 0
-    unknown = (unknown | thin) & ~size.drawn
-    alpha = np.ascontiguousarray(doubled(before, shape))
-    np.copyto(alpha, size.mask, where=thin)
-    np.copyto(alpha, alpha >= 0.5, where=~unknown)
-    if size.drawn.any():
-        alpha[size.drawn] = size.drawn_alpha()[size.drawn]
-    found: dict[int, F32] = {}
-    tiles = [tile for tile in _tiles(shape) if unknown[tile].any()]
+    alpha = np.empty(size.mask.shape, np.float32)
+    tiles = list(_tiles(alpha.shape))
 
     def solve(first: int, last: int) -> None:
-        for k in range(first, last):
-            found[k] = _sharper_tile(size, (alpha, unknown), (small, before), tiles[k])
+        for tile in tiles[first:last]:
+            alpha[tile] = _sharper_tile(size, small, before, tile)
 
     in_threads(solve, len(tiles), parts=4)
-    for k, tile in enumerate(tiles):  # not sooner: tiles look at what is around them
-        alpha[tile] = found[k]
     return alpha
 
 
-def _sharper_tile(
-    size: _Size, now: tuple[F32, Mask], half: tuple[_Size, F32], tile: Window
-) -> F32:  # fmt: skip
-    """One tile of `_sharper`: alpha and what is unknown `now`, and the picture of half the size."""
-    (alpha, unknown), (small, before) = now, half
-    rows, columns = (slice(max(s.start - OVERLAP, 0), s.stop + OVERLAP) for s in tile)
-    around = (rows, columns)
-    inner = tuple(slice(s.start - a.start, s.stop - a.start)
-                  for s, a in zip(tile, around, strict=True))  # fmt: skip
-    coarse = (slice(rows.start // 2, (rows.stop + 1) // 2),
-              slice(columns.start // 2, (columns.stop + 1) // 2))  # fmt: skip
-    rgb, is_open = size.rgb(around), unknown[around]
-    functions = doubled(affine(small.rgb(coarse), before[coarse]), rgb.shape)
-    start = np.einsum("hwc,hwc->hw", functions[..., :3], rgb) + functions[..., 3]
-    start = np.where(is_open, np.clip(start, 0, 1), alpha[around]).astype(np.float32)
+def _sharper_tile(size: _Size, small: _Size, before: F32, tile: Window) -> F32:
+    """One tile of `_sharper`."""
+    around = _wider(tile, OVERLAP, size.mask.shape)
+    inner = _within(tile, around)
+    alpha, is_open = _enlarged(size, before, around)
+    if not is_open[inner].any():
+        return alpha[inner]
+    coarse = _halved_window(around)
+    functions = affine(small.rgb(coarse), before[coarse])
+    rgb = size.rgb(around)
+    start = applied(functions, rgb, is_open, alpha)
     if size.band <= POLISHED:
-        expected = Expected(alpha[around], np.full(start.shape, KEPT, np.float32))
+        expected = Expected(alpha, np.full(start.shape, KEPT, np.float32))
         start = solve_alpha(rgb, is_open, expected, start, ROUNDS[2])
-    return _cleaned(start, is_open)[inner[0], inner[1]]
+    return _cleaned(start, is_open)[inner]
+
+
+def _enlarged(size: _Size, before: F32, window: Window) -> tuple[F32, Mask]:
+    """Alpha in a part (h, w) as half the size has it, and where that is open."""
+    wide = _wider(window, MARGIN, size.mask.shape)
+    coarse, mask, drawn = before[_halved_window(wide)], size.mask[wide], size.drawn[wide]
+    inner = _within(window, wide)
+    shape, value = mask.shape, coarse[0, 0]
+    is_plain = value in (0, 1) and bool((coarse == value).all()) and mask.all() == mask.any()
+    if is_plain and not drawn.any():
+        nowhere = np.zeros(shape, np.bool_)[inner]
+        return np.full(nowhere.shape, value, np.float32), nowhere
+    square = np.ones((3, 3), np.uint8)
+    soft = cv2.dilate(((coarse > 0) & (coarse < 1)).view(np.uint8), square)
+    thin = cv2.dilate(_thin(mask, THIN).view(np.uint8), square) > 0
+    unknown = np.repeat(np.repeat(soft, 2, 0), 2, 1)[: shape[0], : shape[1]] > 0
+    unknown = (unknown | thin) & ~drawn
+    alpha = doubled(coarse, shape)
+    alpha = np.where(thin, mask, alpha)
+    alpha = np.where(unknown, alpha, alpha >= 0.5).astype(np.float32)
+    if drawn.any():
+        alpha[drawn] = size.drawn_alpha(wide)[drawn]
+    return np.ascontiguousarray(alpha[inner]), np.ascontiguousarray(unknown[inner])
 
 
 def _cleaned(alpha: F32, unknown: Mask) -> F32:
@@ -233,6 +239,28 @@ def _tiles(shape: tuple[int, ...]) -> Iterator[Window]:
     for y in range(0, shape[0], TILE):
         for x in range(0, shape[1], TILE):
             yield slice(y, min(y + TILE, shape[0])), slice(x, min(x + TILE, shape[1]))
+
+
+def _wider(window: Window, px: int, shape: tuple[int, ...]) -> Window:
+    """`window` and `px` around it, as far as a picture (h, w) goes."""
+    rows, columns = (
+        slice(max(s.start - px, 0), min(s.stop + px, n)) for s, n in zip(window, shape, strict=True)
+    )
+    return rows, columns
+
+
+def _within(window: Window, around: Window) -> Window:
+    """`window` as a part of one `around` it."""
+    rows, columns = (
+        slice(s.start - a.start, s.stop - a.start) for s, a in zip(window, around, strict=True)
+    )
+    return rows, columns
+
+
+def _halved_window(window: Window) -> Window:
+    """Of a window that begins at even px, what it is at half the size."""
+    rows, columns = (slice(s.start // 2, (s.stop + 1) // 2) for s in window)
+    return rows, columns
 
 
 def signed_distance(mask: Mask) -> F32:

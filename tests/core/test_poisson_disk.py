@@ -48,3 +48,26 @@ def test_where_the_cloud_lies_does_not_matter():
     far = thin_to_spacing(CLOUD + 1000.0, 0.1, ORDER)
     # a pair whose distance rounds across the spacing may decide otherwise
     assert len(np.setxor1d(far, thin_to_spacing(CLOUD, 0.1, ORDER))) <= 4
+
+
+def test_the_first_offered_wins_as_if_all_were_compared():
+    spacing, kept = 0.15, []
+    for i in ORDER[:1500]:
+        if all(np.linalg.norm(CLOUD[i] - CLOUD[j]) >= spacing for j in kept):
+            kept.append(i)
+    # those not offered are not kept
+    assert np.array_equal(thin_to_spacing(CLOUD, spacing, ORDER[:1500]), np.sort(kept))
+
+
+def test_two_sides_that_touch_are_thinned_each_by_itself():
+    sheet = np.column_stack([np.random.default_rng(1).random((800, 2)), np.zeros(800)])
+    cloud, normals = np.tile(sheet, (2, 1)), np.repeat([[0, 0, 1.0], [0, 0, -1.0]], 800, axis=0)
+    order = np.random.default_rng(2).permutation(1600)
+    kept = thin_to_spacing(cloud, 0.1, order, normals)
+    for side in (kept[kept < 800], kept[kept >= 800]):
+        assert cKDTree(cloud[side]).query(cloud)[0].max() < 0.1
+        assert cKDTree(cloud[side]).query(cloud[side], k=2)[0][:, 1].min() >= 0.1
+
+
+def test_none_are_thinned_to_none():
+    assert len(thin_to_spacing(np.empty((0, 3)), 0.1, np.empty(0, int))) == 0

@@ -8,6 +8,7 @@ import pytest
 
 from objectmorpher_core.arrays import F32, F64, Mask
 from objectmorpher_core.document import LiftSettings, Matte
+from objectmorpher_core.lift.canvas import Canvas
 from objectmorpher_core.lift.colours import Colouring, colouring, fill_in
 from objectmorpher_core.lift.growing import grown
 from objectmorpher_core.lift.mirror import MirrorAxis
@@ -39,7 +40,7 @@ def _coloured(rgb: F32, is_mirrored: bool, hidden: Mask | None = None, axis=None
     inside = _away() < 80
     shown = inside if hidden is None else inside & ~hidden
     matte = Matte(0, 0, shown.astype(np.float32), rgb)
-    return colouring(matte, Silhouette.of(inside), SPACING, is_mirrored, axis)
+    return colouring(Canvas.of(matte), Silhouette.of(inside), SPACING, is_mirrored, axis)
 
 
 def _at(colours: Colouring, xy: F64, is_back: bool) -> F32:
@@ -109,7 +110,7 @@ def test_the_size_of_the_photo_does_not_change_the_colours():
     large = cv2.resize(_green(), (3 * SIDE, 3 * SIDE))
     mask = cv2.resize(inside.astype(np.uint8), (3 * SIDE, 3 * SIDE)) > 0
     matte = Matte(0, 0, mask.astype(np.float32), np.asarray(large, np.float32))
-    other = colouring(matte, Silhouette.of(mask), 3 * SPACING, True, None)
+    other = colouring(Canvas.of(matte), Silhouette.of(mask), 3 * SPACING, True, None)
     xy = _circle(50)
     assert np.abs(_at(small, xy, False) - _at(other, 3 * xy, False)).max() < 0.03
 

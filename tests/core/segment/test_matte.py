@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pixels import crop, pixels_from_unit, unit_pixels
+from objectmorpher_core.segment import soft_edge, unmix
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.segment.matte import (
     band_width,
     build_matte,
+    extended,
+    extended_part,
     signed_distance,
     soft_cutout,
 )
-from objectmorpher_core.segment.unmix import exact
+from objectmorpher_core.segment.unmix import exact, unmixed
 from objectmorpher_core.segment.veil import unveiled, veil
 from tests import shapes
 
@@ -390,3 +393,40 @@ def test_a_matte_of_a_large_photo_takes_little_more_than_its_own_memory():
     tracemalloc.stop()
     assert matte.alpha.size > 12e6
     assert most - matte.alpha.nbytes - matte.foreground.nbytes < 400e6
+
+
+def test_a_part_of_what_goes_on_beyond_the_frame_is_that_part():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        height, width = rng.integers(2, 12, 2)
+        extension = tuple(int(rng.integers(0, n)) for n in (height, height, width, width))
+        image = rng.integers(0, 255, (height, width, 3), np.uint8)
+        whole = extended(image, extension)
+        ends = [np.sort(rng.choice(n + 1, 2, replace=False)) for n in whole.shape[:2]]
+        window = (slice(*map(int, ends[0])), slice(*map(int, ends[1])))
+        assert np.array_equal(extended_part(image, extension, window), whole[window])
+
+
+def test_tiles_leave_no_trace(monkeypatch):
+    """A photo of several tiles as one of a single tile."""
+    y, x = np.mgrid[:600, :700] + 0.5
+    distance = 200 - np.hypot(x - 350, y - 300) + 9 * np.sin(x / 6)
+    soft = np.clip(0.5 + distance / 9, 0, 1)[..., None]
+    ground = np.stack([x / 700, y / 600, 0.3 + 0 * x], -1)
+    pixels = pixels_from_unit(soft * [0.8, 0.7, 0.2] + (1 - soft) * ground, np.dtype(np.uint8))
+    mask = distance > 0
+
+    def cutout() -> tuple:
+        # Beyond the sizes that are solved for: there, steps depend on all of a tile.
+        monkeypatch.setattr(soft_edge, "POLISHED", 0.0)
+        alpha = soft_edge.find_alpha(pixels, mask, np.zeros_like(mask), 12.0, 48.0)
+        return alpha, unmixed(pixels, alpha)
+
+    alpha, colours = cutout()
+    monkeypatch.setattr(soft_edge, "TILE", 1024)
+    monkeypatch.setattr(unmix, "TILE", 1024)
+    other, whole = cutout()
+    assert np.abs(alpha - other).max() < ROUNDING
+    assert ((alpha > 0) & (alpha < 1)).mean() > 0.01
+    assert np.abs(colours.foreground - whole.foreground).max() < ROUNDING
+    assert len(colours.rows) == len(whole.rows)
