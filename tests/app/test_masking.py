@@ -13,7 +13,7 @@ from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
 from PIL import Image
 from strokes import move, press, stroke
 
-from app.commands import run
+from app.commands import run, why_not
 from app.editor import Editor
 from app.filing import Dialog
 from app.tasks import Combine
@@ -266,6 +266,23 @@ def test_inverting_and_filling(editor: Editor) -> None:
     run(editor, "fill_holes")
     wait_for_jobs(editor)
     np.testing.assert_array_equal(editor.mask, ball)
+
+
+def test_islands_are_removed_and_come_back_by_undo(editor: Editor) -> None:
+    ball = select_ball(editor)
+    editor.view.brush = Brush(3.0, 0.5)
+    paint(editor, FAR)
+    painted, coverage = editor.mask, editor.object and editor.object.coverage
+    assert painted is not None and coverage is not None and painted[20, 20]
+    run(editor, "remove_islands")
+    wait_for_jobs(editor)
+    np.testing.assert_array_equal(editor.mask, ball)
+    assert editor.object is not None and editor.object.coverage is None, "its rim went, too"
+    assert editor.history is not None and editor.history.undo_label == "Remove islands"
+    run(editor, "undo")
+    assert editor.mask is painted
+    editor.selection.clear()
+    assert why_not(editor, "remove_islands") is not None
 
 
 def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
