@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.importing import Import, Scene
     from objectmorpher_core.lift.placement import Proposal
     from objectmorpher_core.pipeline import Reading
-    from objectmorpher_core.segment import Segmenter
+    from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -100,8 +100,8 @@ def forget_segmenter(progress: Progress) -> None:
     _memory.forget()
 
 
-def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
-    """The mask of what the prompt means, and the backend that made it."""
+def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+    """The mask of what the prompt means, by which backend, and how sure that is."""
     reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
@@ -159,9 +159,7 @@ def fit_object(
     return found, *place_import(scene, gaussians, found.registration.best, rest, seed)
 
 
-def candidate(
-    pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress
-) -> tuple[Mask, str] | str:
+def candidate(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found | str:
     """As `segment`; where nothing can be selected, the sentence that says so."""
     from objectmorpher_core.segment import SelectionError
 
