@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.gaussians import Gaussians
     from objectmorpher_core.importing import Import, Scene
     from objectmorpher_core.lift.placement import Proposal
+    from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
     from objectmorpher_core.segment import Found, Segmenter
 
@@ -93,6 +94,14 @@ def _is_same(a: Pixels, b: Pixels) -> bool:
 def read_photo(pixels: Pixels, backend: str, progress: Progress) -> None:
     """Prepares for clicks on a photo that was just opened."""
     _memory.reading(pixels, backend, progress)
+
+
+def add_model(id: str, path: Path, progress: Progress) -> Added:
+    """A user's file tried and kept among the models."""
+    from objectmorpher_core import models
+
+    progress(0.1, "trying it")
+    return models.add(id, path)
 
 
 def forget_segmenter(progress: Progress) -> None:

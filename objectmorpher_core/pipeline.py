@@ -237,6 +237,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
         back=script.back,
         hidden=hidden,
         horizon=document.horizon,
+        uses_depth=not script.no_depth,
     )
 
 
