@@ -114,7 +114,9 @@ class Models:
 
         def accept(own: Added) -> None:
             self.look()
-            editor.say(t("{name} is ready", name=own.name))
+            again = Action(t("Lift it again"), lambda: editor.shaping.say(t("Depth model")))
+            can_follow = editor.is_lifted and editor.shaping.why_fixed is None
+            editor.say(t("{name} is ready", name=own.name), again if can_follow else None)
 
         editor.jobs.start(
             t("Trying {name}", name=path.name), job_functions.add_model, DEPTH, path,
