@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
@@ -14,6 +15,8 @@ from ..models.depth_net import DepthNet
 from . import LiftError
 from .depth_prior import Seen
 
+Look = Callable[[Pixels, Mask], Seen | None]
+"""Of a photo (H, W, 3), where a mask (H, W) of it is."""
 MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
 
 

@@ -25,7 +25,7 @@ from ..segment.matte import band_width, signed_distance
 from . import LiftError, Subject
 from .body import MIDDLE, Body
 from .colours import Colouring, colouring
-from .depth_look import look
+from .depth_look import Look, look
 from .depth_prior import follow
 from .mirror import MirrorAxis, find_axis
 from .silhouette import Silhouette
@@ -46,6 +46,10 @@ class ReliefLifter:
 
     name = "relief"
 
+    def __init__(self, look: Look = look) -> None:
+        """`look` tells the depth of what is seen: by default as an installed network does."""
+        self._look = look
+
     def missing(self) -> str | None:
         return None
 
@@ -64,7 +68,7 @@ class ReliefLifter:
         body = Body.of(outline, camera, settings, axis)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
-            body = _followed(body, subject, settings, hidden)
+            body = self._followed(body, subject, settings, hidden)
         if settings.nearness is not None:
             body = body.nearer(_nearness(subject, settings.nearness, outline))
         progress(0.3, "Placing Gaussians")
@@ -80,6 +84,20 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
+
+    def _followed(
+        self, body: Body, subject: Subject, settings: LiftSettings, hidden: Mask | None
+    ) -> Body:
+        """The body as deep as a depth network sees it; the same one where none is installed."""
+        seen = self._look(subject.pixels, subject.mask if hidden is None else subject.mask | hidden)
+        if seen is None:
+            return body
+        outline, cells = body.silhouette, None
+        if hidden is not None:
+            at = np.floor(outline.photo_xy(outline.cells)).astype(int)
+            limit = np.array(hidden.shape[::-1]) - 1
+            cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
+        return follow(body, seen, subject.camera.focal, settings.thickness, cells)
 
 
 def _canvas(matte: Matte, hidden: Mask | None) -> tuple[Matte, Mask | None]:
@@ -114,19 +132,6 @@ def _is_mirrored(body: Body, settings: LiftSettings, axis: MirrorAxis | None) ->
     rows, columns = np.nonzero(body.silhouette.inside)
     is_wide = bool(np.ptp(columns) > PROFILE * np.ptp(rows))
     return body.standing.prism is not None or (axis is None and body.standing.is_known and is_wide)
-
-
-def _followed(body: Body, subject: Subject, settings: LiftSettings, hidden: Mask | None) -> Body:
-    """The body as deep as a depth network sees it; the same one where none is installed."""
-    seen = look(subject.pixels, subject.mask if hidden is None else subject.mask | hidden)
-    if seen is None:
-        return body
-    outline, cells = body.silhouette, None
-    if hidden is not None:
-        at = np.floor(outline.photo_xy(outline.cells)).astype(int)
-        limit = np.array(hidden.shape[::-1]) - 1
-        cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
-    return follow(body, seen, subject.camera.focal, settings.thickness, cells)
 
 
 def _nearness(subject: Subject, painted: F32, outline: Silhouette) -> F64:
