@@ -88,12 +88,13 @@ def add(id: str, source: Path) -> Added:
     try:
         if source.stat().st_size > BYTES:
             raise ModelError(f"{source.name} is larger than {BYTES >> 30} GB")
-        CHECKS[id](source)
         where = folder()
         where.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=where, prefix=UNFINISHED) as scratch:
-            copy, note = Path(scratch) / own.file, Path(scratch) / "note"
+            (Path(scratch) / "copy").mkdir()
+            copy, note = Path(scratch) / "copy" / source.name, Path(scratch) / "note"
             shutil.copyfile(source, copy)
+            CHECKS[id](copy)  # not the source: its weights may lie in a second file beside it
             said = {"name": source.name, "sha256": sha256_of(copy)}
             note.write_text(json.dumps(said), encoding="utf-8")
             os.replace(copy, where / own.file)

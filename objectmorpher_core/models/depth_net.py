@@ -36,7 +36,9 @@ class DepthNet:
                 str(path), options, providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime has a type of its own for everything
-            raise ModelError(f"{path.name} is not an ONNX network that can be opened") from error
+            raise ModelError(
+                f"{path.name} is not an ONNX network, all in one file, that can be opened"
+            ) from error
         self._name, self._fixed = self._checked_input(path.name)
 
     def _checked_input(self, name: str) -> tuple[str, tuple[int | None, int | None]]:

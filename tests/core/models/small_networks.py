@@ -28,9 +28,13 @@ def node(kind: str, sources: list[str], target: str, attributes: bytes = b"") ->
     return names + _bytes_field(4, kind.encode()) + attributes
 
 
-def floats(name: str, array: np.ndarray) -> bytes:
-    """TensorProto of float32."""
+def floats(name: str, array: np.ndarray, outside: str = "") -> bytes:
+    """TensorProto of float32; its numbers are in the file `outside`, if there is one."""
     dims = b"".join(b"\x08" + _as_varint(n) for n in array.shape)
+    if outside:
+        place = _bytes_field(1, b"location") + _bytes_field(2, outside.encode())
+        told = _bytes_field(8, name.encode()) + _bytes_field(13, place) + b"\x70\x01"
+        return dims + b"\x10\x01" + told
     raw = np.ascontiguousarray(array, "<f4").tobytes()
     return dims + b"\x10\x01" + _bytes_field(8, name.encode()) + _bytes_field(9, raw)
 
@@ -64,10 +68,12 @@ def brightness() -> bytes:
     return model([mean], [], ends)
 
 
-def constant(depth: np.ndarray, takes: tuple[int | str, ...] = ("n", 3, "h", "w")) -> bytes:
+def constant(
+    depth: np.ndarray, takes: tuple[int | str, ...] = ("n", 3, "h", "w"), outside: str = ""
+) -> bytes:
     """Whatever the picture is, its inverse depth is `depth` (h, w)."""
     nothing = node("ReduceMean", ["image"], "mean", integer("keepdims", 0))
     none = node("Mul", ["mean", "zero"], "none")
-    tensors = [floats("told", depth[None]), floats("zero", np.zeros(()))]
+    tensors = [floats("told", depth[None], outside), floats("zero", np.zeros(()))]
     ends = [value("image", *takes)], [value("depth", 1, *depth.shape)]
     return model([nothing, none, node("Add", ["told", "none"], "depth")], tensors, ends)

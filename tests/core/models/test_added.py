@@ -14,6 +14,7 @@ from tests.core.models.small_networks import brightness, constant, integer, inte
 from tests.core.models.small_networks import node as onnx_node
 from tests.core.models.small_networks import value as onnx_value
 
+BLACK = np.zeros((30, 80, 3), np.uint8)
 RAMP = np.linspace(0, 1, 35, dtype=np.float32).reshape(5, 7)
 
 
@@ -94,7 +95,16 @@ def test_what_is_no_depth_network_is_one_sentence_and_changes_nothing(
     with pytest.raises(models.ModelError, match=sentence) as caught:
         models.add("depth", written(tmp_path, data))
     assert "\n" not in str(caught.value)
-    assert models.added("depth").state == "missing" and not cache.exists()
+    assert models.added("depth").state == "missing" and list(cache.iterdir()) == []
+
+
+def test_weights_in_a_second_file_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "weights.bin").write_bytes(RAMP.tobytes())
+    data = constant(RAMP, outside="weights.bin")
+    assert DepthNet(written(tmp_path, data)).inverse_depth(BLACK).shape == RAMP.shape
+    with pytest.raises(models.ModelError, match="all in one file"):
+        models.add("depth", tmp_path / "mine.onnx")
+    assert models.added("depth").state == "missing"
 
 
 def test_a_missing_file_and_an_unknown_kind_are_one_sentence(tmp_path: Path) -> None:
@@ -117,4 +127,4 @@ def test_the_network_gets_the_picture_as_it_was_trained_on_it(tmp_path: Path) ->
 def test_a_network_of_one_size_gets_that_size(tmp_path: Path) -> None:
     net = DepthNet(written(tmp_path, constant(RAMP, (1, 3, 28, 42))))
     assert net.size_for(800, 300) == (42, 28)
-    np.testing.assert_array_equal(net.inverse_depth(np.zeros((30, 80, 3), np.uint8)), RAMP)
+    np.testing.assert_array_equal(net.inverse_depth(BLACK), RAMP)
