@@ -14,6 +14,7 @@ import numpy as np
 
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Click, Photo, Prompt
+from objectmorpher_core.segment import Found
 
 from . import job_functions
 from .job_functions import Choice
@@ -36,8 +37,11 @@ class Candidate:
 
     photo: Photo
     prompt: Prompt
-    mask: Mask
-    backend: str
+    found: Found
+
+    @property
+    def mask(self) -> Mask:
+        return self.found.mask
 
 
 class Candidates:
@@ -80,7 +84,7 @@ class Candidates:
         if shown is not None and is_here and self._is_same(shown.prompt, question.prompt):
             editor.jobs.cancel(CANDIDATE)
             self.shown = self._asked = None
-            editor.selection.take(question, shown.mask, shown.backend)
+            editor.selection.take(question, shown.found)
             return True
         asked = self._asked is not None and self._is_same(self._asked, question.prompt)
         if not asked or not editor.jobs.promote(CANDIDATE, SELECT):
@@ -128,7 +132,7 @@ class Candidates:
         photo = document.photo
         self._asked = prompt
 
-        def accept(answer: tuple[Mask, str] | str) -> None:
+        def accept(answer: Found | str) -> None:
             wanted = self._pop_wanted()
             if time.monotonic() - now > TOO_SLOW:
                 self._slow = photo
@@ -140,9 +144,9 @@ class Candidates:
                 if wanted is not None:
                     editor.complain(answer)
             elif wanted is not None:
-                editor.selection.take(wanted, *answer)
+                editor.selection.take(wanted, answer)
             elif self._is_wished():
-                self.shown = Candidate(photo, prompt, *answer)
+                self.shown = Candidate(photo, prompt, answer)
 
         def fail(error: JobError) -> None:
             if self._pop_wanted() is not None:

@@ -124,6 +124,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
     add("--floating", action="store_true", default=None,
         help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
+    add("--no-depth", action="store_true", default=None,
+        help="from its outline alone, though a depth model is installed")  # fmt: skip
     add("--hidden", metavar="M.png", help="a mask of what of it is hidden behind something")
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
     add("--flip", action="store_true", default=None, help="that file stands on its head")
@@ -198,8 +200,10 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("action", choices=("list", "get", "path", "verify"))
+    parser.description = "Learned weights: fetched ones, and a depth network that you bring."
+    parser.add_argument("action", choices=("list", "get", "path", "verify", "add", "remove"))
     parser.add_argument("id", nargs="?", help="one weight; default all of them")
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="to add: add depth FILE")
     parser.set_defaults(run=_lazily("models"))
 
 

@@ -26,6 +26,7 @@ from objectmorpher_core.script import (
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 
+from .cli_models import run_models
 from .terminal import PROGRAM, UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
@@ -192,38 +193,6 @@ def run_bench(options: argparse.Namespace) -> None:
         write_all({options.json: figures})
     else:
         sys.stdout.write(figures.decode())
-
-
-def run_models(options: argparse.Namespace) -> None:
-    """`objectmorpher models list|get|path|verify`"""
-    from objectmorpher_core import models
-
-    chosen = [models.weight(options.id)] if options.id else list(models.weights())
-    if options.action == "get":
-        for weight in chosen:
-            with progress_bar(f"Getting {weight.id}") as progress:
-                at = models.fetch(weight.id, progress)
-            sys.stdout.write(f"{weight.id}: {at}\n")
-        return
-    broken = []
-    for weight in chosen:
-        at = models.path(weight.id)
-        if options.action == "path":
-            sys.stdout.write(f"{at}\n" if at else "")
-            broken += [] if at else [weight.id]
-        elif options.action == "list":
-            state = "installed" if at else "not installed"
-            megabytes = weight.size / 1e6
-            sys.stdout.write(
-                f"{weight.id:<12} {megabytes:7.1f} MB  {weight.licence:<12} {state:<14}"
-                f" {weight.purpose}\n"
-            )
-        else:
-            state = models.verify(weight.id)[0].state
-            sys.stdout.write(f"{weight.id}: {state}\n")
-            broken += [] if state == "ok" else [weight.id]
-    if broken:
-        raise UsageError(f"{', '.join(broken)}: not installed or damaged, use `models get`")
 
 
 def _items(options: argparse.Namespace) -> list[BatchItem]:

@@ -33,11 +33,12 @@ class Dialog(Enum):
     MASK_OPEN = "Import mask"
     MASK_SAVE = "Export mask"
     SHAPE_OPEN = "Use 3D file"
+    MODEL_OPEN = "Use depth model"
 
     @property
     def is_opening(self) -> bool:
         """Whether it asks for a file that is there."""
-        return self in (Dialog.OPEN, Dialog.MASK_OPEN, Dialog.SHAPE_OPEN)
+        return self not in (Dialog.SAVE, Dialog.EXPORT, Dialog.MASK_SAVE)
 
 
 class Filing:
@@ -119,6 +120,8 @@ class Filing:
             self._editor.masking.open_file(path)
         elif dialog is Dialog.SHAPE_OPEN:
             self._editor.shaping.open_file(path)
+        elif dialog is Dialog.MODEL_OPEN:
+            self._editor.models.add(path)
         elif dialog is Dialog.MASK_SAVE:
             self._editor.masking.write_file(path if path.suffix else path.with_suffix(".png"))
         elif self._editor.exporting.draft is not None:

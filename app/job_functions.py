@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from objectmorpher_core.gaussians import Gaussians
     from objectmorpher_core.importing import Import, Scene
     from objectmorpher_core.lift.placement import Proposal
+    from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
-    from objectmorpher_core.segment import Segmenter
+    from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -95,13 +96,21 @@ def read_photo(pixels: Pixels, backend: str, progress: Progress) -> None:
     _memory.reading(pixels, backend, progress)
 
 
+def add_model(id: str, path: Path, progress: Progress) -> Added:
+    """A user's file tried and kept among the models."""
+    from objectmorpher_core import models
+
+    progress(0.1, "trying it")
+    return models.add(id, path)
+
+
 def forget_segmenter(progress: Progress) -> None:
     """The next photo or click chooses the backend anew: a model was added."""
     _memory.forget()
 
 
-def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> tuple[Mask, str]:
-    """The mask of what the prompt means, and the backend that made it."""
+def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+    """The mask of what the prompt means, by which backend, and how sure that is."""
     reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
@@ -159,9 +168,7 @@ def fit_object(
     return found, *place_import(scene, gaussians, found.registration.best, rest, seed)
 
 
-def candidate(
-    pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress
-) -> tuple[Mask, str] | str:
+def candidate(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found | str:
     """As `segment`; where nothing can be selected, the sentence that says so."""
     from objectmorpher_core.segment import SelectionError
 

@@ -23,6 +23,7 @@ from objectmorpher_core.document import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.segment import Found
 
 from . import job_functions
 from .feedback import Action
@@ -107,11 +108,11 @@ class Tasks:
         self.question = question
         photo = document.photo
 
-        def accept(answer: tuple[Mask, str]) -> None:
+        def accept(found: Found) -> None:
             self.question = None
             current = editor.document
             if current is not None and current.photo is photo and not editor.hand.is_busy:
-                editor.selection.take(question, *answer)
+                editor.selection.take(question, found)
 
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels, question.prompt,

@@ -5,13 +5,17 @@ from __future__ import annotations
 from objectmorpher_core import warm_up as core
 
 from .render import flattening
+from .render.view_depths import near_to_far
 from .shape import build_shape, rehearse
 
 
 def warm_up() -> None:
-    """A minute or two the first time after an installation, a second afterwards."""
+    """A minute or two the first time after an installation, seconds afterwards."""
     document = core.warm_up()
-    rehearse(build_shape(document.photo.camera, document.objects[0]), document.photo.camera)
+    camera, thing = document.photo.camera, document.objects[0]
+    shape = build_shape(camera, thing)
+    rehearse(shape, camera)
+    near_to_far(shape.puppet.posed(thing.pose, thing.placement))
     flattening.rehearse()
 
 

@@ -27,3 +27,11 @@ def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
     array = np.ascontiguousarray(array, dtype=dtype).view()
     array.setflags(write=False)
     return array
+
+
+def frozen_rows(matrix: Sparse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the rows of a sparse matrix start, its columns and its values, as kernels take them.
+
+    scipy's indices are of 64 bits after some sums: a kernel would be compiled anew for them.
+    """
+    return frozen(matrix.indptr, np.int32), frozen(matrix.indices, np.int32), frozen(matrix.data)

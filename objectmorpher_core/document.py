@@ -128,6 +128,7 @@ class LiftSettings:
     hidden: Mask | None = None  # (H, W) of the photo where something stands before the object
     nearness: F32 | None = None  # (h, w) x its size, towards the camera; stretched over the photo
     horizon: float | None = None  # px, the row of the photo it lies in; None: not known
+    uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
 
     def __post_init__(self) -> None:
         if self.back not in BACKS:

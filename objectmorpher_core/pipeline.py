@@ -38,7 +38,7 @@ from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
 from .script import EditScript, ScriptError
-from .segment import Segmenter
+from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
 from .splat_files import COUNT
@@ -75,16 +75,11 @@ class Reading:
     rgb: RGB
     embedding: Any  # the segmenter's own
 
-    def segment(
-        self, prompt: Prompt, progress: Progress = silent, seed: int = 0
-    ) -> tuple[Mask, str]:
-        """The mask (H, W) that `prompt` means, and the backend that found it."""
+    def segment(self, prompt: Prompt, progress: Progress = silent, seed: int = 0) -> Found:
+        """The mask (H, W) that `prompt` means, and how sure that is."""
         mask = self.segmenter.segment(self.rgb, prompt, self.embedding, progress, seed)
-        return mask, self.segmenter.name
-
-    def confidence(self, prompt: Prompt) -> float | None:
-        """How sure the segmenter is of its answer: the overlap with what is meant to expect."""
-        return self.segmenter.confidence(self.rgb, prompt, self.embedding)
+        sure = self.segmenter.confidence(self.rgb, prompt, self.embedding)  # of the same answer
+        return Found(mask, self.segmenter.name, sure)
 
 
 def read_photo(pixels: Pixels, segmenter: Segmenter, progress: Progress = silent) -> Reading:
@@ -181,7 +176,8 @@ def select(
             pixels = document.photo.pixels
             segmenter = segment.load(script.segment)
             reading = read_photo(pixels, segmenter, part(progress, 0.0, 0.6))
-            found, backend = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
+            answer = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
+            found, backend = answer.mask, answer.backend
     document = edits.set_mask(edits.add_object(document), 0, found, prompt)
     return document.with_backend("segment", backend)
 
@@ -241,6 +237,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
         back=script.back,
         hidden=hidden,
         horizon=document.horizon,
+        uses_depth=not script.no_depth,
     )
 
 

@@ -1,21 +1,38 @@
-"""Compiles every kernel once, so that no first click waits for it.
+"""Compiles every kernel once, so that nobody's first click, drag or import waits for it.
 
-`python -m objectmorpher_core.warm_up` runs the main job on a made picture of 96 x 96 pixels. The
-compiled kernels stay in numba's cache on the disk.
+`python -m objectmorpher_core.warm_up` runs the main job on a made picture of 96 x 96 pixels, and
+then, small, whatever else compiles something. The kernels stay in numba's cache on the disk.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
-from .document import Document
+from .document import DeformSettings, Document, EditObject, Placement
+from .progress import silent
+from .puppet import Puppet, puppet_of
 
 SIZE = 96  # px
+NODES = 8  # unknowns of a made system
+FEW_SURFELS, FEW_PIXELS = 30, 8  # with which every rotation is tried in a moment
 
 
 def warm_up() -> Document:
-    """The edited picture; a minute or two the first time after an installation, a second later."""
+    """The edited picture; a minute or two the first time after an installation, seconds later."""
+    document = _edited()
+    photo, thing = document.photo, document.objects[0]
+    puppet = puppet_of(thing, photo.camera)
+    _show_seldom(document, thing, puppet)
+    _pose_seldom(thing, puppet)
+    _register(document, thing)
+    return document
+
+
+def _edited() -> Document:
+    """The main job."""
     from .image import Picture, encode_mask, encode_picture
     from .pipeline import run_script
     from .script import EditScript, HandleMove
@@ -25,6 +42,7 @@ def warm_up() -> Document:
     rgb, alpha = np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)
     applied(affine(rgb, alpha), rgb, alpha == 0, alpha)  # of large photos only
     halved_pixels(rgb.astype(np.uint16))
+
     rng = np.random.default_rng(0)
     pixels = cv2.GaussianBlur(rng.integers(0, 255, (SIZE, SIZE, 3), np.uint8), (0, 0), 2)
     pixels = pixels.astype(np.uint8)
@@ -35,6 +53,61 @@ def warm_up() -> Document:
     script = EditScript(gaussians=400, handle=(handle,), turn=(10.0, 0.0, 0.0))
     photo = encode_picture(Picture(pixels), ".png")
     return run_script(photo, "warm-up", script, encode_mask(mask.astype(bool))).document
+
+
+def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
+    """A photo that is large, one of 16 bits, and Gaussians that are drawn as they are in a file."""
+    from .compose.composite import object_texture
+    from .pipeline import lift_mask, make_plate
+    from .segment.closed_form import affine
+
+    affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
+    deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
+    assert thing.mask is not None and thing.matte is not None
+    make_plate(deep, thing.mask)
+    lift_mask(deep, document.photo.camera, thing.mask)
+    texture, camera = object_texture(thing.matte), document.photo.camera
+    lifted = puppet.lifted
+    nowhere = replace(lifted.texture, visibility=np.zeros(len(lifted.gaussians), np.float32))
+    plain = replace(lifted, splatting="classic", texture=nowhere)
+    Puppet(plain, DeformSettings(), camera).draw(thing.pose, Placement(), texture, camera)
+
+
+def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
+    """Strain as a colour, Gaussians split, the paper as printed, thousands of control points."""
+    from scipy.sparse import csr_array
+
+    from .compose.composite import object_texture
+    from .deform.response import SparseResponse
+
+    assert thing.pose is not None and thing.matte is not None
+    puppet.deformer.strain(thing.pose)
+    texture, camera = object_texture(thing.matte), puppet.camera
+    for settings in (
+        DeformSettings("laplacian", "euclidean", is_splitting=True, stretch_limit=1.5),
+        DeformSettings(is_faithful=True),
+    ):
+        other = Puppet(puppet.lifted, settings, camera)
+        solution = other.deformer.solve(thing.handles)
+        other.draw(solution.pose, Placement(), texture, camera)
+    SparseResponse(csr_array(np.eye(NODES))).solve(np.ones((NODES, 3)))
+
+
+def _register(document: Document, thing: EditObject) -> None:
+    """The object as if it came out of a file: looked for in every way it can stand, and refined."""
+    from .importing import Scene, place_import
+    from .lift.placement import Registrar
+    from .lift.placement_search import search
+    from .lift.sketch import even_surfels, own_frame
+
+    assert thing.lifted is not None and thing.mask is not None
+    photo, gaussians = document.photo, thing.lifted.body
+    scene = Scene(photo.pixels, photo.camera, thing.mask)
+    target, frame = scene.target, own_frame(gaussians)
+    (few,) = even_surfels(gaussians, frame, (FEW_SURFELS,))
+    search(few, target.view(FEW_PIXELS), target, (photo.camera.focal,), silent)
+    registrar = Registrar(gaussians, target)
+    place_import(scene, gaussians, registrar.rated(thing.lifted.world_from_object))
 
 
 if __name__ == "__main__":

@@ -38,6 +38,9 @@ COMMANDS: dict[str, Command] = {
     "smooth": Command("Smooth", "", lambda e: e.masking.smooth(), no_selection),
     "feather": Command("Feather", "", lambda e: e.masking.feather(), no_selection),
     "fill_holes": Command("Fill holes", "", lambda e: e.masking.fill_holes(), no_selection),
+    "remove_islands": Command(
+        "Remove islands", "", lambda e: e.masking.remove_islands(), no_selection
+    ),
     "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
     "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),
     "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),

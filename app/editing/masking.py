@@ -116,6 +116,10 @@ class Masking:
         """A selection without holes."""
         self._enqueue(Change(t("Fill holes"), mask_edit.fill_holes))
 
+    def remove_islands(self) -> None:
+        """A selection without small pieces beside the large one."""
+        self._enqueue(Change(t("Remove islands"), mask_edit.remove_islands))
+
     def invert(self) -> None:
         """What was not selected is. No click had asked for that: there is no prompt any more."""
         selection = self.shown

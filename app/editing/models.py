@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
-from objectmorpher_core.models import State, Weight
+from objectmorpher_core.models import Added, State, Weight
 from objectmorpher_core.progress import Progress
 
 from .. import job_functions
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
+ADD = "add model"  # likewise
+DEPTH = "depth"  # the id of the one that users bring
+MODEL_ENDING = ".onnx"
 SELECTING = ("dinov2-vits14", "u2netp")  # what the Select tool does better with, best first
 
 
@@ -42,13 +45,14 @@ class Models:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.states: tuple[State, ...] = ()  # empty until they were looked at
+        self.added: tuple[Added, ...] = ()  # what users bring, likewise
         self.is_open = False  # the window shows the list
         self._loading = ""
 
     def look(self) -> None:
         """Reads anew what is there; a damaged file counts as none."""
         self._editor.chores.start(
-            "Looking at the models", lambda progress: models.verify(),
+            "Looking at the models", lambda progress: _looked(),
             kind=LOOK, done=self._take, failed=lambda error: None, is_quiet=True,
         )  # fmt: skip
 
@@ -98,8 +102,37 @@ class Models:
         declined = (*settings.declined_models, id)
         self._editor.settings = replace(settings, declined_models=declined)
 
-    def _take(self, states: tuple[State, ...]) -> None:
-        self.states = states
+    @property
+    def has_depth(self) -> bool:
+        """Whether a depth model tells the relief of what is lifted, where that is wanted."""
+        return any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
+
+    def add(self, path: Path) -> None:
+        """The user's depth model, tried before it is kept."""
+        editor = self._editor
+        editor.message = None
+
+        def accept(own: Added) -> None:
+            self.look()
+            again = Action(t("Lift it again"), lambda: editor.shaping.say(t("Depth model")))
+            can_follow = editor.is_lifted and editor.shaping.why_fixed is None
+            editor.say(t("{name} is ready", name=own.name), again if can_follow else None)
+
+        editor.jobs.start(
+            t("Trying {name}", name=path.name), job_functions.add_model, DEPTH, path,
+            done=accept, failed=editor.complain_of, kind=ADD,
+        )  # fmt: skip
+
+    def remove(self) -> None:
+        """The depth model's copy is deleted; the user's own file stays where it is."""
+        try:
+            models.remove(DEPTH)
+        except models.ModelError as error:
+            self._editor.complain(str(error))
+        self.look()
+
+    def _take(self, found: tuple[tuple[State, ...], tuple[Added, ...]]) -> None:
+        self.states, self.added = found
 
     def _complain(self, error: JobError, id: str) -> None:
         """Whatever it was: networks come back, disks are cleared, indexes are mended."""
@@ -112,6 +145,10 @@ class Models:
             done=lambda _: self._editor.tasks.read_photo(), failed=lambda error: None,
             kind=FORGET, is_quiet=True,
         )  # fmt: skip
+
+
+def _looked() -> tuple[tuple[State, ...], tuple[Added, ...]]:
+    return models.verify(), tuple(models.added(kind.id) for kind in models.KINDS)
 
 
 def names_of(id: str) -> Names:

@@ -10,7 +10,7 @@ import numpy as np
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import LEVELS, Click, Document, Prompt
-from objectmorpher_core.segment import mask_edit
+from objectmorpher_core.segment import Found, mask_edit
 
 from ..tasks import SELECT, Combine, Question
 from ..texts import t
@@ -33,6 +33,7 @@ class Selection:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.path: list[np.ndarray] | None = None  # the line being drawn, canvas px (2,) each
+        self._told: tuple[Mask | None, float | None] = None, None  # a mask, and how sure it was
 
     # What there is
 
@@ -55,6 +56,15 @@ class Selection:
         """How much of the photo is selected, in [0, 1]."""
         mask = self._editor.mask
         return 0.0 if mask is None else self._editor.derived.share(mask)
+
+    @property
+    def confidence(self) -> float | None:
+        """How much what is selected is expected to overlap with what is meant (IoU), in [0, 1].
+
+        None where nobody can tell: it was changed by hand, put together, or is an older step.
+        """
+        mask, told = self._told
+        return told if mask is not None and mask is self._editor.mask else None
 
     @property
     def level(self) -> str:
@@ -125,11 +135,15 @@ class Selection:
 
     # Answers
 
-    def take(self, question: Question, mask: Mask, backend: str) -> None:
+    def take(self, question: Question, found: Found) -> None:
         """The answer of a question is the next step."""
-        document = self._editor.document
-        if document is not None and question.k <= len(document.objects):
-            self._apply(question, mask, document.with_backend("segment", backend))
+        editor, document = self._editor, self._editor.document
+        if document is None or question.k > len(document.objects):
+            return
+        before = editor.mask
+        self._apply(question, found.mask, document.with_backend("segment", found.backend))
+        if editor.mask is not before and question.combine in (Combine.ANEW, Combine.REFINED):
+            self._told = editor.mask, found.confidence
 
     def _apply(self, question: Question, mask: Mask, document: Document) -> None:
         editor, k = self._editor, question.k

@@ -18,6 +18,7 @@ ROW = 28.0
 VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
     Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
+    Dialog.MODEL_OPEN: "Use",
 }  # fmt: skip
 
 

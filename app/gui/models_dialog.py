@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from objectmorpher_core.models import State
+from objectmorpher_core.models import Added, State
 
 from ..editing.models import DOWNLOAD, names_of
 from ..editor import Editor
+from ..filing import Dialog
 from ..texts import t
 from .modal import modal
 from .theme import Icon, theme
@@ -30,6 +31,8 @@ def draw_models(editor: Editor) -> None:
             return
         for state in editor.models.states:
             _draw_model(editor, state)
+        for own in editor.models.added:
+            _draw_added(editor, own)
         if not editor.models.states:
             note(t("Looking at what is there…"))
         imgui.dummy(theme.size(0, 4))
@@ -56,6 +59,33 @@ def _draw_model(editor: Editor, state: State) -> None:
     note(t("{size} to download · licence {licence}", size=megabytes, licence=weight.licence))
     note(t("From {source}, by {page}", source=weight.wheel.split("==")[0],
            page=weight.page.removeprefix("https://")))  # fmt: skip
+    imgui.pop_id()
+
+
+def _draw_added(editor: Editor, own: Added) -> None:
+    """A model that users bring: nothing is fetched for it."""
+    rule()
+    imgui.push_id(own.kind.id)
+    with bold_text():
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(t("Depth model"))
+    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
+    if own.state == "missing":
+        if button(t("Use a file…"), width=BUTTON):
+            editor.filing.wanted = Dialog.MODEL_OPEN
+    elif button(t("Remove"), width=BUTTON):
+        editor.models.remove()
+    room = imgui.get_window_width() - theme.pt(20 + BUTTON + 16)
+    imgui.push_text_wrap_pos(room)
+    imgui.text_unformatted(t("A lifted object is as deep as it looks, not as its outline says"))
+    imgui.pop_text_wrap_pos()
+    if own.state == "ok":
+        size = f"{own.size / 1e6:.0f} MB"
+        note(t("{name}, {size}, SHA-256 {hash}", name=own.name, size=size, hash=own.sha256[:16]))
+    elif own.state == "damaged":
+        note(t("Its file is damaged."))
+    else:
+        note(t("Nothing is downloaded: for instance an ONNX export of Depth-Anything-V2-Small."))
     imgui.pop_id()
 
 

@@ -13,6 +13,7 @@ from ..feedback import Message
 from ..jobs import Job
 from ..texts import t
 from .fade import fades
+from .landmarks import mark
 from .layout import Rect
 from .panes import edge, pane
 from .theme import Icon, theme
@@ -114,7 +115,9 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
     imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
     imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
     if message is None:
-        imgui.text_colored(theme.vec("secondary"), _whole_parts(hint, right - theme.pt(12)))
+        shown = _whole_parts(hint, right - theme.pt(12))
+        imgui.text_colored(theme.vec("secondary"), shown)
+        mark(shown)
     else:
         role = "error" if message.is_error else "text"
         icon = Icon.WARNING if message.is_error else Icon.INFO

@@ -71,6 +71,7 @@ class Icon:
     SMOOTH = "\uf55b"
     FEATHER = "\uf52d"
     FILL = "\uf576"
+    BROOM = "\uf51a"
     IMPORT = "\uf56f"
     POSE = "\uf25a"
     PLACE = "\uf0b2"

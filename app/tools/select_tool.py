@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.segment import UNSURE
+
 from ..feedback import Hover
 from ..tasks import Combine
 from ..texts import t
@@ -75,21 +77,15 @@ class SelectTool:
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:
             return t("Esc takes it back")
-        is_there = editor.mask is not None or editor.selection.pending is not None
-        mode = editor.view.selecting.mode
-        if mode is SelectMode.LASSO:
-            if not is_there:
-                return t("Drag around the object")
-            return t("Drag around: a new selection · Shift adds to it · Alt removes from it")
-        if mode is SelectMode.BOX:
-            if not is_there:
-                return t("Drag a box around an object")
-            return t("Drag a new box · Shift-drag adds its object · Alt-drag removes it")
-        if not is_there:
-            return t("Click an object, or drag a box around it")
-        return t(
-            "Click adds · Right-click removes · Click again: part, object, group · Drag: a new box"
-        )
+        if editor.mask is None and editor.selection.pending is None:
+            return _BEGIN[editor.view.selecting.mode]()
+        sure = editor.selection.confidence
+        share = f"{100 * sure:.0f}" if sure is not None else ""
+        if sure is not None and sure < UNSURE:
+            return t("Only {share} % sure: click what is missing, right-click what is too much, "
+                     "or drag a box around it", share=share)  # fmt: skip
+        hint = _GO_ON[editor.view.selecting.mode]()
+        return t("Selected, {share} % sure", share=share) + " · " + hint if share else hint
 
 
 def _combine(pointer: Pointer) -> Combine:
@@ -97,3 +93,19 @@ def _combine(pointer: Pointer) -> Combine:
     if pointer.alt:
         return Combine.REMOVED
     return Combine.ADDED if pointer.shift else Combine.ANEW
+
+
+_BEGIN = {
+    SelectMode.CLICK: lambda: t("Click an object, or drag a box around it"),
+    SelectMode.BOX: lambda: t("Drag a box around an object"),
+    SelectMode.LASSO: lambda: t("Drag around the object"),
+}
+_GO_ON = {
+    SelectMode.CLICK: lambda: t(
+        "Click adds · Right-click removes · Click again: part, object, group · Drag: a new box"
+    ),
+    SelectMode.BOX: lambda: t("Drag a new box · Shift-drag adds its object · Alt-drag removes it"),
+    SelectMode.LASSO: lambda: t(
+        "Drag around: a new selection · Shift adds to it · Alt removes from it"
+    ),
+}

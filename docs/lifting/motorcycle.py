@@ -13,12 +13,22 @@ import numpy as np
 from skimage import data
 from skimage.metrics import structural_similarity
 
-from objectmorpher_core.arrays import F64, Mask
+from objectmorpher_core.arrays import F32, F64, Mask
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import DeformSettings, LiftedObject, Matte, Placement
+from objectmorpher_core.document import (
+    DeformSettings,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Placement,
+)
+from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift.depth_prior import Seen
+from objectmorpher_core.lift.relief import ReliefLifter
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.pixels import crop
+from objectmorpher_core.progress import silent
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 
@@ -72,16 +82,31 @@ def results() -> list[Result]:
     pair = read_pair()
     height, width = pair.mask.shape
     camera = Camera(FOCAL, width / 2, height / 2, width, height)
-    matte, lifted = lift_mask(pair.left, camera, pair.mask)
+    alone = LiftSettings(uses_depth=False)
+    matte, lifted = lift_mask(pair.left, camera, pair.mask, settings=alone)
+    seen = Seen(_filled(pair.disparity), (0, 0, width, height))
+    subject = Subject(pair.left, camera, pair.mask, matte)
+    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(), silent)
     known = pair.disparity[pair.mask & (pair.disparity > 0)]
     card = float(np.median(known))
     slab = _card_shot(matte, card, (height, width))
     color, error = _relief_shot(pair, matte, lifted, camera)
+    deep_color, deep_error = _relief_shot(pair, matte, deep, camera)
     flat = float(np.sqrt(((known - card) ** 2).mean()))
     return [
         Result("relief", *_compared(pair, color), error),
+        Result("relief with true depth", *_compared(pair, deep_color), deep_error),
         Result("card at the median disparity", *_compared(pair, slab), flat),
     ]
+
+
+def _filled(disparity: F64) -> F32:
+    """(h, w) with the disparities around it where none is known."""
+    top = disparity.max()
+    known = np.rint(disparity / top * 65535).astype(np.uint16)
+    blank = (disparity <= 0).astype(np.uint8)
+    filled = cv2.inpaint(known, blank, 3, cv2.INPAINT_NS)
+    return np.asarray(cv2.GaussianBlur(filled.astype(np.float32), (0, 0), 2.0), np.float32)
 
 
 def _relief_shot(

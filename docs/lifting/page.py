@@ -20,13 +20,14 @@ degrees to both sides. The lighting is painted on. What comes out is compared wi
 - **IoU**: of the two coverages, soft edges counted softly.
 - **PSNR**: dB, over the true background, over all pixels that either of the two covers.
 
-Beside the relief stand two ways to do without a shape:
+*depth* is the relief with the true inverse depth, as a perfect depth network would see it: scale
+and shift are not given. Beside them stand two ways to do without a shape:
 
 - **card**: the cut-out on a flat board at the solid's true distance, turned. A homography.
 - **affine**: the best that any affine warp of the cut-out can do: it is fitted to the true places
   of the points that the photo shows. It knows the answer; nothing that works from one photo does.
 
-All three may be shifted, so that the middles of their boxes agree with the truth's: about which
+All may be shifted, so that the middles of their boxes agree with the truth's: about which
 depth a thing turns is not in the photo.
 
 Seven of the solids are meshes of the package pybullet (zlib licence), which are fetched and not
@@ -38,9 +39,9 @@ STEREO = """## A photographed thing whose shape is known
 
 The motorcycle of the Middlebury 2014 stereo pair (as scikit-image fetches it): the left photo is
 lifted and seen from the right camera. The mask is what rises above the floor's plane in the true
-disparities; where they are not known nothing is compared. The median disparity is given to both
+disparities; where they are not known nothing is compared. The median disparity is given to all
 ways, the field of view is the true one. Its spokes and cables are thinner than a silhouette's grid
-can tell, and both ways carry the floor that shows through them.
+can tell, and all ways carry the floor that shows through them.
 """
 REAL = """## Photos
 
@@ -68,7 +69,9 @@ At rest the photo stays the photo.
 LIMITS = """## What falls short
 
 - A silhouette says nothing of what lies within it: the eye sockets, the bowl of a cup, the arm
-  before a body are no deeper or nearer than the body is. `--nearness` lets one paint that.
+  before a body are no deeper or nearer than the body is. A brush in the editor lets one paint
+  that, and a depth network sees it: `objectmorpher models add depth FILE.onnx`. None is installed
+  for this page; "depth" above is the relief with the true depth, up to scale and shift.
 - What touches the ground in several places is taken to stand on them. An object that does not
   stand at all may be turned wrongly; `--floating` says so.
 - A prism is recognised by straight upright sides and a corner or a curve below; seen exactly from

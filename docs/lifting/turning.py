@@ -1,8 +1,10 @@
 """Solids turned about the upright: what is predicted from one photo, against the true view.
 
-Three predictions. The relief is the product's own lift. The card is the cut-out on a flat board at
-the solid's true distance, turned (a homography). The affine one is the best that any warp of the
-picture with six numbers could do: fitted to the true places of the points that the photo shows.
+Four predictions. The relief is the product's own lift, without a depth network; "depth" is the same
+with a perfect one, whose scale and shift are unknown as any network's are. The card is the cut-out
+on a flat board at the solid's true distance, turned (a homography). The affine one is the best that
+any warp of the picture with six numbers could do: fitted to the true places of the points that the
+photo shows.
 """
 
 from __future__ import annotations
@@ -20,9 +22,13 @@ from solids import Solid, load
 from objectmorpher_core.arrays import F64, Mask, Pixels
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import DeformSettings, Matte, Placement
+from objectmorpher_core.document import DeformSettings, LiftSettings, Matte, Placement
+from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift.depth_prior import Seen
+from objectmorpher_core.lift.relief import ReliefLifter
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.pixels import crop
+from objectmorpher_core.progress import silent
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.rotations import turn_matrix
 
@@ -31,7 +37,8 @@ CAMERA = Camera.from_fov(SIDE, SIDE)
 ANGLES = (-35, -20, -10, 10, 20, 35)  # degrees of yaw
 SHARE = 0.55  # of the picture's width that a solid fills
 AT = np.array([245.0, 270.0])  # px, where its middle is
-WAYS = ("relief", "card", "affine")
+WAYS = ("relief", "depth", "card", "affine")
+ALONE = LiftSettings(uses_depth=False)
 POINTS = 20_000  # on a solid's surface, for the affine warp
 SAME_DEPTH = 0.01  # of a point and of the nearest surface: it is seen
 FAINT = 0.02  # alpha, from which a pixel counts
@@ -55,6 +62,7 @@ class Scene:
     centre: F64  # (3,) world, about which it turns
     shown: F64  # (n, 2) px of points that the photo shows
     moved: dict[int, F64]  # (n, 2) px of them, by degrees
+    inverse: F64  # (h, w) true inverse depth of the photo; what is behind is farther away
 
     @property
     def pixels(self) -> Pixels:
@@ -92,7 +100,8 @@ def make_scene(name: str, meshes: Path) -> Scene:
     is_seen = np.abs(points[:, 2] - views[0].depth[row, column]) < SAME_DEPTH
     photo = shots.pop(0)
     moved = {a: places[a][is_seen] for a in ANGLES}
-    return Scene(name, photo, shots, centre, places[0][is_seen], moved)
+    inverse = np.where(np.isfinite(views[0].depth), 1 / views[0].depth, 0.5 / views[0].depth.min())
+    return Scene(name, photo, shots, centre, places[0][is_seen], moved, inverse)
 
 
 def _sampled(solid: Solid, world: F64) -> tuple[np.ndarray, F64]:
@@ -130,17 +139,26 @@ def score(shot: Shot, truth: Shot) -> Score:
 
 def measured(scene: Scene) -> dict[tuple[int, str], tuple[Shot, Score]]:
     """What each way predicts of each turn."""
-    matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask)
-    puppet, texture = Puppet(lifted, DeformSettings(), CAMERA), object_texture(matte)
+    matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=ALONE)
+    seen = Seen((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
+    subject = Subject(scene.pixels, CAMERA, scene.mask, matte)
+    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(), silent)
+    texture = object_texture(matte)
+    puppets = {
+        "relief": Puppet(lifted, DeformSettings(), CAMERA),
+        "depth": Puppet(deep, DeformSettings(), CAMERA),
+    }
 
-    def relief(angle: int, shift: F64) -> Shot:
+    def relief(way: str, angle: int, shift: F64) -> Shot:
+        puppet = puppets[way]
         place = Placement(move=(float(shift[0]), float(shift[1])), turn=(angle, 0, 0))
         picture = puppet.draw(None, place, texture, CAMERA)
         alpha = np.asarray(picture.alpha, np.float64)
         return Shot(np.asarray(picture.color) / np.maximum(alpha, 1e-6)[..., None], alpha)
 
     drawers: dict[str, Callable[[int, F64], Shot]] = {
-        "relief": relief,
+        "relief": lambda angle, shift: relief("relief", angle, shift),
+        "depth": lambda angle, shift: relief("depth", angle, shift),
         "card": lambda angle, shift: _warped(matte, _card(scene, matte, angle), shift),
         "affine": lambda angle, shift: _warped(matte, _affine(scene, angle), shift),
     }

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from measure import Clicked, Large, Measure, Row, boundary, encoding_seconds, iou
 
+from objectmorpher_core.segment import UNSURE
+
+BAD = 0.75  # IoU below which a mask is not what was meant
 BINS = ((0.0, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01))
 KINDS = (("whole", "Whole objects"), ("part", "Parts"))
 
@@ -121,6 +124,7 @@ def _sureness(rows: list[Row]) -> str:
             span = f"{low:.2f} to {min(high, 1):.2f}"
             lines.append(_line([span, str(len(chosen)), *(f"{v:.2f}" for v in values)]))
     table = "\n".join(lines)
+    is_bad, is_told = pairs[:, 1] < BAD, pairs[:, 0] < UNSURE
     return f"""## How sure it is
 
 The segmenter tells the overlap with what is meant that is to be expected. Over all answers above
@@ -128,6 +132,10 @@ The segmenter tells the overlap with what is meant that is to be expected. Over 
 {np.corrcoef(pairs.T)[0, 1]:.2f} (of the ranks: {np.corrcoef(ranks.T)[0, 1]:.2f}).
 
 {table}
+
+Below {UNSURE:.2f} the status line says what helps: so it does for {(is_bad & is_told).sum()} of the
+{is_bad.sum()} answers with an IoU below {BAD:.2f}, and for {(~is_bad & is_told).sum()} of the
+{(~is_bad).sum()} others.
 """
 
 

@@ -14,7 +14,7 @@ import cv2
 import numba
 import numpy as np
 
-from ..arrays import I32, RGB, Mask, Pixels
+from ..arrays import I32, RGB, Mask, Pixels, frozen
 from ..image import resized, to_u8
 from ..progress import Progress
 from . import InpaintError
@@ -114,7 +114,8 @@ def _sources(small: RGB, hole: Mask, seed: int) -> I32:
     random = np.random.default_rng(seed)
     sources[hole] = places[random.integers(len(places), size=len(targets))]
     padded = np.pad(small, ((radius, radius), (radius, radius), (0, 0)), mode="edge")
-    _improve(padded, usable.view(np.bool_), targets, sources, random)
+    seen = frozen(padded), frozen(usable, np.bool_), frozen(targets)
+    _improve(*seen, sources, random)
     return sources
 
 
@@ -178,7 +179,8 @@ def _with_detail(crop: Pixels, hole: Mask, small: RGB, sources: I32) -> Pixels:
     rough = resized(small, max(1, small.shape[1] // LOW_PASS), max(1, small.shape[0] // LOW_PASS))
     unit = np.float32(np.iinfo(crop.dtype).max / 255)
     filled = crop.copy()
-    _copy_detail(crop, hole, rough * unit, sources, filled)
+    seen = frozen(crop), frozen(hole), frozen(rough * unit), frozen(sources)
+    _copy_detail(*seen, filled)
     return filled
 
 

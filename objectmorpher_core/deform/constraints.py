@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from ..arrays import F64, I32, Sparse, frozen
+from ..arrays import F64, I32, Sparse, frozen, frozen_rows
 from ..threads import FAST
 from .binding import Binding
 from .response import Response
@@ -152,7 +152,7 @@ class HeldResponse:
         unknowns = np.array(self._response.solve(forces), order="C")
         rows = self._rows
         _hold(
-            frozen(rows.indptr), frozen(rows.indices), frozen(rows.data), self._own,
+            *frozen_rows(rows), self._own,
             frozen(targets), frozen(self._inverse), frozen(self._answers), unknowns,
         )  # fmt: skip
         return unknowns

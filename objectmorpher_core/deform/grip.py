@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..arrays import F64, Sparse, frozen
+from ..arrays import F64, Sparse, frozen, frozen_rows
 
 GRIP = 20.0  # x a link's weight, in the middle of the hand
 RADIUS = 0.1  # x diameter, of the patch
@@ -30,8 +30,7 @@ def stiffened(points: F64, weights: Sparse, handles: F64, diameter: float) -> F6
         nearer = (distances[other] - distances[h]) / (SHARED * apart[h, other])
         grip[h] *= np.clip(nearer, 0.0, 1.0)
     data = weights.data.copy()
-    indices = frozen(weights.indptr), frozen(weights.indices)
-    _stiffen(*indices, frozen(weights.data), frozen(grip), data)
+    _stiffen(*frozen_rows(weights), frozen(grip), data)
     return data
 
 

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..arrays import F32, F64, Sparse, frozen
+from ..arrays import F32, F64, Sparse, frozen, frozen_rows
 from ..threads import FAST
 from .rotation_fit import fit_rotations
 
@@ -77,9 +77,8 @@ class Links:
     def energies(self, positions: F64, rotations: F64) -> F64:
         """(M,) each control point's share of Eq. 2, object units squared."""
         out = np.empty(len(positions))
-        indices = frozen(self.weights.indptr), frozen(self.weights.indices)
         pose = frozen(positions), frozen(rotations)
-        _energies(*indices, frozen(self.weights.data), self.points, *pose, out)
+        _energies(*frozen_rows(self.weights), self.points, *pose, out)
         return out
 
     @cached_property
@@ -140,7 +139,7 @@ def _pack(order: np.ndarray, weights: Sparse) -> tuple[np.ndarray, ...]:
 
 def _totals_of(points: F64, weights: Sparse) -> F64:
     out = np.empty((5, len(points)))
-    _totals(frozen(weights.indptr), frozen(weights.indices), frozen(weights.data), points, out)
+    _totals(*frozen_rows(weights), points, out)
     return frozen(out)
 
 

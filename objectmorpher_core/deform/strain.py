@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..arrays import F64, Sparse
+from ..arrays import F64, Sparse, frozen, frozen_rows
 from ..document import Pose
 from ..threads import FAST
 
@@ -28,9 +28,8 @@ def measure_strain(points: F64, weights: Sparse, pose: Pose) -> Strain:
     least-squares fit to its links. Its links lie along a surface, so F_i is taken in the plane
     of their two widest directions, and its singular values are the stretches.
     """
-    links = weights.indptr, weights.indices, weights.data
-    rest = np.asarray(points, np.float64)
-    before, after, energy = _sums(*links, rest, pose.points, pose.rotations)
+    own = frozen(points, np.float64), frozen(pose.points), frozen(pose.rotations)
+    before, after, energy = _sums(*frozen_rows(weights), *own)
     squares = np.trace(before, axis1=1, axis2=2)
     spread, axes = np.linalg.eigh(before)  # rising
     widest = np.maximum(spread[:, 2], 1e-300)

@@ -31,6 +31,7 @@ class Body:
     middle: F64  # (h, w) px, height of the middle sheet
     front: Thickness
     back: Thickness
+    detail: F64 | None = None  # (h, w) px, height of the front beyond its thickness; None: 0
 
     @staticmethod
     def of(
@@ -55,7 +56,7 @@ class Body:
             halves = camera.focal * far * (1 - 1 / _nearer(standing.prism, xy))
             share = _share(standing.prism, xy, silhouette.extent)
             sides = [inflated.mixed(settings.thickness * half, share) for half in halves]
-        return Body(silhouette, standing, middle, *sides)
+        return Body(silhouette, standing, middle, sides[0], sides[1])
 
     def nearer(self, height: F64) -> Body:
         """With its parts moved towards the camera by `height` (h, w) px."""
@@ -76,19 +77,32 @@ class Body:
             half, slope = thickness.sample(grid_xy[is_there], cell)
             height[is_there] += share[is_there] * half
             gradient[is_there] += share[is_there, None] * slope
+        if self.detail is not None:
+            self._add_detail(grid_xy, np.maximum(share, 0.0), height, gradient)
         return height, gradient
 
     def height(self, xy: F64, side: float) -> F64:
         """Height (N,) px of the FRONT or the BACK alone, at photo px (N, 2) inside."""
         grid_xy = self.silhouette.grid_xy(xy)
         thickness = self.front if side > 0 else self.back
-        return bilinear(self.middle, grid_xy) + side * thickness.half(grid_xy)
+        height = bilinear(self.middle, grid_xy) + side * thickness.half(grid_xy)
+        if self.detail is not None and side > 0:
+            height += bilinear(self.detail, grid_xy)
+        return height
 
     @cached_property
     def _middle_fields(self) -> F64:
         """(h, w, 3) the middle sheet and its gradient."""
         dy, dx = np.gradient(self.middle, self.silhouette.cell)
         return np.stack([self.middle, dx, dy], -1)
+
+    def _add_detail(self, grid_xy: F64, share: F64, height: F64, gradient: F64) -> None:
+        """Adds the front's detail, `share` (N,) of it, to heights (N,) and gradients (N, 2)."""
+        assert self.detail is not None
+        dy, dx = np.gradient(self.detail, self.silhouette.cell)
+        fields = bilinear(np.stack([self.detail, dx, dy], -1), grid_xy)
+        height += share * fields[:, 0]
+        gradient += share[:, None] * fields[:, 1:]
 
 
 def _nearer(prism: Prism, xy: F64) -> F64:

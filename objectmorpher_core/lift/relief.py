@@ -26,6 +26,8 @@ from .bilinear import bilinear
 from .body import MIDDLE, Body
 from .canvas import Canvas
 from .colours import FINENESS, Colouring, colouring
+from .depth_look import Look, look
+from .depth_prior import follow
 from .mirror import MirrorAxis, find_axis
 from .silhouette import Silhouette
 from .spreading import Surface, spread
@@ -47,6 +49,10 @@ class ReliefLifter:
 
     name = "relief"
 
+    def __init__(self, look: Look = look) -> None:
+        """`look` tells the depth of what is seen: by default as an installed network does."""
+        self._look = look
+
     def missing(self) -> str | None:
         return None
 
@@ -64,6 +70,9 @@ class ReliefLifter:
         canvas = _canvas(matte, hidden, area, settings.count)
         axis = _axis(canvas, settings)
         body = Body.of(outline, camera, settings, axis)
+        if settings.uses_depth:
+            progress(0.1, "Looking how deep it is")
+            body = self._followed(body, subject, settings, hidden)
         if settings.nearness is not None:
             body = body.nearer(_nearness(subject, settings.nearness, outline))
         progress(0.3, "Placing Gaussians")
@@ -79,6 +88,20 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
+
+    def _followed(
+        self, body: Body, subject: Subject, settings: LiftSettings, hidden: Mask | None
+    ) -> Body:
+        """The body as deep as a depth network sees it; the same one where none is installed."""
+        seen = self._look(subject.pixels, subject.mask if hidden is None else subject.mask | hidden)
+        if seen is None:
+            return body
+        outline, cells = body.silhouette, None
+        if hidden is not None:
+            at = np.floor(outline.photo_xy(outline.cells)).astype(int)
+            limit = np.array(hidden.shape[::-1]) - 1
+            cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
+        return follow(body, seen, subject.camera.focal, settings.thickness, cells)
 
 
 def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> Canvas:

@@ -3,16 +3,23 @@
 Nothing here is needed to run: every stage has a weight-free backend.
 """
 
-from .fetch import State, fetch, folder, path, verify
+from .added import KINDS, Added, add, added, remove
+from .fetch import State, fetch, folder, look, path, verify
 from .registry import ModelError, Weight, weight, weights
 
 __all__ = [
+    "KINDS",
+    "Added",
     "ModelError",
     "State",
     "Weight",
+    "add",
+    "added",
     "fetch",
     "folder",
+    "look",
     "path",
+    "remove",
     "verify",
     "weight",
     "weights",

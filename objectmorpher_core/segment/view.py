@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..arrays import F32, RGB, Mask
+from ..arrays import F32, RGB, Mask, frozen
 from ..document import Click, Prompt
 from ..progress import Progress, part
 from .answers import Answer, add_click, begin, confidence
@@ -114,13 +114,20 @@ class PhotoView:
         self._rgb, self._encode = rgb, encode
         self._whole = View(rgb, embedding)
         self._details: dict[Box, View] = {}
+        self._last: tuple[Prompt, Mask, float] | None = None  # found, and how sure it was
 
     def find(self, prompt: Prompt, progress: Progress) -> tuple[Mask, float]:
-        """(H, W) what a prompt means, and how sure that is, in [0, 1]."""
+        """(H, W) what a prompt means, and how sure that is, in [0, 1]; the last one at once."""
+        if self._last is None or self._last[0] != prompt:
+            mask, sureness = self._find(prompt, progress)
+            self._last = prompt, frozen(mask), sureness
+        return self._last[1:]
+
+    def _find(self, prompt: Prompt, progress: Progress) -> tuple[Mask, float]:
         steps = steps_of(prompt)
         whole = None
         if prompt.level != "object" and any(c.is_foreground for c in prompt.clicks):
-            whole, _ = self.find(replace(steps[0], level="object"), part(progress, 0.0, 0.3))
+            whole, _ = self._find(replace(steps[0], level="object"), part(progress, 0.0, 0.3))
         mask, sureness = self._find_within(steps, whole, part(progress, 0.3, 1.0))
         if whole is not None and len(steps) == 1:  # at the photo's size, too
             nested = mask & whole if prompt.level == "part" else mask | whole

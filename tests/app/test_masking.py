@@ -13,15 +13,17 @@ from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
 from PIL import Image
 from strokes import move, press, stroke
 
-from app.commands import run
+from app.commands import run, why_not
 from app.editor import Editor
 from app.filing import Dialog
-from app.tasks import Combine
+from app.tasks import Combine, Question
 from app.tools.mask_tool import MaskTool
 from app.tools.pointer import Button, Tool
 from app.tools.select_tool import SelectTool
 from app.view import Selecting, SelectMode, ToolName
+from objectmorpher_core import segment
 from objectmorpher_core.brush import Brush
+from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.session_file import decode_session, encode_session
 
@@ -268,6 +270,23 @@ def test_inverting_and_filling(editor: Editor) -> None:
     np.testing.assert_array_equal(editor.mask, ball)
 
 
+def test_islands_are_removed_and_come_back_by_undo(editor: Editor) -> None:
+    ball = select_ball(editor)
+    editor.view.brush = Brush(3.0, 0.5)
+    paint(editor, FAR)
+    painted, coverage = editor.mask, editor.object and editor.object.coverage
+    assert painted is not None and coverage is not None and painted[20, 20]
+    run(editor, "remove_islands")
+    wait_for_jobs(editor)
+    np.testing.assert_array_equal(editor.mask, ball)
+    assert editor.object is not None and editor.object.coverage is None, "its rim went, too"
+    assert editor.history is not None and editor.history.undo_label == "Remove islands"
+    run(editor, "undo")
+    assert editor.mask is painted
+    editor.selection.clear()
+    assert why_not(editor, "remove_islands") is not None
+
+
 def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
     select_ball(editor)
     levels = []
@@ -304,3 +323,37 @@ def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(editor: Edi
     run(editor, "undo")
     assert len(editor.document.objects) == 1
     assert editor.mask is None
+
+
+def test_the_status_line_tells_how_sure_a_selection_is(editor: Editor) -> None:
+    if (reason := segment.load("dino").missing()) is not None:
+        pytest.skip(reason)
+    tool = SelectTool()
+    assert "sure" not in tool.hint(editor)
+    select_ball(editor)
+    told = editor.selection.confidence
+    assert told is not None and told > segment.UNSURE
+    assert tool.hint(editor).startswith(f"Selected, {100 * told:.0f} % sure")
+    editor.masking.grow()
+    wait_for_jobs(editor)
+    assert editor.selection.confidence is None, "it was changed by hand"
+    assert "sure" not in tool.hint(editor)
+    run(editor, "undo")
+    assert editor.selection.confidence == told
+    editor.selection.add_click(*FAR, True)
+    wait_for_jobs(editor)
+    assert editor.selection.confidence != told
+    run(editor, "undo")
+    run(editor, "undo")
+    assert editor.selection.confidence is None
+
+
+def test_who_is_not_sure_says_what_helps(editor: Editor) -> None:
+    ball = select_ball(editor)
+    run(editor, "undo")
+    editor.message = None
+    question = Question(Prompt((Click(*CENTRE),)), "Add to selection", editor.current)
+    editor.selection.take(question, segment.Found(ball, "dino", 0.61))
+    hint = SelectTool().hint(editor)
+    assert hint.startswith("Only 61 % sure") and "right-click" in hint
+    assert editor.message is None, "nothing to be dismissed"

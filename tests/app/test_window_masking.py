@@ -9,6 +9,8 @@ from conftest import CENTRE
 from hands import Hands, opened
 from test_window import PRIMARY, screen_xy
 
+from objectmorpher_core import segment
+
 pytestmark = pytest.mark.window
 
 
@@ -27,6 +29,8 @@ def test_a_stroke_by_hand_makes_the_selection_larger(
         hands.click(*screen_xy(*CENTRE))
         hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
         hands.wait(lambda: brightness(hands, 30.5, 18.5) < 0.8 * before, "veiling")
+        if segment.load("dino").missing() is None:
+            hands.wait(lambda: any("% sure" in text for text in hands.places()), "telling")
         hands.press("2")
         hands.drag(screen_xy(20, 18), screen_xy(60, 18))
         hands.wait(lambda: brightness(hands, 30.5, 18.5) > 0.95 * before, "painting")

@@ -279,8 +279,9 @@ def test_a_target_outside_the_photo_is_allowed():
 
 def test_a_small_photo_is_segmented_by_a_click():
     reading = read_photo(PIXELS, segment.load("grabcut"))
-    mask, backend = reading.segment(pipeline.prompt_of(EditScript(click=((78, 62),))))
-    assert backend == "grabcut"
+    found = reading.segment(pipeline.prompt_of(EditScript(click=((78, 62),))))
+    mask = found.mask
+    assert found.backend == "grabcut" and found.confidence is None
     overlap = (mask & MASK).sum() / (mask | MASK).sum()
     assert overlap > 0.8
 

@@ -16,8 +16,8 @@ from ..widgets import Number, gap, half_width, heading, note, number_field, tool
 ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
     "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
-    "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT, "harden": Icon.IMAGE,
-    "subject": Icon.PERSON, "import_shape": Icon.CUBE,
+    "remove_islands": Icon.BROOM, "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT,
+    "harden": Icon.IMAGE, "subject": Icon.PERSON, "import_shape": Icon.CUBE,
 }  # fmt: skip
 
 
@@ -28,7 +28,8 @@ def draw_edge(editor: Editor) -> None:
     editor.view.selecting.reach = number_field(reach, editor.view.selecting.reach).value
     draw_pair(editor, "grow", "shrink")
     draw_pair(editor, "smooth", "feather")
-    draw_pair(editor, "fill_holes", "invert")
+    draw_pair(editor, "fill_holes", "remove_islands")
+    draw_command(editor, "invert")
     if editor.masking.is_soft:
         note(t("Part of the edge was drawn soft, and is cut out so."))
         draw_command(editor, "harden")
@@ -61,6 +62,7 @@ def _hint(name: str) -> str:
         "smooth": t("Straighten the edge: teeth and specks go"),
         "feather": t("Make the edge soft by this many pixels to each side"),
         "fill_holes": t("Select what the selection encloses"),
+        "remove_islands": t("Take away the small pieces beside the large one"),
         "import_shape": t(
             "A splat or mesh file takes the object's place, where it is in the photo"
         ),

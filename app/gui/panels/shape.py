@@ -23,6 +23,7 @@ def draw_shape(editor: Editor) -> None:
         _draw_back(editor)
         _draw_symmetry(editor)
         _draw_standing(editor)
+        _draw_depth(editor)
     else:
         note(f"{reason}.")
         _draw_poses(editor)
@@ -72,6 +73,17 @@ def _draw_standing(editor: Editor) -> None:
     tooltip(t("Its feet tell which end is nearer; not so for what flies or hangs"))
     if chosen != is_standing:
         editor.shaping.say(t("Standing"), is_standing=chosen)
+
+
+def _draw_depth(editor: Editor) -> None:
+    """Where a depth model is there, or would be used."""
+    uses_depth = editor.shaping.settings.uses_depth
+    if not editor.models.has_depth and uses_depth:
+        return
+    chosen = checkbox(t("Use the depth model"), uses_depth)
+    tooltip(t("Its front is as deep as the model sees it; what you painted is added to that"))
+    if chosen != uses_depth:
+        editor.shaping.say(t("Depth model"), uses_depth=chosen)
 
 
 def _draw_poses(editor: Editor) -> None:

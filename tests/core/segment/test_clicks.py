@@ -13,12 +13,14 @@ import pytest
 
 from objectmorpher_core import segment
 from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.pipeline import Reading
 from objectmorpher_core.progress import silent
 from tests.core.segment.simulated_user import Step, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
 
 HELPS = 0.01  # IoU that a click in the middle of the largest error may cost
+BAD = 0.75  # IoU below which a mask is not what was meant
 FEW = ("astronaut", "coffee", "dahlia", "spoon")
 RANDOM_CLICKS = 6
 LATENCY = 0.3  # x the time of encoding: a click's, once the photo is encoded
@@ -189,6 +191,31 @@ def test_it_is_less_sure_of_what_is_less_right():
                 true.append(step.iou)
     assert abs(np.mean(told) - np.mean(true)) < 0.1
     assert segment.load("grabcut").confidence(photo("coffee"), Prompt(), None) is None
+
+
+@pytest.mark.slow
+def test_most_bad_masks_are_told_and_few_good_ones_are_doubted():
+    doubted: dict[bool, list[bool]] = {True: [], False: []}  # by whether the mask is bad
+    for each in TRUTHS:
+        rgb, known = photo(each.photo), embedding(each.photo)
+        for step in steps(each.name):
+            if each.kind == "whole" or step.prompt.level == "part":
+                sure = dino().confidence(rgb, step.prompt, known)
+                assert sure is not None
+                doubted[step.iou < BAD].append(sure < segment.UNSURE)
+    assert np.mean(doubted[True]) >= 0.7
+    assert np.mean(doubted[False]) <= 0.25
+
+
+def test_how_sure_it_is_costs_nothing_after_the_mask():
+    reading = Reading(photo("coffee"), dino(), photo("coffee"), embedding("coffee"))
+    asked = Prompt((Click(300, 130), Click(60, 300, False)))
+    found = reading.segment(asked)
+    assert found.confidence is not None
+    start = time.perf_counter()
+    assert dino().confidence(photo("coffee"), asked, embedding("coffee")) == found.confidence
+    assert time.perf_counter() - start < 0.01
+    np.testing.assert_array_equal(reading.segment(asked).mask, found.mask)
 
 
 def test_a_click_on_an_encoded_photo_is_much_faster_than_encoding():
