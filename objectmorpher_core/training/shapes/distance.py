@@ -30,15 +30,17 @@ SIZE = 8  # numbers of a primitive
 JOIN, CUT, KEEP = 0, 1, 2  # union, difference, intersection
 
 FAR = 1e9
-STEPS = 96  # of a ray
-CLOSE = 4e-4  # x distance, at which a surface is met
+STEPS = 192  # of a ray
+CLOSE = 6e-4  # from a surface, at which it is met
+ALMOST = 4e-3  # from it, where a ray along a surface has used up its steps
 GRAZING = 0.02  # along a ray that touches a surface without getting in
+LEAST_STEP = 3e-3  # within the object
 SLOW = 0.8  # of a step, where distances are only nearly bounds
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _polygon(x, y, outlines, first, count):
-    """Distance to a closed polygon, negative inside."""
+def _polygon(x, y, outlines, first, count, axis):
+    """Distance to a closed polygon, negative inside; sides with x <= axis are no surface."""
     best, sign = FAR, 1.0
     j = first + count - 1
     for i in range(first, first + count):
@@ -46,13 +48,31 @@ def _polygon(x, y, outlines, first, count):
         wx, wy = x - outlines[i, 0], y - outlines[i, 1]
         t = min(max((wx * ex + wy * ey) / max(ex * ex + ey * ey, 1e-12), 0.0), 1.0)
         bx, by = wx - ex * t, wy - ey * t
-        best = min(best, bx * bx + by * by)
+        if outlines[i, 0] > axis or outlines[j, 0] > axis:
+            best = min(best, bx * bx + by * by)
         above, below = y >= outlines[i, 1], y < outlines[j, 1]
         left = ex * wy > ey * wx
         if (above and below and left) or (not above and not below and not left):
             sign = -sign
         j = i
     return sign * math.sqrt(best)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _superquadric(x, y, z, a):
+    """(f - 1) / |its slope| of the norm f whose unit ball it is: a bound, as f is convex."""
+    size = max(max(x, max(y, z)), 1e-6)
+    x, y, z = max(x / size, 1e-4), max(y / size, 1e-4), max(z / size, 1e-4)
+    side, above = a[3], a[4]
+    flat = x ** (2 / above) + z ** (2 / above)
+    total = flat ** (above / side) + y ** (2 / side)
+    outer = total ** (side / 2 - 1)
+    level = flat ** (above / side - 1)
+    gx = outer * level * x ** (2 / above - 1) / a[0]
+    gz = outer * level * z ** (2 / above - 1) / a[2]
+    gy = outer * y ** (2 / side - 1) / a[1]
+    slope = math.sqrt(gx * gx + gy * gy + gz * gz)
+    return (size * outer * total - 1.0) / max(slope, 1e-9)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -84,27 +104,24 @@ def _primitive(kind, x, y, z, a, outlines):
         along = x * sx + z * cx if cx * x > sx * z else math.sqrt(x * x + z * z)
         return math.sqrt(max(x * x + y * y + z * z + a[0] ** 2 - 2 * a[0] * along, 0.0)) - a[1]
     if kind == LATHE:
-        return _polygon(math.sqrt(x * x + z * z), y, outlines, int(a[0]), int(a[1]))
+        return _polygon(math.sqrt(x * x + z * z), y, outlines, int(a[0]), int(a[1]), 1e-6)
     if kind == PRISM:
-        d, h = _polygon(x, y, outlines, int(a[0]), int(a[1])) + a[3], abs(z) - a[2] + a[3]
+        d, h = _polygon(x, y, outlines, int(a[0]), int(a[1]), -FAR) + a[3], abs(z) - a[2] + a[3]
         return min(max(d, h), 0.0) + math.sqrt(max(d, 0.0) ** 2 + max(h, 0.0) ** 2) - a[3]
     if kind == SUPERQUADRIC:
-        px, py, pz = abs(x / a[0]) + 1e-6, abs(y / a[1]) + 1e-6, abs(z / a[2]) + 1e-6
-        around = (px ** (2 / a[4]) + pz ** (2 / a[4])) ** (a[4] / a[3])
-        f = (around + py ** (2 / a[3])) ** (a[3] / 2)
-        r = math.sqrt(x * x + y * y + z * z)
-        return 0.6 * r * (1.0 - 1.0 / max(f, 1e-6))
+        return _superquadric(abs(x / a[0]), abs(y / a[1]), abs(z / a[2]), a)
     # A sheet, bent about y and waved
-    bend = a[7]
+    bend, near = a[7], 1.0
     if abs(bend) > 1e-4:
         radius = 1.0 / bend
         angle = math.atan2(x, radius - z) if bend > 0 else math.atan2(x, z - radius)
         away = math.sqrt(x * x + (radius - z) ** 2)
+        near = min(away * abs(bend), 1.0)  # lengths along it are shorter inside the bend
         x, z = angle * abs(radius), (radius - away) if bend > 0 else (away + radius)
     z -= a[3] * math.sin(a[4] * x + a[6]) * math.cos(a[5] * y + 0.5 * a[6])
     steep = 1.0 + abs(a[3]) * max(abs(a[4]), abs(a[5]))
     edge = math.sqrt((x / a[0]) ** 4 + (y / a[1]) ** 4) ** 0.5
-    side = (edge - 1.0) * min(a[0], a[1])
+    side = (edge - 1.0) * min(a[0], a[1]) * near
     return max(side, abs(z) - a[2]) / steep
 
 
@@ -164,28 +181,29 @@ def distance(px, py, pz, solid, is_filled):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _towards(o, d, start, end, solid, is_filled):
     """Distance along a ray at which the object is met, and its part; -1 where it is not."""
-    t = start
+    t, s, part = start, FAR, -1
     for _ in range(STEPS):
         s, part = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], solid, is_filled)
-        if s < CLOSE * max(t, 1.0):
+        if s < CLOSE:
             return t, part
         t += SLOW * s
         if t > end:
-            break
-    return -1.0, -1
+            return -1.0, -1
+    return (t, part) if s < ALMOST else (-1.0, -1)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _out_of(o, d, start, end, solid):
     """Distance along a ray that begins within at which the filled object is left."""
-    t, is_within = start, False
+    t, before, last = start, 0.0, start
     for _ in range(STEPS):
         s, _ = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], solid, True)
-        if s < 0.0:
-            is_within = True
-        elif is_within or t > start + GRAZING:
+        if s >= 0.0 and before < 0.0:  # the surface is between the last two places
+            return last + (t - last) * before / (before - s)
+        if s >= 0.0 and t > start + GRAZING:
             return t
-        t += max(SLOW * abs(s), 1.5e-3)
+        before, last = s, t
+        t += max(SLOW * abs(s), LEAST_STEP)
         if t > end:
             break
     return min(t, end)
