@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ..solid import Builder
+from .boxes import boxes
 from .creatures import creatures
 from .figures import figures
+from .furniture import furniture
 from .lumps import superquadrics
 from .vessels import lathe
 
@@ -19,6 +21,8 @@ FAMILIES: dict[str, Family] = {
     "creatures": creatures,
     "figures": figures,
     "lathe": lathe,
+    "boxes": boxes,
+    "furniture": furniture,
     "superquadrics": superquadrics,
 }
 
