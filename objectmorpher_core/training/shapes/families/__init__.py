@@ -12,6 +12,8 @@ from .creatures import creatures
 from .figures import figures
 from .furniture import furniture
 from .lumps import superquadrics
+from .rings import rings
+from .vehicles import vehicles
 from .vessels import lathe
 
 Family = Callable[[np.random.Generator], Builder]
@@ -23,6 +25,8 @@ FAMILIES: dict[str, Family] = {
     "lathe": lathe,
     "boxes": boxes,
     "furniture": furniture,
+    "rings": rings,
+    "vehicles": vehicles,
     "superquadrics": superquadrics,
 }
 
