@@ -8,11 +8,14 @@ import numpy as np
 
 from ..solid import Builder
 from .boxes import boxes
+from .busts import busts
 from .creatures import creatures
 from .figures import figures
 from .furniture import furniture
 from .lumps import superquadrics
+from .plants import plants
 from .rings import rings
+from .sheets import sheets
 from .vehicles import vehicles
 from .vessels import lathe
 
@@ -22,11 +25,14 @@ Family = Callable[[np.random.Generator], Builder]
 FAMILIES: dict[str, Family] = {
     "creatures": creatures,
     "figures": figures,
+    "busts": busts,
     "lathe": lathe,
     "boxes": boxes,
     "furniture": furniture,
     "rings": rings,
+    "plants": plants,
     "vehicles": vehicles,
+    "sheets": sheets,
     "superquadrics": superquadrics,
 }
 
