@@ -10,6 +10,7 @@ from ..solid import Builder
 from .boxes import boxes
 from .busts import busts
 from .creatures import creatures
+from .extrusions import extrusions
 from .figures import figures
 from .furniture import furniture
 from .lumps import superquadrics
@@ -34,6 +35,7 @@ FAMILIES: dict[str, Family] = {
     "vehicles": vehicles,
     "sheets": sheets,
     "superquadrics": superquadrics,
+    "extrusions": extrusions,
 }
 
 __all__ = ["FAMILIES", "Family"]
