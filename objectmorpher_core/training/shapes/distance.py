@@ -293,6 +293,25 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
                 row[12] = min(max(s, 0.0) / 0.15, 1.0)
 
 
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def lowest(solid, columns):
+    """The least y of the object, by rays upwards, so many across; never too low by half a gap."""
+    best, gap = 1.0, 2.0 / columns
+    for i in range(columns):
+        for j in range(columns):
+            x, z = -1.0 + gap * (i + 0.5), -1.0 + gap * (j + 0.5)
+            if x * x + z * z > 1.0:
+                continue
+            y = -1.02
+            while y < best:
+                s, _ = distance(x, y, z, solid, True)
+                if s < 0.5 * gap:
+                    best = y
+                    break
+                y += SLOW * s
+    return best
+
+
 def ball_of(points: np.ndarray) -> np.ndarray:
     """(4,) the centre and radius of a ball that holds points (n, 3)."""
     centre = 0.5 * (points.min(0) + points.max(0))
