@@ -64,15 +64,14 @@ def _superquadric(x, y, z, a):
     size = max(max(x, max(y, z)), 1e-6)
     x, y, z = max(x / size, 1e-4), max(y / size, 1e-4), max(z / size, 1e-4)
     side, above = a[3], a[4]
-    flat = x ** (2 / above) + z ** (2 / above)
-    total = flat ** (above / side) + y ** (2 / side)
-    outer = total ** (side / 2 - 1)
-    level = flat ** (above / side - 1)
-    gx = outer * level * x ** (2 / above - 1) / a[0]
-    gz = outer * level * z ** (2 / above - 1) / a[2]
-    gy = outer * y ** (2 / side - 1) / a[1]
+    px, py, pz = x ** (2 / above), y ** (2 / side), z ** (2 / above)
+    level = (px + pz) ** (above / side)
+    total = level + py
+    norm = total ** (side / 2)
+    around = norm / total * level / (px + pz)
+    gx, gz, gy = around * px / (x * a[0]), around * pz / (z * a[2]), norm / total * py / (y * a[1])
     slope = math.sqrt(gx * gx + gy * gy + gz * gz)
-    return (size * outer * total - 1.0) / max(slope, 1e-9)
+    return (size * norm - 1.0) / max(slope, 1e-9)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -137,7 +136,7 @@ def _joined(a, b, soft):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def distance(px, py, pz, solid, is_filled):
     """To the object, and the part that is nearest; `is_filled`: cavities are not cut away."""
-    kinds, frames, numbers, joins, softness, cavities, parts, bounds, outlines, warp = solid
+    kinds, frames, numbers, joins, softness, cavities, balls, parts, bounds, outlines, warp = solid
     x, y, z = px, py, pz
     slow = 1.0
     if warp[0] != 0.0:  # twisted about y
@@ -161,6 +160,12 @@ def distance(px, py, pz, solid, is_filled):
         own = FAR
         for k in range(parts[part, 0], parts[part, 1]):
             if is_filled and cavities[k]:
+                continue
+            b = balls[k]
+            least = math.sqrt((x - b[0]) ** 2 + (y - b[1]) ** 2 + (z - b[2]) ** 2) - b[3]
+            if joins[k] == JOIN and least > own + softness[k]:
+                continue  # too far away to matter
+            if joins[k] == CUT and least > softness[k] - own:
                 continue
             f = frames[k]
             qx = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z + f[0, 3]
@@ -237,6 +242,16 @@ def shade(x, y, z, way, solid, steps, sharp):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _openness(x, y, z, n, solid):
+    """How free the space before a surface is, in [0, 1]."""
+    opened = 0.0
+    for step in (0.05, 0.15, 0.3):
+        s, _ = distance(x + step * n[0], y + step * n[1], z + step * n[2], solid, False)
+        opened += min(max(s, 0.0) / step, 1.0) / 3.0
+    return opened
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def trace(rays, eye, solid, lamps, ground, first, last, out):
     """Fills rows first..last of `out` (n, 16) for unit rays (n, 3) from `eye` (3,), object frame.
 
@@ -267,13 +282,7 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
                 back, _ = _towards(far, (-d[0], -d[1], -d[2]), 0.0, end - t, solid, True)
                 row[2] = end - back if back >= 0.0 else t
                 row[2] = max(row[2], row[1])
-                opened = 0.0
-                for step in (0.05, 0.15, 0.3):
-                    s, _ = distance(
-                        x + step * n[0], y + step * n[1], z + step * n[2], solid, False
-                    )
-                    opened += min(max(s, 0.0) / step, 1.0) / 3.0
-                row[7] = opened
+                row[7] = _openness(x, y, z, n, solid)
                 for lamp in range(len(lamps)):
                     way = lamps[lamp]
                     facing = way[0] * n[0] + way[1] * n[1] + way[2] * n[2]

@@ -29,6 +29,7 @@ class Solid(NamedTuple):
     joins: np.ndarray  # (n,)
     softness: F64  # (n,)
     cavities: np.ndarray  # (n,) bool: cut away, but what is behind belongs to the same body
+    balls: F64  # (n, 4) centre and radius of a ball that holds the primitive
     parts: np.ndarray  # (m, 2) first and last + 1 primitive
     bounds: F64  # (m, 4) centre and radius of a ball that holds the part
     outlines: F64  # (k, 2)
@@ -72,12 +73,19 @@ class Builder:
         self._parts.append([])
         self.material.append(material)
 
-    def ellipsoid(self, at: ArrayLike, half: ArrayLike, turn: F64 | None = None, **how: Unpack[How]) -> None:
+    def ellipsoid(
+        self, at: ArrayLike, half: ArrayLike, turn: F64 | None = None, **how: Unpack[How]
+    ) -> None:
         size = np.asarray(half, float)
         self._add(sdf.ELLIPSOID, at, turn, tuple(size), size, **how)
 
     def box(
-        self, at: ArrayLike, half: ArrayLike, round_: float = 0.0, turn: F64 | None = None, **how: Unpack[How]
+        self,
+        at: ArrayLike,
+        half: ArrayLike,
+        round_: float = 0.0,
+        turn: F64 | None = None,
+        **how: Unpack[How],
     ) -> None:
         size = np.asarray(half, float)
         self._add(sdf.BOX, at, turn, (*size, min(round_, 0.98 * size.min())), size, **how)
@@ -109,7 +117,9 @@ class Builder:
         half = np.array([large + small, small, large + small])
         self._add(sdf.TORUS, at, turn, (large, small, half_angle), half, **how)
 
-    def lathe(self, at: ArrayLike, outline: F64, turn: F64 | None = None, **how: Unpack[How]) -> None:
+    def lathe(
+        self, at: ArrayLike, outline: F64, turn: F64 | None = None, **how: Unpack[How]
+    ) -> None:
         """`outline` (k, 2): radius and y, a closed polygon; on the axis where it is solid."""
         low, high, wide = outline[:, 1].min(), outline[:, 1].max(), outline[:, 0].max()
         half, middle = np.array([wide, (high - low) / 2, wide]), np.array([0, (high + low) / 2, 0])
@@ -133,8 +143,9 @@ class Builder:
         self._add(sdf.SUPERQUADRIC, at, turn, (*size, side, above), size, **how)
 
     def sheet(
-        self, at: ArrayLike, half: ArrayLike, thick: float, waves: tuple[float, float, float, float],
-        bend: float = 0.0, turn: F64 | None = None, **how: Unpack[How],
+        self, at: ArrayLike, half: ArrayLike, thick: float,
+        waves: tuple[float, float, float, float], bend: float = 0.0, turn: F64 | None = None,
+        **how: Unpack[How],
     ) -> None:  # fmt: skip
         """`half` (2,): x and y; `waves`: height, per x, per y, phase; `bend`: 1 / radius."""
         x, y = np.asarray(half, float)
@@ -162,11 +173,11 @@ class Builder:
         scale, flat = 1 / radius, [p for part in self._parts for p in part]
         to_object = np.diag([scale, scale, scale, 1.0])
         to_object[:3, 3] = -scale * centre
-        frames: list[F64] = [np.linalg.inv(to_object @ p.frame @ _sized(radius))[:3] for p in flat]
+        frames = [np.linalg.inv(to_object @ p.frame @ _sized(radius))[:3] for p in flat]
+        balls = np.array([_ball((_cloud(p, self._outlines) - centre) * scale) for p in flat])
         ends = np.cumsum([0] + [len(part) for part in self._parts])
-        bounds = np.array([sdf.ball_of((cloud - centre) * scale) for cloud in clouds])
-        bulges = [BULGE * scale * max(p.soft for p in part) for part in self._parts]
-        bounds[:, 3] = MARGIN * bounds[:, 3] + bulges + THINNEST
+        bounds = np.array([_ball((cloud - centre) * scale) for cloud in clouds])
+        bounds[:, 3] += [BULGE * scale * max(p.soft for p in part) for part in self._parts]
         outlines = np.concatenate(self._outlines) if self._outlines else np.zeros((1, 2))
         return Solid(
             np.array([p.kind for p in flat], np.int64),
@@ -175,6 +186,7 @@ class Builder:
             np.array([p.join for p in flat], np.int64),
             np.array([p.soft * scale for p in flat]),
             np.array([p.is_cavity for p in flat]),
+            balls,
             np.column_stack([ends[:-1], ends[1:]]),
             bounds,
             outlines * scale,
@@ -225,6 +237,12 @@ def _scaled(primitive: _Primitive, scale: float) -> F64:
 def _sized(radius: float) -> F64:
     """A primitive's frame has the lengths of the unit ball, too."""
     return np.diag([radius, radius, radius, 1.0])
+
+
+def _ball(cloud: F64) -> F64:
+    ball = sdf.ball_of(cloud)
+    ball[3] = MARGIN * ball[3] + THINNEST
+    return ball
 
 
 def _cloud(primitive: _Primitive, outlines: list[F64]) -> F64:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from ....arrays import F64
 from ..solid import Builder, turned
+from .buildings import buildings, house, tower
 from .making import Rng, chance, ngon, pick, rounded, span, vec
 
 BODY, FRONT, KNOB, MORE, GLASS = range(5)
@@ -13,14 +16,32 @@ BODY, FRONT, KNOB, MORE, GLASS = range(5)
 
 def boxes(rng: Rng) -> Builder:
     """One of them, with its details."""
-    kinds = (_carton, _books, _radio, _television, _camera, _suitcase, _house, _house, _toaster,
-             _phone, _brick, _parcel, _tower, _buildings, _dice, _washer, _stack)  # fmt: skip
+    kinds = (
+        _carton,
+        _books,
+        _radio,
+        _television,
+        _camera,
+        _suitcase,
+        house,
+        house,
+        _toaster,
+        _phone,
+        _brick,
+        _parcel,
+        tower,
+        buildings,
+        _dice,
+        _washer,
+        _stack,
+    )
     built = Builder()
     pick(rng, kinds)(rng, built)
     return built
 
 
 def _size(rng: Rng, x: float, y: float, z: float) -> F64:
+    """(3,) half sizes, varied."""
     return vec(x, y, z) * np.exp(rng.normal(0, 0.2, 3))
 
 
@@ -82,11 +103,13 @@ def _books(rng: Rng, built: Builder) -> None:
 
 
 def _radio(rng: Rng, built: Builder) -> None:
+    """With loudspeakers, a dial, knobs, an aerial, a bow."""
     half = _size(rng, 0.8, 0.45, 0.25)
     built.part(BODY)
     if chance(rng, 0.3):  # an arched top
-        arch = np.concatenate([[[-half[0], 0]], [[half[0], 0]],
-                               vec(0, half[1]) + half[:2] * ngon(16)[:9]])  # fmt: skip
+        arch = np.concatenate(
+            [[[-half[0], 0]], [[half[0], 0]], vec(0, half[1]) + half[:2] * ngon(16)[:9]]
+        )
         built.prism([0, 0, 0], arch, half[2], 0.03)
     else:
         built.box([0, half[1], 0], half, span(rng, 0.02, 0.2))
@@ -118,7 +141,11 @@ def _television(rng: Rng, built: Builder) -> None:
         built.box(middle - [0, 0, 1.2 * half[2]], half * [0.7, 0.7, 0.7], 0.08, soft=0.1)
     screen = half - [rim, rim, 0]
     screen[0] -= 0 if is_flat else span(rng, 0, 0.25)
-    built.box(middle + [screen[0] - half[0] + rim, 0, 1.02 * half[2]], [screen[0], screen[1], 0.03], cut=True)
+    built.box(
+        middle + [screen[0] - half[0] + rim, 0, 1.02 * half[2]],
+        [screen[0], screen[1], 0.03],
+        cut=True,
+    )
     built.part(GLASS)
     at = middle + [screen[0] - half[0] + rim, 0, 0.0]
     if is_flat:
@@ -132,30 +159,42 @@ def _television(rng: Rng, built: Builder) -> None:
         built.box([0, 0.03, 0], [0.4 * half[0], 0.03, 0.25], 0.02)
     else:
         for x in (-0.7, 0.7):
-            built.limb([0.9 * x * half[0], lift + 0.02, 0], [x * half[0] * 1.2, 0.03, 0.12], 0.04, 0.03)
-            built.limb([0.9 * x * half[0], lift + 0.02, 0], [x * half[0] * 1.2, 0.03, -0.12], 0.04, 0.03)
+            built.limb(
+                [0.9 * x * half[0], lift + 0.02, 0], [x * half[0] * 1.2, 0.03, 0.12], 0.04, 0.03
+            )
+            built.limb(
+                [0.9 * x * half[0], lift + 0.02, 0], [x * half[0] * 1.2, 0.03, -0.12], 0.04, 0.03
+            )
 
 
 def _camera(rng: Rng, built: Builder) -> None:
+    """With a lens, a hump, a grip, buttons."""
     half = _size(rng, 0.6, 0.38, 0.22)
     built.part(BODY)
     built.box([0, half[1], 0], half, span(rng, 0.03, 0.12))
     if chance(rng, 0.6):
-        built.box([span(rng, -0.2, 0.2), 2.1 * half[1], 0], [0.2, 0.15, 0.9 * half[2]], 0.06, soft=0.05)
+        built.box(
+            [span(rng, -0.2, 0.2), 2.1 * half[1], 0], [0.2, 0.15, 0.9 * half[2]], 0.06, soft=0.05
+        )
     if chance(rng, 0.5):
         built.limb([-half[0], 0.15, 0.1], [-half[0], 1.8 * half[1], 0.1], 0.13, 0.13, soft=0.05)
     y, z, x = half[1], half[2], span(rng, -0.15, 0.25)
     for part, radius in zip((FRONT, KNOB, GLASS), (0.75, 0.66, 0.55), strict=True):
         built.part(part)
         long = span(rng, 0.05, 0.25) if part != GLASS else 0.01
-        built.cylinder([x, y, z + long], radius * 0.9 * half[1], long + 0.02, 0.02, turned(0, np.pi / 2))
+        built.cylinder(
+            [x, y, z + long], radius * 0.9 * half[1], long + 0.02, 0.02, turned(0, np.pi / 2)
+        )
         z += 1.9 * long
     for _ in range(rng.integers(1, 4)):
         built.part(KNOB)
-        built.cylinder([span(rng, -0.8, 0.8) * half[0], 2.05 * half[1], 0], span(rng, 0.05, 0.12), 0.06, 0.01)
+        built.cylinder(
+            [span(rng, -0.8, 0.8) * half[0], 2.05 * half[1], 0], span(rng, 0.05, 0.12), 0.06, 0.01
+        )
 
 
 def _suitcase(rng: Rng, built: Builder) -> None:
+    """With straps, a bow and locks."""
     half = _size(rng, 0.75, 0.5, 0.2)
     built.part(BODY)
     built.box([0, half[1], 0], half, span(rng, 0.04, 0.15))
@@ -173,82 +212,31 @@ def _suitcase(rng: Rng, built: Builder) -> None:
                 built.ellipsoid([x * half[0], -0.03, z * half[2]], [0.07, 0.07, 0.05])
 
 
-def _roof(rng: Rng, built: Builder, at: F64, half: F64, kind: str) -> None:
-    """On a storey's upper side `at`."""
-    high, over = span(rng, 0.5, 1.2) * half[2], span(rng, 0.03, 0.12)
-    built.part(FRONT)
-    if kind == "gable":
-        wide = half[2] + over
-        outline = np.array([[-wide, 0], [wide, 0], [0, high]])
-        built.prism(at, outline, half[0] + over, 0, turned(np.pi / 2))
-    elif kind == "hip":
-        for turn, long, wide in ((0.0, half[2], half[0]), (np.pi / 2, half[0], half[2])):
-            slope = np.array([[-wide - over, 0], [wide + over, 0], [max(wide - long, 0) + 0.02, high],
-                              [-max(wide - long, 0) - 0.02, high]])  # fmt: skip
-            built.prism(at, slope, long + over, 0, turned(turn), keep=turn > 0)
-    elif kind == "shed":
-        outline = np.array([[-half[2] - over, 0], [half[2] + over, 0], [half[2] + over, 0.15 * high],
-                            [-half[2] - over, high]])  # fmt: skip
-        built.prism(at, outline, half[0] + over, 0, turned(np.pi / 2))
-    elif kind == "dome":
-        built.ellipsoid(at, [half[0], high, half[2]])
-        built.box(at - [0, high, 0], [3, high, 3], cut=True)
-    else:
-        built.box(at + [0, 0.04, 0], [half[0] + over, 0.05, half[2] + over])
-
-
-def _windows(rng: Rng, built: Builder, middle: F64, half: F64, rows: int, columns: int) -> None:
-    """On the front (+z) and one side of a storey."""
-    built.part(GLASS)
-    tall, wide = 0.3 * half[1] / rows * 1.6, 0.5 * half[0] / columns
-    for row in range(rows):
-        y = middle[1] + half[1] * (2 * (row + 0.55) / rows - 1)
-        for column in range(columns):
-            x = middle[0] + half[0] * (2 * (column + 0.5) / columns - 1)
-            built.box([x, y, middle[2] + half[2]], [wide, tall, 0.02])
-        built.box([middle[0] + half[0], y, middle[2]], [0.02, tall, 0.35 * half[2]])
-    if chance(rng, 0.7):
-        built.part(KNOB)
-        x = middle[0] + span(rng, -0.6, 0.6) * half[0]
-        tall = min(0.3, 0.6 * half[1])
-        built.box([x, middle[1] - half[1] + tall, middle[2] + half[2]], [0.12, tall, 0.035])
-
-
-def _house(rng: Rng, built: Builder) -> None:
-    half = _size(rng, 0.8, 0.4, 0.5)
-    middle = vec(0, half[1], 0)
-    built.part(BODY)
-    built.box(middle, half)
-    kind = pick(rng, ("gable", "gable", "hip", "shed", "flat"))
-    _windows(rng, built, middle, half, int(rng.integers(1, 3)), int(rng.integers(1, 4)))
-    _roof(rng, built, vec(0, 2 * half[1], 0), half, kind)
-    if chance(rng, 0.6):  # a chimney
-        built.part(KNOB)
-        x = span(rng, -0.6, 0.6) * half[0]
-        built.box([x, 2 * half[1] + 0.3, 0.3 * half[2]], [0.08, 0.36, 0.08])
-    if chance(rng, 0.5):  # a wing
-        wing = half * rng.uniform(0.4, 0.8, 3)
-        at = vec(span(rng, -0.5, 0.5) * half[0], wing[1], half[2] + 0.6 * wing[2])
-        built.part(BODY)
-        built.box(at, wing)
-        _roof(rng, built, at + [0, wing[1], 0], wing, pick(rng, ("hip", "shed", "gable")))
-
-
 def _toaster(rng: Rng, built: Builder) -> None:
+    """Rounded, with one or two slots."""
     half = _size(rng, 0.6, 0.4, 0.3)
     built.part(BODY)
-    built.prism([0, half[1], 0], rounded(half[2], half[1], span(rng, 0.08, 0.28), 6), half[0], 0.05,
-                turned(np.pi / 2))  # fmt: skip
+    built.prism(
+        [0, half[1], 0],
+        rounded(half[2], half[1], span(rng, 0.08, 0.28), 6),
+        half[0],
+        0.05,
+        turned(np.pi / 2),
+    )
     slots = pick(rng, (1, 2, 2))
     for k in range(slots):
         z = (k - 0.5 * (slots - 1)) * 0.8 * half[2]
         built.box([0, 2 * half[1], z], [0.75 * half[0], 0.3, 0.07], cavity=True)
     if chance(rng, 0.4):
         built.part(MORE)
-        built.box([0, 2 * half[1] + 0.1, 0.4 * half[2] * (slots - 1)], [0.55 * half[0], 0.35, 0.05], 0.04)
+        built.box(
+            [0, 2 * half[1] + 0.1, 0.4 * half[2] * (slots - 1)], [0.55 * half[0], 0.35, 0.05], 0.04
+        )
     built.part(KNOB)
     built.box([half[0] + 0.04, span(rng, 0.8, 1.6) * half[1], 0], [0.07, 0.04, 0.1], 0.02)
-    built.cylinder([half[0], 0.4 * half[1], 0.4 * half[2]], 0.06, 0.05, 0.01, turned(0, 0, np.pi / 2))
+    built.cylinder(
+        [half[0], 0.4 * half[1], 0.4 * half[2]], 0.06, 0.05, 0.01, turned(0, 0, np.pi / 2)
+    )
 
 
 def _phone(rng: Rng, built: Builder) -> None:
@@ -268,7 +256,9 @@ def _phone(rng: Rng, built: Builder) -> None:
     elif chance(rng, 0.5):
         built.part(KNOB)
         for x in (-0.6, -0.2):
-            built.cylinder(turn @ vec(x * half[0], -half[1], -0.8 * half[2]), 0.07, 0.03, 0.01, turn)
+            built.cylinder(
+                turn @ vec(x * half[0], -half[1], -0.8 * half[2]), 0.07, 0.03, 0.01, turn
+            )
 
 
 def _brick(rng: Rng, built: Builder) -> None:
@@ -281,7 +271,11 @@ def _brick(rng: Rng, built: Builder) -> None:
     is_toy = chance(rng, 0.6)
     for i in range(columns):
         for j in range(rows):
-            at = vec((2 * i + 1 - columns) / columns * half[0], 2 * half[1], (2 * j + 1 - rows) / rows * half[2])
+            at = vec(
+                (2 * i + 1 - columns) / columns * half[0],
+                2 * half[1],
+                (2 * j + 1 - rows) / rows * half[2],
+            )
             built.cylinder(at, size, 0.1 if is_toy else 4.0, 0.01, cut=not is_toy)
 
 
@@ -305,54 +299,23 @@ def _parcel(rng: Rng, built: Builder) -> None:
     built.ellipsoid([0, 2 * half[1] + 0.07, 0], [0.09, 0.08, 0.09])
 
 
-def _tower(rng: Rng, built: Builder) -> None:
-    """Storeys that get narrower; round, square or with many corners."""
-    corners, y, wide = pick(rng, (0, 4, 4, 6, 8)), 0.0, span(rng, 0.4, 0.7)
-    for k in range(rng.integers(2, 6)):
-        high = span(rng, 0.1, 0.7)
-        built.part(pick(rng, (BODY, BODY, FRONT)))
-        if corners:
-            turn = turned(0, np.pi / 2)
-            built.prism([0, y + high, 0], ngon(corners, wide, np.pi / 4), high, 0.01, turn)
-        else:
-            built.cylinder([0, y + high, 0], wide, high, 0.01)
-        if k % 2 == 0 and high > 0.25:
-            built.part(GLASS)
-            for way in range(4):
-                at = 0.7 * wide * vec(np.sin(way * np.pi / 2), 0, np.cos(way * np.pi / 2))
-                built.box(at + [0, y + 1.1 * high, 0], [0.1, 0.4 * high, 0.32 * wide],
-                          0.02, turned(way * np.pi / 2))  # fmt: skip
-        y += 2 * high
-        wide *= span(rng, 0.65, 1.15)
-    built.part(KNOB)
-    if chance(rng, 0.7):
-        built.limb([0, y, 0], [0, y + span(rng, 0.3, 1.0), 0], 0.9 * wide, 0.03)
-    else:
-        built.ellipsoid([0, y, 0], [0.8 * wide, span(rng, 0.2, 0.7), 0.8 * wide])
-
-
-def _buildings(rng: Rng, built: Builder) -> None:
-    """Several blocks on one ground."""
-    built.part(MORE)
-    built.box([0, 0.03, 0], [1.1, 0.03, 0.8])
-    for _ in range(rng.integers(2, 5)):
-        half = _size(rng, 0.28, 0.5, 0.25)
-        at = vec(span(rng, -0.75, 0.75), 0.04 + half[1], span(rng, -0.45, 0.45))
-        built.part(pick(rng, (BODY, FRONT)))
-        built.box(at, half)
-        _windows(rng, built, at, half, int(rng.integers(1, 4)), 2)
-        _roof(rng, built, at + [0, half[1], 0], half, pick(rng, ("gable", "flat", "flat", "hip", "dome")))
-
-
 def _dice(rng: Rng, built: Builder) -> None:
+    """With spots cut in."""
     turn = turned(span(rng, 0, 6), *(rng.normal(0, 0.5, 2) * (rng.random() < 0.5)))
     built.part(BODY)
     built.box([0, 0, 0], [0.5, 0.5, 0.5], span(rng, 0.03, 0.2), turn)
-    spots = ([[0, 0]], [[-1, -1], [1, 1]], [[-1, -1], [0, 0], [1, 1]], [[-1, 1], [1, 1], [-1, -1], [1, -1]])
+    spots = (
+        [[0, 0]],
+        [[-1, -1], [1, 1]],
+        [[-1, -1], [0, 0], [1, 1]],
+        [[-1, 1], [1, 1], [-1, -1], [1, -1]],
+    )
     for k, way in enumerate((vec(0, 0, 1), vec(0, 1, 0), vec(1, 0, 0), vec(0, 0, -1))):
         side, up = np.roll(way, 1), np.roll(way, 2)
         for x, y in spots[k]:
-            built.ellipsoid(turn @ (0.52 * way + 0.25 * (x * side + y * up)), np.full(3, 0.09), cut=True)
+            built.ellipsoid(
+                turn @ (0.52 * way + 0.25 * (x * side + y * up)), np.full(3, 0.09), cut=True
+            )
 
 
 def _washer(rng: Rng, built: Builder) -> None:
@@ -364,17 +327,23 @@ def _washer(rng: Rng, built: Builder) -> None:
     if kind == "round":
         for part, radius, z in ((KNOB, 0.62, 0.02), (GLASS, 0.48, 0.05)):
             built.part(part)
-            built.cylinder([0, 0.9 * half[1], half[2]], radius * min(half[:2]), z, 0.015, turned(0, np.pi / 2))
+            built.cylinder(
+                [0, 0.9 * half[1], half[2]], radius * min(half[:2]), z, 0.015, turned(0, np.pi / 2)
+            )
     else:
         edges = (-1, 1) if kind == "door" else (-1, span(rng, -0.3, 0.5), 1)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in itertools.pairwise(edges):
             built.part(FRONT)
             at = half[1] * (1 + 0.5 * (low + high))
             tall = 0.5 * (high - low) * half[1] - 0.03
             built.box([0, at, half[2]], [0.95 * half[0], tall, 0.04], 0.02)
             built.part(KNOB)
-            built.limb([0.8 * half[0], at - 0.4 * tall, half[2] + 0.09],
-                       [0.8 * half[0], at + 0.4 * tall, half[2] + 0.09], 0.025, 0.025)  # fmt: skip
+            built.limb(
+                [0.8 * half[0], at - 0.4 * tall, half[2] + 0.09],
+                [0.8 * half[0], at + 0.4 * tall, half[2] + 0.09],
+                0.025,
+                0.025,
+            )
     built.part(MORE)
     _dials(rng, built, half * [1, 1, 1], int(rng.integers(0, 4)), 0.05)
 

@@ -44,8 +44,13 @@ def _head(rng: Rng, built: Builder, tilt: F64) -> None:
         turn = tilt @ turned(-sign * 0.5)
         at = tilt @ vec(sign * wide * 0.98, -0.08, -0.1)
         built.ellipsoid(at, [0.07, 1.3 * size, size], turn)
-        built.ellipsoid(at + turn @ vec(0.06 * sign, 0.03, 0.05), [0.05, 0.8 * size, 0.6 * size], turn,
-                        cut=True, soft=0.04)  # fmt: skip
+        built.ellipsoid(
+            at + turn @ vec(0.06 * sign, 0.03, 0.05),
+            [0.05, 0.8 * size, 0.6 * size],
+            turn,
+            cut=True,
+            soft=0.04,
+        )
     _hair(rng, built, tilt, wide)
 
 
@@ -55,14 +60,24 @@ def _face(rng: Rng, built: Builder, tilt: F64) -> None:
     tip = vec(0, 0.1 - long, out)
     built.limb(tilt @ vec(0, 0.15, 0.72), tilt @ tip, 0.07, nose, soft=0.08)
     for sign in (1, -1):
-        built.ellipsoid(tilt @ (tip + [0.1 * sign, -0.02, -0.1]), np.full(3, 0.65 * nose), soft=0.05)
+        built.ellipsoid(
+            tilt @ (tip + [0.1 * sign, -0.02, -0.1]), np.full(3, 0.65 * nose), soft=0.05
+        )
     apart, deep = span(rng, 0.25, 0.33), span(rng, 0.0, 0.08)
     for sign in (1, -1):
-        built.ellipsoid(tilt @ vec(apart * sign, 0.05, 0.86), [0.17, 0.1, 0.12], tilt, cut=True, soft=0.1)
+        built.ellipsoid(
+            tilt @ vec(apart * sign, 0.05, 0.86), [0.17, 0.1, 0.12], tilt, cut=True, soft=0.1
+        )
     kind = pick(rng, ("lips", "lips", "open", "none"))
     mouth = vec(0, -0.55, 0.76)
     if kind == "open":
-        built.ellipsoid(tilt @ (mouth + [0, 0, 0.04]), [0.22, span(rng, 0.05, 0.15), 0.2], tilt, cut=True, soft=0.04)
+        built.ellipsoid(
+            tilt @ (mouth + [0, 0, 0.04]),
+            [0.22, span(rng, 0.05, 0.15), 0.2],
+            tilt,
+            cut=True,
+            soft=0.04,
+        )
     for sign in (1, -1):
         built.part(EYE)
         built.ellipsoid(tilt @ vec(apart * sign, 0.05, 0.66 - deep), np.full(3, 0.145))
@@ -77,8 +92,12 @@ def _face(rng: Rng, built: Builder, tilt: F64) -> None:
     if chance(rng, 0.2):
         for sign in (1, -1):
             built.part(MORE)
-            built.ring(tilt @ vec(apart * sign, 0.05, 0.92), 0.24, 0.03, turn=tilt @ turned(0, np.pi / 2))
-            built.limb(tilt @ vec(0.5 * sign, 0.07, 0.9), tilt @ vec(0.8 * sign, 0.05, 0), 0.03, 0.03)
+            built.ring(
+                tilt @ vec(apart * sign, 0.05, 0.92), 0.24, 0.03, turn=tilt @ turned(0, np.pi / 2)
+            )
+            built.limb(
+                tilt @ vec(0.5 * sign, 0.07, 0.9), tilt @ vec(0.8 * sign, 0.05, 0), 0.03, 0.03
+            )
         built.limb(tilt @ vec(-0.08, 0.07, 0.95), tilt @ vec(0.08, 0.07, 0.95), 0.03, 0.03)
 
 
@@ -86,23 +105,7 @@ def _hair(rng: Rng, built: Builder, tilt: F64, wide: float) -> None:
     """Short, long, curly, a knot, a hat, a beard, or none."""
     kind = pick(rng, ("cap", "cap", "long", "curls", "none", "hat", "crown", "helmet"))
     if kind in ("cap", "long", "helmet"):
-        built.part(HAIR)
-        over = span(rng, 0.06, 0.16)
-        built.ellipsoid(tilt @ vec(0, 0.26, -0.16), vec(wide, 0.82, 0.88) + over, tilt)
-        if kind == "long":
-            for sign in (1, -1):
-                line = [[0.6 * sign, 0.4, -0.3], [0.8 * sign, -0.4, -0.3], [0.7 * sign, -span(rng, 0.9, 1.6), -0.1]]
-                tube(built, curve(line, 5) @ tilt.T, 0.3, 0.2, soft=0.2)
-            built.ellipsoid(tilt @ vec(0, -0.5, -0.5), [0.7, 0.85, 0.35], tilt, soft=0.2)
-        low = span(rng, -0.3, 0.1)
-        built.box(tilt @ vec(0, low - 0.55, 0.75), [0.62, 0.95, 0.8], 0.25, tilt, cut=True, soft=0.06)
-        if kind == "helmet":
-            built.box(tilt @ vec(0, -1.6, 0), [2, 1.3, 2], 0, tilt, cut=True)
-            built.part(MORE)
-            built.ring(tilt @ vec(0, -0.2, -0.1), wide + over, 0.06, turn=tilt)
-        elif chance(rng, 0.25):
-            built.part(HAIR)
-            built.ellipsoid(tilt @ vec(0, span(rng, 0.2, 1.1), -0.95), np.full(3, 0.33))
+        _cap(rng, built, tilt, wide, kind)
     elif kind == "curls":
         count = 16
         for k in range(count):
@@ -124,10 +127,41 @@ def _hair(rng: Rng, built: Builder, tilt: F64, wide: float) -> None:
         built.cylinder(tilt @ vec(0, 0.75, -0.08), wide + 0.06, 0.25, 0.01, tilt)
         built.cylinder(tilt @ vec(0, 0.95, -0.08), wide - 0.01, 0.4, 0, tilt, cut=True)
         for k in range(4):
-            built.box(tilt @ vec(0, 1.0, -0.08), [2, 0.12, 0.12], 0, tilt @ turned(k * np.pi / 4), cut=True)
+            built.box(
+                tilt @ vec(0, 1.0, -0.08),
+                [2, 0.12, 0.12],
+                0,
+                tilt @ turned(k * np.pi / 4),
+                cut=True,
+            )
     if chance(rng, 0.15):
         built.part(HAIR)
         built.ellipsoid(tilt @ vec(0, -0.85, 0.4), [0.5, span(rng, 0.3, 0.7), 0.4], tilt)
+
+
+def _cap(rng: Rng, built: Builder, tilt: F64, wide: float, kind: str) -> None:
+    """Hair or a helmet around the skull, open before the face."""
+    built.part(HAIR)
+    over = span(rng, 0.06, 0.16)
+    built.ellipsoid(tilt @ vec(0, 0.26, -0.16), vec(wide, 0.82, 0.88) + over, tilt)
+    if kind == "long":
+        for sign in (1, -1):
+            line = [
+                [0.6 * sign, 0.4, -0.3],
+                [0.8 * sign, -0.4, -0.3],
+                [0.7 * sign, -span(rng, 0.9, 1.6), -0.1],
+            ]
+            tube(built, curve(line, 5) @ tilt.T, 0.3, 0.2, soft=0.2)
+        built.ellipsoid(tilt @ vec(0, -0.5, -0.5), [0.7, 0.85, 0.35], tilt, soft=0.2)
+    low = span(rng, -0.3, 0.1)
+    built.box(tilt @ vec(0, low - 0.55, 0.75), [0.62, 0.95, 0.8], 0.25, tilt, cut=True, soft=0.06)
+    if kind == "helmet":
+        built.box(tilt @ vec(0, -1.6, 0), [2, 1.3, 2], 0, tilt, cut=True)
+        built.part(MORE)
+        built.ring(tilt @ vec(0, -0.2, -0.1), wide + over, 0.06, turn=tilt)
+    elif chance(rng, 0.25):
+        built.part(HAIR)
+        built.ellipsoid(tilt @ vec(0, span(rng, 0.2, 1.1), -0.95), np.full(3, 0.33))
 
 
 def _shoulders(rng: Rng, built: Builder) -> None:
@@ -138,11 +172,19 @@ def _shoulders(rng: Rng, built: Builder) -> None:
     built.limb([0, -0.5, -0.15], [0, -1.5, -0.15], neck, 1.15 * neck)
     if chance(rng, 0.6):
         built.part(CLOTH)
-    built.ellipsoid([0, -2.05, -0.15], [broad, span(rng, 0.55, 0.7), span(rng, 0.5, 0.65)], soft=0.3)
+    built.ellipsoid(
+        [0, -2.05, -0.15], [broad, span(rng, 0.55, 0.7), span(rng, 0.5, 0.65)], soft=0.3
+    )
     for sign in (1, -1):
         built.limb([0.3 * sign, -1.55, -0.15], [sign * broad, -1.85, -0.2], 0.22, 0.34, soft=0.25)
         if chance(rng, 0.4):
-            built.limb([sign * broad, -1.85, -0.2], [sign * (broad + 0.1), -2.5, -0.1], 0.32, 0.28, soft=0.1)
+            built.limb(
+                [sign * broad, -1.85, -0.2],
+                [sign * (broad + 0.1), -2.5, -0.1],
+                0.32,
+                0.28,
+                soft=0.1,
+            )
     low = span(rng, -2.6, -2.1)
     built.box([0, low - 2, 0], [4, 2, 4], cut=True)
     if chance(rng, 0.35):
@@ -155,7 +197,9 @@ def _shoulders(rng: Rng, built: Builder) -> None:
     if chance(rng, 0.2):
         for sign in (1, -1):
             built.part(CLOTH)
-            built.box([0.2 * sign, -1.6, 0.35], [0.22, 0.2, 0.05], 0.03, turned(0, -0.5, 0.5 * sign))
+            built.box(
+                [0.2 * sign, -1.6, 0.35], [0.22, 0.2, 0.05], 0.03, turned(0, -0.5, 0.5 * sign)
+            )
 
 
 def _hand(rng: Rng, built: Builder) -> None:
@@ -163,12 +207,20 @@ def _hand(rng: Rng, built: Builder) -> None:
     turn = turned(span(rng, 0, 6), rng.normal(0, 0.6), rng.normal(0, 0.5))
     wide, thick = span(rng, 0.4, 0.52), span(rng, 0.13, 0.2)
     pose = pick(rng, ("open", "open", "fist", "point", "two", "relaxed", "ball"))
-    bent = {"open": (0.05,) * 4, "fist": (1.6,) * 4, "point": (0.0, 1.6, 1.6, 1.6), "two": (0, 0, 1.6, 1.6),
-            "relaxed": (0.4, 0.5, 0.6, 0.7), "ball": (0.75,) * 4}[pose]  # fmt: skip
+    bent = {
+        "open": (0.05,) * 4,
+        "fist": (1.6,) * 4,
+        "point": (0.0, 1.6, 1.6, 1.6),
+        "two": (0, 0, 1.6, 1.6),
+        "relaxed": (0.4, 0.5, 0.6, 0.7),
+        "ball": (0.75,) * 4,
+    }[pose]
     built.part(SKIN)
     built.box([0, 0, 0], [wide, 0.48, thick], 0.9 * thick, turn)
     built.ellipsoid(turn @ vec(-0.25, -0.15, 0.08), [0.26, 0.36, thick], turn, soft=0.1)
-    built.limb(turn @ vec(0, -0.3, 0), turn @ vec(0, -span(rng, 0.7, 1.5), 0), 0.26, 0.26, soft=0.12)
+    built.limb(
+        turn @ vec(0, -0.3, 0), turn @ vec(0, -span(rng, 0.7, 1.5), 0), 0.26, 0.26, soft=0.12
+    )
     spread = span(rng, 0.0, 0.22)
     radius = 0.24 * wide
     for k in range(4):

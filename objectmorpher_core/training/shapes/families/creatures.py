@@ -8,7 +8,7 @@ import numpy as np
 
 from ....arrays import F64
 from ..solid import Builder, turned
-from .making import Rng, chance, curve, joint, pick, span, tube, two_bones, vary, vec
+from .making import Rng, ahead, chance, curve, joint, pick, span, tube, two_bones, vary, vec
 from .small_creatures import bird, fish, insect
 
 SKIN, OTHER, EYES, HORN = 0, 1, 2, 3
@@ -56,11 +56,15 @@ def creatures(rng: Rng) -> Builder:
 
 
 def _four_legged(rng: Rng) -> Builder:
+    """Any of the plans, varied, in one of the poses."""
     name = pick(rng, tuple(PLANS))
     base = PLANS[name]
-    numbers = [vary(rng, float(v), 0.14) for v in base[:8]]
     ear = base.ear if chance(rng, 0.8) else pick(rng, ("flap", "point", "round", "long", "side"))
-    plan = _Plan(*numbers, ear, base.tail)
+    plan = _Plan(
+        vary(rng, base.girth), vary(rng, base.leg), vary(rng, base.shin), vary(rng, base.neck),
+        vary(rng, base.rise), vary(rng, base.head), vary(rng, base.snout), vary(rng, base.muzzle),
+        ear, base.tail,
+    )  # fmt: skip
     pose = pick(rng, ("stand", "stand", "walk", "walk", "sit", "lie"))
     if name in ("turtle", "hippo", "giraffe", "cow") and pose == "sit":
         pose = "stand"
@@ -77,7 +81,9 @@ def _four_legged(rng: Rng) -> Builder:
     if name == "turtle":
         built.part(OTHER)
         middle = 0.5 * (hip + chest) + vec(0, 0.3 * plan.girth, 0)
-        built.ellipsoid(middle, [0.62, 0.34, 0.5], turned(0, 0, float(np.arcsin(chest[1] - hip[1]))))
+        built.ellipsoid(
+            middle, [0.62, 0.34, 0.5], turned(0, 0, float(np.arcsin(chest[1] - hip[1])))
+        )
         built.box(middle - [0, 0.66, 0], [1.2, 0.5, 1.2], cut=True)
     return built
 
@@ -110,10 +116,8 @@ def _torso(rng: Rng, built: Builder, plan: _Plan, hip: F64, chest: F64) -> None:
 def _head(rng: Rng, built: Builder, plan: _Plan, head: F64, face: F64) -> None:
     """Skull, snout, ears, eyes; a trunk or horns for some."""
     r = plan.head
-    up = vec(0, 1, 0) - face * face[1]
-    up /= np.linalg.norm(up)
-    side = np.cross(face, up)
-    axes = np.column_stack([face, up, side])
+    axes = ahead(face)
+    up = axes[:, 1]
     built.ellipsoid(head, [1.1 * r, r, span(rng, 0.8, 1.05) * r], axes, soft=0.3 * r)
     tip = head + face * (0.5 * r + plan.snout) - up * 0.25 * r
     built.limb(head + face * 0.3 * r - up * 0.15 * r, tip, 0.7 * r, plan.muzzle, soft=0.4 * r)
@@ -123,18 +127,20 @@ def _head(rng: Rng, built: Builder, plan: _Plan, head: F64, face: F64) -> None:
         tube(built, curve(reach, 9), 0.95 * plan.muzzle, 0.4 * plan.muzzle, soft=0.03)
     else:
         built.part(EYES)
-        built.ellipsoid(tip + face * 0.75 * plan.muzzle + up * 0.2 * plan.muzzle,
-                        np.full(3, 0.45 * plan.muzzle))  # fmt: skip
+        built.ellipsoid(
+            tip + face * 0.75 * plan.muzzle + up * 0.2 * plan.muzzle, np.full(3, 0.45 * plan.muzzle)
+        )
     built.part(EYES)
     for sign in (1, -1):
         eye = head + axes @ (r * vec(0.75, 0.38, sign * 0.55))
         built.ellipsoid(eye, np.full(3, span(rng, 0.1, 0.18) * r))
     _ears(rng, built, plan, head, axes)
-    if plan.ear == "side" and chance(rng, 0.7) or chance(rng, 0.06):
+    if (plan.ear == "side" and chance(rng, 0.7)) or chance(rng, 0.06):
         _horns(rng, built, head, axes * r)
 
 
 def _ears(rng: Rng, built: Builder, plan: _Plan, head: F64, axes: F64) -> None:
+    """Two ears of the shape that the plan asks for."""
     r = plan.head
     shape = {  # where on the head, half sizes, and turn of the ear: forward, up, aside
         "flap": (vec(-0.1, 0.25, 0.95), vec(0.35, 0.65, 0.14), -0.25),
@@ -157,6 +163,7 @@ def _ears(rng: Rng, built: Builder, plan: _Plan, head: F64, axes: F64) -> None:
 
 
 def _horns(rng: Rng, built: Builder, head: F64, axes: F64) -> None:
+    """Two horns, short or long; `axes` (3, 3) are as long as the head is thick."""
     high, wide, on = span(rng, 0.6, 1.8), span(rng, 0.4, 1.2), span(rng, -0.6, 0.6)
     for sign in (1, -1):
         built.part(HORN)
@@ -176,7 +183,7 @@ def _legs(rng: Rng, built: Builder, plan: _Plan, pose: str, hip: F64, chest: F64
             step = stride * sign * (1 if fore else -1) * span(rng, 0.6, 1.1)
             foot = vec(root[0] + step, 0, root[2] + sign * span(rng, 0, 0.08))
             length = 1.04 * plan.leg + 0.5 * g
-            bend = vec(1 if fore else 1, 0, 0.2 * sign)
+            bend = vec(-1 if fore else 1, 0, 0.2 * sign)
             if is_low:  # spread legs
                 foot = vec(root[0] + span(rng, -0.1, 0.25), 0, sign * (g + 0.8 * plan.leg))
                 bend = vec(0, 1, 0.3 * sign)
@@ -199,16 +206,22 @@ def _legs(rng: Rng, built: Builder, plan: _Plan, pose: str, hip: F64, chest: F64
 
 
 def _tail(rng: Rng, built: Builder, plan: _Plan, hip: F64, pose: str) -> None:
+    """One tail of the kind that the plan asks for."""
     start = hip - vec(0.75 * plan.girth, -0.35 * plan.girth, 0)
     sway = rng.normal(0, 0.25, 3)
     ways = {
-        "up": [[-0.2, 0.15, 0], [-0.25, 0.45, 0]], "long": [[-0.3, 0, 0], [-0.6, 0.1, 0], [-0.7, 0.4, 0]],
-        "brush": [[-0.15, -0.1, 0], [-0.2, -0.55, 0]], "curl": [[-0.1, 0.1, 0.06], [-0.15, 0, -0.05]],
-        "thin": [[-0.1, -0.2, 0], [-0.2, -0.45, 0]], "stub": [[-0.06, 0.03, 0]],
+        "up": [[-0.2, 0.15, 0], [-0.25, 0.45, 0]],
+        "long": [[-0.3, 0, 0], [-0.6, 0.1, 0], [-0.7, 0.4, 0]],
+        "brush": [[-0.15, -0.1, 0], [-0.2, -0.55, 0]],
+        "curl": [[-0.1, 0.1, 0.06], [-0.15, 0, -0.05]],
+        "thin": [[-0.1, -0.2, 0], [-0.2, -0.45, 0]],
+        "stub": [[-0.06, 0.03, 0]],
         "thick": [[-0.4, -0.05, 0], [-0.8, -0.1, 0.2], [-1.2, -0.1, -0.1]],
-    }  # fmt: skip
-    line = [start] + [start + np.array(w) * (1 + 0.3 * sway[0]) + vec(0, 0, sway[1] * abs(w[0]))
-                      for w in ways[plan.tail]]  # fmt: skip
+    }
+    line = [start] + [
+        start + np.array(w) * (1 + 0.3 * sway[0]) + vec(0, 0, sway[1] * abs(w[0]))
+        for w in ways[plan.tail]
+    ]
     thick = {"thick": 0.7 * plan.girth, "stub": 0.06, "brush": 0.05, "up": 0.05, "long": 0.04}
     near = thick.get(plan.tail, 0.03) * span(rng, 0.8, 1.3)
     far = {"brush": 1.8 * near, "stub": near}.get(plan.tail, 0.4 * near)
@@ -216,4 +229,3 @@ def _tail(rng: Rng, built: Builder, plan: _Plan, hip: F64, pose: str) -> None:
     path[:, 1] = np.maximum(path[:, 1], near)
     built.part(SKIN if chance(rng, 0.75) else OTHER)
     tube(built, path, near, far, soft=0.5 * near)
-

@@ -32,11 +32,17 @@ def figures(rng: Rng) -> Builder:
     """One figure, sometimes with a thing in its hand."""
     is_toy, is_stiff = chance(rng, 0.35), chance(rng, 0.2)
     body = _Body(
-        vary(rng, 0.42), vary(rng, 0.3), vary(rng, 0.34), vary(rng, 0.22),
-        vary(rng, 0.42 if is_toy else 0.24), span(rng, 0.04, 0.14),
-        vary(rng, 0.9 if is_toy else 1.15), vary(rng, 0.85 if is_toy else 1.6, 0.2),
-        vary(rng, 0.13 if is_toy else 0.1, 0.2), is_stiff,
-    )  # fmt: skip
+        vary(rng, 0.42),
+        vary(rng, 0.3),
+        vary(rng, 0.34),
+        vary(rng, 0.22),
+        vary(rng, 0.42 if is_toy else 0.24),
+        span(rng, 0.04, 0.14),
+        vary(rng, 0.9 if is_toy else 1.15),
+        vary(rng, 0.85 if is_toy else 1.6, 0.2),
+        vary(rng, 0.13 if is_toy else 0.1, 0.2),
+        is_stiff,
+    )
     built = Builder()
     is_sitting = chance(rng, 0.25)
     high = 0.5 * body.leg if is_sitting and chance(rng, 0.5) else 0.12 if is_sitting else body.leg
@@ -64,6 +70,7 @@ def figures(rng: Rng) -> Builder:
 
 
 def _torso(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
+    """Chest, belly, shoulders, hips and neck; a box or a drum for a robot."""
     built.part(SHIRT)
     if body.is_stiff:
         half = vec(body.shoulder, 0.5, body.deep)
@@ -81,10 +88,17 @@ def _torso(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
     soft = span(rng, 0.08, 0.2)
     built.ellipsoid(hip + axes @ vec(0, 0.72, 0), [0.95 * body.shoulder, 0.36, body.deep], axes)
     belly = body.deep * span(rng, 0.75, 1.4)
-    built.ellipsoid(hip + axes @ vec(0, 0.36, 0.1 * belly), [body.waist, 0.36, belly], axes, soft=soft)
+    built.ellipsoid(
+        hip + axes @ vec(0, 0.36, 0.1 * belly), [body.waist, 0.36, belly], axes, soft=soft
+    )
     for sign in (1, -1):
-        built.limb(hip + axes @ vec(0, 0.9, 0), hip + axes @ vec(sign * 0.8 * body.shoulder, 0.86, 0),
-                   0.1, body.thick, soft=0.08)  # fmt: skip
+        built.limb(
+            hip + axes @ vec(0, 0.9, 0),
+            hip + axes @ vec(sign * 0.8 * body.shoulder, 0.86, 0),
+            0.1,
+            body.thick,
+            soft=0.08,
+        )
     if chance(rng, 0.25):
         for sign in (1, -1):
             at = vec(sign * 0.4 * body.shoulder, 0.68, 0.75 * body.deep)
@@ -93,11 +107,16 @@ def _torso(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
         built.part(TROUSERS)
     built.ellipsoid(hip + vec(0, 0.06, 0), [body.hip, 0.24, 0.95 * body.deep], soft=soft)
     built.part(SKIN)
-    built.limb(hip + axes @ vec(0, 0.9, 0), hip + axes @ vec(0, 1.05 + body.neck, 0.03), 0.12,
-               min(0.1, 0.4 * body.head))  # fmt: skip
+    built.limb(
+        hip + axes @ vec(0, 0.9, 0),
+        hip + axes @ vec(0, 1.05 + body.neck, 0.03),
+        0.12,
+        min(0.1, 0.4 * body.head),
+    )
 
 
 def _head(rng: Rng, built: Builder, body: _Body, at: F64, axes: F64) -> None:
+    """A head with eyes, ears, a nose and hair, or that of a robot."""
     r = body.head
     turn = axes @ turned(rng.normal(0, 0.4), rng.normal(0, 0.2), rng.normal(0, 0.1))
     built.part(SKIN)
@@ -114,12 +133,17 @@ def _head(rng: Rng, built: Builder, body: _Body, at: F64, axes: F64) -> None:
         built.ellipsoid(at + [0, 1.65 * r, 0], np.full(3, 0.07))
     else:
         built.ellipsoid(at, [0.82 * r, r, 0.9 * r], turn)
-        built.ellipsoid(at + turn @ (r * vec(0, -0.5, 0.25)), [0.55 * r, 0.5 * r, 0.6 * r], turn,
-                        soft=0.3 * r)  # fmt: skip
+        built.ellipsoid(
+            at + turn @ (r * vec(0, -0.5, 0.25)), [0.55 * r, 0.5 * r, 0.6 * r], turn, soft=0.3 * r
+        )
         nose = span(rng, 0.1, 0.22) * r
-        built.ellipsoid(at + turn @ (r * vec(0, -0.1, 0.92)), [0.8 * nose, nose, nose], turn, soft=0.1 * r)
+        built.ellipsoid(
+            at + turn @ (r * vec(0, -0.1, 0.92)), [0.8 * nose, nose, nose], turn, soft=0.1 * r
+        )
         for sign in (1, -1):
-            built.ellipsoid(at + turn @ (r * vec(0.82 * sign, -0.05, 0)), [0.1 * r, 0.22 * r, 0.15 * r])
+            built.ellipsoid(
+                at + turn @ (r * vec(0.82 * sign, -0.05, 0)), [0.1 * r, 0.22 * r, 0.15 * r]
+            )
         _hair(rng, built, r, at, turn)
     built.part(MORE)
     for sign in (1, -1):
@@ -136,11 +160,20 @@ def _hair(rng: Rng, built: Builder, r: float, at: F64, turn: F64) -> None:
     if kind in ("short", "long", "bun"):
         built.ellipsoid(at + turn @ (r * vec(0, 0.22, -0.15)), r * vec(0.95, 0.92, 0.98), turn)
         if kind == "long":
-            built.limb(at + turn @ (r * vec(0, 0.1, -0.5)), at + turn @ (r * vec(0, -span(rng, 1, 2), -0.6)),
-                       0.75 * r, 0.5 * r, soft=0.2 * r)  # fmt: skip
+            built.limb(
+                at + turn @ (r * vec(0, 0.1, -0.5)),
+                at + turn @ (r * vec(0, -span(rng, 1, 2), -0.6)),
+                0.75 * r,
+                0.5 * r,
+                soft=0.2 * r,
+            )
         if kind == "bun":
-            built.ellipsoid(at + turn @ (r * vec(0, span(rng, 0.2, 1.2), -0.8)), np.full(3, 0.45 * r))
-        built.box(at + turn @ (r * vec(0, -0.55, 0.8)), r * vec(1.2, 0.95, 0.55), 0.1, turn, cut=True)
+            built.ellipsoid(
+                at + turn @ (r * vec(0, span(rng, 0.2, 1.2), -0.8)), np.full(3, 0.45 * r)
+            )
+        built.box(
+            at + turn @ (r * vec(0, -0.55, 0.8)), r * vec(1.2, 0.95, 0.55), 0.1, turn, cut=True
+        )
         return
     if kind == "helmet":
         built.ellipsoid(at + turn @ (r * vec(0, 0.15, -0.05)), r * vec(1.08, 1.1, 1.12), turn)
@@ -158,16 +191,20 @@ def _hair(rng: Rng, built: Builder, r: float, at: F64, turn: F64) -> None:
 
 
 def _skirt(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> None:
+    """From the waist over the legs."""
     built.part(TROUSERS)
     long = (0.35 if is_sitting else span(rng, 0.3, 0.85)) * body.leg
     low = max(hip[1] - long, 0.05)
     wide = body.hip * span(rng, 1.2, 2.0)
     top = hip[1] + 0.3
-    outline = np.array([[0, low], [wide, low], [1.05 * body.hip, hip[1]], [body.waist, top], [0, top]])
+    outline = np.array(
+        [[0, low], [wide, low], [1.05 * body.hip, hip[1]], [body.waist, top], [0, top]]
+    )
     built.lathe([0, 0, 0], outline, soft=0.0)
 
 
 def _legs(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> None:
+    """Two legs, each with a shoe, walking, standing or sitting."""
     stride = pick(rng, (0.0, 0.1, 0.5)) * body.leg * span(rng, 0.6, 1.1)
     wide = span(rng, 0.45, 0.75) * body.hip
     thick = min(1.4 * body.thick, 0.5 * body.hip)
@@ -180,7 +217,9 @@ def _legs(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> 
             foot[2] = far * body.leg
         gap = float(np.linalg.norm(root - foot))
         bend = span(rng, 1.0, 1.06) if not is_sitting else span(rng, 1.02, 1.3)
-        knee = joint(root, foot, max(bend * gap, 1.01 * gap), vec(0.1 * sign, 0.4 if is_sitting else 0, 1))
+        knee = joint(
+            root, foot, max(bend * gap, 1.01 * gap), vec(0.1 * sign, 0.4 if is_sitting else 0, 1)
+        )
         built.part(TROUSERS if chance(rng, 0.8) else SKIN)
         if body.is_stiff and chance(rng, 0.6):
             for a, b in ((root, knee), (knee, foot)):
@@ -191,8 +230,11 @@ def _legs(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> 
         built.part(SHOES)
         toe = vec(0.25 * sign * spread, 0, 1)
         yaw = float(np.arctan2(toe[0], 1))
-        built.ellipsoid(foot + vec(0, -0.15 * thick, 0.7 * thick) + 0.1 * toe,
-                        [0.85 * thick, 0.6 * thick, 1.8 * thick], turned(yaw))  # fmt: skip
+        built.ellipsoid(
+            foot + vec(0, -0.15 * thick, 0.7 * thick) + 0.1 * toe,
+            [0.85 * thick, 0.6 * thick, 1.8 * thick],
+            turned(yaw),
+        )
 
 
 def _arms(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
@@ -235,7 +277,10 @@ def _hand(rng: Rng, body: _Body, pose: str, sign: int, root: F64) -> tuple[F64, 
         "down": (vec(out * 1.35, 0.9 - 0.97 * arm, 0.1), vec(sign, 0, -0.5)),
         "up": (root + arm * vec(0.35 * sign, 0.9, 0.1), vec(sign, 0, -0.3)),
         "akimbo": (vec(sign * 1.05 * max(body.waist, body.hip), 0.18, 0.1), vec(sign, 0, -0.4)),
-        "across": (vec(-out * span(rng, -0.3, 0.9), span(rng, 0.1, 0.75), front), vec(sign, -0.6, 0.6)),
+        "across": (
+            vec(-out * span(rng, -0.3, 0.9), span(rng, 0.1, 0.75), front),
+            vec(sign, -0.6, 0.6),
+        ),
         "ahead": (root + arm * vec(-0.1 * sign, span(rng, -0.3, 0.3), 0.9), vec(0.5 * sign, -1, 0)),
         "side": (root + arm * vec(0.95 * sign, span(rng, -0.2, 0.2), 0.1), vec(0, -1, -0.2)),
         "wave": (root + arm * vec(0.45 * sign, 0.45, 0.15), vec(sign, -0.6, 0)),

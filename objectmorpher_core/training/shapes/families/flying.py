@@ -23,11 +23,19 @@ def aeroplane(rng: Rng, built: Builder) -> None:
     sweep = {"airliner": 0.5, "light": 0.05, "biplane": 0.0, "jet": 0.7}[kind] * span(rng, 0.7, 1.3)
     reach, chord = span(rng, 0.8, 1.2) * (0.75 if kind == "jet" else 1), span(rng, 0.16, 0.26)
     tip = chord * span(rng, 0.3, 1.0)
-    levels = (0.2 * fat,) if kind != "biplane" else (-0.6 * fat, 2.2 * fat)
+    levels: tuple[float, ...] = (0.2 * fat,) if kind != "biplane" else (-0.6 * fat, 2.2 * fat)
     if kind == "light" and chance(rng, 0.5):
         levels = (fat,)
-    wing = np.array([[0.1 + chord, 0], [0.1 - sweep + tip, reach], [0.1 - sweep - tip, reach],
-                     [0.1 - chord, 0], [0.1 - sweep - tip, -reach], [0.1 - sweep + tip, -reach]])  # fmt: skip
+    wing = np.array(
+        [
+            [0.1 + chord, 0],
+            [0.1 - sweep + tip, reach],
+            [0.1 - sweep - tip, reach],
+            [0.1 - chord, 0],
+            [0.1 - sweep - tip, -reach],
+            [0.1 - sweep + tip, -reach],
+        ]
+    )
     for y in levels:
         built.part(pick(rng, (BODY, MORE)))
         built.prism([0, y, 0], wing, 0.025, 0.012, FLAT)
@@ -35,13 +43,15 @@ def aeroplane(rng: Rng, built: Builder) -> None:
         built.part(METAL)
         for z in (0.55, -0.55):
             for x in (0.2, 0.0):
-                built.limb([x, levels[0], z * reach], [x, levels[1], z * reach], 0.015, 0.015)
+                built.limb([x, levels[0], z * reach], [x, levels[-1], z * reach], 0.015, 0.015)
     built.part(pick(rng, (BODY, MORE)))
     high, back = span(rng, 0.25, 0.42), span(rng, 0.1, 0.25)
     fin = np.array([[-0.65, 0], [-1.0, 0], [-1.0 - 0.4 * back, high], [-0.85 - 0.4 * back, high]])
     built.prism([0, 0.3 * fat, 0], fin, 0.022, 0.01)
     small = wing * [0.45, 0.38] + [-0.92, 0]
-    built.prism([0, 0.5 * fat if chance(rng, 0.7) else 0.3 * fat + high, 0], small, 0.02, 0.01, FLAT)
+    built.prism(
+        [0, 0.5 * fat if chance(rng, 0.7) else 0.3 * fat + high, 0], small, 0.02, 0.01, FLAT
+    )
     built.part(GLASS)
     built.ellipsoid([0.55, 0.6 * fat, 0], [0.2, 0.7 * fat, 0.7 * fat])
     _engines(rng, built, kind, fat, reach)
@@ -51,15 +61,25 @@ def _engines(rng: Rng, built: Builder, kind: str, fat: float, reach: float) -> N
     """Jets beneath the wings or a propeller; wheels."""
     axle = turned(0, 0, np.pi / 2)
     if kind == "airliner":
-        for z in ((0.35, -0.35) if chance(rng, 0.6) else (0.3, -0.3, 0.6, -0.6)):
+        for z in (0.35, -0.35) if chance(rng, 0.6) else (0.3, -0.3, 0.6, -0.6):
             built.part(METAL)
-            built.cylinder([0.12 - 0.4 * abs(z), -0.5 * fat - 0.02, z * reach], 0.075, 0.14, 0.03, axle)
-            built.cylinder([0.27 - 0.4 * abs(z), -0.5 * fat - 0.02, z * reach], 0.055, 0.05, cut=True, turn=axle)
+            built.cylinder(
+                [0.12 - 0.4 * abs(z), -0.5 * fat - 0.02, z * reach], 0.075, 0.14, 0.03, axle
+            )
+            built.cylinder(
+                [0.27 - 0.4 * abs(z), -0.5 * fat - 0.02, z * reach],
+                0.055,
+                0.05,
+                cut=True,
+                turn=axle,
+            )
     elif kind != "jet":
         built.part(METAL)
         turn = turned(0, span(rng, 0, 3))
         for k in range(pick(rng, (1, 2))):
-            built.ellipsoid([0.8 + 0.8 * fat, 0, 0], [0.02, 0.32, 0.045], turn @ turned(0, k * np.pi / 2))
+            built.ellipsoid(
+                [0.8 + 0.8 * fat, 0, 0], [0.02, 0.32, 0.045], turn @ turned(0, k * np.pi / 2)
+            )
         built.ellipsoid([0.8 + 0.8 * fat, 0, 0], np.full(3, 0.05))
     if chance(rng, 0.5):
         for x, z in ((0.3, 0.2), (0.3, -0.2), (-0.85, 0.0)):
@@ -97,21 +117,36 @@ def rocket(rng: Rng, built: Builder) -> None:
     wide, high = span(rng, 0.15, 0.32), span(rng, 0.8, 1.8)
     lean = turned(0, *(rng.normal(0, 0.4, 2) * (rng.random() < 0.5)))
     nose, tail = span(rng, 0.3, 0.7), span(rng, 0.5, 1.0) * wide
-    outline = [[tail, 0.1], [wide, 0.25 * high], [wide, 0.75 * high], [0.6 * wide, high + 0.4 * nose],
-               [0.02, high + nose]]  # fmt: skip
+    outline = [
+        [tail, 0.1],
+        [wide, 0.25 * high],
+        [wide, 0.75 * high],
+        [0.6 * wide, high + 0.4 * nose],
+        [0.02, high + nose],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(smooth(outline, 1, False), 1), lean)
     built.part(METAL)
     built.lathe([0, 0, 0], profile([[0.8 * tail, -0.1], [0.5 * tail, 0.15]], 0), lean)
     fins = pick(rng, (3, 4))
     out, down = span(rng, 0.2, 0.5), span(rng, -0.2, 0.15)
-    fin = np.array([[0.5 * wide, 0.15], [wide + out, down], [wide + out, down + 0.2], [0.9 * wide, 0.5 * high]])
+    fin = np.array(
+        [[0.5 * wide, 0.15], [wide + out, down], [wide + out, down + 0.2], [0.9 * wide, 0.5 * high]]
+    )
     for k in range(fins):
         built.part(MORE)
-        built.prism([0, 0, 0], smooth(fin, pick(rng, (0, 1))), 0.025, 0.01, lean @ turned(k * 2 * np.pi / fins))
+        built.prism(
+            [0, 0, 0],
+            smooth(fin, pick(rng, (0, 1))),
+            0.025,
+            0.01,
+            lean @ turned(k * 2 * np.pi / fins),
+        )
     built.part(GLASS)
     for k in range(rng.integers(0, 3)):
-        built.ellipsoid(lean @ vec(0, 0.75 * high - 0.28 * k, 0.93 * wide), [0.09, 0.09, 0.05], lean)
+        built.ellipsoid(
+            lean @ vec(0, 0.75 * high - 0.28 * k, 0.93 * wide), [0.09, 0.09, 0.05], lean
+        )
     if chance(rng, 0.35):
         for sign in (1, -1):
             built.part(MORE)
@@ -127,14 +162,31 @@ def balloon(rng: Rng, built: Builder) -> None:
         for k in range(4):
             built.part(MORE)
             turn = turned(0, k * np.pi / 2)
-            built.prism([0, 0, 0], np.array([[-0.6, 0.1], [-0.95, 0.1], [-1.0, 0.35], [-0.85, 0.36]]), 0.02, 0, turn)
+            built.prism(
+                [0, 0, 0],
+                np.array([[-0.6, 0.1], [-0.95, 0.1], [-1.0, 0.35], [-0.85, 0.36]]),
+                0.02,
+                0,
+                turn,
+            )
         built.part(METAL)
         built.box([0.1, -0.42, 0], [0.3, 0.1, 0.1], 0.06)
         return
     built.part(BODY)
     high = span(rng, 0.6, 0.9)
-    built.lathe([0, 0, 0], profile([[0.12, 0.1], [0.6, high - 0.1], [0.72, high + 0.4], [0.5, high + 0.8],
-                                    [0.05, high + 0.95]], 3))  # fmt: skip
+    built.lathe(
+        [0, 0, 0],
+        profile(
+            [
+                [0.12, 0.1],
+                [0.6, high - 0.1],
+                [0.72, high + 0.4],
+                [0.5, high + 0.8],
+                [0.05, high + 0.95],
+            ],
+            3,
+        ),
+    )
     built.part(MORE)
     built.box([0, -0.35, 0], [0.15, 0.13, 0.15], 0.03)
     built.box([0, -0.25, 0], [0.12, 0.13, 0.12], 0, cavity=True)

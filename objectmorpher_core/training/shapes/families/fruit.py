@@ -23,10 +23,12 @@ def vegetable(rng: Rng, built: Builder) -> None:
 
 
 def _tilt(rng: Rng) -> np.ndarray:
+    """Upright more often than not."""
     return turned(span(rng, 0, 6), *(rng.normal(0, 0.6, 2) * (rng.random() < 0.5)))
 
 
 def _stem(rng: Rng, built: Builder, turn: np.ndarray, y: float, long: float, thick: float) -> None:
+    """On top, at the height y; sometimes with a leaf."""
     built.part(MIDDLE)
     bow = vec(span(rng, -0.4, 0.4) * long, 0.5 * long, 0)
     line = np.array([[0, y, 0], vec(0, y, 0) + bow * 0.6, vec(0, y, 0) + bow + [0, 0.5 * long, 0]])
@@ -41,11 +43,27 @@ def _apple(rng: Rng, built: Builder) -> None:
     """Apples, peaches, oranges, plums: a dent above, sometimes a seam, sometimes a bite."""
     turn, high = _tilt(rng), span(rng, 0.75, 1.1)
     built.part(SKIN)
-    outline = [[0.02, -0.75 * high], [0.3, -0.85 * high], [0.75, -0.6 * high], [1.05, 0.15 * high],
-               [0.75, 0.8 * high], [0.3, 0.85 * high], [0.05, 0.5 * high], [0.0, 0.5 * high]]  # fmt: skip
+    outline = [
+        [0.02, -0.75 * high],
+        [0.3, -0.85 * high],
+        [0.75, -0.6 * high],
+        [1.05, 0.15 * high],
+        [0.75, 0.8 * high],
+        [0.3, 0.85 * high],
+        [0.05, 0.5 * high],
+        [0.0, 0.5 * high],
+    ]
     built.lathe([0, 0, 0], profile(outline, 3), turn)
     if chance(rng, 0.25):
-        built.ring(turn @ vec(0, 0, 0.05), 1.0, 0.1, 1.3, turn @ turned(0, 0, np.pi / 2), cut=True, soft=0.15)
+        built.ring(
+            turn @ vec(0, 0, 0.05),
+            1.0,
+            0.1,
+            1.3,
+            turn @ turned(0, 0, np.pi / 2),
+            cut=True,
+            soft=0.15,
+        )
     if chance(rng, 0.2):
         way = rng.normal(0, 1, 3)
         for shift in (-0.2, 0.2):
@@ -55,6 +73,7 @@ def _apple(rng: Rng, built: Builder) -> None:
 
 
 def _pear(rng: Rng, built: Builder) -> None:
+    """A belly and a neck."""
     turn, long = _tilt(rng), span(rng, 0.9, 1.5)
     built.part(SKIN)
     built.ellipsoid([0, 0, 0], [0.75, span(rng, 0.65, 0.8), 0.75], turn)
@@ -69,10 +88,19 @@ def _banana(rng: Rng, built: Builder) -> None:
     turn = _tilt(rng)
     for k in range(count):
         spin = turn @ turned(0.0, 0.28 * (k - 0.5 * count)) @ turned(rng.normal(0, 0.1))
-        line = curve([[-1, 0.1, 0.1 * k], [-0.5, -0.6 * bow, 0.18 * k], [0.4, -bow, 0.18 * k],
-                      [1.0, 0.3 * bow, 0.15 * k]], 7)  # fmt: skip
+        line = curve(
+            [
+                [-1, 0.1, 0.1 * k],
+                [-0.5, -0.6 * bow, 0.18 * k],
+                [0.4, -bow, 0.18 * k],
+                [1.0, 0.3 * bow, 0.15 * k],
+            ],
+            7,
+        )
         built.part(SKIN)
-        for j, (near, far) in enumerate(((0.07, 0.15), (0.15, 0.19), (0.19, 0.2), (0.2, 0.18), (0.18, 0.14), (0.14, 0.05))):
+        for j, (near, far) in enumerate(
+            ((0.07, 0.15), (0.15, 0.19), (0.19, 0.2), (0.2, 0.18), (0.18, 0.14), (0.14, 0.05))
+        ):
             built.limb(spin @ line[j], spin @ line[j + 1], near, far, soft=0.03)
         built.part(MIDDLE)
         built.limb(spin @ line[0], spin @ vec(-1.2, 0.2, 0), 0.07, 0.06)
@@ -91,11 +119,14 @@ def _pumpkin(rng: Rng, built: Builder) -> None:
         built.ellipsoid(0.75 * at, half, turn, soft=0.06)
     if chance(rng, 0.3):
         for x, y, size in ((0.3, 0.2, 0.15), (-0.3, 0.2, 0.15), (0, -0.2, 0.25)):
-            built.prism([x, y, 1.0], np.array([[-size, -0.1], [size, -0.1], [0, 0.12]]), 0.7, 0, cut=True)
+            built.prism(
+                [x, y, 1.0], np.array([[-size, -0.1], [size, -0.1], [0, 0.12]]), 0.7, 0, cut=True
+            )
     _stem(rng, built, np.eye(3), 0.6 * flat, 0.5, 0.12)
 
 
 def _grapes(rng: Rng, built: Builder) -> None:
+    """Balls around a stalk, fewer towards the end."""
     count, size = int(rng.integers(10, 22)), span(rng, 0.18, 0.24)
     turn = turned(0, span(rng, 0, 1.4))
     for k in range(count):
@@ -108,6 +139,7 @@ def _grapes(rng: Rng, built: Builder) -> None:
 
 
 def _cherries(rng: Rng, built: Builder) -> None:
+    """One to three on their stalks."""
     top = vec(0, 1.2, 0)
     for k in range(pick(rng, (1, 2, 2, 3))):
         at = vec(0.45 * (k - 0.5), 0.3 * rng.random(), rng.normal(0, 0.2))
@@ -120,6 +152,7 @@ def _cherries(rng: Rng, built: Builder) -> None:
 
 
 def _pineapple(rng: Rng, built: Builder) -> None:
+    """A barrel under a tuft."""
     built.part(SKIN)
     high = span(rng, 0.65, 0.9)
     built.superquadric([0, 0, 0], [0.5, high, 0.5], 0.75, 1.0)
@@ -136,6 +169,7 @@ def _slice(rng: Rng, built: Builder) -> None:
     wedge = 3 * np.array([[0, 0], [np.cos(half), -np.sin(half)], [np.cos(half), np.sin(half)]])
     flat = turn @ turned(0, np.pi / 2)
     kind = pick(rng, ("melon", "cake", "pizza"))
+    high = 0.05 if kind == "pizza" else 0.35
     for part, size in ((SKIN, 1.0), (MIDDLE, 0.88)):
         built.part(part)
         if kind == "melon":
@@ -143,7 +177,6 @@ def _slice(rng: Rng, built: Builder) -> None:
             lean = wedge - [0.0 if part == SKIN else 0.012, 0]
             built.prism([0, 0, 0], lean, 2, 0, flat, keep=True)
         else:
-            high = 0.35 if kind == "cake" else 0.05
             if part == SKIN:
                 built.cylinder([0, 0, 0], 1.0, high, 0.02, turn)
             elif kind == "cake":
@@ -157,10 +190,13 @@ def _slice(rng: Rng, built: Builder) -> None:
             far = span(rng, 0.4, 0.85)
             way = span(rng, -0.6, 0.6) * half
             at = vec(far * np.cos(way), high + 0.04, -far * np.sin(way))
-            built.ellipsoid(turn @ at, np.full(3, span(rng, 0.06, 0.13)) * [1, 0.6 if k else 1, 1], turn)
+            built.ellipsoid(
+                turn @ at, np.full(3, span(rng, 0.06, 0.13)) * [1, 0.6 if k else 1, 1], turn
+            )
 
 
 def _strawberry(rng: Rng, built: Builder) -> None:
+    """A cone with a collar of leaves."""
     turn = _tilt(rng)
     built.part(SKIN)
     built.limb([0, 0, 0], turn @ vec(0, -span(rng, 0.6, 1.0), 0), 0.55, 0.18)
@@ -177,7 +213,9 @@ def _carrot(rng: Rng, built: Builder) -> None:
     built.part(SKIN)
     wide = span(rng, 0.25, 0.4)
     built.limb([0, 0, 0], turn @ vec(rng.normal(0, 0.1), -long, 0), wide, 0.05)
-    built.limb(turn @ vec(0, -0.9 * long, 0), turn @ vec(0.05, -long - 0.3, 0), 0.05, 0.02, soft=0.04)
+    built.limb(
+        turn @ vec(0, -0.9 * long, 0), turn @ vec(0.05, -long - 0.3, 0), 0.05, 0.02, soft=0.04
+    )
     for k in range(rng.integers(0, 6)):
         built.part(GREEN)
         spin = turn @ turned(2.4 * k) @ turned(0, span(rng, 0.05, 0.6))
@@ -199,12 +237,15 @@ def _aubergine(rng: Rng, built: Builder) -> None:
 
 
 def _pepper(rng: Rng, built: Builder) -> None:
+    """Three or four lobes."""
     lobes, turn, high = pick(rng, (3, 4)), _tilt(rng), span(rng, 0.5, 0.8)
     built.part(SKIN)
     for k in range(lobes):
         spin = turned(k * 2 * np.pi / lobes)
         at = spin @ vec(0, 0, 0.32)
-        built.limb(turn @ (at + [0, 0.3, 0]), turn @ (0.6 * at - [0, high, 0]), 0.38, 0.24, soft=0.1)
+        built.limb(
+            turn @ (at + [0, 0.3, 0]), turn @ (0.6 * at - [0, high, 0]), 0.38, 0.24, soft=0.1
+        )
     _stem(rng, built, turn, 0.5, 0.5, 0.09)
 
 
@@ -218,7 +259,9 @@ def _tomatoes(rng: Rng, built: Builder) -> None:
         built.part(GREEN)
         for j in range(5):
             spin = turned(1.2566 * j) @ turned(0, 0.15)
-            built.ellipsoid(at + [0, 1.7 * size, 0] + spin @ vec(0, 0, 0.2), [0.05, 0.025, 0.2], spin)
+            built.ellipsoid(
+                at + [0, 1.7 * size, 0] + spin @ vec(0, 0, 0.2), [0.05, 0.025, 0.2], spin
+            )
         built.limb(at + [0, 1.65 * size, 0], at + [0.03, 1.65 * size + 0.2, 0], 0.035, 0.035)
 
 
@@ -231,7 +274,9 @@ def _cabbage(rng: Rng, built: Builder) -> None:
         spin = turned(2.4 * k) @ turned(0, span(rng, -0.4, 0.1))
         size = span(rng, 0.4, 0.55)
         waves = (0.04, 5.0, 6.0, span(rng, 0, 6))
-        built.sheet(spin @ vec(0, 0.55, 0.68), [size, size * 1.1], 0.018, waves, -span(rng, 0.6, 1.4), spin)
+        built.sheet(
+            spin @ vec(0, 0.55, 0.68), [size, size * 1.1], 0.018, waves, -span(rng, 0.6, 1.4), spin
+        )
 
 
 def _onion(rng: Rng, built: Builder) -> None:
@@ -269,4 +314,6 @@ def _maize(rng: Rng, built: Builder) -> None:
     for k in range(rng.integers(2, 5)):
         built.part(GREEN)
         spin = turn @ turned(1.8 * k) @ turned(0, span(rng, 0.1, 0.6))
-        built.sheet(spin @ vec(0, 0.45, 0.3), [0.28, 0.75], 0.016, (0.02, 3, 3, 0), -span(rng, 1, 2.5), spin)
+        built.sheet(
+            spin @ vec(0, 0.45, 0.3), [0.28, 0.75], 0.016, (0.02, 3, 3, 0), -span(rng, 1, 2.5), spin
+        )

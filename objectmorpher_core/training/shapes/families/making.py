@@ -97,9 +97,13 @@ def curve(points: ArrayLike, count: int, is_closed: bool = False) -> F64:
 
 
 def tube(
-    built: Builder, points: F64, near: float, far: float | None = None, is_closed: bool = False,
+    built: Builder,
+    points: F64,
+    near: float,
+    far: float | None = None,
+    is_closed: bool = False,
     soft: float = 0.0,
-) -> None:  # fmt: skip
+) -> None:
     """Limbs along a line (k, 3), from the radius `near` to `far`; `soft` where it begins."""
     radii = np.linspace(near, near if far is None else far, len(points))
     for k in range(len(points) - (0 if is_closed else 1)):
@@ -124,9 +128,14 @@ def two_bones(
         built.limb(points[k], points[k + 1], radii[k], radii[k + 1], soft=soft if k else 0.0)
 
 
-def on_both(at: ArrayLike, axis: int = 2) -> tuple[F64, F64]:
-    """A place and its mirror image."""
-    place = np.asarray(at, np.float64)
-    other = place.copy()
-    other[axis] *= -1
-    return place, other
+def ahead(face: F64) -> F64:
+    """(3, 3) axes: forward, up and to the right of something that looks along `face` (3,)."""
+    up = vec(0, 1, 0) - face * face[1]
+    up = up / float(np.linalg.norm(up))
+    return np.column_stack([face, up, np.cross(face, up)]).astype(np.float64)
+
+
+def depth(rng: Rng) -> tuple[float, float]:
+    """Half the depth and how round its edges are."""
+    half = span(rng, 0.05, 0.4)
+    return half, min(half, 0.12) * span(rng, 0, 0.9)

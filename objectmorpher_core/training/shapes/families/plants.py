@@ -14,8 +14,26 @@ GREEN, PETAL, MIDDLE, POT, MORE = range(5)
 
 def plants(rng: Rng) -> Builder:
     """One of them."""
-    kinds = (_flower, _flower, _bouquet, _potted, _potted, _leaf, _leaf, _mushroom, _cactus, _tree,
-             _tree, _fir, _palm, fruit, fruit, fruit, vegetable, vegetable)  # fmt: skip
+    kinds = (
+        _flower,
+        _flower,
+        _bouquet,
+        _potted,
+        _potted,
+        _leaf,
+        _leaf,
+        _mushroom,
+        _cactus,
+        _tree,
+        _tree,
+        _fir,
+        _palm,
+        fruit,
+        fruit,
+        fruit,
+        vegetable,
+        vegetable,
+    )
     built = Builder()
     pick(rng, kinds)(rng, built)
     return built
@@ -38,8 +56,12 @@ def _bloom(rng: Rng, built: Builder, at: F64, face: F64, size: float) -> None:
         built.lathe(at, profile(np.concatenate([inside, top]), 1), axes, cavity=True)
         for k in range(3):
             spin = axes @ turned(2.094 * k)
-            built.ellipsoid(at + spin @ vec(0, 0.9 * size, 0.66 * size), size * vec(0.22, 0.25, 0.3), spin,
-                            cut=True)  # fmt: skip
+            built.ellipsoid(
+                at + spin @ vec(0, 0.9 * size, 0.66 * size),
+                size * vec(0.22, 0.25, 0.3),
+                spin,
+                cut=True,
+            )
         return
     rows = 2 if kind == "rose" or chance(rng, 0.3) else 1
     for row in range(rows):
@@ -54,7 +76,9 @@ def _bloom(rng: Rng, built: Builder, at: F64, face: F64, size: float) -> None:
             if kind == "sheets":
                 flat = spin @ turned(0, np.pi / 2)
                 waves = (0.08 * size * rng.random(), 2 / size, 4 / size, span(rng, 0, 6))
-                built.sheet(middle, [wide, long], 0.02 * size, waves, rng.normal(0, 0.8) / size, flat)
+                built.sheet(
+                    middle, [wide, long], 0.02 * size, waves, rng.normal(0, 0.8) / size, flat
+                )
             else:
                 built.ellipsoid(middle, [wide, 0.07 * size, long], spin)
     built.part(MIDDLE)
@@ -83,7 +107,14 @@ def _blade(rng: Rng, built: Builder, root: F64, yaw: float, long: float) -> None
     else:
         flat = spin @ turned(0, np.pi / 2)
         waves = (span(rng, 0, 0.05), 0.0, 3 / long, span(rng, 0, 6))
-        built.sheet(root + spin @ vec(0, 0, 0.95 * long), [wide, long], 0.012, waves, rng.normal(0, 1.0), flat)
+        built.sheet(
+            root + spin @ vec(0, 0, 0.95 * long),
+            [wide, long],
+            0.012,
+            waves,
+            rng.normal(0, 1.0),
+            flat,
+        )
 
 
 def _flower(rng: Rng, built: Builder) -> None:
@@ -110,7 +141,13 @@ def _bouquet(rng: Rng, built: Builder) -> None:
     if in_vase:
         built.part(POT)
         wide = span(rng, 0.2, 0.35)
-        outline = [[0.7 * wide, 0], [0.7 * wide, 0], [wide, 0.3], [0.55 * wide, 0.65], [0.7 * wide, 0.8]]
+        outline = [
+            [0.7 * wide, 0],
+            [0.7 * wide, 0],
+            [wide, 0.3],
+            [0.55 * wide, 0.65],
+            [0.7 * wide, 0.8],
+        ]
         built.lathe([0, 0, 0], profile(outline, 3))
 
 
@@ -170,7 +207,9 @@ def _leaf(rng: Rng, built: Builder) -> None:
         outline = smooth(np.concatenate([side, side[::-1][1:-1] * [-1, 1]]), 1)
         built.prism([0, 0, 0], outline, 1.0, 0, turn, keep=True)
     built.part(MIDDLE)
-    tube(built, curve([[0, -0.9, 0], [0, -1.15, 0.03], [0.05, -1.5, -0.1]], 5) @ turn.T, 0.03, 0.025)
+    tube(
+        built, curve([[0, -0.9, 0], [0, -1.15, 0.03], [0.05, -1.5, -0.1]], 5) @ turn.T, 0.03, 0.025
+    )
 
 
 def _mushroom(rng: Rng, built: Builder) -> None:
@@ -185,7 +224,13 @@ def _mushroom(rng: Rng, built: Builder) -> None:
         built.limb(foot + [0, 0.8 * stalk, 0], top, stalk * span(rng, 1, 1.5), 0.8 * stalk)
         cap, dome = size * span(rng, 0.4, 0.75), size * span(rng, 0.25, 0.6)
         built.part(PETAL)
-        outline = [[0.15, -0.1 * dome], [cap, -0.15 * dome], [cap, 0.1 * dome], [0.7 * cap, 0.75 * dome], [0.03, dome]]
+        outline = [
+            [0.15, -0.1 * dome],
+            [cap, -0.15 * dome],
+            [cap, 0.1 * dome],
+            [0.7 * cap, 0.75 * dome],
+            [0.03, dome],
+        ]
         built.lathe(top, profile(outline, 3), lean)
         if chance(rng, 0.5):
             for j in range(7):
@@ -206,8 +251,12 @@ def _arms(rng: Rng, built: Builder, foot: F64, high: float) -> None:
         for k in range(ribs):
             spin = turned(2 * np.pi * k / ribs)
             half = high * vec(0.95 / ribs + 0.02, 0.4, 0.25)
-            built.ellipsoid(foot + [0, 0.36 * high, 0] + spin @ (high * vec(0, 0, 0.18)), half, spin,
-                            soft=0.04 * high)  # fmt: skip
+            built.ellipsoid(
+                foot + [0, 0.36 * high, 0] + spin @ (high * vec(0, 0, 0.18)),
+                half,
+                spin,
+                soft=0.04 * high,
+            )
     elif kind == "pads":
         at, size = foot + [0, 0.3 * high, 0], 0.3 * high
         built.ellipsoid(at, size * vec(0.75, 1, 0.25))
@@ -215,12 +264,18 @@ def _arms(rng: Rng, built: Builder, foot: F64, high: float) -> None:
             way = span(rng, -0.9, 0.9)
             tip = at + 1.7 * size * vec(np.sin(way), np.cos(way), 0.1 * (k - 1))
             built.part(GREEN)
-            built.ellipsoid(tip, 0.8 * size * vec(0.75, 1, 0.25), turned(span(rng, -0.5, 0.5), 0, -way))
+            built.ellipsoid(
+                tip, 0.8 * size * vec(0.75, 1, 0.25), turned(span(rng, -0.5, 0.5), 0, -way)
+            )
     else:
         built.limb(foot, foot + [0, high, 0], thick, 0.85 * thick)
-        for k in range(rng.integers(0, 4)):
+        for _ in range(rng.integers(0, 4)):
             spin = turned(span(rng, 0, 6.3))
-            low, out, up = span(rng, 0.3, 0.6) * high, span(rng, 2, 3) * thick, span(rng, 0.2, 0.5) * high
+            low, out, up = (
+                span(rng, 0.3, 0.6) * high,
+                span(rng, 2, 3) * thick,
+                span(rng, 0.2, 0.5) * high,
+            )
             knots = [[0, low, 0], [0, low, out], [0, low + up, out]]
             built.part(GREEN)
             tube(built, foot + curve(knots, 6) @ spin.T, 0.75 * thick, 0.65 * thick)
@@ -231,6 +286,7 @@ def _arms(rng: Rng, built: Builder, foot: F64, high: float) -> None:
 
 
 def _cactus(rng: Rng, built: Builder) -> None:
+    """Without a pot."""
     _arms(rng, built, vec(0, 0, 0), 1.0)
 
 
@@ -268,7 +324,10 @@ def _fir(rng: Rng, built: Builder) -> None:
     for _ in range(storeys):
         high = span(rng, 0.4, 0.7) * (2.0 if storeys == 1 else 1.0)
         built.part(GREEN)
-        built.lathe([0, y, 0], profile([[0.9 * wide, 0], [wide, 0.03], [0.5 * wide, 0.5 * high], [0.04, high]], 1))
+        built.lathe(
+            [0, y, 0],
+            profile([[0.9 * wide, 0], [wide, 0.03], [0.5 * wide, 0.5 * high], [0.04, high]], 1),
+        )
         y += 0.6 * high
         wide *= 0.72
     if chance(rng, 0.4):
@@ -276,7 +335,9 @@ def _fir(rng: Rng, built: Builder) -> None:
             built.part(PETAL + k % 2)
             t = span(rng, 0.05, 0.8)
             r = 0.75 * (1 - t) * 0.75
-            built.ellipsoid([r * np.cos(2.4 * k), 0.35 + t * (y - 0.2), r * np.sin(2.4 * k)], np.full(3, 0.07))
+            built.ellipsoid(
+                [r * np.cos(2.4 * k), 0.35 + t * (y - 0.2), r * np.sin(2.4 * k)], np.full(3, 0.07)
+            )
 
 
 def _palm(rng: Rng, built: Builder) -> None:
@@ -284,16 +345,17 @@ def _palm(rng: Rng, built: Builder) -> None:
     high = span(rng, 0.8, 1.5)
     top = vec(span(rng, -0.4, 0.4), high, span(rng, -0.2, 0.2))
     built.part(MIDDLE)
-    tube(built, curve([[0, 0, 0], 0.5 * top + [0.12, 0, 0], top], 6), 0.1, 0.07)
+    tube(built, curve([vec(0, 0, 0), 0.5 * top + [0.12, 0, 0], top], 6), 0.1, 0.07)
     for k in range(rng.integers(5, 9)):
         built.part(GREEN)
         spin, hang = turned(2.4 * k), span(rng, 0.1, 0.5)
         line = [[0, 0, 0], [0, 0.2, 0.3], [0, 0.2 - 0.3 * hang, 0.65], [0, -hang, 0.9]]
         path = top + curve(line, 5) @ spin.T
         for a, b, wide in zip(path[:-1], path[1:], (0.08, 0.13, 0.13, 0.07), strict=True):
-            axes = np.column_stack([spin[:, 0], np.cross((b - a) / np.linalg.norm(b - a), spin[:, 0]), b - a])
-            axes[:, 2] /= np.linalg.norm(b - a)
-            built.ellipsoid(0.5 * (a + b), [wide, 0.03, 0.62 * np.linalg.norm(b - a)], axes, soft=0.03)
+            long = float(np.linalg.norm(b - a))
+            way = np.asarray((b - a) / long, np.float64)
+            axes = np.column_stack([spin[:, 0], np.cross(way, spin[:, 0]), way]).astype(np.float64)
+            built.ellipsoid(0.5 * (a + b), [wide, 0.03, 0.62 * long], axes, soft=0.03)
     for k in range(rng.integers(0, 4)):
         built.part(POT)
         built.ellipsoid(top + 0.1 * vec(np.cos(2 * k), -1, np.sin(2 * k)), np.full(3, 0.09))

@@ -13,14 +13,33 @@ BODY, MORE, THIRD = range(3)
 
 def rings(rng: Rng) -> Builder:
     """One of them, lying, standing or hanging."""
-    kinds = (_torus, _torus, _bent_tube, _bent_tube, _chain, _tyre, _wreath, _knot, _spring, _hook,
-             _pipes, _frame, _frame, _washers, _links, _basket, _headphones, _glasses)  # fmt: skip
+    kinds = (
+        _torus,
+        _torus,
+        _bent_tube,
+        _bent_tube,
+        _chain,
+        _tyre,
+        _wreath,
+        _knot,
+        _spring,
+        _hook,
+        _pipes,
+        _frame,
+        _frame,
+        _washers,
+        _links,
+        _basket,
+        _headphones,
+        _glasses,
+    )
     built = Builder()
     pick(rng, kinds)(rng, built)
     return built
 
 
 def _any_turn(rng: Rng) -> F64:
+    """Anyhow, upright, or lying."""
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     upright = turned(span(rng, 0, 6)) @ turned(0, np.pi / 2)
     lying = turned(0, *rng.normal(0, 0.15, 2))
@@ -39,9 +58,11 @@ def _torus(rng: Rng, built: Builder) -> None:
         built.ring(turn @ vec(0, 0.25 * thick, 0), 1.0, 0.92 * thick, half, turn)
     elif kind < 0.5:
         built.part(MORE)
-        built.superquadric(turn @ vec(0, 0, 1 + thick), np.full(3, span(rng, 0.15, 0.35)), 0.7, 0.6, turn)
+        built.superquadric(
+            turn @ vec(0, 0, 1 + thick), np.full(3, span(rng, 0.15, 0.35)), 0.7, 0.6, turn
+        )
     elif kind < 0.75:
-        for k in range(rng.integers(2, 9)):
+        for _k in range(rng.integers(2, 9)):
             built.part(MORE)
             way = span(rng, -half, half)
             at = vec(np.sin(way), span(rng, 0.5, 1) * thick, np.cos(way))
@@ -77,7 +98,9 @@ def _chain(rng: Rng, built: Builder) -> None:
         built.part(BODY if k % 2 or chance(rng, 0.8) else MORE)
         for sign in (1, -1):
             side = axes @ vec(0, 0, 0.24 * sign)
-            built.limb(flat @ (at + side - 0.15 * step), flat @ (at + side + 0.15 * step), small, small)
+            built.limb(
+                flat @ (at + side - 0.15 * step), flat @ (at + side + 0.15 * step), small, small
+            )
             end = flat @ axes @ turned(sign * np.pi / 2)
             built.ring(flat @ (at + sign * 0.15 * step), 0.24, small, np.pi / 2, end)
         at = at + (0.78 - 2 * small) * step
@@ -98,7 +121,13 @@ def _tyre(rng: Rng, built: Builder) -> None:
         if piled == 1:
             for j in range(14):
                 spin = turn @ turned(j * 0.4488)
-                built.box(spin @ vec(0, 0, large + 1.02 * small), [0.03, 2 * small, 0.04], 0, spin, cut=True)
+                built.box(
+                    spin @ vec(0, 0, large + 1.02 * small),
+                    [0.03, 2 * small, 0.04],
+                    0,
+                    spin,
+                    cut=True,
+                )
     if piled == 1 and chance(rng, 0.5):
         built.part(MORE)
         built.cylinder([0, 0, 0], large - 0.28 * small, 0.3 * small, 0.02, turn)
@@ -169,7 +198,9 @@ def _hook(rng: Rng, built: Builder) -> None:
         tube(built, bow @ flat.T, 0.5 * thick)
         return
     if kind == "anchor":
-        bow = curve([[-0.7, -0.3, 0], [-0.55, -0.7, 0], [0, -0.95, 0], [0.55, -0.7, 0], [0.7, -0.3, 0]], 11)
+        bow = curve(
+            [[-0.7, -0.3, 0], [-0.55, -0.7, 0], [0, -0.95, 0], [0.55, -0.7, 0], [0.7, -0.3, 0]], 11
+        )
         tube(built, bow @ flat.T, thick)
         built.limb(flat @ vec(0, -0.95, 0), flat @ vec(0, 0.7, 0), thick, thick)
         built.limb(flat @ vec(-0.4, 0.45, 0), flat @ vec(0.4, 0.45, 0), 0.8 * thick, 0.8 * thick)
@@ -177,7 +208,11 @@ def _hook(rng: Rng, built: Builder) -> None:
         built.ring(flat @ vec(0, 0.9, 0), 0.18, 0.06, turn=flat @ turned(0, np.pi / 2))
         return
     top = [[0, 0.6, 0], [0.1, 0.95, 0], [0.4, 1.1, 0], [0.7, 0.9, 0], [0.72, 0.6, 0]]
-    low = [[0, -1.2, 0]] if kind == "cane" else [[-0.6, -0.7, 0], [-0.4, -1.0, 0], [-0.05, -0.8, 0], [0, -0.3, 0]]
+    low = (
+        [[0, -1.2, 0]]
+        if kind == "cane"
+        else [[-0.6, -0.7, 0], [-0.4, -1.0, 0], [-0.05, -0.8, 0], [0, -0.3, 0]]
+    )
     tube(built, curve(np.array(low + top), 18) @ flat.T, thick, thick * span(rng, 0.6, 1.1))
     if chance(rng, 0.5):
         built.part(MORE)
@@ -215,11 +250,13 @@ def _frame(rng: Rng, built: Builder) -> None:
     if kind == "round":
         outline, hole = ngon(24) * half, ngon(24) * (half - rim)
     elif kind == "arch":
-        outline, hole = (np.concatenate([[[-h[0], -h[1]], [h[0], -h[1]]], ngon(20)[:11] * h * [1, 0.5]])
-                         for h in (half, half - rim))  # fmt: skip
+        outline, hole = (
+            np.concatenate([[[-h[0], -h[1]], [h[0], -h[1]]], ngon(20)[:11] * h * [1, 0.5]])
+            for h in (half, half - rim)
+        )
     else:
         round_ = span(rng, 0.0, 0.3) * float(half.min()) + 0.01
-        outline, hole = (rounded(*h, round_, 3) for h in (half, half - rim))
+        outline, hole = (rounded(h[0], h[1], round_, 3) for h in (half, half - rim))
     built.prism([0, 0, 0], outline, deep, min(0.4 * deep, 0.03), turn)
     built.prism([0, 0, 0], hole, 3 * deep, 0, turn, cut=True)
     if chance(rng, 0.5):  # a picture or a pane; otherwise one looks through
@@ -268,7 +305,9 @@ def _links(rng: Rng, built: Builder) -> None:
         turn = turned(rng.normal(0, 0.5), 0, rng.normal(0, 0.5))
         at = vec(0, 0.55, 0.08 * k)
         built.cylinder(at, 0.2, 0.035, 0.01, turn @ turned(0, np.pi / 2))
-        built.cylinder(at + turn @ vec(0, 0.1, 0), 0.06, 0.2, 0, turn @ turned(0, np.pi / 2), cut=True)
+        built.cylinder(
+            at + turn @ vec(0, 0.1, 0), 0.06, 0.2, 0, turn @ turned(0, np.pi / 2), cut=True
+        )
         built.box(at + turn @ vec(0, -0.55, 0), [0.06, 0.4, 0.03], 0.01, turn)
         for y in rng.uniform(-0.9, -0.6, 3):
             built.box(at + turn @ vec(0.08, y, 0), [0.06, 0.04, 0.03], 0.005, turn)
@@ -283,7 +322,13 @@ def _basket(rng: Rng, built: Builder) -> None:
     for y in np.arange(0.1, high, 0.14):
         built.ring([0, y, 0], wide, 0.045)
     built.part(MORE)
-    built.ring([0, high - 0.04, 0], wide - 0.02, 0.045, np.pi / 2, turned(0, -np.pi / 2 + span(rng, -0.6, 0.6)))
+    built.ring(
+        [0, high - 0.04, 0],
+        wide - 0.02,
+        0.045,
+        np.pi / 2,
+        turned(0, -np.pi / 2 + span(rng, -0.6, 0.6)),
+    )
     for k in range(rng.integers(0, 6)):
         built.part(THIRD)
         at = 0.55 * wide * vec(np.cos(1.3 * k), 0, np.sin(1.3 * k))
@@ -309,8 +354,15 @@ def _glasses(rng: Rng, built: Builder) -> None:
     for sign in (1, -1):
         built.part(BODY)
         built.ring([sign * gap, 0, 0], size, thick, turn=turned(0, np.pi / 2))
-        built.limb([sign * (gap + size), 0.08, 0], [sign * (gap + size + 0.02), 0.1, -0.8], thick, thick)
-        built.limb([sign * (gap + size + 0.02), 0.1, -0.8], [sign * (gap + size), -0.12, -1.0], thick, thick)
+        built.limb(
+            [sign * (gap + size), 0.08, 0], [sign * (gap + size + 0.02), 0.1, -0.8], thick, thick
+        )
+        built.limb(
+            [sign * (gap + size + 0.02), 0.1, -0.8],
+            [sign * (gap + size), -0.12, -1.0],
+            thick,
+            thick,
+        )
         if chance(rng, 0.5):
             built.part(MORE)
             built.cylinder([sign * gap, 0, 0], size, 0.014, 0.0, turned(0, np.pi / 2))

@@ -45,12 +45,16 @@ def bird(rng: Rng) -> Builder:
 
 
 def _beak(rng: Rng, built: Builder, head: F64, face: F64, size: float) -> None:
+    """A beak, eyes, now and then a comb."""
     built.part(HORN)
     long = size * pick(rng, (0.6, 0.8, 1.4, 2.4))
     start = head + face * 0.75 * size
     if chance(rng, 0.3):
-        built.ellipsoid(start + 0.5 * long * face, [0.7 * long, 0.2 * size, 0.35 * size],
-                        turned(-float(np.arctan2(face[2], face[0]))))  # fmt: skip
+        built.ellipsoid(
+            start + 0.5 * long * face,
+            [0.7 * long, 0.2 * size, 0.35 * size],
+            turned(-float(np.arctan2(face[2], face[0]))),
+        )
     else:
         hook = vec(0, -span(rng, 0, 0.5) * long, 0)
         line = [start, start + 0.7 * long * face, start + long * face + hook]
@@ -58,15 +62,22 @@ def _beak(rng: Rng, built: Builder, head: F64, face: F64, size: float) -> None:
     built.part(EYES)
     side = np.cross(face, vec(0, 1, 0))
     for sign in (1, -1):
-        built.ellipsoid(head + size * (0.5 * face + 0.75 * sign * side + vec(0, 0.3, 0)),
-                        np.full(3, 0.17 * size))  # fmt: skip
+        built.ellipsoid(
+            head + size * (0.5 * face + 0.75 * sign * side + vec(0, 0.3, 0)),
+            np.full(3, 0.17 * size),
+        )
     if chance(rng, 0.2):  # a comb
         built.part(OTHER)
         for k in range(3):
-            built.ellipsoid(head + vec(0.12 - 0.1 * k, 0.95 * size, 0), [0.07, 0.1, 0.03], soft=0.02)
+            built.ellipsoid(
+                head + vec(0.12 - 0.1 * k, 0.95 * size, 0), [0.07, 0.1, 0.03], soft=0.02
+            )
 
 
-def _wing(rng: Rng, built: Builder, middle: F64, fat: float, pitch: float, sign: int, is_spread: bool) -> None:  # fmt: skip
+def _wing(
+    rng: Rng, built: Builder, middle: F64, fat: float, pitch: float, sign: int, is_spread: bool
+) -> None:
+    """Folded at the side, or spread in two pieces."""
     built.part(OTHER)
     if not is_spread:
         at = middle + vec(-0.08, 0.1 * fat, sign * 0.88 * fat)
@@ -87,6 +98,7 @@ def _wing(rng: Rng, built: Builder, middle: F64, fat: float, pitch: float, sign:
 
 
 def _bird_leg(rng: Rng, built: Builder, middle: F64, fat: float, sign: int) -> None:
+    """A leg with four toes."""
     built.part(HORN)
     root = middle + vec(0, -0.6 * fat, sign * 0.4 * fat)
     foot = vec(root[0] + span(rng, -0.15, 0.15), 0.02, root[2] + sign * span(rng, 0, 0.05))
@@ -106,8 +118,13 @@ def fish(rng: Rng) -> Builder:
     spine = curve([[0.9, 0, 0], [0.4, 0, 0], [-0.1, 0, 0.3 * wag], [-0.8, 0, wag]], 6)
     if high < 0.24:
         for k, radius in enumerate((0.5, 0.85, 1, 0.75, 0.45)):
-            built.limb(spine[k], spine[k + 1], high * radius, high * (0.85, 1, 0.75, 0.45, 0.2)[k],
-                       soft=0.1)  # fmt: skip
+            built.limb(
+                spine[k],
+                spine[k + 1],
+                high * radius,
+                high * (0.85, 1, 0.75, 0.45, 0.2)[k],
+                soft=0.1,
+            )
     else:
         built.ellipsoid([0.2, 0, 0], [0.75, high, wide])
         built.limb([-0.3, 0, 0], spine[-1], 0.5 * wide, 0.07, soft=0.3)
@@ -162,14 +179,19 @@ def insect(rng: Rng) -> Builder:
         for k in range(pairs):
             built.part(HORN)
             root = places[1] + vec((k - 1) * 0.6 * sizes[1], -0.2 * sizes[1], sign * 0.5 * sizes[1])
-            foot = vec(root[0] + (k - 0.5 * pairs + 0.4) * 0.35 + rng.normal(0, 0.05), 0.02,
-                       sign * reach)  # fmt: skip
+            foot = vec(
+                root[0] + (k - 0.5 * pairs + 0.4) * 0.35 + rng.normal(0, 0.05), 0.02, sign * reach
+            )
             knee = joint(root, foot, 1.25 * float(np.linalg.norm(root - foot)), [0, 1, 0.2 * sign])
             two_bones(built, [root, knee, foot], [0.045, 0.03, 0.018])
         built.part(EYES)
         built.ellipsoid(head + size * vec(0.5, 0.4, 0.65 * sign), np.full(3, 0.3 * size))
         built.part(HORN)
-        line = head + np.array([[0.5, 0.5, 0.3], [1.4, 1.3, 0.6], [2.2, 1.2, 1.1]]) * size * [1, 1, sign]
+        line = head + np.array([[0.5, 0.5, 0.3], [1.4, 1.3, 0.6], [2.2, 1.2, 1.1]]) * size * [
+            1,
+            1,
+            sign,
+        ]
         tube(built, curve(line, 4), 0.02, 0.014)
     if chance(rng, 0.65):
         _insect_wings(rng, built, places[1], float(sizes[1]))

@@ -1,6 +1,8 @@
-"""Tools and cutlery: hammers, spanners, keys, scissors, knives, spoons, brushes, rackets, guitars."""
+"""Tools and cutlery, rackets and guitars: what has a handle."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
@@ -13,8 +15,26 @@ STEEL, GRIP, MORE = range(3)
 
 def tool(rng: Rng, built: Builder, turn: F64) -> None:
     """One tool in the plane of x and y of `turn`, its handle below."""
-    kinds = (_hammer, _spanner, _key, _scissors, _screwdriver, _saw, _knife, _fork, _spoon, _brush,
-             _racket, _guitar, _torch, _pen, _magnifier, _pliers, _axe, _plug)  # fmt: skip
+    kinds = (
+        _hammer,
+        _spanner,
+        _key,
+        _scissors,
+        _screwdriver,
+        _saw,
+        _knife,
+        _fork,
+        _spoon,
+        _brush,
+        _racket,
+        _guitar,
+        _torch,
+        _pen,
+        _magnifier,
+        _pliers,
+        _axe,
+        _plug,
+    )
     pick(rng, kinds)(rng, built, turn)
 
 
@@ -25,13 +45,19 @@ def _grip(rng: Rng, built: Builder, turn: F64, low: float, high: float, thick: f
     if kind == "round":
         built.limb(turn @ vec(0, low, 0), turn @ vec(0, high, 0), thick, 0.85 * thick)
     elif kind == "flat":
-        built.box(turn @ vec(0, 0.5 * (low + high), 0), [thick, 0.5 * (high - low), 0.6 * thick], 0.3 * thick, turn)
+        built.box(
+            turn @ vec(0, 0.5 * (low + high), 0),
+            [thick, 0.5 * (high - low), 0.6 * thick],
+            0.3 * thick,
+            turn,
+        )
     else:
         swell = np.array([[0.8, 0], [1.15, 0.1], [0.9, 0.4], [1.2, 0.75], [0.7, 1]])
         built.lathe([0, 0, 0], profile(swell * [thick, high - low] + [0, low], 2), turn)
 
 
 def _hammer(rng: Rng, built: Builder, turn: F64) -> None:
+    """With a claw, a mallet, or square."""
     _grip(rng, built, turn, -1.2, 0.6, span(rng, 0.07, 0.12))
     built.part(STEEL)
     half, size = span(rng, 0.2, 0.5), span(rng, 0.11, 0.2)
@@ -67,6 +93,7 @@ def _spanner(rng: Rng, built: Builder, turn: F64) -> None:
 
 
 def _key(rng: Rng, built: Builder, turn: F64) -> None:
+    """With a ring, a plate or a clover leaf, and teeth."""
     half = span(rng, 0.05, 0.09)
     axle = turn @ turned(0, np.pi / 2)
     built.part(STEEL)
@@ -86,15 +113,21 @@ def _key(rng: Rng, built: Builder, turn: F64) -> None:
 
 
 def _scissors(rng: Rng, built: Builder, turn: F64) -> None:
+    """More or less open."""
     opened = span(rng, 0.05, 0.5)
     for sign in (1, -1):
         spin = turn @ turned(0, 0, sign * opened)
         lift = turn @ vec(0, 0, 0.035 * sign)
         built.part(STEEL)
-        blade = np.array([[-0.1, -0.3], [0.1, -0.3], [0.12, 0.2], [0.0, 1.3], [-0.1, 0.2]]) * [sign, 1]
+        blade = np.array([[-0.1, -0.3], [0.1, -0.3], [0.12, 0.2], [0.0, 1.3], [-0.1, 0.2]]) * [
+            sign,
+            1,
+        ]
         built.prism(lift, blade, 0.035, 0.01, spin)
         built.part(GRIP)
-        built.limb(lift + spin @ vec(0, -0.2, 0), lift + spin @ vec(-0.12 * sign, -0.6, 0), 0.07, 0.08)
+        built.limb(
+            lift + spin @ vec(0, -0.2, 0), lift + spin @ vec(-0.12 * sign, -0.6, 0), 0.07, 0.08
+        )
         at = lift + spin @ vec(-0.22 * sign, -0.85, 0)
         built.ring(at, span(rng, 0.2, 0.28), 0.07, turn=spin @ turned(0, np.pi / 2))
     built.part(MORE)
@@ -102,6 +135,7 @@ def _scissors(rng: Rng, built: Builder, turn: F64) -> None:
 
 
 def _screwdriver(rng: Rng, built: Builder, turn: F64) -> None:
+    """A blade in a handle."""
     _grip(rng, built, turn, -1.0, -0.1, span(rng, 0.14, 0.22))
     built.part(STEEL)
     built.limb(turn @ vec(0, -0.2, 0), turn @ vec(0, 0.9, 0), 0.06, 0.05)
@@ -109,6 +143,7 @@ def _screwdriver(rng: Rng, built: Builder, turn: F64) -> None:
 
 
 def _saw(rng: Rng, built: Builder, turn: F64) -> None:
+    """A blade with teeth and a handle with a hole."""
     teeth, high = int(rng.integers(8, 14)), span(rng, 0.25, 0.4)
     x = np.linspace(0, 1.8, 2 * teeth)
     low = np.stack([x, np.where(np.arange(2 * teeth) % 2, -0.08, 0)], 1)
@@ -155,7 +190,12 @@ def _spoon(rng: Rng, built: Builder, turn: F64) -> None:
     built.box(turn @ vec(0, 0.35, 1.0), [2, 2, 1.0], 0, turn, cut=True)
     built.ellipsoid(turn @ vec(0, 0.35, 0.04), [wide - 0.05, 0.4, deep - 0.03], turn, cavity=True)
     built.part(pick(rng, (STEEL, GRIP)))
-    built.limb(turn @ vec(0, 0, -0.05), turn @ vec(0, -long, span(rng, 0, 0.3)), 0.06, span(rng, 0.06, 0.12))
+    built.limb(
+        turn @ vec(0, 0, -0.05),
+        turn @ vec(0, -long, span(rng, 0, 0.3)),
+        0.06,
+        span(rng, 0.06, 0.12),
+    )
 
 
 def _brush(rng: Rng, built: Builder, turn: F64) -> None:
@@ -172,7 +212,9 @@ def _brush(rng: Rng, built: Builder, turn: F64) -> None:
         built.box(turn @ vec(0, 0.05, 0), [0.5, 0.09, 0.1], 0.03, turn)
         for k in range(9):
             x = 0.11 * (k - 4)
-            built.limb(turn @ vec(x, 0.1, 0), turn @ vec(1.3 * x, span(rng, 0.5, 0.6), 0), 0.055, 0.05)
+            built.limb(
+                turn @ vec(x, 0.1, 0), turn @ vec(1.3 * x, span(rng, 0.5, 0.6), 0), 0.055, 0.05
+            )
     else:
         built.box(turn @ vec(0, 0.3, 0), [0.1, 0.35, 0.05], 0.03, turn)
         built.part(STEEL)
@@ -196,13 +238,22 @@ def _racket(rng: Rng, built: Builder, turn: F64) -> None:
     for k in range(-2, 3):
         s = 0.58 * np.sqrt(max(1 - (0.37 * k) ** 2, 0))
         built.limb(turn @ vec(0.22 * k, 0.4 - s, 0), turn @ vec(0.22 * k, 0.4 + s, 0), 0.014, 0.014)
-        built.limb(turn @ vec(-s, 0.4 + 0.22 * k, 0), turn @ vec(s, 0.4 + 0.22 * k, 0), 0.014, 0.014)
+        built.limb(
+            turn @ vec(-s, 0.4 + 0.22 * k, 0), turn @ vec(s, 0.4 + 0.22 * k, 0), 0.014, 0.014
+        )
 
 
 def _guitar(rng: Rng, built: Builder, turn: F64) -> None:
     """A body with a waist, a hole, a neck and pegs."""
     deep, wide = span(rng, 0.06, 0.2), span(rng, 0.48, 0.62)
-    side = [[0.02, -0.75], [wide, -0.7], [1.05 * wide, -0.25], [0.55 * wide, 0.05], [0.75 * wide, 0.45], [0.4 * wide, 0.7]]
+    side = [
+        [0.02, -0.75],
+        [wide, -0.7],
+        [1.05 * wide, -0.25],
+        [0.55 * wide, 0.05],
+        [0.75 * wide, 0.45],
+        [0.4 * wide, 0.7],
+    ]
     outline = np.array(side + [[-x, y] for x, y in side[::-1]])
     built.part(GRIP)
     built.prism([0, 0, 0], smooth(outline, 2), deep, 0.03, turn)
@@ -287,7 +338,17 @@ def _axe(rng: Rng, built: Builder, turn: F64) -> None:
     built.part(STEEL)
     if chance(rng, 0.6):
         wide = span(rng, 0.2, 0.45)
-        head = np.array([[-0.15, -0.13], [0.15, -0.12], [0.6, -wide], [0.66, 0], [0.6, wide], [0.15, 0.12], [-0.15, 0.13]])
+        head = np.array(
+            [
+                [-0.15, -0.13],
+                [0.15, -0.12],
+                [0.6, -wide],
+                [0.66, 0],
+                [0.6, wide],
+                [0.15, 0.12],
+                [-0.15, 0.13],
+            ]
+        )
         built.prism(turn @ vec(0, 0.5, 0), smooth(head, 1), 0.08, 0.05, turn)
     else:
         for sign in (1, -1):
@@ -311,6 +372,11 @@ def _plug(rng: Rng, built: Builder, turn: F64) -> None:
     for x in (0.14, -0.14):
         built.limb(turn @ vec(x, 0.3, 0), turn @ vec(x, 0.7, 0), 0.045, 0.04)
     built.part(MORE)
-    line = [vec(0, -0.3, 0), vec(0, -0.7, 0.05), vec(span(rng, -0.4, 0.4), -1.1, 0.1), vec(0.1, -1.5, 0.3)]
-    for a, b in zip(line[:-1], line[1:], strict=True):
+    line = [
+        vec(0, -0.3, 0),
+        vec(0, -0.7, 0.05),
+        vec(span(rng, -0.4, 0.4), -1.1, 0.1),
+        vec(0.1, -1.5, 0.3),
+    ]
+    for a, b in itertools.pairwise(line):
         built.limb(turn @ a, turn @ b, 0.05, 0.05)

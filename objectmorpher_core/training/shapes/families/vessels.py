@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....arrays import F64
 from ..solid import Builder, along, turned
+from .hollow import handle, hollow, saucer
+from .kitchen import cheese, plate, pot, teapot
 from .making import Rng, chance, curve, pick, profile, span, tube, vec
 
 BODY, LID, INSIDE, MORE = range(4)
@@ -13,33 +14,28 @@ BODY, LID, INSIDE, MORE = range(4)
 
 def lathe(rng: Rng) -> Builder:
     """One vessel or turned thing."""
-    kinds = (_cup, _cup, _bottle, _bottle, _vase, _bowl, _can, _jar, _lamp, _glass, _pot, _teapot,
-             _plate, _cheese, _candle, _chessman, _anything)  # fmt: skip
+    kinds = (
+        _cup,
+        _cup,
+        _bottle,
+        _bottle,
+        _vase,
+        _bowl,
+        _can,
+        _jar,
+        _lamp,
+        _glass,
+        pot,
+        teapot,
+        plate,
+        cheese,
+        _candle,
+        _chessman,
+        _anything,
+    )
     built = Builder()
     pick(rng, kinds)(rng, built)
     return built
-
-
-def _hollow(built: Builder, outside: F64, wall: float, floor: float) -> None:
-    """A body turned from `outside` (k, 2), below to top, hollow and open above."""
-    built.lathe([0, 0, 0], profile(outside, 3))
-    inside = np.array([p for p in outside if p[1] > outside[0, 1] + floor])
-    inside = inside - [wall, 0]
-    first = vec(inside[0, 0], outside[0, 1] + floor)
-    inside = np.concatenate([first[None], inside, inside[-1:] + [0, 0.5]])
-    inside[:, 0] = np.maximum(inside[:, 0], 0.3 * outside[:, 0].min())
-    built.lathe([0, 0, 0], profile(inside, 3), cavity=True)
-
-
-def _handle(rng: Rng, built: Builder, x: float, low: float, high: float, out: float, thick: float) -> None:  # fmt: skip
-    """An ear at the side +x, between two heights."""
-    knots = [[x - thick, low, 0], [x + 0.7 * out, low - 0.02, 0], [x + out, 0.45 * low + 0.55 * high, 0],
-             [x + 0.75 * out, high, 0], [x - thick, high, 0]]  # fmt: skip
-    if chance(rng, 0.3):  # an ear with corners
-        knots = [[x - thick, low, 0], [x + out, low, 0], [x + out, high, 0], [x - thick, high, 0]]
-        tube(built, np.array(knots), thick, thick)
-        return
-    tube(built, curve(knots, 9), thick, thick * span(rng, 0.8, 1.2))
 
 
 def _cup(rng: Rng, built: Builder) -> None:
@@ -48,27 +44,23 @@ def _cup(rng: Rng, built: Builder) -> None:
     belly = span(rng, 0.9, 1.2) * 0.5 * (low + top)
     outside = np.array([[low, 0], [low, 0], [belly, 0.5 * high], [top, high], [top, high]])
     built.part(BODY)
-    _hollow(built, outside, span(rng, 0.05, 0.1), 0.1)
+    hollow(built, outside, span(rng, 0.05, 0.1), 0.1)
     if chance(rng, 0.75):
         built.part(pick(rng, (BODY, BODY, MORE)))
         a, b = span(rng, 0.15, 0.3) * high, span(rng, 0.7, 0.9) * high
         at = belly if chance(rng, 0.5) else 0.5 * (low + top)
-        _handle(rng, built, at, a, b, span(rng, 0.25, 0.5), span(rng, 0.05, 0.1))
+        handle(rng, built, at, a, b, span(rng, 0.25, 0.5), span(rng, 0.05, 0.1))
     if chance(rng, 0.4):  # what is in it
         built.part(INSIDE)
         level = span(rng, 0.6, 0.88)
-        built.cylinder([0, 0.5 * level * high + 0.03, 0], 0.9 * min(low, top, belly) - 0.02,
-                       0.5 * level * high - 0.04)  # fmt: skip
+        built.cylinder(
+            [0, 0.5 * level * high + 0.03, 0],
+            0.9 * min(low, top, belly) - 0.02,
+            0.5 * level * high - 0.04,
+        )
     if chance(rng, 0.25):
         built.part(LID)
-        _saucer(rng, built, 1.5 * low + 0.25)
-
-
-def _saucer(rng: Rng, built: Builder, wide: float) -> None:
-    rim = span(rng, 0.08, 0.25)
-    outline = [[0.4 * wide, -0.06], [0.4 * wide, -0.06], [wide, rim], [wide, rim + 0.05],
-               [0.45 * wide, 0.02], [0.4 * wide, 0.02]]  # fmt: skip
-    built.lathe([0, 0, 0], profile(outline, 1))
+        saucer(rng, built, 1.5 * low + 0.25)
 
 
 def _bottle(rng: Rng, built: Builder) -> None:
@@ -77,8 +69,16 @@ def _bottle(rng: Rng, built: Builder) -> None:
     slope, long = span(rng, 0.1, 0.5), span(rng, 0.1, 0.6)
     waist = span(rng, 0.75, 1.1) if chance(rng, 0.4) else 1.0
     top = body + slope + long
-    outline = [[wide, 0], [wide, 0], [waist * wide, 0.5 * body], [wide, body], [neck, body + slope],
-               [neck, body + slope], [neck, top], [neck, top]]  # fmt: skip
+    outline = [
+        [wide, 0],
+        [wide, 0],
+        [waist * wide, 0.5 * body],
+        [wide, body],
+        [neck, body + slope],
+        [neck, body + slope],
+        [neck, top],
+        [neck, top],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(outline, 3))
     if chance(rng, 0.25):
@@ -94,17 +94,18 @@ def _bottle(rng: Rng, built: Builder) -> None:
         built.box([0.12, top + cap + 0.22, 0], [0.25, 0.06, 0.08], 0.03)
     if chance(rng, 0.2):
         built.part(BODY)
-        _handle(rng, built, 0.8 * wide, 0.5 * body, body + 0.6 * slope, 0.3, 0.06)
+        handle(rng, built, 0.8 * wide, 0.5 * body, body + 0.6 * slope, 0.3, 0.06)
 
 
 def _vase(rng: Rng, built: Builder) -> None:
+    """Hollow or not; some have two ears."""
     count = int(rng.integers(3, 6))
     y = np.sort(rng.uniform(0, 1, count)) * span(rng, 1, 1.8)
     outside = np.stack([rng.uniform(0.18, 0.65, count), y - y[0]], 1)
     outside = np.concatenate([outside[:1], outside, outside[-1:]])
     built.part(BODY)
     if chance(rng, 0.6):
-        _hollow(built, outside, 0.06, 0.1)
+        hollow(built, outside, 0.06, 0.1)
     else:
         built.lathe([0, 0, 0], profile(outside, 3))
     if chance(rng, 0.3):
@@ -118,9 +119,11 @@ def _vase(rng: Rng, built: Builder) -> None:
 def _bowl(rng: Rng, built: Builder) -> None:
     """A bowl, sometimes with fruit or eggs in it."""
     wide, high, foot = span(rng, 0.7, 1.1), span(rng, 0.3, 0.8), span(rng, 0.25, 0.6)
-    outside = np.array([[foot, 0], [foot, 0], [0.9 * wide, 0.35 * high], [wide, high], [wide, high]])
+    outside = np.array(
+        [[foot, 0], [foot, 0], [0.9 * wide, 0.35 * high], [wide, high], [wide, high]]
+    )
     built.part(BODY)
-    _hollow(built, outside, span(rng, 0.05, 0.09), 0.08)
+    hollow(built, outside, span(rng, 0.05, 0.09), 0.08)
     if chance(rng, 0.45):
         for k in range(rng.integers(3, 8)):
             built.part(INSIDE + int(chance(rng, 0.4)))
@@ -131,6 +134,7 @@ def _bowl(rng: Rng, built: Builder) -> None:
 
 
 def _can(rng: Rng, built: Builder) -> None:
+    """A tin with rims, a drum, a pillbox."""
     wide, high = span(rng, 0.3, 0.7), span(rng, 0.25, 1.0)
     built.part(BODY)
     built.cylinder([0, high, 0], wide, high, span(rng, 0, 0.08))
@@ -143,9 +147,16 @@ def _can(rng: Rng, built: Builder) -> None:
 
 
 def _jar(rng: Rng, built: Builder) -> None:
+    """With a lid and often a knob."""
     wide, high, neck = span(rng, 0.4, 0.6), span(rng, 0.6, 1.2), span(rng, 0.6, 0.9)
-    outline = [[0.9 * wide, 0], [0.9 * wide, 0], [wide, 0.1], [wide, 0.8 * high],
-               [neck * wide, 0.95 * high], [neck * wide, high]]  # fmt: skip
+    outline = [
+        [0.9 * wide, 0],
+        [0.9 * wide, 0],
+        [wide, 0.1],
+        [wide, 0.8 * high],
+        [neck * wide, 0.95 * high],
+        [neck * wide, high],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(outline, 1))
     built.part(LID)
@@ -163,13 +174,20 @@ def _lamp(rng: Rng, built: Builder) -> None:
         built.cylinder([0, 0.05, 0], foot, 0.05, 0.03)
         built.limb([0, 0.05, 0], [0, high + 0.3, 0], 0.05, 0.05, soft=0.08)
     else:
-        outline = [[foot, 0], [foot, 0], [span(rng, 0.1, 0.5), 0.4 * high], [0.08, 0.8 * high],
-                   [0.05, high + 0.3]]  # fmt: skip
+        outline = [
+            [foot, 0],
+            [foot, 0],
+            [span(rng, 0.1, 0.5), 0.4 * high],
+            [0.08, 0.8 * high],
+            [0.05, high + 0.3],
+        ]
         built.lathe([0, 0, 0], profile(outline, 3))
     low, top, tall = span(rng, 0.5, 0.9), span(rng, 0.2, 0.6), span(rng, 0.4, 0.8)
     built.part(LID)
     built.lathe([0, high, 0], profile([[low, 0], [top, tall]], 0))
-    inner = profile([[low - 0.01, -0.1], [low - 0.05, 0], [top - 0.05, tall], [top - 0.05, tall + 0.1]], 0)
+    inner = profile(
+        [[low - 0.01, -0.1], [low - 0.05, 0], [top - 0.05, tall], [top - 0.05, tall + 0.1]], 0
+    )
     built.lathe([0, high, 0], inner, cavity=True)
     built.part(INSIDE)
     built.ellipsoid([0, high + 0.3, 0], [0.12, 0.15, 0.12])
@@ -179,97 +197,40 @@ def _glass(rng: Rng, built: Builder) -> None:
     """A wine glass or a goblet."""
     wide, foot, stem = span(rng, 0.3, 0.5), span(rng, 0.25, 0.4), span(rng, 0.3, 0.7)
     cup, top = span(rng, 0.4, 0.8), span(rng, 0.7, 1.1)
-    outline = [[foot, 0], [foot, 0.04], [0.06, 0.1], [0.05, stem], [0.15, stem + 0.05],
-               [wide, stem + 0.4 * cup], [top * wide, stem + cup], [top * wide, stem + cup]]  # fmt: skip
+    outline = [
+        [foot, 0],
+        [foot, 0.04],
+        [0.06, 0.1],
+        [0.05, stem],
+        [0.15, stem + 0.05],
+        [wide, stem + 0.4 * cup],
+        [top * wide, stem + cup],
+        [top * wide, stem + cup],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(outline, 3))
-    inside = [[0.08, stem + 0.12], [wide - 0.05, stem + 0.4 * cup], [top * wide - 0.05, stem + cup],
-              [top * wide - 0.05, stem + cup + 0.1]]  # fmt: skip
+    inside = [
+        [0.08, stem + 0.12],
+        [wide - 0.05, stem + 0.4 * cup],
+        [top * wide - 0.05, stem + cup],
+        [top * wide - 0.05, stem + cup + 0.1],
+    ]
     built.lathe([0, 0, 0], profile(inside, 1), cavity=True)
-
-
-def _pot(rng: Rng, built: Builder) -> None:
-    """Pots and pans with lids, ears or a long handle."""
-    wide, high = span(rng, 0.5, 0.8), span(rng, 0.2, 0.8)
-    built.part(BODY)
-    outside = np.array([[0.92 * wide, 0], [0.92 * wide, 0], [wide, 0.12], [wide, high], [wide, high]])
-    _hollow(built, outside, 0.05, 0.06)
-    if chance(rng, 0.5):
-        for sign in (1, -1):
-            built.part(MORE)
-            turn = turned(sign * np.pi / 2)
-            built.ring([sign * wide, 0.8 * high, 0], 0.17, 0.045, 1.7, turn)
-    else:
-        built.part(MORE)
-        built.limb([wide, 0.85 * high, 0], [wide + span(rng, 0.6, 1.2), high, 0], 0.06, 0.08)
-    if chance(rng, 0.6):
-        tall = span(rng, 0.05, 0.3)
-        built.part(LID)
-        outline = [[1.03 * wide, high], [1.03 * wide, high + 0.05], [0.6 * wide, high + 0.8 * tall + 0.05],
-                   [0.05, high + tall + 0.06]]  # fmt: skip
-        built.lathe([0, 0, 0], profile(outline, 1))
-        built.part(MORE)
-        built.ellipsoid([0, high + tall + 0.13, 0], [0.11, 0.09, 0.11])
-
-
-def _teapot(rng: Rng, built: Builder) -> None:
-    """Teapots, kettles, watering cans: a spout on -x and a handle on +x."""
-    wide, high = span(rng, 0.5, 0.75), span(rng, 0.6, 1.2)
-    foot, top = span(rng, 0.3, 0.5), span(rng, 0.2, 0.35)
-    outline = [[foot, 0], [foot, 0], [wide, 0.35 * high], [0.9 * wide, 0.75 * high], [top, high]]
-    built.part(BODY)
-    built.lathe([0, 0, 0], profile(outline, 3))
-    reach = span(rng, 0.35, 0.7)
-    knots = [[-0.7 * wide, 0.3 * high, 0], [-wide - 0.5 * reach, 0.45 * high, 0],
-             [-wide - reach, span(rng, 0.85, 1.15) * high, 0]]  # fmt: skip
-    tube(built, curve(knots, 6), 0.16, 0.08, soft=0.06)
-    built.part(pick(rng, (BODY, MORE)))
-    if chance(rng, 0.75):
-        _handle(rng, built, 0.75 * wide, 0.25 * high, 0.8 * high, span(rng, 0.35, 0.6), 0.06)
-    else:  # above, like a kettle's
-        built.ring([0, 0.85 * high, 0], 0.85 * wide, 0.05, 1.5, turned(0, -np.pi / 2))
-    built.part(LID)
-    built.lathe([0, high - 0.04, 0], profile([[1.15 * top, 0], [1.1 * top, 0.06], [0.06, 0.16]], 1))
-    built.ellipsoid([0, high + 0.17, 0], [0.07, 0.08, 0.07], soft=0.03)
-
-
-def _plate(rng: Rng, built: Builder) -> None:
-    """A plate, often with food on it."""
-    wide = span(rng, 0.8, 1.2)
-    built.part(BODY)
-    _saucer(rng, built, wide)
-    for k in range(rng.integers(0, 5)):
-        built.part(INSIDE + k % 2)
-        at = 0.3 * wide * vec(np.cos(1.7 * k), 0, np.sin(1.7 * k)) * span(rng, 0.5, 1.2)
-        half = vec(span(rng, 0.12, 0.4), span(rng, 0.08, 0.25), span(rng, 0.12, 0.3))
-        built.superquadric(at + [0, half[1], 0], half, span(rng, 0.4, 1), span(rng, 0.4, 1),
-                           turned(span(rng, 0, 3)))  # fmt: skip
-
-
-def _cheese(rng: Rng, built: Builder) -> None:
-    """A wheel of cheese, a cake or a pie; often a slice is gone."""
-    wide, high = span(rng, 0.6, 1.0), span(rng, 0.12, 0.4)
-    built.part(BODY)
-    built.cylinder([0, high, 0], wide, high, span(rng, 0.02, 0.12))
-    if chance(rng, 0.6):
-        half = span(rng, 0.2, 0.6)
-        wedge = 3 * np.array([[0, 0], [np.cos(half), -np.sin(half)], [np.cos(half), np.sin(half)]])
-        built.prism([0.02, high, 0], wedge, 2 * high, 0, turned(0, np.pi / 2), cut=True)
-    if chance(rng, 0.5):
-        for k in range(rng.integers(1, 8)):
-            built.part(MORE)
-            way = 2.4 * k + 1.2
-            far = wide * span(rng, 0.3, 0.75)
-            built.ellipsoid([-far * abs(np.cos(way)), 2 * high, far * np.sin(way)],
-                            np.full(3, span(rng, 0.06, 0.12)))  # fmt: skip
 
 
 def _candle(rng: Rng, built: Builder) -> None:
     """A candle on a stick."""
     foot, stick, wax = span(rng, 0.25, 0.5), span(rng, 0.1, 1.0), span(rng, 0.3, 0.9)
     thick = span(rng, 0.07, 0.2)
-    outline = [[foot, 0], [foot, 0.05], [0.08, 0.12], [span(rng, 0.06, 0.2), 0.5 * stick + 0.1],
-               [0.08, stick], [thick + 0.08, stick + 0.12], [thick + 0.08, stick + 0.16]]  # fmt: skip
+    outline = [
+        [foot, 0],
+        [foot, 0.05],
+        [0.08, 0.12],
+        [span(rng, 0.06, 0.2), 0.5 * stick + 0.1],
+        [0.08, stick],
+        [thick + 0.08, stick + 0.12],
+        [thick + 0.08, stick + 0.16],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(outline, 3))
     built.part(LID)
@@ -279,10 +240,20 @@ def _candle(rng: Rng, built: Builder) -> None:
 
 
 def _chessman(rng: Rng, built: Builder) -> None:
+    """A pawn, a rook, a bishop, a king or a queen."""
     high = span(rng, 0.7, 1.5)
     base, waist, collar = span(rng, 0.35, 0.5), span(rng, 0.12, 0.2), span(rng, 0.2, 0.3)
-    outline = [[base, 0], [base, 0.1], [0.8 * base, 0.16], [0.75 * base, 0.24], [waist, 0.4 * high],
-               [waist, 0.8 * high], [collar, 0.86 * high], [collar, 0.9 * high], [0.1, high]]  # fmt: skip
+    outline = [
+        [base, 0],
+        [base, 0.1],
+        [0.8 * base, 0.16],
+        [0.75 * base, 0.24],
+        [waist, 0.4 * high],
+        [waist, 0.8 * high],
+        [collar, 0.86 * high],
+        [collar, 0.9 * high],
+        [0.1, high],
+    ]
     built.part(BODY)
     built.lathe([0, 0, 0], profile(outline, 1))
     kind = pick(rng, ("pawn", "rook", "bishop", "king", "queen"))
@@ -303,8 +274,11 @@ def _chessman(rng: Rng, built: Builder) -> None:
     if kind == "queen":
         for k in range(6):
             way = k * np.pi / 3
-            built.ellipsoid([0.7 * size * np.cos(way), high + 1.9 * size, 0.7 * size * np.sin(way)],
-                            np.full(3, 0.07), soft=0.03)  # fmt: skip
+            built.ellipsoid(
+                [0.7 * size * np.cos(way), high + 1.9 * size, 0.7 * size * np.sin(way)],
+                np.full(3, 0.07),
+                soft=0.03,
+            )
 
 
 def _anything(rng: Rng, built: Builder) -> None:
