@@ -227,6 +227,17 @@ def _normal(x, y, z, solid):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _facing(n, d):
+    """A normal that a ray `d` can see: at edges the slopes of both sides are mixed."""
+    away = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    if away <= 0.0:
+        return n
+    x, y, z = n[0] - away * d[0], n[1] - away * d[1], n[2] - away * d[2]
+    size = math.sqrt(x * x + y * y + z * z)
+    return (x / size, y / size, z / size) if size > 1e-3 else (-d[0], -d[1], -d[2])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def shade(x, y, z, way, solid, steps, sharp):
     """How much of a lamp in the direction `way` reaches a place, in [0, 1]; soft-edged."""
     light, t = 1.0, 0.02
@@ -274,7 +285,7 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
             t, part = _towards(eye, d, start, end, solid, False)
             if t > 0.0:
                 x, y, z = eye[0] + t * d[0], eye[1] + t * d[1], eye[2] + t * d[2]
-                n = _normal(x, y, z, solid)
+                n = _facing(_normal(x, y, z, solid), d)
                 row[0], row[3] = t, part
                 row[4], row[5], row[6] = n
                 row[1] = _out_of(eye, d, t, end, solid)
