@@ -35,6 +35,7 @@ CLOSE = 6e-4  # from a surface, at which it is met
 ALMOST = 4e-3  # from it, where a ray along a surface has used up its steps
 GRAZING = 0.02  # along a ray that touches a surface without getting in
 LEAST_STEP = 3e-3  # within the object
+HALVINGS = 4  # of a step in which a ray leaves it
 SLOW = 0.8  # of a step, where distances are only nearly bounds
 
 
@@ -59,6 +60,22 @@ def _polygon(x, y, outlines, first, count, axis):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _ellipsoid(x, y, z, a):
+    """As below; inside, where that may be far too much, no more than along the shortest axis."""
+    px, py, pz = (x / a[0]) ** 2, (y / a[1]) ** 2, (z / a[2]) ** 2
+    square = px + py + pz
+    norm = math.sqrt(square)
+    slope = math.sqrt(px / a[0] ** 2 + py / a[1] ** 2 + pz / a[2] ** 2)
+    first = norm * (norm - 1.0) / max(slope, 1e-9)
+    if square >= 1.0:
+        return first
+    short = min(a[0], min(a[1], a[2]))
+    own = px if a[0] == short else (py if a[1] == short else pz)
+    depth = short * (math.sqrt(max(1.0 - square + own, 0.0)) - math.sqrt(own))
+    return max(first, -depth) if norm > 1e-6 else -short
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _superquadric(x, y, z, a):
     """(f - 1) / |its slope| of the norm f whose unit ball it is: a bound, as f is convex."""
     size = max(max(x, max(y, z)), 1e-6)
@@ -71,16 +88,14 @@ def _superquadric(x, y, z, a):
     around = norm / total * level / (px + pz)
     gx, gz, gy = around * px / (x * a[0]), around * pz / (z * a[2]), norm / total * py / (y * a[1])
     slope = math.sqrt(gx * gx + gy * gy + gz * gz)
-    return (size * norm - 1.0) / max(slope, 1e-9)
+    return max((size * norm - 1.0) / max(slope, 1e-9), -min(a[0], min(a[1], a[2])))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _primitive(kind, x, y, z, a, outlines):
     """Distance from a place in the primitive's own frame; `a`: its numbers."""
     if kind == ELLIPSOID:
-        k0 = math.sqrt((x / a[0]) ** 2 + (y / a[1]) ** 2 + (z / a[2]) ** 2)
-        k1 = math.sqrt((x / a[0] ** 2) ** 2 + (y / a[1] ** 2) ** 2 + (z / a[2] ** 2) ** 2)
-        return k0 * (k0 - 1.0) / max(k1, 1e-9) if k0 > 1e-6 else -min(a[0], min(a[1], a[2]))
+        return _ellipsoid(abs(x), abs(y), abs(z), a)
     if kind == BOX:
         qx, qy, qz = abs(x) - a[0] + a[3], abs(y) - a[1] + a[3], abs(z) - a[2] + a[3]
         out = math.sqrt(max(qx, 0.0) ** 2 + max(qy, 0.0) ** 2 + max(qz, 0.0) ** 2)
@@ -204,7 +219,12 @@ def _out_of(o, d, start, end, solid):
     for _ in range(STEPS):
         s, _ = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], solid, True)
         if s >= 0.0 and before < 0.0:  # the surface is between the last two places
-            return last + (t - last) * before / (before - s)
+            for _ in range(HALVINGS):
+                middle = 0.5 * (last + t)
+                x, y, z = o[0] + middle * d[0], o[1] + middle * d[1], o[2] + middle * d[2]
+                s, _ = distance(x, y, z, solid, True)
+                last, t = (middle, t) if s < 0.0 else (last, middle)
+            return 0.5 * (last + t)
         if s >= 0.0 and t > start + GRAZING:
             return t
         before, last = s, t

@@ -226,3 +226,17 @@ def test_a_part_begins_with_something_that_is_there() -> None:
     built.box([0, 0, 0], [1, 1, 1], cut=True)
     with pytest.raises(ValueError, match="begins with something"):
         built.finish()
+
+
+def test_a_flat_ellipsoid_is_as_thick_as_it_is() -> None:
+    """Its slope says nothing about distances inside: rays once left it far too late."""
+    built = Builder()
+    built.part(0)
+    built.ellipsoid([0, 0, 0], [1, 0.7, 0.02])
+    solid = built.finish()
+    half = solid.numbers[0, :3]
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-0.6, 0.6, 15), np.linspace(-0.6, 0.6, 15)))
+    places = np.stack([x * half[0], y * half[1], np.full(len(x), 2.0)], 1)
+    out = _trace(solid, places, np.array([0.0, 0, -1]))
+    thick = 2 * half[2] * np.sqrt(1 - x**2 - y**2)
+    np.testing.assert_allclose(out[:, 1] - out[:, 0], thick, atol=1.5e-3)

@@ -72,6 +72,7 @@ def _load(rng: Rng, built: Builder, middle: F64, size: F64) -> None:
             built.cylinder(at, 0.1, 0.95 * rear, 0.01, turned(0, 0, np.pi / 2))
     if load == "ladder":
         built.part(METAL)
+        built.limb(middle + [-0.6 * rear, 0.3, 0], middle + [-0.6 * rear, 0.52, 0], 0.1, 0.1)
         for sign in (1, -1):
             built.limb(
                 middle + [-rear, 0.5, 0.12 * sign],
