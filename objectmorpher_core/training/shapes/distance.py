@@ -30,15 +30,18 @@ SIZE = 8  # numbers of a primitive
 JOIN, CUT, KEEP = 0, 1, 2  # union, difference, intersection
 
 FAR = 1e9
-STEPS = 96  # of a ray
-CLOSE = 4e-4  # x distance, at which a surface is met
+STEPS = 192  # of a ray
+CLOSE = 6e-4  # from a surface, at which it is met
+ALMOST = 4e-3  # from it, where a ray along a surface has used up its steps
 GRAZING = 0.02  # along a ray that touches a surface without getting in
+LEAST_STEP = 3e-3  # within the object
+HALVINGS = 4  # of a step in which a ray leaves it
 SLOW = 0.8  # of a step, where distances are only nearly bounds
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _polygon(x, y, outlines, first, count):
-    """Distance to a closed polygon, negative inside."""
+def _polygon(x, y, outlines, first, count, axis):
+    """Distance to a closed polygon, negative inside; sides with x <= axis are no surface."""
     best, sign = FAR, 1.0
     j = first + count - 1
     for i in range(first, first + count):
@@ -46,7 +49,8 @@ def _polygon(x, y, outlines, first, count):
         wx, wy = x - outlines[i, 0], y - outlines[i, 1]
         t = min(max((wx * ex + wy * ey) / max(ex * ex + ey * ey, 1e-12), 0.0), 1.0)
         bx, by = wx - ex * t, wy - ey * t
-        best = min(best, bx * bx + by * by)
+        if outlines[i, 0] > axis or outlines[j, 0] > axis:
+            best = min(best, bx * bx + by * by)
         above, below = y >= outlines[i, 1], y < outlines[j, 1]
         left = ex * wy > ey * wx
         if (above and below and left) or (not above and not below and not left):
@@ -56,12 +60,42 @@ def _polygon(x, y, outlines, first, count):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _ellipsoid(x, y, z, a):
+    """As below; inside, where that may be far too much, no more than along the shortest axis."""
+    px, py, pz = (x / a[0]) ** 2, (y / a[1]) ** 2, (z / a[2]) ** 2
+    square = px + py + pz
+    norm = math.sqrt(square)
+    slope = math.sqrt(px / a[0] ** 2 + py / a[1] ** 2 + pz / a[2] ** 2)
+    first = norm * (norm - 1.0) / max(slope, 1e-9)
+    if square >= 1.0:
+        return first
+    short = min(a[0], min(a[1], a[2]))
+    own = px if a[0] == short else (py if a[1] == short else pz)
+    depth = short * (math.sqrt(max(1.0 - square + own, 0.0)) - math.sqrt(own))
+    return max(first, -depth) if norm > 1e-6 else -short
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _superquadric(x, y, z, a):
+    """(f - 1) / |its slope| of the norm f whose unit ball it is: a bound, as f is convex."""
+    size = max(max(x, max(y, z)), 1e-6)
+    x, y, z = max(x / size, 1e-4), max(y / size, 1e-4), max(z / size, 1e-4)
+    side, above = a[3], a[4]
+    px, py, pz = x ** (2 / above), y ** (2 / side), z ** (2 / above)
+    level = (px + pz) ** (above / side)
+    total = level + py
+    norm = total ** (side / 2)
+    around = norm / total * level / (px + pz)
+    gx, gz, gy = around * px / (x * a[0]), around * pz / (z * a[2]), norm / total * py / (y * a[1])
+    slope = math.sqrt(gx * gx + gy * gy + gz * gz)
+    return max((size * norm - 1.0) / max(slope, 1e-9), -min(a[0], min(a[1], a[2])))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _primitive(kind, x, y, z, a, outlines):
     """Distance from a place in the primitive's own frame; `a`: its numbers."""
     if kind == ELLIPSOID:
-        k0 = math.sqrt((x / a[0]) ** 2 + (y / a[1]) ** 2 + (z / a[2]) ** 2)
-        k1 = math.sqrt((x / a[0] ** 2) ** 2 + (y / a[1] ** 2) ** 2 + (z / a[2] ** 2) ** 2)
-        return k0 * (k0 - 1.0) / max(k1, 1e-9) if k0 > 1e-6 else -min(a[0], min(a[1], a[2]))
+        return _ellipsoid(abs(x), abs(y), abs(z), a)
     if kind == BOX:
         qx, qy, qz = abs(x) - a[0] + a[3], abs(y) - a[1] + a[3], abs(z) - a[2] + a[3]
         out = math.sqrt(max(qx, 0.0) ** 2 + max(qy, 0.0) ** 2 + max(qz, 0.0) ** 2)
@@ -84,27 +118,24 @@ def _primitive(kind, x, y, z, a, outlines):
         along = x * sx + z * cx if cx * x > sx * z else math.sqrt(x * x + z * z)
         return math.sqrt(max(x * x + y * y + z * z + a[0] ** 2 - 2 * a[0] * along, 0.0)) - a[1]
     if kind == LATHE:
-        return _polygon(math.sqrt(x * x + z * z), y, outlines, int(a[0]), int(a[1]))
+        return _polygon(math.sqrt(x * x + z * z), y, outlines, int(a[0]), int(a[1]), 1e-6)
     if kind == PRISM:
-        d, h = _polygon(x, y, outlines, int(a[0]), int(a[1])) + a[3], abs(z) - a[2] + a[3]
+        d, h = _polygon(x, y, outlines, int(a[0]), int(a[1]), -FAR) + a[3], abs(z) - a[2] + a[3]
         return min(max(d, h), 0.0) + math.sqrt(max(d, 0.0) ** 2 + max(h, 0.0) ** 2) - a[3]
     if kind == SUPERQUADRIC:
-        px, py, pz = abs(x / a[0]) + 1e-6, abs(y / a[1]) + 1e-6, abs(z / a[2]) + 1e-6
-        around = (px ** (2 / a[4]) + pz ** (2 / a[4])) ** (a[4] / a[3])
-        f = (around + py ** (2 / a[3])) ** (a[3] / 2)
-        r = math.sqrt(x * x + y * y + z * z)
-        return 0.6 * r * (1.0 - 1.0 / max(f, 1e-6))
+        return _superquadric(abs(x / a[0]), abs(y / a[1]), abs(z / a[2]), a)
     # A sheet, bent about y and waved
-    bend = a[7]
+    bend, near = a[7], 1.0
     if abs(bend) > 1e-4:
         radius = 1.0 / bend
         angle = math.atan2(x, radius - z) if bend > 0 else math.atan2(x, z - radius)
         away = math.sqrt(x * x + (radius - z) ** 2)
+        near = min(away * abs(bend), 1.0)  # lengths along it are shorter inside the bend
         x, z = angle * abs(radius), (radius - away) if bend > 0 else (away + radius)
     z -= a[3] * math.sin(a[4] * x + a[6]) * math.cos(a[5] * y + 0.5 * a[6])
     steep = 1.0 + abs(a[3]) * max(abs(a[4]), abs(a[5]))
     edge = math.sqrt((x / a[0]) ** 4 + (y / a[1]) ** 4) ** 0.5
-    side = (edge - 1.0) * min(a[0], a[1])
+    side = (edge - 1.0) * min(a[0], a[1]) * near
     return max(side, abs(z) - a[2]) / steep
 
 
@@ -120,7 +151,7 @@ def _joined(a, b, soft):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def distance(px, py, pz, solid, is_filled):
     """To the object, and the part that is nearest; `is_filled`: cavities are not cut away."""
-    kinds, frames, numbers, joins, softness, cavities, parts, bounds, outlines, warp = solid
+    kinds, frames, numbers, joins, softness, cavities, balls, parts, bounds, outlines, warp = solid
     x, y, z = px, py, pz
     slow = 1.0
     if warp[0] != 0.0:  # twisted about y
@@ -145,6 +176,12 @@ def distance(px, py, pz, solid, is_filled):
         for k in range(parts[part, 0], parts[part, 1]):
             if is_filled and cavities[k]:
                 continue
+            b = balls[k]
+            least = math.sqrt((x - b[0]) ** 2 + (y - b[1]) ** 2 + (z - b[2]) ** 2) - b[3]
+            if joins[k] == JOIN and least > own + softness[k]:
+                continue  # too far away to matter
+            if joins[k] == CUT and least > softness[k] - own:
+                continue
             f = frames[k]
             qx = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z + f[0, 3]
             qy = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z + f[1, 3]
@@ -164,28 +201,34 @@ def distance(px, py, pz, solid, is_filled):
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _towards(o, d, start, end, solid, is_filled):
     """Distance along a ray at which the object is met, and its part; -1 where it is not."""
-    t = start
+    t, s, part = start, FAR, -1
     for _ in range(STEPS):
         s, part = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], solid, is_filled)
-        if s < CLOSE * max(t, 1.0):
+        if s < CLOSE:
             return t, part
         t += SLOW * s
         if t > end:
-            break
-    return -1.0, -1
+            return -1.0, -1
+    return (t, part) if s < ALMOST else (-1.0, -1)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _out_of(o, d, start, end, solid):
     """Distance along a ray that begins within at which the filled object is left."""
-    t, is_within = start, False
+    t, before, last = start, 0.0, start
     for _ in range(STEPS):
         s, _ = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], solid, True)
-        if s < 0.0:
-            is_within = True
-        elif is_within or t > start + GRAZING:
+        if s >= 0.0 and before < 0.0:  # the surface is between the last two places
+            for _ in range(HALVINGS):
+                middle = 0.5 * (last + t)
+                x, y, z = o[0] + middle * d[0], o[1] + middle * d[1], o[2] + middle * d[2]
+                s, _ = distance(x, y, z, solid, True)
+                last, t = (middle, t) if s < 0.0 else (last, middle)
+            return 0.5 * (last + t)
+        if s >= 0.0 and t > start + GRAZING:
             return t
-        t += max(SLOW * abs(s), 1.5e-3)
+        before, last = s, t
+        t += max(SLOW * abs(s), LEAST_STEP)
         if t > end:
             break
     return min(t, end)
@@ -204,6 +247,17 @@ def _normal(x, y, z, solid):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _facing(n, d):
+    """A normal that a ray `d` can see: at edges the slopes of both sides are mixed."""
+    away = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    if away <= 0.0:
+        return n
+    x, y, z = n[0] - away * d[0], n[1] - away * d[1], n[2] - away * d[2]
+    size = math.sqrt(x * x + y * y + z * z)
+    return (x / size, y / size, z / size) if size > 1e-3 else (-d[0], -d[1], -d[2])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def shade(x, y, z, way, solid, steps, sharp):
     """How much of a lamp in the direction `way` reaches a place, in [0, 1]; soft-edged."""
     light, t = 1.0, 0.02
@@ -216,6 +270,16 @@ def shade(x, y, z, way, solid, steps, sharp):
         if t > 3.0:
             break
     return light
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _openness(x, y, z, n, solid):
+    """How free the space before a surface is, in [0, 1]."""
+    opened = 0.0
+    for step in (0.05, 0.15, 0.3):
+        s, _ = distance(x + step * n[0], y + step * n[1], z + step * n[2], solid, False)
+        opened += min(max(s, 0.0) / step, 1.0) / 3.0
+    return opened
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -241,7 +305,7 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
             t, part = _towards(eye, d, start, end, solid, False)
             if t > 0.0:
                 x, y, z = eye[0] + t * d[0], eye[1] + t * d[1], eye[2] + t * d[2]
-                n = _normal(x, y, z, solid)
+                n = _facing(_normal(x, y, z, solid), d)
                 row[0], row[3] = t, part
                 row[4], row[5], row[6] = n
                 row[1] = _out_of(eye, d, t, end, solid)
@@ -249,13 +313,7 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
                 back, _ = _towards(far, (-d[0], -d[1], -d[2]), 0.0, end - t, solid, True)
                 row[2] = end - back if back >= 0.0 else t
                 row[2] = max(row[2], row[1])
-                opened = 0.0
-                for step in (0.05, 0.15, 0.3):
-                    s, _ = distance(
-                        x + step * n[0], y + step * n[1], z + step * n[2], solid, False
-                    )
-                    opened += min(max(s, 0.0) / step, 1.0) / 3.0
-                row[7] = opened
+                row[7] = _openness(x, y, z, n, solid)
                 for lamp in range(len(lamps)):
                     way = lamps[lamp]
                     facing = way[0] * n[0] + way[1] * n[1] + way[2] * n[2]
@@ -273,6 +331,25 @@ def trace(rays, eye, solid, lamps, ground, first, last, out):
                 row[11] = shade(x, ground + 2e-3, z, lamps[0], solid, 24, 6.0)
                 s, _ = distance(x, ground + 0.15, z, solid, False)
                 row[12] = min(max(s, 0.0) / 0.15, 1.0)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def lowest(solid, columns):
+    """The least y of the object, by rays upwards, so many across; never too low by half a gap."""
+    best, gap = 1.0, 2.0 / columns
+    for i in range(columns):
+        for j in range(columns):
+            x, z = -1.0 + gap * (i + 0.5), -1.0 + gap * (j + 0.5)
+            if x * x + z * z > 1.0:
+                continue
+            y = -1.02
+            while y < best:
+                s, _ = distance(x, y, z, solid, True)
+                if s < 0.5 * gap:
+                    best = y
+                    break
+                y += SLOW * s
+    return best
 
 
 def ball_of(points: np.ndarray) -> np.ndarray:

@@ -38,7 +38,8 @@ def photographs() -> tuple[F32, ...]:
     from sklearn.datasets import load_sample_image
 
     names = ("astronaut", "chelsea", "coffee", "rocket", "brick", "grass", "gravel")
-    shown = [getattr(data, name)() for name in (*names, "hubble_deep_field", "immunohistochemistry")]
+    names = (*names, "hubble_deep_field", "immunohistochemistry")
+    shown = [getattr(data, name)() for name in names]
     shown += [data.stereo_motorcycle()[0], load_sample_image("china.jpg")]
     pictures = []
     for image in shown:

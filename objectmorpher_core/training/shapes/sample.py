@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ...arrays import F32, F64, RGB, Mask
-from .distance import trace
+from .distance import lowest, trace
 from .families import FAMILIES
 from .materials import Material, a_colour, a_crop, a_material, albedo, grain, linear, noise_block
 from .solid import Builder, Solid, turned
@@ -29,6 +29,9 @@ LEAST = 0.04  # x crop's area, that an object covers at least
 CUT = 0.18  # how often the photo's frame cuts the object
 JUMP = 0.035  # crop units between neighbouring pixels, beyond what their slopes explain
 NO_GROUND = -99.0
+COLUMNS = 96  # rays each way, by which the ground beneath the object is found
+FACED = 0.4  # how often the photographer stood before the object
+TWISTED, BENT = 1.0, 0.6  # radians per radius at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +83,12 @@ def _try(rng: np.random.Generator, name: str, side: int) -> Sample | None:
     """None where the object is hardly seen."""
     built = FAMILIES[name](rng)
     if rng.random() < 0.12:
-        built.twist = rng.normal(0, 0.5)
+        built.twist = float(np.clip(rng.normal(0, 0.5), -TWISTED, TWISTED))
     if rng.random() < 0.1:
-        built.bend = rng.normal(0, 0.25)
+        built.bend = float(np.clip(rng.normal(0, 0.25), -BENT, BENT))
     solid = built.finish()
     eye = _aim(rng)
-    ground = -_lowest(solid) if eye.axes[2, 1] < -0.05 and rng.random() < 0.75 else NO_GROUND
+    ground = lowest(solid, COLUMNS) if eye.axes[2, 1] < -0.05 and rng.random() < 0.75 else NO_GROUND
     eye = _framed(rng, solid, eye)
     if eye is None:
         return None
@@ -108,7 +111,8 @@ def _aim(rng: np.random.Generator) -> _Eye:
     width = 2 * np.tan(field / 2) * share  # tangents
     away = max(NEAREST, 1.25 / np.sin(np.arctan(width / 2)) / np.sqrt(2.0))
     pitch = np.radians(rng.choice([rng.uniform(-5, 35), rng.uniform(-50, 88)], p=[0.75, 0.25]))
-    axes = turned(rng.uniform(0, 2 * np.pi)).T  # turns the object about the upright
+    yaw = rng.normal(0, 0.7) if rng.random() < FACED else rng.uniform(0, 2 * np.pi)
+    axes = turned(yaw).T  # turns the object about the upright; what has a front looks along +z
     axes = turned(0, pitch, np.radians(rng.normal(0, 6))) @ axes
     room = 0.5 * max(2 * np.tan(field / 2) - width, 0.0)
     middle = rng.uniform(-room, room, 2) * [1.0, 0.6]
@@ -153,21 +157,6 @@ def _lamps(rng: np.random.Generator, eye: _Eye) -> F64:
     return lamps / np.linalg.norm(lamps, axis=1, keepdims=True)
 
 
-def _lowest(solid: Solid) -> float:
-    """How far below the middle the object reaches: where the ground is."""
-    rays = np.zeros((400, 3))
-    ring = np.linspace(-0.95, 0.95, 20)
-    grid = np.stack(np.meshgrid(ring, ring), -1).reshape(-1, 2)
-    rays[:] = [0, 1.0, 0]
-    lowest = 1.0
-    out = np.zeros((1, 16))
-    for x, z in grid[np.linalg.norm(grid, axis=1) < 1]:
-        trace(rays[:1], np.array([x, -1.5, z]), solid, np.zeros((0, 3)), NO_GROUND, 0, 1, out)
-        if out[0, 0] > 0:
-            lowest = min(lowest, 1.5 - out[0, 0])
-    return lowest
-
-
 def _materials(rng: np.random.Generator, built: Builder) -> list[Material]:
     """One for each part; parts with the same number look the same, others often alike."""
     base = a_colour(rng)
@@ -204,7 +193,9 @@ def _picture(
     return picture.reshape(side, side, 3)
 
 
-def _lit(material: Material, at: F64, normal: F64, rays: F64, lamps: F64, out: F64, light: tuple) -> F64:  # fmt: skip
+def _lit(
+    material: Material, at: F64, normal: F64, rays: F64, lamps: F64, out: F64, light: tuple
+) -> F64:
     """(n, 3) light that places (n, 3) send along rays (n, 3) (Blinn 1977)."""
     noise, power, tint, sky, backdrop, side, eye = light
     colour = albedo(material, at, normal, noise)
@@ -244,8 +235,11 @@ def _measured(
     rng: np.random.Generator, name: str, eye: _Eye, out: F64, lengths: F64, mask: Mask, picture: F64
 ) -> Sample:
     side = len(mask)
+    rgb, shown = _developed(rng, picture), mask
+    if rng.random() < CUT:
+        rgb, shown = _cut(rng, rgb, mask)
     away, exit_, last = (np.where(mask.ravel(), out[:, k], 0.0) for k in (0, 1, 2))
-    mean = away[mask.ravel()].mean()
+    mean = away[shown.ravel()].mean()
     # One crop unit: its width at the object's distance, which is measured along the middle ray.
     unit = mean / np.hypot(np.linalg.norm(eye.middle), 1.0) * eye.width
     front = np.where(mask, (mean - away.reshape(mask.shape)) / unit, 0)
@@ -253,10 +247,7 @@ def _measured(
     depth = np.where(mask, (last - away).reshape(mask.shape) / unit, 0)
     normal = (out[:, 4:7] @ eye.axes.T).reshape(side, side, 3) * mask[..., None]
     part = np.where(mask, out[:, 3].reshape(mask.shape), -1).astype(np.int16)
-    edge = _hiding(front, mask)
-    rgb = _developed(rng, picture)
-    if rng.random() < CUT:
-        rgb, mask = _cut(rng, rgb, mask)
+    edge, mask = _hiding(front, mask), shown
     kept = mask.astype(np.float32)
     tangents = np.array([*eye.middle, eye.width], np.float32)
     return Sample(

@@ -1,0 +1,41 @@
+"""The kinds of objects; each is a function of a random generator that returns a `Builder`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..solid import Builder
+from .boxes import boxes
+from .busts import busts
+from .creatures import creatures
+from .extrusions import extrusions
+from .figures import figures
+from .furniture import furniture
+from .lumps import superquadrics
+from .plants import plants
+from .rings import rings
+from .sheets import sheets
+from .vehicles import vehicles
+from .vessels import lathe
+
+Family = Callable[[np.random.Generator], Builder]
+
+# Names and what makes such an object
+FAMILIES: dict[str, Family] = {
+    "creatures": creatures,
+    "figures": figures,
+    "busts": busts,
+    "lathe": lathe,
+    "boxes": boxes,
+    "furniture": furniture,
+    "rings": rings,
+    "plants": plants,
+    "vehicles": vehicles,
+    "sheets": sheets,
+    "superquadrics": superquadrics,
+    "extrusions": extrusions,
+}
+
+__all__ = ["FAMILIES", "Family"]
