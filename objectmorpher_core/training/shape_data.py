@@ -74,7 +74,7 @@ def _write(job: tuple[Path, int, tuple[str, ...] | None]) -> None:
     arrays["tokens"] = _tokens(np.stack([s.rgb for s in samples]))
     partial = file.with_suffix(".part")
     with partial.open("wb") as out:
-        np.savez(out, **arrays)
+        np.savez(out, allow_pickle=False, **arrays)
     partial.rename(file)
 
 
@@ -123,9 +123,7 @@ def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = No
 
     count = len(arrays["mask"])
     masks = [m if rng is None else _worn(m, rng) for m in arrays["mask"]]
-    planes = [
-        planes_of(arrays["rgb"][k], masks[k], arrays["tangents"][k]) for k in range(count)
-    ]
+    planes = [planes_of(arrays["rgb"][k], masks[k], arrays["tangents"][k]) for k in range(count)]
 
     def image(name: str) -> Tensor:
         return torch.from_numpy(arrays[name].astype(np.float32))[:, None]

@@ -52,7 +52,7 @@ def relief_surfaces(mask: Mask, tangents: F32, is_standing: bool = True) -> Surf
     camera = Camera(focal, centre[0], centre[1], side, side)
     body = Body.of(Silhouette.of(mask), camera, LiftSettings(is_standing=is_standing))
     rows, columns = np.nonzero(mask)
-    xy = np.column_stack([columns + 0.5, rows + 0.5])
+    xy = np.column_stack([columns, rows]).astype(np.float64) + 0.5
     heights = [body.sample(xy, sheet)[0] / side for sheet in (FRONT, BACK)]
     surfaces = np.zeros((2, side, side))
     surfaces[0][mask], surfaces[1][mask] = heights[0], heights[0] - heights[1]

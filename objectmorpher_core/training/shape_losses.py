@@ -50,7 +50,9 @@ def _slopes(error: Tensor, mask: Tensor) -> Tensor:
     total = error.new_zeros(())
     for step in STEPS:
         for axis in (2, 3):
-            first, last = (torch.narrow(error, axis, s, error.shape[axis] - step) for s in (0, step))
+            first, last = (
+                torch.narrow(error, axis, s, error.shape[axis] - step) for s in (0, step)
+            )
             a, b = (torch.narrow(mask, axis, s, mask.shape[axis] - step) for s in (0, step))
             total = total + _mean((last - first).abs(), a * b)
     return total / (2 * len(STEPS))

@@ -6,6 +6,7 @@ Everything is kept in one folder; called again it goes on where it was stopped.
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from collections.abc import Iterator
@@ -50,7 +51,9 @@ class Plan:
         return tuple(name for name in FAMILIES if name not in self.held_out)
 
 
-def train(folder: Path, plan: Plan, minutes: float | None = None, progress: Progress = silent) -> Path:  # fmt: skip
+def train(
+    folder: Path, plan: Plan, minutes: float | None = None, progress: Progress = silent
+) -> Path:
     """Trains in `folder`, for so many minutes at most; the path of the checkpoint."""
     files = _samples(folder / "samples", 0, plan.samples, plan.families)
     _samples(folder / "unseen", UNSEEN, CHECKED, None)
@@ -144,7 +147,7 @@ def _schedule(share: float) -> float:
     """Up, and down along a cosine."""
     if share < WARM_UP:
         return share / WARM_UP
-    return 0.5 * (1 + np.cos(np.pi * min((share - WARM_UP) / (1 - WARM_UP), 1.0))) + 0.01
+    return 0.505 + 0.495 * math.cos(math.pi * min((share - WARM_UP) / (1 - WARM_UP), 1.0))
 
 
 def trained(checkpoint: Path) -> ShapeNet:
