@@ -24,8 +24,13 @@ from objectmorpher_core.document import (
     Placement,
 )
 from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.depth_prior import Seen
+from objectmorpher_core.lift.mirror import MirrorAxis
 from objectmorpher_core.lift.relief import ReliefLifter
+from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.lift.standing import FLAT
+from objectmorpher_core.lift.thickness import Thickness
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.pixels import crop
 from objectmorpher_core.progress import silent
@@ -87,17 +92,31 @@ def results() -> list[Result]:
     seen = Seen(_filled(pair.disparity), (0, 0, width, height))
     subject = Subject(pair.left, camera, pair.mask, matte)
     deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(), silent)
+    board = ReliefLifter(shape=_slab).lift(subject, alone, silent)
     known = pair.disparity[pair.mask & (pair.disparity > 0)]
     card = float(np.median(known))
     slab = _card_shot(matte, card, (height, width))
     color, error = _relief_shot(pair, matte, lifted, camera)
     deep_color, deep_error = _relief_shot(pair, matte, deep, camera)
+    board_color, board_error = _relief_shot(pair, matte, board, camera)
     flat = float(np.sqrt(((known - card) ** 2).mean()))
     return [
         Result("relief", *_compared(pair, color), error),
         Result("relief with true depth", *_compared(pair, deep_color), deep_error),
+        Result("constant thickness", *_compared(pair, board_color), board_error),
         Result("card at the median disparity", *_compared(pair, slab), flat),
     ]
+
+
+def _slab(
+    silhouette: Silhouette, camera: Camera, settings: LiftSettings, axis: MirrorAxis | None
+) -> Body:
+    """As thick everywhere as the relief is on average, and facing the camera."""
+    inflated = Thickness.of(silhouette)
+    half, _ = inflated.sample(silhouette.cells[silhouette.inside], silhouette.cell)
+    even = np.full(silhouette.shape, float(half.mean()))
+    side = inflated.mixed(even, np.ones(silhouette.shape))
+    return Body(silhouette, FLAT, np.zeros(silhouette.shape), side, side)
 
 
 def _filled(disparity: F64) -> F32:

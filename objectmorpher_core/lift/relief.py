@@ -8,6 +8,7 @@ carries the matte's soft edge.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -43,15 +44,20 @@ NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of 
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
+Shaper = Callable[[Silhouette, Camera, LiftSettings, MirrorAxis | None], Body]
+
 
 class ReliefLifter:
     """`--lift relief`: the embedded default."""
 
     name = "relief"
 
-    def __init__(self, look: Look = look) -> None:
-        """`look` tells the depth of what is seen: by default as an installed network does."""
-        self._look = look
+    def __init__(self, look: Look = look, shape: Shaper = Body.of) -> None:
+        """`look` tells the depth of what is seen: by default as an installed network does.
+
+        `shape` makes the body of a silhouette.
+        """
+        self._look, self._shape = look, shape
 
     def missing(self) -> str | None:
         return None
@@ -69,7 +75,7 @@ class ReliefLifter:
         outline = Silhouette.of(mask if hidden is None else mask | hidden)
         canvas = _canvas(matte, hidden, area, settings.count)
         axis = _axis(canvas, settings)
-        body = Body.of(outline, camera, settings, axis)
+        body = self._shape(outline, camera, settings, axis)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)
