@@ -100,8 +100,8 @@ class _State:
     def resumed(folder: Path, plan: Plan) -> _State:
         """As it was saved last, with the same plan; fresh where it was not."""
         state = _State(folder / "checkpoint.pt", plan)
-        if state.file.exists():
-            kept = torch.load(state.file, weights_only=True)
+        kept = torch.load(state.file, weights_only=True) if state.file.exists() else None
+        if kept is not None and kept["plan"] == json.dumps(asdict(plan)):
             state.net.load_state_dict(kept["net"])
             state.optimiser.load_state_dict(kept["optimiser"])
             state.mean, state.step, state.history = kept["mean"], kept["step"], kept["history"]
