@@ -19,7 +19,7 @@ from .terminal import PROGRAM
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
-COMMANDS = ("edit", "select", "replay", "info", "convert", "models", "bench")
+COMMANDS = ("edit", "select", "replay", "info", "convert", "models", "bench", "train")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -63,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_convert(commands.add_parser("convert", help="turn splat and mesh files into each other"))
     _add_bench(commands.add_parser("bench", help="measure, on objects it makes itself"))
     _add_models(commands.add_parser("models", help="list, get and check learned weights"))
+    _add_train(commands.add_parser("train", help="make the product's own networks anew"))
     return parser
 
 
@@ -205,6 +206,25 @@ def _add_models(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("id", nargs="?", help="one weight; default all of them")
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="to add: add depth FILE")
     parser.set_defaults(run=_lazily("models"))
+
+
+def _add_train(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Trains on endless made-up objects; called again it goes on."
+    add = parser.add_argument
+    add("network", choices=("shape",), help="which one")
+    add("--folder", type=Path, required=True, metavar="DIR", help="samples and checkpoints")
+    add("--samples", type=int, default=8192, metavar="N", help="objects to make")
+    add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
+    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
+    add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
+    add("--seed", type=int, default=0)
+    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
+    add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
+    parser.set_defaults(run=_lazily("train"))
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def _lazily(name: str) -> Callable[[argparse.Namespace], None]:

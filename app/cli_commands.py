@@ -27,6 +27,7 @@ from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 
 from .cli_models import run_models
+from .cli_train import run_train
 from .terminal import PROGRAM, UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
@@ -279,4 +280,5 @@ __all__ = [
     "run_models",
     "run_replay",
     "run_select",
+    "run_train",
 ]

@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 CORE, APP = ROOT / "objectmorpher_core", ROOT / "app"
+TRAINING = CORE / "training"
 WINDOW = {"imgui_bundle", "imgui", "glfw", "OpenGL"}
 GL = {"moderngl", "glcontext"}
 HEAVY = {"torch", "onnxruntime", "patchmatch", "trimesh", "tifffile"}  # only inside functions
@@ -68,7 +69,16 @@ def test_core_knows_no_window(path):
 @pytest.mark.parametrize("path", sources(CORE), ids=name_of)
 def test_core_starts_light(path):
     others = tops(path, is_at_import=True) - set(sys.stdlib_module_names)
+    if path.parent == TRAINING:  # networks are classes of torch's
+        others -= {"torch"}
     assert others <= CORE_AT_IMPORT, "import it inside the function that needs it"
+
+
+@pytest.mark.parametrize("path", [*sources(CORE), *sources(APP)], ids=name_of)
+def test_only_training_knows_of_training(path):
+    is_its_own = TRAINING in path.parents
+    reached = {".".join(name.split(".")[:2]) for name in imports(path, is_at_import=True)}
+    assert is_its_own or "objectmorpher_core.training" not in reached
 
 
 @pytest.mark.parametrize("path", sources(APP), ids=name_of)

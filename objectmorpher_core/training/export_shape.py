@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from pathlib import Path
 
 import torch
@@ -22,13 +21,12 @@ def export(net: ShapeNet, path: Path) -> str:
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-    whole = io.BytesIO()
     inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
     torch.onnx.export(
-        net.eval(), inputs, whole, input_names=list(INPUTS), output_names=[OUTPUT],
+        net.eval(), inputs, path, input_names=list(INPUTS), output_names=[OUTPUT],
         opset_version=OPSET, dynamo=False,
     )  # fmt: skip
-    model = onnx.load_from_string(whole.getvalue())
+    model = onnx.load(path)
     graph = model.graph
     narrow, casts = [], []
     for weight in graph.initializer:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,6 +28,7 @@ UNSEEN = 50_000_000  # the first seed that is never trained on
 CHECKED = 8 * SHARD  # unseen samples
 WARM_UP = 0.04  # share of the steps, during which the rate rises
 MEMORY = 0.999  # of the mean of weights that is kept and shipped
+CURVE = 100  # points of the learning curve that are told
 SAVED = 120.0  # s between two checkpoints
 
 
@@ -54,7 +56,12 @@ class Plan:
 def train(
     folder: Path, plan: Plan, minutes: float | None = None, progress: Progress = silent
 ) -> Path:
-    """Trains in `folder`, for so many minutes at most; the path of the checkpoint."""
+    """Trains in `folder`, for so many minutes at most; the path of the checkpoint.
+
+    Raises ValueError for fewer samples than a step takes.
+    """
+    if plan.samples < plan.size:
+        raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
     files = _samples(folder / "samples", 0, plan.samples, plan.families)
     _samples(folder / "unseen", UNSEEN, CHECKED, None)
     state = _State.resumed(folder, plan)
@@ -155,6 +162,30 @@ def trained(checkpoint: Path) -> ShapeNet:
     net = ShapeNet()
     net.load_state_dict(torch.load(checkpoint, weights_only=True)["mean"])
     return net.eval()
+
+
+def figures(folder: Path, net: ShapeNet) -> dict[str, Any]:
+    """Scores on samples that were never trained on, by family and in all, and the curve."""
+    kept = torch.load(folder / "checkpoint.pt", weights_only=True)
+    scores = check(net, sorted((folder / "unseen").glob("*.npz")))
+    ways = next(iter(scores.values()))
+    history = kept["history"]
+    bins = np.array_split(np.arange(len(history)), min(CURVE, len(history)))
+    return {
+        "plan": json.loads(kept["plan"]),
+        "steps": kept["step"],
+        "means": {
+            way: Score(*np.mean([row[way] for row in scores.values()], 0))._asdict() for way in ways
+        },
+        "families": {
+            name: {way: found._asdict() for way, found in row.items()}
+            for name, row in scores.items()
+        },
+        "curve": [
+            {part: round(float(np.mean([history[k][part] for k in own])), 4) for part in history[0]}
+            for own in bins
+        ],
+    }
 
 
 @torch.inference_mode()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -101,3 +103,27 @@ def test_it_runs_without_torch(arrays, tmp_path):
         expected = net(batch.planes[:1], batch.tokens[:1]).numpy()
     assert found.shape[1] == OUTPUTS
     assert np.abs(found - expected).mean() < 2e-3 * max(1.0, np.abs(expected).mean())
+
+
+def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("onnx")
+    from app.cli import main
+
+    for name, first in (("samples", 0), ("unseen", train_shape.UNSEEN)):
+        (tmp_path / name).mkdir()
+        four_times = {key: np.concatenate([array] * 4) for key, array in arrays.items()}
+        np.savez(tmp_path / name / f"{first:08d}.npz", **four_times)
+    monkeypatch.setattr(train_shape, "CHECKED", COUNT)
+    words = ["train", "shape", "--folder", str(tmp_path)]
+    assert main([*words, "--samples", "16", "--passes", "2"]) == 0
+    told = json.loads((tmp_path / "shape.json").read_text(encoding="utf-8"))
+    assert told["steps"] == 2
+    weights = (tmp_path / "shape.onnx").read_bytes()
+    assert told["sha256"] == hashlib.sha256(weights).hexdigest()
+    for way in ("network", "relief", "inflation"):
+        assert 0 < told["means"][way]["front"] < 2
+    capsys.readouterr()
+    assert main([*words, "--samples", "4"]) == 1
+    assert "fewer than" in capsys.readouterr().err
+    assert main([*words, "--hold-out", "boxes,unicorns"]) == 1
+    assert "no family 'unicorns'" in capsys.readouterr().err
