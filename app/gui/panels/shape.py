@@ -51,6 +51,7 @@ def _draw_back(editor: Editor) -> None:
         Choice("mirrored", t("Mirrored"), t("The other side looks like this one")),
         Choice("continued", t("Continued"), t("The rim goes on to the other side")),
     )
+    note(t("Other side"))
     back = segmented("back", choices, editor.shaping.settings.back)
     if back != editor.shaping.settings.back:
         editor.shaping.say(t("Other side"), back=back)
@@ -62,6 +63,7 @@ def _draw_symmetry(editor: Editor) -> None:
         Choice(True, t("Symmetric"), t("Left and right are alike: what is hidden is mirrored")),
         Choice(False, t("Not"), t("Left and right have nothing to do with each other")),
     )
+    note(t("Symmetry"))
     chosen = segmented("symmetry", choices, editor.shaping.settings.is_symmetric)
     if chosen != editor.shaping.settings.is_symmetric:
         editor.shaping.say(t("Symmetry"), is_symmetric=chosen)
