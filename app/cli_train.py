@@ -28,11 +28,12 @@ def run_train(options: argparse.Namespace) -> None:
     plan = Plan(options.samples, options.passes, held_out=held_out, seed=options.seed)
     with progress_bar("training") as progress:
         checkpoint = train(options.folder, plan, options.minutes, progress)
-    found = figures(options.folder, trained(checkpoint))
+    net = trained(checkpoint)
+    found = figures(options.folder, net)
     from objectmorpher_core.training.export_shape import export
 
     weights = options.output or options.folder / "shape.onnx"
-    found["sha256"] = export(trained(checkpoint), weights)
+    found["sha256"] = export(net, weights)
     report = options.report or weights.with_suffix(".json")
     write_all({report: json.dumps(found, indent=1).encode()})
     print(f"{weights}, figures in {report}")

@@ -6,8 +6,6 @@ it; the subject map, where its weights are here, says how far a whole object ext
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 
@@ -15,16 +13,13 @@ from .. import models
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
 from ..progress import Progress, part, silent
+from .dino_tokens import PATCH, WEIGHT, TokenNet
 from .piece_features import main_directions
 from .pieces import Pieces
 from .selection import SelectionError, box_mask, check_mask, check_prompt
-from .subject import DEVIATION, MEAN, SubjectNet
+from .subject import SubjectNet
 from .view import PhotoView, Tokens
 
-WEIGHT = "dinov2-vits14"
-IMAGES = "input_image"
-TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
-PATCH = 14  # px
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
 TILE_PATCHES = 900  # of a tile of a large photo
 SMALLEST_PATCH = 4  # px of the photo; finer ones would only see the enlargement's blur
@@ -36,7 +31,7 @@ class DinoWalk:
     name = "dino"
 
     def __init__(self) -> None:
-        self._session: Any = None
+        self._net: TokenNet | None = None
         self._subject = SubjectNet()
         self._view: PhotoView | None = None  # of the last photo
 
@@ -103,19 +98,9 @@ class DinoWalk:
             (w * PATCH, h * PATCH),
             interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC,
         )
-        pixels = ((small.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        tokens = self._open().run([TOKENS], {IMAGES: pixels})[0][0, 1:].reshape(h, w, -1)
-        return main_directions(np.asarray(tokens, np.float32))
+        return main_directions(self._open().tokens(np.asarray(small, np.uint8)))
 
-    def _open(self) -> Any:
-        """The network, opened so that it gives its patch tokens and takes any size."""
-        if self._session is None:
-            import onnxruntime
-
-            from ..models.onnx_graph import with_interface
-
-            path = models.path(WEIGHT)
-            assert path is not None, "encode() asks missing() first"
-            graph = with_interface(path.read_bytes(), IMAGES, TOKENS)
-            self._session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
-        return self._session
+    def _open(self) -> TokenNet:
+        if self._net is None:
+            self._net = TokenNet()
+        return self._net

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, RGB, Mask
+from ..progress import Progress, silent
 from .shapes.sample import SIDE, Sample, make_sample
 
 if TYPE_CHECKING:
@@ -50,7 +51,13 @@ def planes_of(rgb: RGB, mask: Mask, tangents: F32) -> F32:
     return np.concatenate([colours * 4, np.stack(own)]).astype(np.float32)
 
 
-def write_shards(folder: Path, first: int, count: int, families: tuple[str, ...] | None) -> None:
+def write_shards(
+    folder: Path,
+    first: int,
+    count: int,
+    families: tuple[str, ...] | None,
+    progress: Progress = silent,
+) -> None:
     """Files of samples with the seeds first.., those that are not there yet, in all cores."""
     folder.mkdir(parents=True, exist_ok=True)
     wanted = [
@@ -60,7 +67,7 @@ def write_shards(folder: Path, first: int, count: int, families: tuple[str, ...]
     ]
     with ProcessPoolExecutor(os.cpu_count(), initializer=_begin) as pool:
         for number, _ in enumerate(pool.map(_write, wanted), 1):
-            print(f"{number * SHARD} of {len(wanted) * SHARD} samples", flush=True)
+            progress(number / len(wanted), f"{number * SHARD} of {len(wanted) * SHARD} samples")
 
 
 def _begin() -> None:
@@ -97,11 +104,12 @@ _ENCODER: list[Any] = []
 
 def _tokens(rgb: np.ndarray) -> np.ndarray:
     """(n, 384, g, g) float16 of crops (n, s, s, 3)."""
-    from ..lift.shape_tokens import TokenNet
+    from ..segment.dino_tokens import TokenNet
 
     if not _ENCODER:
         _ENCODER.append(TokenNet(threads=1))
-    return np.concatenate([_ENCODER[0].tokens(one)[None] for one in rgb]).astype(np.float16)
+    found = np.stack([_ENCODER[0].tokens(one) for one in rgb])
+    return np.ascontiguousarray(found.transpose(0, 3, 1, 2), np.float16)
 
 
 def batches(files: list[Path], size: int, rng: np.random.Generator) -> Iterator[Batch]:

@@ -62,8 +62,8 @@ def train(
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
-    files = _samples(folder / "samples", 0, plan.samples, plan.families)
-    _samples(folder / "unseen", UNSEEN, CHECKED, None)
+    files = _samples(folder / "samples", 0, plan.samples, plan.families, progress)
+    _samples(folder / "unseen", UNSEEN, CHECKED, None, progress)
     state = _State.resumed(folder, plan)
     start, saved = time.monotonic(), time.monotonic()
     for batch in _endless(files, plan, state.step):
@@ -78,8 +78,10 @@ def train(
     return state.file
 
 
-def _samples(folder: Path, first: int, count: int, families: tuple[str, ...] | None) -> list[Path]:
-    write_shards(folder, first, count, families)
+def _samples(
+    folder: Path, first: int, count: int, families: tuple[str, ...] | None, progress: Progress
+) -> list[Path]:
+    write_shards(folder, first, count, families, progress)
     return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 

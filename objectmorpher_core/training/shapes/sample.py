@@ -15,7 +15,7 @@ import numpy as np
 from ...arrays import F32, F64, RGB, Mask
 from .distance import lowest, trace
 from .families import FAMILIES
-from .materials import Material, a_colour, a_crop, a_material, albedo, grain, linear, noise_block
+from .materials import Material, a_colour, a_crop, a_material, albedo, grain, noise_block
 from .solid import Builder, Solid, turned
 
 SIDE = 224  # px
@@ -296,6 +296,3 @@ def _cut(rng: np.random.Generator, rgb: RGB, mask: Mask) -> tuple[RGB, Mask]:
     if (mask & gone).sum() > 0.5 * mask.sum():
         return rgb, mask
     return np.where(gone[..., None], 0, rgb).astype(np.uint8), mask & ~gone
-
-
-__all__ = ["SIDE", "Sample", "linear", "make_sample"]

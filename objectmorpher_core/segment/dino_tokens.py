@@ -1,4 +1,4 @@
-"""DINOv2's patch tokens of a crop, as the shape network takes them."""
+"""DINOv2's patch tokens of a picture: selection walks over them, the shape network reads them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ import numpy as np
 
 from .. import models
 from ..arrays import F32, RGB
-from ..segment.dino_walk import IMAGES, PATCH, TOKENS, WEIGHT
-from ..segment.subject import DEVIATION, MEAN
+from .subject import DEVIATION, MEAN
+
+WEIGHT = "dinov2-vits14"
+IMAGES = "input_image"
+TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
+PATCH = 14  # px
 
 
 class TokenNet:
-    """DINOv2 ViT-S/14 (Oquab et al., arXiv 2304.07193), opened once."""
+    """DINOv2 ViT-S/14 (Oquab et al., arXiv 2304.07193), opened so that it takes any size."""
 
     def __init__(self, threads: int = 0) -> None:
-        """`threads` of one run; 0: as many as there are cores."""
+        """`threads` of one run; 0: one a core. Raises ModelError without the weights."""
         import onnxruntime
 
         from ..models.onnx_graph import with_interface
@@ -32,8 +36,8 @@ class TokenNet:
         )
 
     def tokens(self, rgb: RGB) -> F32:
-        """(384, g, g) for a crop (s, s, 3) whose side is g patches long."""
-        grid = rgb.shape[0] // PATCH
+        """(h, w, 384) of a picture of h x w patches."""
+        height, width = (n // PATCH for n in rgb.shape[:2])
         pixels = ((rgb.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        found = self._session.run([TOKENS], {IMAGES: pixels.astype(np.float32)})[0][0, 1:]
-        return np.ascontiguousarray(found.reshape(grid, grid, -1).transpose(2, 0, 1))
+        found = self._session.run([TOKENS], {IMAGES: pixels})[0][0, 1:]
+        return np.asarray(found.reshape(height, width, -1), np.float32)
