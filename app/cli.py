@@ -125,8 +125,14 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
     add("--floating", action="store_true", default=None,
         help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
+    add(
+        "--trust",
+        type=float,
+        metavar="T",
+        help="in the shape network, 0 to 1; 0: its outline alone tells its shape; default 1",
+    )
     add("--no-depth", action="store_true", default=None,
-        help="from its outline alone, though a depth model is installed")  # fmt: skip
+        help="not as a depth model sees it, though one is installed")  # fmt: skip
     add("--hidden", metavar="M.png", help="a mask of what of it is hidden behind something")
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
     add("--flip", action="store_true", default=None, help="that file stands on its head")

@@ -129,6 +129,7 @@ class LiftSettings:
     nearness: F32 | None = None  # (h, w) x its size, towards the camera; stretched over the photo
     horizon: float | None = None  # px, the row of the photo it lies in; None: not known
     uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
+    trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone tells the shape
 
     def __post_init__(self) -> None:
         if self.back not in BACKS:
@@ -138,6 +139,8 @@ class LiftSettings:
                 f"a thickness of {self.thickness:g} is not between {LEAST_THICKNESS:g} and"
                 f" {MOST_THICKNESS:g}"
             )
+        if not 0.0 <= self.trust <= 1.0:
+            raise ValueError(f"a trust of {self.trust:g} is not between 0 and 1")
         if self.hidden is not None:
             object.__setattr__(self, "hidden", frozen(self.hidden, np.bool_))
         if self.nearness is not None:

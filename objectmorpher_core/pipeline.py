@@ -238,6 +238,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
         hidden=hidden,
         horizon=document.horizon,
         uses_depth=not script.no_depth,
+        trust=script.trust,
     )
 
 

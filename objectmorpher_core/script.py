@@ -49,6 +49,7 @@ class EditScript:
     back: str = "auto"
     symmetry: str = "auto"
     floating: bool = False  # not turned as its feet on the ground tell
+    trust: float = 1.0  # in the shape network, of [0, 1]
     no_depth: bool = False  # not as a depth network sees it, where one is installed
     hidden: str | None = None  # file
     pin: tuple[XY, ...] = ()
@@ -198,7 +199,8 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
-    "no_depth": _flag, "hidden": _text, "gaussians": _whole(100, 2_000_000),
+    "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
+    "gaussians": _whole(100, 2_000_000),
     "pin": _points, "handle": _handles,
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
+from objectmorpher_core.lift import shape_look
 from objectmorpher_core.models import Added, State, Weight
 from objectmorpher_core.progress import Progress
+from objectmorpher_core.segment import dino_tokens
 
 from .. import job_functions
 from ..feedback import Action
@@ -106,6 +108,13 @@ class Models:
     def has_depth(self) -> bool:
         """Whether a depth model tells the relief of what is lifted, where that is wanted."""
         return any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
+
+    @property
+    def has_shape(self) -> bool:
+        """Whether the shape network can look at what is lifted."""
+        needed = {dino_tokens.WEIGHT: "ok"}.items()
+        is_fed = needed <= {state.weight.id: state.state for state in self.states}.items()
+        return is_fed and shape_look.is_shipped()
 
     def add(self, path: Path) -> None:
         """The user's depth model, tried before it is kept."""

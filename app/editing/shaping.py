@@ -64,6 +64,7 @@ class Shaping:
         self._stroke: Stroke | None = None
         self._painted, self._is_inverse = Painted.DEPTH, False
         self._fitting: Fitting | None = None
+        self._trust: float | None = None  # while it is dragged
 
     @property
     def settings(self) -> LiftSettings:
@@ -94,6 +95,20 @@ class Shaping:
             editor.preview = editor.derived.solved(changed, k, None)
         except ValueError as error:
             editor.complain(str(error))
+
+    @property
+    def trust(self) -> float:
+        """In the shape network, as it is or as it is dragged."""
+        return self.settings.trust if self._trust is None else self._trust
+
+    def preview_trust(self, trust: float) -> None:
+        """Another trust is shown as a number; `end_trust` lifts the object with it."""
+        self._trust = trust
+
+    def end_trust(self) -> None:
+        trust, self._trust = self.trust, None
+        if trust != self.settings.trust:
+            self.say(t("Trust"), trust=trust)
 
     def say(self, label: str, **words: object) -> None:
         """A word about the shape: fields of `LiftSettings`."""

@@ -21,6 +21,7 @@ class View:
     color: F64  # (h, w, 3) the mean of what is hit
     alpha: F64  # (h, w) share that is hit
     depth: F64  # (h, w) world, of the nearest; inf where nothing is
+    back: F64  # (h, w) world, of the farthest; -inf where nothing is
 
 
 def draw(solid: Solid, world: F64, camera: Camera) -> View:
@@ -28,7 +29,7 @@ def draw(solid: Solid, world: F64, camera: Camera) -> View:
     n = SAMPLES
     pixels = camera.project(world) * n
     height, width = camera.height * n, camera.width * n
-    nearest, face, corners = _rasterise(
+    nearest, farthest, face, corners = _rasterise(
         pixels.astype(np.float64), world[:, 2].copy(), solid.faces, height, width
     )
     hit = face >= 0
@@ -43,13 +44,15 @@ def draw(solid: Solid, world: F64, camera: Camera) -> View:
     alpha = mean(hit[..., None].astype(np.float64))[..., 0]
     color = mean(colors) / np.maximum(alpha, 1e-9)[..., None]
     depth = nearest.reshape(camera.height, n, camera.width, n).min((1, 3))
-    return View(color, alpha, depth)
+    back = farthest.reshape(camera.height, n, camera.width, n).max((1, 3))
+    return View(color, alpha, depth, back)
 
 
 @numba.njit(cache=True)
 def _rasterise(pixels, depth, faces, height, width):
-    """Depth (h, w) of the nearest face, its index, and its corners' weights there."""
+    """Depths (h, w) of nearest and farthest faces; the nearest's index, its corners' weights."""
     nearest = np.full((height, width), np.inf)
+    farthest = np.full((height, width), -np.inf)
     found = np.full((height, width), -1, np.int32)
     corners = np.zeros((height, width, 3))
     for f in range(len(faces)):
@@ -75,10 +78,11 @@ def _rasterise(pixels, depth, faces, height, width):
                     continue
                 inverse = u / depth[a] + v / depth[b] + w / depth[c]
                 z = 1.0 / inverse
+                farthest[i, j] = max(farthest[i, j], z)
                 if z < nearest[i, j]:
                     nearest[i, j] = z
                     found[i, j] = f
                     corners[i, j, 0] = u / depth[a] * z
                     corners[i, j, 1] = v / depth[b] * z
                     corners[i, j, 2] = w / depth[c] * z
-    return nearest, found, corners
+    return nearest, farthest, found, corners

@@ -87,20 +87,23 @@ def results() -> list[Result]:
     pair = read_pair()
     height, width = pair.mask.shape
     camera = Camera(FOCAL, width / 2, height / 2, width, height)
-    alone = LiftSettings(uses_depth=False)
+    alone = LiftSettings(uses_depth=False, trust=0)
     matte, lifted = lift_mask(pair.left, camera, pair.mask, settings=alone)
+    _, learned = lift_mask(pair.left, camera, pair.mask, settings=replace(alone, trust=1.0))
     seen = Seen(_filled(pair.disparity), (0, 0, width, height))
     subject = Subject(pair.left, camera, pair.mask, matte)
-    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(), silent)
+    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
     board = ReliefLifter(shape=_slab).lift(subject, alone, silent)
     known = pair.disparity[pair.mask & (pair.disparity > 0)]
     card = float(np.median(known))
     slab = _card_shot(matte, card, (height, width))
     color, error = _relief_shot(pair, matte, lifted, camera)
+    seen_color, seen_error = _relief_shot(pair, matte, learned, camera)
     deep_color, deep_error = _relief_shot(pair, matte, deep, camera)
     board_color, board_error = _relief_shot(pair, matte, board, camera)
     flat = float(np.sqrt(((known - card) ** 2).mean()))
     return [
+        Result("network", *_compared(pair, seen_color), seen_error),
         Result("relief", *_compared(pair, color), error),
         Result("relief with true depth", *_compared(pair, deep_color), deep_error),
         Result("constant thickness", *_compared(pair, board_color), board_error),

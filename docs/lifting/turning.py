@@ -1,10 +1,10 @@
 """Solids turned about the upright: what is predicted from one photo, against the true view.
 
-Four predictions. The relief is the product's own lift, without a depth network; "depth" is the same
-with a perfect one, whose scale and shift are unknown as any network's are. The card is the cut-out
-on a flat board at the solid's true distance, turned (a homography). The affine one is the best that
-any warp of the picture with six numbers could do: fitted to the true places of the points that the
-photo shows.
+Five predictions. "network" is the product's own lift; "relief" is the same from the silhouette
+alone, and "depth" is that with a perfect depth network, whose scale and shift are unknown as any
+network's are. The card is the cut-out on a flat board at the solid's true distance, turned (a
+homography). The affine one is the best that any warp of the picture with six numbers could do:
+fitted to the true places of the points that the photo shows.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ CAMERA = Camera.from_fov(SIDE, SIDE)
 ANGLES = (-35, -20, -10, 10, 20, 35)  # degrees of yaw
 SHARE = 0.55  # of the picture's width that a solid fills
 AT = np.array([245.0, 270.0])  # px, where its middle is
-WAYS = ("relief", "depth", "card", "affine")
-ALONE = LiftSettings(uses_depth=False)
+WAYS = ("network", "relief", "depth", "card", "affine")
+ALONE = LiftSettings(uses_depth=False, trust=0)  # the silhouette
+SEEN = LiftSettings(uses_depth=False)
 POINTS = 20_000  # on a solid's surface, for the affine warp
 SAME_DEPTH = 0.01  # of a point and of the nearest surface: it is seen
 FAINT = 0.02  # alpha, from which a pixel counts
@@ -63,6 +64,7 @@ class Scene:
     shown: F64  # (n, 2) px of points that the photo shows
     moved: dict[int, F64]  # (n, 2) px of them, by degrees
     inverse: F64  # (h, w) true inverse depth of the photo; what is behind is farther away
+    back: F64  # (h, w) true depth of where rays leave the solid; not finite beside it
 
     @property
     def pixels(self) -> Pixels:
@@ -101,7 +103,7 @@ def make_scene(name: str, meshes: Path) -> Scene:
     photo = shots.pop(0)
     moved = {a: places[a][is_seen] for a in ANGLES}
     inverse = np.where(np.isfinite(views[0].depth), 1 / views[0].depth, 0.5 / views[0].depth.min())
-    return Scene(name, photo, shots, centre, places[0][is_seen], moved, inverse)
+    return Scene(name, photo, shots, centre, places[0][is_seen], moved, inverse, views[0].back)
 
 
 def _sampled(solid: Solid, world: F64) -> tuple[np.ndarray, F64]:
@@ -140,11 +142,13 @@ def score(shot: Shot, truth: Shot) -> Score:
 def measured(scene: Scene) -> dict[tuple[int, str], tuple[Shot, Score]]:
     """What each way predicts of each turn."""
     matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=ALONE)
+    _, learned = lift_mask(scene.pixels, CAMERA, scene.mask, settings=SEEN)
     seen = Seen((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
     subject = Subject(scene.pixels, CAMERA, scene.mask, matte)
-    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(), silent)
+    deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
     texture = object_texture(matte)
     puppets = {
+        "network": Puppet(learned, DeformSettings(), CAMERA),
         "relief": Puppet(lifted, DeformSettings(), CAMERA),
         "depth": Puppet(deep, DeformSettings(), CAMERA),
     }
@@ -157,6 +161,7 @@ def measured(scene: Scene) -> dict[tuple[int, str], tuple[Shot, Score]]:
         return Shot(np.asarray(picture.color) / np.maximum(alpha, 1e-6)[..., None], alpha)
 
     drawers: dict[str, Callable[[int, F64], Shot]] = {
+        "network": lambda angle, shift: relief("network", angle, shift),
         "relief": lambda angle, shift: relief("relief", angle, shift),
         "depth": lambda angle, shift: relief("depth", angle, shift),
         "card": lambda angle, shift: _warped(matte, _card(scene, matte, angle), shift),

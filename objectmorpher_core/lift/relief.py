@@ -14,7 +14,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64, Mask
+from ..arrays import F32, F64, Mask, Pixels
 from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, LiftSettings, Matte, PhotoTexture
@@ -22,13 +22,14 @@ from ..gaussians import Gaussians
 from ..progress import Progress
 from ..rotations import quats_along
 from ..segment.matte import band_width
-from . import LiftError, Subject
+from . import LiftError, Subject, shape_look
 from .bilinear import bilinear
 from .body import MIDDLE, Body
 from .canvas import Canvas
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
+from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .silhouette import Silhouette
 from .spreading import Surface, spread
@@ -45,6 +46,7 @@ NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
 Shaper = Callable[[Silhouette, Camera, LiftSettings, MirrorAxis | None], Body]
+See = Callable[[Pixels, Mask, Camera], shape_look.SeenShape | None]
 
 
 class ReliefLifter:
@@ -52,12 +54,15 @@ class ReliefLifter:
 
     name = "relief"
 
-    def __init__(self, look: Look = look, shape: Shaper = Body.of) -> None:
+    def __init__(
+        self, look: Look = look, shape: Shaper = Body.of, see: See = shape_look.look
+    ) -> None:
         """`look` tells the depth of what is seen: by default as an installed network does.
 
-        `shape` makes the body of a silhouette.
+        `shape` makes the body of a silhouette, and `see` tells more of it: by default as the
+        program's own network does.
         """
-        self._look, self._shape = look, shape
+        self._look, self._shape, self._see = look, shape, see
 
     def missing(self) -> str | None:
         return None
@@ -76,6 +81,10 @@ class ReliefLifter:
         canvas = _canvas(matte, hidden, area, settings.count)
         axis = _axis(canvas, settings)
         body = self._shape(outline, camera, settings, axis)
+        if settings.trust > 0:
+            progress(0.05, "Looking at its shape")
+            if (seen := self._see(subject.pixels, mask, camera)) is not None:
+                body = fused(body, seen, camera, settings.thickness, settings.trust)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)

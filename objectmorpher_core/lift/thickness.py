@@ -75,6 +75,11 @@ class Thickness:
         square = self.square + share * ((half / FULLNESS) ** 2 - self.square)
         return Thickness(square, self.crease * (1 - share))
 
+    def towards(self, half: F64, share: F64) -> Thickness:
+        """As thick as `half` (h, w) px where `share` (h, w) is 1; it leaves a rim as steeply."""
+        wanted = (half / FULLNESS + self.crease) ** 2 - self.crease**2
+        return Thickness(self.square + share * (wanted - self.square), self.crease)
+
     def sample(self, grid_xy: F64, cell: float) -> tuple[F64, F64]:
         """Half-thickness (N,) px and its gradient (N, 2) at grid coordinates (N, 2)."""
         q, c, qx, qy, cx, cy = bilinear(self._fields, grid_xy).T

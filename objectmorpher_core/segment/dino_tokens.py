@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -41,3 +43,17 @@ class TokenNet:
         pixels = ((rgb.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
         found = self._session.run([TOKENS], {IMAGES: pixels})[0][0, 1:]
         return np.asarray(found.reshape(height, width, -1), np.float32)
+
+
+_opening = Lock()
+
+
+def shared() -> TokenNet:
+    """The network, opened once for selecting and lifting; raises ModelError without weights."""
+    with _opening:
+        return _opened()
+
+
+@cache
+def _opened() -> TokenNet:
+    return TokenNet()

@@ -13,7 +13,7 @@ from .. import models
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
 from ..progress import Progress, part, silent
-from .dino_tokens import PATCH, WEIGHT, TokenNet
+from .dino_tokens import PATCH, WEIGHT, shared
 from .piece_features import main_directions
 from .pieces import Pieces
 from .selection import SelectionError, box_mask, check_mask, check_prompt
@@ -31,7 +31,6 @@ class DinoWalk:
     name = "dino"
 
     def __init__(self) -> None:
-        self._net: TokenNet | None = None
         self._subject = SubjectNet()
         self._view: PhotoView | None = None  # of the last photo
 
@@ -98,9 +97,4 @@ class DinoWalk:
             (w * PATCH, h * PATCH),
             interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC,
         )
-        return main_directions(self._open().tokens(np.asarray(small, np.uint8)))
-
-    def _open(self) -> TokenNet:
-        if self._net is None:
-            self._net = TokenNet()
-        return self._net
+        return main_directions(shared().tokens(np.asarray(small, np.uint8)))

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import torch
 
-from .shape_net import GRID, PLANES, SIDE, WIDTH, ShapeNet
+from ..lift.crop import SIDE
+from .shape_net import GRID, PLANES, WIDTH, ShapeNet
 
 OPSET = 17
 INPUTS, OUTPUT = ("planes", "tokens"), "shape"

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from ..arrays import F32, RGB, Mask
+from ..arrays import Mask
+from ..lift.crop import planes_of
 from ..progress import Progress, silent
-from .shapes.sample import SIDE, Sample, make_sample
+from .shapes.sample import Sample, make_sample
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 SHARD = 32  # samples in a file
 NORMAL_STEPS = 127.0  # a normal's coordinate is kept in a byte
-OUTLINE_SCALE = 0.25  # crop's side, of the distance to the outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +38,6 @@ class Batch:
     normal: Tensor  # (n, 3, s, s)
     rays: Tensor  # (n, 3, s, s) unit
     away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
-
-
-def planes_of(rgb: RGB, mask: Mask, tangents: F32) -> F32:
-    """(7, s, s) what the network sees of a crop besides its tokens."""
-    side = len(mask)
-    distance = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    steps = ((np.arange(side, dtype=np.float32) + 0.5) / side - 0.5) * tangents[2]
-    x, y = np.meshgrid(steps + tangents[0], steps + tangents[1])
-    colours = rgb.transpose(2, 0, 1).astype(np.float32) / 255 - 0.45
-    own = [mask.astype(np.float32), distance / (OUTLINE_SCALE * side), x, y]
-    return np.concatenate([colours * 4, np.stack(own)]).astype(np.float32)
 
 
 def write_shards(
@@ -122,7 +111,19 @@ def batches(files: list[Path], size: int, rng: np.random.Generator) -> Iterator[
         for start in range(0, len(mixed) - size + 1, size):
             rows = mixed[start : start + size]
             picked = {name: array[rows] for name, array in joined.items()}
-            yield batch_of(picked, rng)
+            yield batch_of(_mirrored(picked, rng.random(size) < 0.5), rng)
+
+
+def _mirrored(arrays: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
+    """Packed samples, left and right exchanged in some (n,): a token goes with its place."""
+    found = {name: array.copy() for name, array in arrays.items()}
+    for name, array in arrays.items():
+        if array.ndim > 2:
+            axis = 3 if name == "tokens" else 2
+            found[name][which] = np.flip(array[which], axis)
+    found["normal"][which, ..., 0] *= -1
+    found["tangents"][which, 0] *= -1
+    return found
 
 
 def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = None) -> Batch:
@@ -159,6 +160,3 @@ def _worn(mask: Mask, rng: np.random.Generator) -> Mask:
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
     return inside - outside + noise.clip(-2, 2) > 0
-
-
-__all__ = ["SIDE", "Batch", "batch_of", "batches", "planes_of", "write_shards"]

@@ -8,11 +8,14 @@ from torch.nn import functional as F
 
 from .shape_data import Batch
 
-STEPS = (1, 2, 4, 8, 16)  # px, over which differences are compared
+STEPS = (1, 4, 16)  # px, over which differences are compared
+SPAN = 2  # px each way, over which the surface must lie as its normal says
 WEIGHTS = {
-    "front": 4.0, "thickness": 2.0, "depth": 2.0, "slope": 6.0, "normal": 0.5, "agree": 0.3,
-    "edge": 0.3, "spread": 0.1,
+    "front": 4.0, "thickness": 2.0, "depth": 2.0, "slope": 4.0, "normal": 2.0, "agree": 0.05,
+    "edge": 0.5, "spread": 0.1,
 }  # fmt: skip
+SIZE = 0.25  # crop units, of depth: an object USUAL deep counts once, a much thinner one more
+USUAL = 0.15
 RARE = 6.0  # x weight of a pixel that is an edge
 
 
@@ -20,6 +23,8 @@ def losses(found: Tensor, batch: Batch) -> dict[str, Tensor]:
     """The parts of the loss, each a mean over the object's pixels of (n, OUTPUTS, s, s)."""
     mask = batch.mask
     area = mask.sum((1, 2, 3), keepdim=True).clamp(min=1)
+    # Of what is thin less is far off: errors count in proportion.
+    scale = SIZE / (SIZE - USUAL + (batch.depth * mask).sum((1, 2, 3), keepdim=True) / area)
     error = found[:, :1] - batch.front
     # About which depth the object lies is not in the photo: the mean is free.
     error = (error - (error * mask).sum((1, 2, 3), keepdim=True) / area) * mask
@@ -27,14 +32,14 @@ def losses(found: Tensor, batch: Batch) -> dict[str, Tensor]:
         (found[:, k : k + 1] - true) * mask for k, true in ((1, batch.thickness), (2, batch.depth))
     )
     parts = {
-        "front": _mean(error.abs(), mask),
-        "thickness": _mean(thick.abs(), mask),
-        "depth": _mean(deep.abs(), mask),
-        "slope": _slopes(error, mask),
-        "normal": _mean(1 - (found[:, 3:6] * batch.normal).sum(1, keepdim=True), mask),
+        "front": _mean(scale * error.abs(), mask),
+        "thickness": _mean(scale * thick.abs(), mask),
+        "depth": _mean(scale * deep.abs(), mask),
+        "slope": _slopes(scale * error, mask),
+        "normal": _mean((found[:, 3:6] - batch.normal).square().sum(1, keepdim=True), mask),
         "agree": _agreement(found[:, :1], batch),
         "edge": _edges(found[:, 6:7], batch),
-        "spread": _spread(error, found[:, 7:8], mask) + _spread(thick, found[:, 8:9], mask),
+        "spread": _spread(error, found[:, 7:8], mask) + _spread(deep, found[:, 8:9], mask),
     }
     parts["all"] = torch.stack([WEIGHTS[name] * part for name, part in parts.items()]).sum()
     return parts
@@ -59,14 +64,21 @@ def _slopes(error: Tensor, mask: Tensor) -> Tensor:
 
 
 def _agreement(front: Tensor, batch: Batch) -> Tensor:
-    """How far the surface's own slopes are from the true normals, away from jumps."""
+    """How far short steps along the surface leave the true tangent planes, away from jumps.
+
+    Unlike the angle between normals it is linear in the depth, so a rough start is no cliff.
+    """
     points = batch.rays * (batch.away - front)  # (n, 3, s, s)
-    across = points[:, :, 1:-1, 2:] - points[:, :, 1:-1, :-2]
-    down = points[:, :, 2:, 1:-1] - points[:, :, :-2, 1:-1]
-    normal = F.normalize(torch.cross(down, across, dim=1), dim=1, eps=1e-8)
-    bad = 1 - batch.mask + batch.edge
-    clear = 1 - F.max_pool2d(bad.clamp(max=1), 3, 1)
-    return _mean(1 - (normal * batch.normal[:, :, 1:-1, 1:-1]).sum(1, keepdim=True), clear)
+    bad = (1 - batch.mask + batch.edge).clamp(max=1)
+    clear = 1 - F.max_pool2d(bad, 2 * SPAN + 1, 1, SPAN)
+    total = front.new_zeros(())
+    for axis in (2, 3):
+        room = front.shape[axis] - 2 * SPAN
+        before, after = (torch.narrow(points, axis, at, room) for at in (0, 2 * SPAN))
+        normal, own = (torch.narrow(x, axis, SPAN, room) for x in (batch.normal, clear))
+        off = ((after - before) * normal).sum(1, keepdim=True).abs()
+        total = total + _mean(off * front.shape[axis] / (2 * SPAN), own)
+    return total / 2
 
 
 def _edges(logit: Tensor, batch: Batch) -> Tensor:

@@ -1,7 +1,7 @@
 """The decoder: DINOv2's tokens of a crop, its pixels and its mask -> the surface that is seen.
 
 A U-Net (Ronneberger et al. 2015) from the pixels, which takes in the frozen tokens where it is as
-coarse as they are. Everything is in crop units (`shapes.sample`).
+coarse as they are. Everything is in crop units (`lift.crop`).
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-SIDE = 224  # px of a crop
 GRID = 16  # tokens across
 WIDTH = 384  # of a token (DINOv2 ViT-S/14)
 PLANES = 7  # red, green, blue, mask, distance to the outline, and the ray's two tangents
-OUTPUTS = 9  # front, thickness, depth, normal (3), edge, spread of front, spread of thickness
+OUTPUTS = 9  # front, thickness, depth, normal (3), edge, spread of front, spread of depth
 CHANNELS = (24, 48, 96, 160)  # from half the size to a sixteenth
 MIXED = 256  # at a sixteenth, with the tokens
-FINE = 24  # at the full size
+FINE = 32  # at half the size
+SCALES = {"front": 0.15, "thick": 0.2, "normal": 0.5}  # the usual size of what is predicted
+FACING = -0.5  # z of the normals before training, towards the camera
 
 
 class Block(nn.Module):
@@ -46,9 +47,8 @@ class ShapeNet(nn.Module):
         self.middle = nn.Sequential(_conv(2 * d, MIXED, size=1), Block(MIXED), Block(MIXED))
         self.up3 = nn.Sequential(_conv(MIXED + c + c // 2, 128), Block(128))
         self.up2 = nn.Sequential(_conv(128 + b, 64), Block(64))
-        self.up1 = nn.Sequential(_conv(64 + a, 40), Block(40))
-        self.up0 = nn.Sequential(_conv(40 + PLANES, FINE), _conv(FINE, FINE))
-        self.head = nn.Conv2d(FINE, OUTPUTS, 1)
+        self.up1 = nn.Sequential(_conv(64 + a, FINE), Block(FINE))
+        self.head = nn.Conv2d(FINE, 4 * OUTPUTS, 1)  # of four pixels each (Shi et al. 2016)
 
     def forward(self, planes: Tensor, tokens: Tensor) -> Tensor:
         x1 = self.down1(planes)
@@ -60,13 +60,14 @@ class ShapeNet(nn.Module):
         y = self.up3(torch.cat([_resized(y, x3), x3, _resized(self.tokens_fine(tokens), x3)], 1))
         y = self.up2(torch.cat([_resized(y, x2), x2], 1))
         y = self.up1(torch.cat([_resized(y, x1), x1], 1))
-        y = self.up0(torch.cat([_resized(y, planes), planes], 1))
-        raw = self.head(y)
-        thick = F.softplus(raw[:, 1:3] - 2.0)  # never negative; about 0.13 before training
-        normal = raw[:, 3:6]
-        normal = normal / normal.square().sum(1, keepdim=True).add(1e-6).sqrt()
+        with torch.autocast("cpu", enabled=False):  # eight bits are too few for a depth
+            raw = F.pixel_shuffle(self.head(y.float()), 2)
+        front = SCALES["front"] * raw[:, :1]
+        thick = SCALES["thick"] * F.softplus(raw[:, 1:3])  # never negative
+        # Not made unit vectors here: those have no gradient once they are all alike.
+        normal = SCALES["normal"] * raw[:, 3:6] + raw.new_tensor([0, 0, FACING])[:, None, None]
         spread = raw[:, 7:9].clamp(-7.0, 2.0)
-        return torch.cat([raw[:, :1], thick, normal, raw[:, 6:7], spread], 1)
+        return torch.cat([front, thick, normal, raw[:, 6:7], spread], 1)
 
 
 def _conv(

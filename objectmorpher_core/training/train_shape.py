@@ -27,6 +27,7 @@ from .shapes.families import FAMILIES
 UNSEEN = 50_000_000  # the first seed that is never trained on
 CHECKED = 8 * SHARD  # unseen samples
 WARM_UP = 0.04  # share of the steps, during which the rate rises
+STEEPEST = 5.0  # length of a gradient that is not shortened
 MEMORY = 0.999  # of the mean of weights that is kept and shipped
 CURVE = 100  # points of the learning curve that are told
 SAVED = 120.0  # s between two checkpoints
@@ -127,7 +128,7 @@ class _State:
         parts = losses(found.float(), batch)
         self.optimiser.zero_grad(set_to_none=True)
         parts["all"].backward()
-        torch.nn.utils.clip_grad_norm_(self.net.parameters(), 1.0)
+        torch.nn.utils.clip_grad_norm_(self.net.parameters(), STEEPEST)
         self.optimiser.step()
         self.step += 1
         kept = min(MEMORY, (1 + self.step) / (10 + self.step))

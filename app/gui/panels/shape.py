@@ -20,6 +20,7 @@ def draw_shape(editor: Editor) -> None:
     heading(t("Shape"))
     if (reason := editor.shaping.why_fixed) is None:
         _draw_thickness(editor)
+        _draw_trust(editor)
         _draw_back(editor)
         _draw_symmetry(editor)
         _draw_standing(editor)
@@ -41,6 +42,19 @@ def _draw_thickness(editor: Editor) -> None:
         editor.shaping.preview_thickness(change.value / 100)
     if change.is_done:
         editor.commit(t("Thickness"))
+
+
+def _draw_trust(editor: Editor) -> None:
+    """How far the shape network is believed, where it can look."""
+    if not editor.models.has_shape:
+        return
+    number = Number(t("Trust"), "%.0f %%", 1.0, 10.0, 100.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.shaping.trust)
+    tooltip(t("In the learned shape; at 0 % the outline alone tells it"))
+    if change.is_changed:
+        editor.shaping.preview_trust(change.value / 100)
+    if change.is_done:
+        editor.shaping.end_trust()
 
 
 def _draw_back(editor: Editor) -> None:

@@ -1,7 +1,6 @@
 """One made-up photo of a made-up object, and the whole truth about its shape.
 
-Distances are from the camera along each pixel's ray, in crop units: one is as long as the crop is
-wide at the object's distance. So the same object far away or magnified has the same numbers.
+Its units are those of `lift.crop`, in which the network sees a photo.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ import cv2
 import numpy as np
 
 from ...arrays import F32, F64, RGB, Mask
+from ...lift.crop import SIDE
 from .distance import lowest, trace
 from .families import FAMILIES
 from .materials import Material, a_colour, a_crop, a_material, albedo, grain, noise_block
 from .solid import Builder, Solid, turned
 
-SIDE = 224  # px
 COARSE = 56  # px of the first look, which finds the object's box
 LOOSE = 1.05  # x the ball's angle, of the first look
 PAD = (1.08, 1.5)  # crop's side over the object's larger side
@@ -28,6 +27,7 @@ NEAREST = 1.25  # radii of the ball, from the camera to its middle
 LEAST = 0.04  # x crop's area, that an object covers at least
 CUT = 0.18  # how often the photo's frame cuts the object
 JUMP = 0.035  # crop units between neighbouring pixels, beyond what their slopes explain
+PART_JUMP = 0.014  # likewise where another part begins: an arm that lies on a body
 NO_GROUND = -99.0
 COLUMNS = 96  # rays each way, by which the ground beneath the object is found
 FACED = 0.4  # how often the photographer stood before the object
@@ -247,7 +247,7 @@ def _measured(
     depth = np.where(mask, (last - away).reshape(mask.shape) / unit, 0)
     normal = (out[:, 4:7] @ eye.axes.T).reshape(side, side, 3) * mask[..., None]
     part = np.where(mask, out[:, 3].reshape(mask.shape), -1).astype(np.int16)
-    edge, mask = _hiding(front, mask), shown
+    edge, mask = _hiding(front, mask, part), shown
     kept = mask.astype(np.float32)
     tangents = np.array([*eye.middle, eye.width], np.float32)
     return Sample(
@@ -257,7 +257,7 @@ def _measured(
     )  # fmt: skip
 
 
-def _hiding(front: F64, mask: Mask) -> Mask:
+def _hiding(front: F64, mask: Mask, part: np.ndarray) -> Mask:
     """(s, s) pixels beside which the surface jumps back, more than the slopes around it say."""
     edge = np.zeros(mask.shape, bool)
     for axis in (0, 1):
@@ -267,8 +267,8 @@ def _hiding(front: F64, mask: Mask) -> Mask:
             beyond = np.roll(front, -2 * sense, axis)
             slope = np.where(own, np.abs(front - before), 0)
             slope = np.maximum(slope, np.where(inside, np.abs(beyond - other), 0).clip(0, JUMP))
-            jump = front - other
-            edge |= mask & inside & (jump > JUMP + 1.5 * np.minimum(slope, JUMP))
+            least = np.where(part == np.roll(part, -sense, axis), JUMP, PART_JUMP)
+            edge |= mask & inside & (front - other > least + 1.5 * np.minimum(slope, JUMP))
     return edge
 
 

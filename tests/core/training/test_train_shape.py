@@ -39,7 +39,7 @@ def test_the_truth_has_no_loss_but_what_cannot_be_known(arrays):
     for name in ("front", "thickness", "depth", "slope", "edge"):
         assert abs(float(parts[name])) < 1e-4, name
     assert float(parts["normal"]) < 1e-3
-    assert float(parts["agree"]) < 0.05  # bytes of normals, halves of depths
+    assert float(parts["agree"]) < 0.15  # bytes of normals, halves of depths, curves
     wrong = truth.clone()
     wrong[:, 0] *= -1
     assert float(losses(wrong, batch)["all"]) > float(parts["all"]) + 0.1

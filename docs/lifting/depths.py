@@ -1,0 +1,68 @@
+"""How far the lifted surfaces of solids are from the true ones, seen from all around."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mesh_view
+import numpy as np
+from solids import SOLIDS, Solid, load
+from turning import AT, CAMERA, SHARE, SIDE, Shot, over_plate
+
+from objectmorpher_core.arrays import F64, Mask
+from objectmorpher_core.document import LiftSettings
+from objectmorpher_core.lift import shape_look
+from objectmorpher_core.lift.body import BACK, FRONT, Body
+from objectmorpher_core.lift.fusion import fused
+from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.training.shape_eval import Score, Surfaces, score
+
+YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
+WAYS = ("network", "relief", "inflation", "flat")
+
+
+def depth_scores(meshes: Path) -> dict[str, dict[str, Score]]:
+    """Of each solid the means over its views, by way."""
+    found = {}
+    for name in SOLIDS:
+        solid = load(name, meshes)
+        views = [_scores(solid.turned(yaw), mesh_view) for yaw in YAWS]
+        found[name] = {way: _mean([view[way] for view in views]) for way in WAYS}
+    return found
+
+
+def _scores(solid: Solid) -> dict[str, Score]:
+    depth = CAMERA.focal / (SHARE * SIDE)
+    view = mesh_view.draw(solid, solid.vertices + CAMERA.unproject(AT, depth), CAMERA)
+    mask = (view.alpha > 0.5) & np.isfinite(view.depth)
+    pixels = np.clip(over_plate(Shot(view.color, view.alpha)) * 255 + 0.5, 0, 255).astype(np.uint8)
+    outline = Silhouette.of(mask)
+    standing = Body.of(outline, CAMERA, LiftSettings())
+    seen = shape_look.look(pixels, mask, CAMERA)
+    assert seen is not None, "the network's weights are here"
+    bodies = {
+        "network": fused(standing, seen, CAMERA, 1.0, 1.0),
+        "relief": standing,
+        "inflation": Body.of(outline, CAMERA, LiftSettings(is_standing=False)),
+    }
+    ways = {way: _surfaces(body, mask) for way, body in bodies.items()}
+    flat = np.full(mask.shape, float(ways["inflation"].thickness[mask].mean()))
+    ways["flat"] = Surfaces(np.zeros(mask.shape), flat)
+    nearest, farthest = (np.where(mask, side, 1.0) for side in (view.depth, view.back))
+    scale = CAMERA.focal / float(nearest[mask].mean())  # px at which the photo is as wide
+    true = Surfaces(-scale * nearest, scale * (farthest - nearest))
+    return {way: score(surfaces, true, mask) for way, surfaces in ways.items()}
+
+
+def _surfaces(body: Body, mask: Mask) -> Surfaces:
+    """Heights in px at the pixels of a mask (H, W)."""
+    rows, columns = np.nonzero(mask)
+    xy = np.column_stack([columns, rows]).astype(np.float64) + 0.5
+    sheets: list[F64] = [body.height(xy, side) for side in (FRONT, BACK)]
+    front, thickness = np.zeros(mask.shape), np.zeros(mask.shape)
+    front[mask], thickness[mask] = sheets[0], sheets[0] - sheets[1]
+    return Surfaces(front, thickness)
+
+
+def _mean(scores: list[Score]) -> Score:
+    return Score(*np.mean(scores, 0))

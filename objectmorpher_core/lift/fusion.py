@@ -1,0 +1,127 @@
+"""A body from its silhouette and from what the shape network sees, each as far as it is sure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ..arrays import F64, Mask
+from ..camera import Camera
+from .bilinear import bilinear
+from .body import Body
+from .crop import SIDE, rays
+from .integration import integrated
+from .shape_look import SeenShape
+from .silhouette import Silhouette
+from .thickness import Thickness
+
+# How far off the silhouette's body is expected to be: crop units, and per its half-thickness.
+INFLATED_ERROR = (0.02, 0.5)
+ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns away; it ends there
+RIM = 0.035  # x extent from the outline, over which a body that is round there closes
+INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
+
+
+class Sheets(NamedTuple):
+    """Heights (h, w) px over a silhouette's cells, and what is known about them."""
+
+    front: F64
+    back: F64
+    front_error: F64  # px, expected
+    back_error: F64
+    facing: F64  # cosine between the front's normal and the ray
+
+
+def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: float) -> Body:
+    """`body`, whose thickness was multiplied by `thickness`, as `seen` where that is surer.
+
+    `trust` in [0, 1]: 0 leaves the body as it is.
+    """
+    if trust <= 0:
+        return body
+    outline = body.silhouette
+    sheets = sheets_of(seen, camera, outline)
+    halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
+    error = seen.crop.side * INFLATED_ERROR[0] + INFLATED_ERROR[1] * 0.5 * (halves[0] + halves[1])
+    front_share, back_share = (
+        trust * error**2 / (error**2 + own**2) for own in (sheets.front_error, sheets.back_error)
+    )
+    # The silhouette does not tell how far away the object is: both are about as far.
+    fronts = body.middle + halves[0]
+    shift = float((sheets.front - fronts)[outline.inside].mean())
+    half = 0.5 * (sheets.front - sheets.back)
+    middle = (1 - front_share) * (body.middle + shift) + front_share * (sheets.front - half)
+    # Where the body closes a front that is thinner lies deeper: at the outline both meet amid.
+    sides = [
+        _thicker(side, closing(half, sheets.facing, outline, own), back_share, thickness)
+        for side, own in zip((body.front, body.back), halves, strict=True)
+    ]
+    return replace(body, middle=middle - shift * (1 - trust), front=sides[0], back=sides[1])
+
+
+def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
+    """What is seen, over the cells of a silhouette; beyond what is seen as at its nearest pixel."""
+    crop, mask = seen.crop, seen.mask
+    ways = rays(crop.tangents)
+    distance = crop.away - seen.front.astype(np.float64)
+    step = 1 / (SIDE * crop.away)
+    distance = integrated(distance, seen.front_error, seen.normal, seen.edge, ways, mask, step)
+    facing = -(seen.normal * ways).sum(-1)
+    px = crop.side * ways[..., 2]  # of depth along the axis, per crop unit along the ray
+    front = camera.focal - px * distance
+    back = camera.focal - px * (distance + seen.depth)
+    fields = np.stack(
+        [front, back, crop.side * seen.front_error, crop.side * seen.depth_error, facing], -1
+    )
+    fields = _continued(fields, mask)
+    cells = crop.grid_xy(outline.photo_xy(outline.cells)).reshape(-1, 2)
+    found = bilinear(fields, cells).reshape(*outline.shape, -1)
+    return Sheets(*np.moveaxis(found, -1, 0))
+
+
+def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
+    """(h, w) px: `half`, but falling to 0 at the outline where the front turns away there.
+
+    A pixel is too wide to tell how. There it closes as the silhouette's body does, `inflated`,
+    times as much as `half` is thicker than that farther in.
+    """
+    reach = RIM * outline.extent
+    share = np.clip(outline.depth / reach, 0, 1)
+    weight = share * outline.inside
+    sigma = max(0.5 * reach / outline.cell, 0.5)
+    ratio = np.clip(half / np.maximum(inflated, 1e-3 * outline.extent), 0.0, 4.0)
+    blurred = cv2.GaussianBlur(ratio * weight, (0, 0), sigma)
+    ratio = blurred / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)
+    is_round = np.clip((ROUND[1] - facing) / (ROUND[1] - ROUND[0]), 0, 1)
+    is_round = cv2.GaussianBlur(is_round, (0, 0), sigma)
+    closed = np.minimum(ratio * inflated, half.max())
+    amount = is_round * (1 - share)
+    return np.maximum(half + amount * (closed - half), 0.0)
+
+
+def _half(side: Thickness, outline: Silhouette) -> F64:
+    """(h, w) px."""
+    return side.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
+
+
+def _thicker(side: Thickness, half: F64, share: F64, thickness: float) -> Thickness:
+    """`side` as thick as `half` (h, w) where `share` (h, w) is 1."""
+    return side.towards(thickness * half, share)
+
+
+def _continued(fields: F64, mask: Mask) -> F64:
+    """`fields` (s, s, c), outside `mask` (s, s) as at its nearest pixel well inside."""
+    away = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
+    inner = away > INNER
+    if not inner.any():
+        inner = mask
+    _, found = cv2.distanceTransformWithLabels(
+        (~inner).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    label = np.asarray(found, np.int64)
+    nearest = np.zeros(int(label.max()) + 1, np.int64)
+    nearest[label[inner]] = np.flatnonzero(inner)
+    return fields.reshape(-1, fields.shape[-1])[nearest[label]]
