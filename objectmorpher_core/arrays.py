@@ -11,6 +11,7 @@ Sparse = Any  # a scipy.sparse.csr_array: its own type hints leave its fields un
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 U8 = npt.NDArray[np.uint8]
 Selection = npt.NDArray[Any]  # (H, W) bool, or u8: how much of a pixel is meant, 255 for all

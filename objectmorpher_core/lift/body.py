@@ -11,7 +11,9 @@ from ..arrays import F64
 from ..camera import Camera
 from ..document import LiftSettings
 from .bilinear import bilinear
+from .cuts import Cuts
 from .mirror import MirrorAxis
+from .overlaps import Overlaps, overlaps_of
 from .prism import Prism
 from .silhouette import Silhouette
 from .standing import FLAT, Standing, stand
@@ -32,6 +34,8 @@ class Body:
     front: Thickness
     back: Thickness
     detail: F64 | None = None  # (h, w) px, height of the front beyond its thickness; None: 0
+    cuts: Cuts | None = None  # between cells where one part ends before another
+    own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
 
     @staticmethod
     def of(
@@ -67,7 +71,8 @@ class Body:
 
         `side`: FRONT, BACK, or any share (N,) of the thickness in front of the middle sheet.
         """
-        cell, grid_xy = self.silhouette.cell, self.silhouette.grid_xy(xy)
+        cell, wanted = self.silhouette.cell, self.silhouette.grid_xy(xy)
+        grid_xy = wanted if self.cuts is None else self.cuts.settled(wanted)
         fields = bilinear(self._middle_fields, grid_xy)
         gradient = fields[:, 1:].copy()
         beyond = grid_xy - np.clip(grid_xy, 0, np.array(self.middle.shape[::-1]) - 1)
@@ -79,10 +84,14 @@ class Body:
             gradient[is_there] += share[is_there, None] * slope
         if self.detail is not None:
             self._add_detail(grid_xy, np.maximum(share, 0.0), height, gradient)
+        if self.cuts is not None:
+            height += cell * ((wanted - grid_xy) * gradient).sum(1)
         return height, gradient
 
     def height(self, xy: F64, side: float) -> F64:
         """Height (N,) px of the FRONT or the BACK alone, at photo px (N, 2) inside."""
+        if self.cuts is not None:
+            return self.sample(xy, side)[0]
         grid_xy = self.silhouette.grid_xy(xy)
         thickness = self.front if side > 0 else self.back
         height = bilinear(self.middle, grid_xy) + side * thickness.half(grid_xy)
@@ -91,16 +100,31 @@ class Body:
         return height
 
     @cached_property
+    def overlaps(self) -> Overlaps | None:
+        """What lies behind parts that are before others; None where none is."""
+        if self.cuts is None:
+            return None
+        outline = self.silhouette
+        at = outline.photo_xy(outline.cells).reshape(-1, 2)
+        front, back = (self.sample(at, side)[0].reshape(outline.shape) for side in (FRONT, BACK))
+        own = np.ones(outline.shape) if self.own is None else self.own
+        thickness = own * (front - back)
+        return overlaps_of(front, back, thickness, self.cuts, outline.inside, outline.extent)
+
+    @cached_property
     def _middle_fields(self) -> F64:
         """(h, w, 3) the middle sheet and its gradient."""
-        dy, dx = np.gradient(self.middle, self.silhouette.cell)
-        return np.stack([self.middle, dx, dy], -1)
+        return np.stack([self.middle, *self._slopes(self.middle)], -1)
+
+    def _slopes(self, field: F64) -> tuple[F64, F64]:
+        """(h, w) each, what `field` (h, w) grows by per px right and down."""
+        down, right = np.gradient(field) if self.cuts is None else self.cuts.gradient(field)
+        return right / self.silhouette.cell, down / self.silhouette.cell
 
     def _add_detail(self, grid_xy: F64, share: F64, height: F64, gradient: F64) -> None:
         """Adds the front's detail, `share` (N,) of it, to heights (N,) and gradients (N, 2)."""
         assert self.detail is not None
-        dy, dx = np.gradient(self.detail, self.silhouette.cell)
-        fields = bilinear(np.stack([self.detail, dx, dy], -1), grid_xy)
+        fields = bilinear(np.stack([self.detail, *self._slopes(self.detail)], -1), grid_xy)
         height += share * fields[:, 0]
         gradient += share[:, None] * fields[:, 1:]
 

@@ -13,6 +13,7 @@ from ..camera import Camera
 from .bilinear import bilinear
 from .body import Body
 from .crop import SIDE, rays
+from .cuts import find_cuts
 from .integration import integrated
 from .shape_look import SeenShape
 from .silhouette import Silhouette
@@ -33,6 +34,8 @@ class Sheets(NamedTuple):
     front_error: F64  # px, expected
     back_error: F64
     facing: F64  # cosine between the front's normal and the ray
+    own: F64  # share of the thickness that is of the part that is seen
+    edge: F64  # probability that the front ends beside a cell
 
 
 def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: float) -> Body:
@@ -44,6 +47,12 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
         return body
     outline = body.silhouette
     sheets = sheets_of(seen, camera, outline)
+    cuts = find_cuts(
+        sheets.front, trust * sheets.edge, outline.inside, outline.cell, outline.extent
+    )
+    if cuts is not None:
+        sharp = (cuts.sharpened(field, outline.inside) for field in (sheets.front, sheets.own))
+        sheets = sheets._replace(**dict(zip(("front", "own"), sharp, strict=True)))
     halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
     error = seen.crop.side * INFLATED_ERROR[0] + INFLATED_ERROR[1] * 0.5 * (halves[0] + halves[1])
     front_share, back_share = (
@@ -55,11 +64,18 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
     half = 0.5 * (sheets.front - sheets.back)
     middle = (1 - front_share) * (body.middle + shift) + front_share * (sheets.front - half)
     # Where the body closes a front that is thinner lies deeper: at the outline both meet amid.
+    if cuts is not None:
+        body = replace(
+            body, front=replace(body.front, cuts=cuts), back=replace(body.back, cuts=cuts)
+        )
     sides = [
         _thicker(side, closing(half, sheets.facing, outline, own), back_share, thickness)
         for side, own in zip((body.front, body.back), halves, strict=True)
     ]
-    return replace(body, middle=middle - shift * (1 - trust), front=sides[0], back=sides[1])
+    own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
+    return replace(
+        body, middle=middle - shift * (1 - trust), front=sides[0], back=sides[1], cuts=cuts, own=own
+    )
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
@@ -74,8 +90,11 @@ def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
     front = camera.focal - px * distance
     back = camera.focal - px * (distance + seen.depth)
     fields = np.stack(
-        [front, back, crop.side * seen.front_error, crop.side * seen.depth_error, facing], -1
-    )
+        [
+            front, back, crop.side * seen.front_error, crop.side * seen.depth_error, facing,
+            seen.thickness / np.maximum(seen.depth, 1e-4), seen.edge,
+        ], -1,
+    )  # fmt: skip
     fields = _continued(fields, mask)
     cells = crop.grid_xy(outline.photo_xy(outline.cells)).reshape(-1, 2)
     found = bilinear(fields, cells).reshape(*outline.shape, -1)

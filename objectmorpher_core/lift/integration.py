@@ -35,7 +35,7 @@ def integrated(
         slope, weight = _steps(normal, edge, rays, mask, axis)
         slopes.append(slope)
         weights.append(weight / (SLOPE_ERROR * step) ** 2)
-    change = _solved(start, sure, slopes[0], slopes[1], weights[0], weights[1], ROUNDS, CLOSE)
+    change = solved(start, sure, slopes[0], slopes[1], weights[0], weights[1], ROUNDS, CLOSE)
     return np.where(mask, np.exp(start + change), distance)
 
 
@@ -79,8 +79,12 @@ def _applied(x, sure, down, right, out):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _solved(start, sure, slope_down, slope_right, down, right, rounds, close):
-    """(h, w) what is to be added to `start`: conjugate gradients, scaled by the diagonal."""
+def solved(start, sure, slope_down, slope_right, down, right, rounds, close):
+    """(h, w) what is to be added to `start`, so that its steps are near the slopes.
+
+    `sure`: weights (h, w) of keeping `start`. `down`, `right`: weights (h, w) of the steps to the
+    next row and column. Conjugate gradients, scaled by the diagonal.
+    """
     height, width = start.shape
     x, ax = np.zeros((height, width)), np.zeros((height, width))
     residual, diagonal = np.zeros((height, width)), np.zeros((height, width))

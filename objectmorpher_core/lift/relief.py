@@ -220,7 +220,7 @@ def _assemble(
         quats_along(normals).astype(np.float32),
         scales.astype(np.float32),
         np.ones(len(means), np.float32),
-        colours.sample(surface.xy, ~surface.is_front),
+        colours.sample(surface.color_xy, ~surface.is_front),
     )
     solid = ~surface.is_brim
     texture = PhotoTexture(

@@ -15,12 +15,14 @@ import numpy as np
 from ..arrays import F64, Mask
 from ..poisson_disk import thin_to_spacing
 from ..threads import in_threads
+from .bilinear import bilinear
 from .body import BACK, FRONT, MIDDLE, Body
 from .silhouette import Silhouette
 
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
+WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
 MIN_SPACING = 1.0  # px: more points than pixels carry nothing
 
 
@@ -34,6 +36,7 @@ class Surface:
     is_front: Mask  # (N,) on the side of the camera
     is_seen: Mask  # (N,) by the photo
     is_brim: Mask  # (N,) outside the silhouette
+    color_xy: F64  # (N, 2) photo px of which it has the colour
 
     def select(self, index: np.ndarray) -> Surface:
         return Surface(*(getattr(self, f.name)[index] for f in fields(self)))
@@ -47,13 +50,14 @@ def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tup
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
     wall = _wall_area(body)
-    total = sum(area.sum() for area in areas) + wall.sum()
+    total = sum(area.sum() for area in areas) + wall.sum() + _inner_area(body)
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
     drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
     around = [
         _wall(body, wall * density, rng),
         _brim(body, band + BRIM * spacing, density, rng),
+        *_inner(body, density, rng),
     ]
     # Most candidates of the sheets are dropped: their normals are found when that is done.
     clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
@@ -112,7 +116,7 @@ def _sheet(body: Body, xy: F64, side: float) -> Surface:
     normals = side * np.column_stack([-gradient, np.ones(len(xy))])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     is_front = np.full(len(xy), side == FRONT)
-    return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool))
+    return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
 
 
 def _wall_area(body: Body) -> F64:
@@ -120,7 +124,7 @@ def _wall_area(body: Body) -> F64:
     middles, offsets = body.silhouette.contour
     front, _ = body.sample(middles, FRONT)
     back, _ = body.sample(middles, BACK)
-    return np.linalg.norm(offsets, axis=1) * (front - back)
+    return np.linalg.norm(offsets, axis=1) * np.maximum(front - back, 0.0)
 
 
 def _wall(body: Body, expected: F64, rng: np.random.Generator) -> Surface:
@@ -132,7 +136,53 @@ def _wall(body: Body, expected: F64, rng: np.random.Generator) -> Surface:
     height, _ = body.sample(xy, rng.uniform(BACK, FRONT, len(xy)))
     normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
     no = np.zeros(len(xy), bool)
-    return Surface(xy, height, normals, no, no, no)
+    return Surface(xy, height, normals, no, no, no, xy)
+
+
+def _inner_area(body: Body) -> float:
+    """px^2 of what is between parts of the object."""
+    inner = body.overlaps
+    if inner is None:
+        return 0.0
+    cell = body.silhouette.cell
+    walls = cell * float((inner.walls.top - inner.walls.foot).sum())
+    return walls + 2 * cell**2 * int(inner.is_apart.sum())
+
+
+def _inner(body: Body, density: float, rng: np.random.Generator) -> list[Surface]:
+    """Between parts of the object: the sides of near ones, their backs, and what is beneath."""
+    inner, outline = body.overlaps, body.silhouette
+    if inner is None:
+        return []
+    cell, walls = outline.cell, inner.walls
+    expected = density * cell * (walls.top - walls.foot)
+    which = np.repeat(
+        np.arange(len(expected)), np.floor(expected + rng.random(len(expected))).astype(int)
+    )
+    along = walls.step[which][:, ::-1] * (rng.random((len(which), 1)) - 0.5)
+    xy = outline.photo_xy(walls.near[which] + WITHIN * walls.step[which] + along)
+    share = rng.random(len(which))
+    height = walls.foot[which] + share * (walls.top - walls.foot)[which]
+    normals = np.column_stack([walls.step[which], np.zeros(len(which))]).astype(np.float64)
+    no = np.zeros(len(which), bool)
+    behind = outline.photo_xy(walls.near[which] - walls.step[which].astype(np.float64))
+    sheets = [Surface(xy, height, normals, ~no, no, no, behind)]
+    assert body.cuts is not None, "there are overlaps"
+    for field, side in ((inner.own_back, BACK), (inner.beneath, FRONT)):
+        down, right = (slope / cell for slope in body.cuts.gradient(field))
+        area = np.where(inner.is_apart, cell**2 * np.sqrt(1 + down**2 + right**2), 0.0)
+        xy = _draw(outline, area * density, rng)
+        at = outline.grid_xy(xy)
+        near = body.cuts.settled(at)
+        height, dx, dy = bilinear(np.stack([field, right, down], -1), near).T
+        height = height + cell * ((at - near) * np.column_stack([dx, dy])).sum(1)
+        normals = side * np.column_stack([-dx, -dy, np.ones(len(xy))])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        no = np.zeros(len(xy), bool)
+        j, i = np.clip(np.rint(at).astype(int), 0, np.array(field.shape[::-1]) - 1).T
+        source = xy if side == BACK else outline.photo_xy(inner.beside[i, j].astype(np.float64))
+        sheets.append(Surface(xy, height, normals, ~no, no, no, source))
+    return sheets
 
 
 def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) -> Surface:
@@ -146,4 +196,4 @@ def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) ->
     height, _ = body.sample(xy, MIDDLE)
     normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])
     yes = np.ones(len(xy), bool)
-    return Surface(xy, height, normals, yes, yes, yes)
+    return Surface(xy, height, normals, yes, yes, yes, xy)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import F64
 from .bilinear import bilinear
+from .cuts import Cuts
 from .silhouette import Silhouette, is_covered
 
 FULL_BODY = 0.6  # x extent: radius of the disc that becomes a ball 0.7 times as deep as wide
@@ -36,6 +37,7 @@ class Thickness:
 
     square: F64  # (h, w) q px^2; below 0 outside, so that 0 is on the outline
     crease: F64  # (h, w) c px
+    cuts: Cuts | None = None  # between cells that are not of one surface
 
     @staticmethod
     def of(silhouette: Silhouette) -> Thickness:
@@ -59,7 +61,7 @@ class Thickness:
 
     def times(self, factor: F64) -> Thickness:
         """Thicker by `factor` (h, w)."""
-        return Thickness(self.square * factor**2, self.crease * factor)
+        return Thickness(self.square * factor**2, self.crease * factor, self.cuts)
 
     def mean_with(self, grid_xy: F64) -> Thickness:
         """The mean with its own image, of which `grid_xy` (h, w, 2) are the places."""
@@ -68,17 +70,19 @@ class Thickness:
         is_in = (at >= 0).all(1) & (at <= [w - 1, h - 1]).all(1)
         image = bilinear(self.square, at).reshape(h, w)
         both = is_in.reshape(h, w) & (image > 0) & (self.square > 0)
-        return Thickness(np.where(both, 0.5 * (image + self.square), self.square), self.crease)
+        return Thickness(
+            np.where(both, 0.5 * (image + self.square), self.square), self.crease, self.cuts
+        )
 
     def mixed(self, half: F64, share: F64) -> Thickness:
         """As thick as `half` (h, w) px, up to the outline, where `share` (h, w) is 1."""
         square = self.square + share * ((half / FULLNESS) ** 2 - self.square)
-        return Thickness(square, self.crease * (1 - share))
+        return Thickness(square, self.crease * (1 - share), self.cuts)
 
     def towards(self, half: F64, share: F64) -> Thickness:
         """As thick as `half` (h, w) px where `share` (h, w) is 1; it leaves a rim as steeply."""
         wanted = (half / FULLNESS + self.crease) ** 2 - self.crease**2
-        return Thickness(self.square + share * (wanted - self.square), self.crease)
+        return Thickness(self.square + share * (wanted - self.square), self.crease, self.cuts)
 
     def sample(self, grid_xy: F64, cell: float) -> tuple[F64, F64]:
         """Half-thickness (N,) px and its gradient (N, 2) at grid coordinates (N, 2)."""
@@ -95,7 +99,8 @@ class Thickness:
     @cached_property
     def _fields(self) -> F64:
         """(h, w, 6) q, c and what both grow by from cell to cell, across and down."""
-        (qdy, qdx), (cdy, cdx) = (np.gradient(f) for f in (self.square, self.crease))
+        gradient = np.gradient if self.cuts is None else self.cuts.gradient
+        (qdy, qdx), (cdy, cdx) = (gradient(f) for f in (self.square, self.crease))
         return np.stack([self.square, self.crease, qdx, qdy, cdx, cdy], -1)
 
 

@@ -1,0 +1,97 @@
+"""What lies behind a part of the object and before another: backs, and fronts beneath."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ..arrays import F64, I64, Mask
+from .cuts import LEAST_JUMP, Cuts
+
+GAP = 0.03  # x extent of air between two parts, from which the nearer has a back of its own
+LEAST_CELLS = 24  # of such a part
+CLEAR = 2.0  # cells from a cut, nearer to which colours are mixed with the other side's
+SMOOTH = 1.5  # cells
+
+
+class Walls(NamedTuple):
+    """Stretches of cuts, each between a near cell and a far one, side by side."""
+
+    near: I64  # (n, 2) column and row
+    step: I64  # (n, 2) to the far cell
+    top: F64  # (n,) px, height of the near front
+    foot: F64  # (n,) px, where that part ends or the far front begins
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Fields (h, w) over a silhouette's cells; heights are px."""
+
+    walls: Walls
+    own_back: F64  # of the part that is seen
+    beneath: F64  # of the front that goes on behind it, hidden from the photo
+    beside: I64  # (h, w, 2) column and row of a cell that has the colours of that
+    is_apart: Mask  # where there is air between the two
+
+
+def overlaps_of(
+    front: F64, back: F64, thickness: F64, cuts: Cuts, inside: Mask, extent: float
+) -> Overlaps:
+    """`thickness` (h, w) px of the part that is seen, beneath its `front` (h, w)."""
+    own_back = np.maximum(front - thickness, back)
+    walls = _walls(front, own_back, cuts, LEAST_JUMP * extent)
+    far = np.zeros(inside.shape, bool)
+    far[walls.near[:, 1] + walls.step[:, 1], walls.near[:, 0] + walls.step[:, 0]] = True
+    nearest = _nearest(far & inside)
+    rows, columns = np.divmod(nearest, inside.shape[1])
+    beneath = cv2.GaussianBlur(front[rows, columns], (0, 0), SMOOTH)
+    clear = cv2.distanceTransform((~cuts.beside()).astype(np.uint8), cv2.DIST_L2, 3) >= CLEAR
+    is_farther = front - beneath < GAP * extent  # the far side of a cut
+    source = clear & inside & is_farther
+    if source.any():
+        nearest = _nearest(source).ravel()[nearest]
+    beside = np.stack(np.divmod(nearest, inside.shape[1])[::-1], -1)
+    is_apart = inside & (own_back - np.maximum(beneath, back) > GAP * extent)
+    return Overlaps(walls, own_back, beneath, beside, _large(is_apart))
+
+
+def _walls(front: F64, own_back: F64, cuts: Cuts, least: float) -> Walls:
+    """Where the front falls by at least so many px."""
+    found = []
+    for is_cut, step in ((cuts.down, (0, 1)), (cuts.right, (1, 0))):
+        rows, columns = np.nonzero(is_cut)
+        first = np.column_stack([columns, rows])
+        second = first + step
+        is_first = front[rows, columns] > front[second[:, 1], second[:, 0]]
+        near = np.where(is_first[:, None], first, second)
+        found.append((near, np.where(is_first[:, None], second, first) - near))
+    near, step = (np.concatenate(parts).astype(np.int64) for parts in zip(*found, strict=True))
+    top, beyond = (front[at[:, 1], at[:, 0]] for at in (near, near + step))
+    falls = top - beyond >= least
+    near, step, top, beyond = (part[falls] for part in (near, step, top, beyond))
+    return Walls(
+        near, step, top, np.maximum(own_back[near[:, 1], near[:, 0]], beyond).clip(None, top)
+    )
+
+
+def _nearest(source: Mask) -> I64:
+    """(h, w) flat index of the nearest of `source` (h, w); 0 where there is none."""
+    if not source.any():
+        return np.zeros(source.shape, np.int64)
+    _, label = cv2.distanceTransformWithLabels(
+        (~source).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    index = np.zeros(int(np.max(label)) + 1, np.int64)
+    index[np.asarray(label)[source]] = np.flatnonzero(source)
+    return index[np.asarray(label, np.int64)]
+
+
+def _large(mask: Mask) -> Mask:
+    """Without specks."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    kept = stats[:, cv2.CC_STAT_AREA] >= LEAST_CELLS
+    kept[0] = False
+    return kept[labels]
