@@ -108,7 +108,8 @@ def test_no_front_hangs_between_two_parts():
         height = surface.height[own] / SIDE
         low, high = (f(SAMPLE.front, np.ones((3, 3))) for f in (cv2.erode, cv2.dilate))
         shift = np.median(height - SAMPLE.front[y, x])
-        between = (height - shift > low[y, x] + 0.02) & (height - shift < high[y, x] - 0.02)
+        share = (height - shift - low[y, x]) / np.maximum(high - low, 1e-3)[y, x]
+        between = (share > 0.25) & (share < 0.75)
         beside = cv2.dilate(SAMPLE.edge.astype(np.uint8), np.ones((3, 3)))[y, x] > 0
         return float(between[beside].mean())
 
