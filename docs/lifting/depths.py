@@ -9,13 +9,12 @@ import numpy as np
 from solids import SOLIDS, Solid, load
 from turning import AT, CAMERA, SHARE, SIDE, Shot, over_plate
 
-from objectmorpher_core.arrays import F64, Mask
 from objectmorpher_core.document import LiftSettings
 from objectmorpher_core.lift import shape_look
-from objectmorpher_core.lift.body import BACK, FRONT, Body
+from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.fusion import fused
 from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.training.shape_eval import Score, Surfaces, score
+from objectmorpher_core.training.shape_eval import Score, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
 WAYS = ("network", "relief", "inflation", "flat")
@@ -45,23 +44,13 @@ def _scores(solid: Solid) -> dict[str, Score]:
         "relief": standing,
         "inflation": Body.of(outline, CAMERA, LiftSettings(is_standing=False)),
     }
-    ways = {way: _surfaces(body, mask) for way, body in bodies.items()}
+    ways = {way: surfaces_of(body, mask) for way, body in bodies.items()}
     flat = np.full(mask.shape, float(ways["inflation"].thickness[mask].mean()))
     ways["flat"] = Surfaces(np.zeros(mask.shape), flat)
     nearest, farthest = (np.where(mask, side, 1.0) for side in (view.depth, view.back))
     scale = CAMERA.focal / float(nearest[mask].mean())  # px at which the photo is as wide
     true = Surfaces(-scale * nearest, scale * (farthest - nearest))
     return {way: score(surfaces, true, mask) for way, surfaces in ways.items()}
-
-
-def _surfaces(body: Body, mask: Mask) -> Surfaces:
-    """Heights in px at the pixels of a mask (H, W)."""
-    rows, columns = np.nonzero(mask)
-    xy = np.column_stack([columns, rows]).astype(np.float64) + 0.5
-    sheets: list[F64] = [body.height(xy, side) for side in (FRONT, BACK)]
-    front, thickness = np.zeros(mask.shape), np.zeros(mask.shape)
-    front[mask], thickness[mask] = sheets[0], sheets[0] - sheets[1]
-    return Surfaces(front, thickness)
 
 
 def _mean(scores: list[Score]) -> Score:

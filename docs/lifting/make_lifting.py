@@ -11,6 +11,7 @@ import json
 import sys
 from pathlib import Path
 
+from depths import depth_scores
 from motorcycle import results
 from page import write_page
 from pictures import draw_backs, draw_real, draw_solids, draw_thickness
@@ -21,6 +22,7 @@ FOLDER = Path(__file__).resolve().parent
 sys.path.append(str(FOLDER.parent))
 from meshes import fetched  # noqa: E402  # beside this folder: other pages have them, too
 
+PICTURED_WAYS = ("network", "relief", "card")
 PICTURED = ("duck", "bunny", "ring", "brick", "figure", "mug")
 
 
@@ -39,12 +41,14 @@ def main() -> None:
         rows.append(row_of(name, found))
         print(rows[-1], flush=True)
         if name in PICTURED:
-            shown.append((scene, {way: found[35, way][0] for way in ("relief", "card")}))
+            shown.append((scene, {way: found[35, way][0] for way in PICTURED_WAYS}))
     draw_solids(FOLDER / "solids.jpg", shown)
     draw_real(FOLDER / "photos.jpg")
     draw_backs(FOLDER / "backs.jpg")
     draw_thickness(FOLDER / "thickness.jpg")
-    (FOLDER / "README.md").write_text(write_page(rows, results()), encoding="utf-8")
+    (FOLDER / "README.md").write_text(
+        write_page(rows, depth_scores(meshes), results()), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ CLICKS = {
     "coffee": EditScript(click=((300.0, 130.0),)),
     "astronaut": EditScript(click=((220.0, 80.0), (180.0, 440.0))),
     "flower": EditScript(click=((310.0, 240.0),)),
+    "rocket": EditScript(click=((322.0, 200.0),)),
 }
 GAP, LABEL, FONT_SIZE, QUALITY = 6, 24, 15, 86
 INK = (35, 35, 40)
@@ -30,31 +31,33 @@ BOX = (75, 95, 425, 445)  # px of the made photos that is shown
 Sheet = list[list[np.ndarray]]  # rows of pictures (h, w, 3) u8
 
 Turn = tuple[float, float, float]
-TURNS: dict[str, Turn] = {
-    "the photo": (0, 0, 0), "yaw -25": (-25, 0, 0), "yaw 25": (25, 0, 0), "pitch 20": (0, 20, 0),
-}  # fmt: skip
+TURNS: dict[str, Turn] = {"yaw -25": (-25, 0, 0), "yaw 25": (25, 0, 0), "pitch 20": (0, 20, 0)}
 
 
 def draw_solids(path: Path, shown: list[tuple[Scene, dict[str, Shot]]]) -> None:
-    """Photo, truth, relief and card at 35 degrees, two solids in a row."""
+    """Photo, truth, and what is predicted at 35 degrees, two solids in a row."""
     x0, y0, x1, y1 = BOX
     rows = []
     for scene, shots in shown:
         pictures = [over_plate(s) for s in (scene.photo, scene.turned[35], *shots.values())]
         rows.append([_bytes(p[y0:y1, x0:x1]) for p in pictures])
-    labels = ["the photo", "35 degrees, true", "relief", "card"]
+    labels = ["the photo", "35 degrees, true", "network", "relief", "card"]
     half = -(-len(rows) // 2)
     pairs = [a + b for a, b in zip(rows[:half], rows[half:], strict=True)]
-    _write(path, labels * 2, pairs, 200)
+    _write(path, labels * 2, pairs, 160)
 
 
 def draw_real(path: Path) -> None:
-    """Photos, turned."""
+    """Photos, turned, with the network and without."""
     rows = []
     for name in CLICKS:
-        document = _lifted(name, AS_SEEN)
-        rows.append([_turned(document, turn) for turn in TURNS.values()])
-    _write(path, list(TURNS), rows, 300)
+        learned, plain = (_lifted(name, replace(AS_SEEN, trust=trust)) for trust in (1.0, 0.0))
+        row = [learned.photo.pixels]
+        for turn in TURNS.values():
+            row += [_turned(learned, turn), _turned(plain, turn)]
+        rows.append(row)
+    labels = [f"{turn}, {way}" for turn in TURNS for way in ("network", "relief")]
+    _write(path, ["the photo", *labels], rows, 200)
 
 
 def draw_backs(path: Path) -> None:

@@ -118,7 +118,10 @@ class Body:
 
     def _slopes(self, field: F64) -> tuple[F64, F64]:
         """(h, w) each, what `field` (h, w) grows by per px right and down."""
-        down, right = np.gradient(field) if self.cuts is None else self.cuts.gradient(field)
+        if self.cuts is not None:
+            down, right = self.cuts.gradient(field)
+        else:
+            down, right = (np.asarray(slope, np.float64) for slope in np.gradient(field))
         return right / self.silhouette.cell, down / self.silhouette.cell
 
     def _add_detail(self, grid_xy: F64, share: F64, height: F64, gradient: F64) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import F64, Mask
 from ..camera import Camera
+from ..distances import nearest_in
 from .bilinear import bilinear
 from .body import Body
 from .crop import SIDE, rays
@@ -46,36 +47,38 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
     if trust <= 0:
         return body
     outline = body.silhouette
+    halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
     sheets = sheets_of(seen, camera, outline)
+    # How far away it is neither tells: both fronts are, in the mean. Away from the camera all
+    # grows alike, and the picture stays.
+    means = [
+        float(front[outline.inside].mean()) for front in (body.middle + halves[0], sheets.front)
+    ]
+    away = (camera.focal - means[0]) / (camera.focal - means[1])
+    front, back = (camera.focal - away * (camera.focal - side) for side in sheets[:2])
+    sheets = sheets._replace(front=front, back=back)
     cuts = find_cuts(
         sheets.front, trust * sheets.edge, outline.inside, outline.cell, outline.extent
     )
     if cuts is not None:
         sharp = (cuts.sharpened(field, outline.inside) for field in (sheets.front, sheets.own))
         sheets = sheets._replace(**dict(zip(("front", "own"), sharp, strict=True)))
-    halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
     error = seen.crop.side * INFLATED_ERROR[0] + INFLATED_ERROR[1] * 0.5 * (halves[0] + halves[1])
     front_share, back_share = (
         trust * error**2 / (error**2 + own**2) for own in (sheets.front_error, sheets.back_error)
     )
-    # The silhouette does not tell how far away the object is: both are about as far.
-    fronts = body.middle + halves[0]
-    shift = float((sheets.front - fronts)[outline.inside].mean())
     half = 0.5 * (sheets.front - sheets.back)
-    middle = (1 - front_share) * (body.middle + shift) + front_share * (sheets.front - half)
-    # Where the body closes a front that is thinner lies deeper: at the outline both meet amid.
+    middle = (1 - front_share) * body.middle + front_share * (sheets.front - half)
     if cuts is not None:
         body = replace(
             body, front=replace(body.front, cuts=cuts), back=replace(body.back, cuts=cuts)
         )
     sides = [
-        _thicker(side, closing(half, sheets.facing, outline, own), back_share, thickness)
+        side.towards(thickness * closing(half, sheets.facing, outline, own), back_share)
         for side, own in zip((body.front, body.back), halves, strict=True)
     ]
     own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
-    return replace(
-        body, middle=middle - shift * (1 - trust), front=sides[0], back=sides[1], cuts=cuts, own=own
-    )
+    return replace(body, middle=middle, front=sides[0], back=sides[1], cuts=cuts, own=own)
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
@@ -126,21 +129,10 @@ def _half(side: Thickness, outline: Silhouette) -> F64:
     return side.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
 
 
-def _thicker(side: Thickness, half: F64, share: F64, thickness: float) -> Thickness:
-    """`side` as thick as `half` (h, w) where `share` (h, w) is 1."""
-    return side.towards(thickness * half, share)
-
-
 def _continued(fields: F64, mask: Mask) -> F64:
     """`fields` (s, s, c), outside `mask` (s, s) as at its nearest pixel well inside."""
     away = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     inner = away > INNER
     if not inner.any():
         inner = mask
-    _, found = cv2.distanceTransformWithLabels(
-        (~inner).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    label = np.asarray(found, np.int64)
-    nearest = np.zeros(int(label.max()) + 1, np.int64)
-    nearest[label[inner]] = np.flatnonzero(inner)
-    return fields.reshape(-1, fields.shape[-1])[nearest[label]]
+    return fields.reshape(-1, fields.shape[-1])[nearest_in(inner)]

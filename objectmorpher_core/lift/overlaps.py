@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ..arrays import F64, I64, Mask
+from ..distances import nearest_in
 from .cuts import LEAST_JUMP, Cuts
 
 GAP = 0.03  # x extent of air between two parts, from which the nearer has a back of its own
@@ -45,14 +46,15 @@ def overlaps_of(
     walls = _walls(front, own_back, cuts, LEAST_JUMP * extent)
     far = np.zeros(inside.shape, bool)
     far[walls.near[:, 1] + walls.step[:, 1], walls.near[:, 0] + walls.step[:, 0]] = True
-    nearest = _nearest(far & inside)
+    nearest = nearest_in(far & inside)
     rows, columns = np.divmod(nearest, inside.shape[1])
-    beneath = cv2.GaussianBlur(front[rows, columns], (0, 0), SMOOTH)
+    smooth = cv2.GaussianBlur(front[rows, columns], (0, 0), SMOOTH)
+    beneath = np.asarray(smooth, np.float64)
     clear = cv2.distanceTransform((~cuts.beside()).astype(np.uint8), cv2.DIST_L2, 3) >= CLEAR
     is_farther = front - beneath < GAP * extent  # the far side of a cut
     source = clear & inside & is_farther
     if source.any():
-        nearest = _nearest(source).ravel()[nearest]
+        nearest = nearest_in(source).ravel()[nearest]
     beside = np.stack(np.divmod(nearest, inside.shape[1])[::-1], -1)
     is_apart = inside & (own_back - np.maximum(beneath, back) > GAP * extent)
     return Overlaps(walls, own_back, beneath, beside, _large(is_apart))
@@ -60,38 +62,27 @@ def overlaps_of(
 
 def _walls(front: F64, own_back: F64, cuts: Cuts, least: float) -> Walls:
     """Where the front falls by at least so many px."""
-    found = []
+    nears, steps = [], []
     for is_cut, step in ((cuts.down, (0, 1)), (cuts.right, (1, 0))):
         rows, columns = np.nonzero(is_cut)
         first = np.column_stack([columns, rows])
         second = first + step
         is_first = front[rows, columns] > front[second[:, 1], second[:, 0]]
         near = np.where(is_first[:, None], first, second)
-        found.append((near, np.where(is_first[:, None], second, first) - near))
-    near, step = (np.concatenate(parts).astype(np.int64) for parts in zip(*found, strict=True))
-    top, beyond = (front[at[:, 1], at[:, 0]] for at in (near, near + step))
-    falls = top - beyond >= least
-    near, step, top, beyond = (part[falls] for part in (near, step, top, beyond))
-    return Walls(
-        near, step, top, np.maximum(own_back[near[:, 1], near[:, 0]], beyond).clip(None, top)
-    )
-
-
-def _nearest(source: Mask) -> I64:
-    """(h, w) flat index of the nearest of `source` (h, w); 0 where there is none."""
-    if not source.any():
-        return np.zeros(source.shape, np.int64)
-    _, label = cv2.distanceTransformWithLabels(
-        (~source).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    index = np.zeros(int(np.max(label)) + 1, np.int64)
-    index[np.asarray(label)[source]] = np.flatnonzero(source)
-    return index[np.asarray(label, np.int64)]
+        nears.append(near)
+        steps.append(np.where(is_first[:, None], second, first) - near)
+    near, step = np.concatenate(nears), np.concatenate(steps)
+    beyond = near + step
+    fall = front[near[:, 1], near[:, 0]] - front[beyond[:, 1], beyond[:, 0]]
+    near, step, beyond = near[fall >= least], step[fall >= least], beyond[fall >= least]
+    top = front[near[:, 1], near[:, 0]]
+    foot = np.maximum(own_back[near[:, 1], near[:, 0]], front[beyond[:, 1], beyond[:, 0]])
+    return Walls(near, step, top, np.minimum(foot, top))
 
 
 def _large(mask: Mask) -> Mask:
     """Without specks."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
-    kept = stats[:, cv2.CC_STAT_AREA] >= LEAST_CELLS
+    _, found, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    kept = np.asarray(stats)[:, cv2.CC_STAT_AREA] >= LEAST_CELLS
     kept[0] = False
-    return kept[labels]
+    return kept[np.asarray(found, np.int64)]

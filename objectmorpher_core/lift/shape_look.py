@@ -38,6 +38,16 @@ class SeenShape:
     front_error: F32  # expected
     depth_error: F32  # expected
 
+    @staticmethod
+    def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
+        """Of what the network says, (9, s, s); see `training.shape_net`."""
+        normal = raw[3:6] / np.maximum(np.linalg.norm(raw[3:6], axis=0), 1e-6)
+        return SeenShape(
+            crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
+            normal.transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
+            np.exp(raw[7]), np.exp(raw[8]),
+        )  # fmt: skip
+
 
 def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
     """What is seen where `mask` (H, W) of a photo is; None where the network cannot run."""
@@ -51,6 +61,11 @@ def missing() -> str | None:
     if models.path(dino_tokens.WEIGHT) is None:
         return f"the model {dino_tokens.WEIGHT} is not here: `objectmorpher models get`"
     return None if is_shipped() else "the shape network is missing from this installation"
+
+
+def shipped() -> bytes:
+    """The network's own weights, an ONNX file. Raises FileNotFoundError."""
+    return files(PACKAGE).joinpath(WEIGHTS).read_bytes()
 
 
 def is_shipped() -> bool:
@@ -70,13 +85,7 @@ class ShapeNet:
         """Of planes (7, s, s) and tokens (g, g, c) of a crop."""
         wanted = {"planes": planes[None], "tokens": tokens.transpose(2, 0, 1)[None]}
         found = self._session.run(None, {k: np.ascontiguousarray(v) for k, v in wanted.items()})
-        raw = np.asarray(found[0][0], np.float32)
-        normal = raw[3:6] / np.maximum(np.linalg.norm(raw[3:6], axis=0), 1e-6)
-        return SeenShape(
-            crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
-            normal.transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
-            np.exp(raw[7]), np.exp(raw[8]),
-        )  # fmt: skip
+        return SeenShape.of(np.asarray(found[0][0], np.float32), mask, crop)
 
 
 class _Memory:
@@ -98,7 +107,7 @@ class _Memory:
             if self._last is not None and self._last[0] == digest:
                 return self._last[1]
             if self._net is None:
-                self._net = ShapeNet(files(PACKAGE).joinpath(WEIGHTS).read_bytes())
+                self._net = ShapeNet(shipped())
             tokens = dino_tokens.shared().tokens(rgb)
             found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
             self._last = digest, found

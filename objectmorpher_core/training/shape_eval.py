@@ -10,11 +10,14 @@ from ..arrays import F32, F64, Mask
 from ..camera import Camera
 from ..document import LiftSettings
 from ..lift.body import BACK, FRONT, Body
+from ..lift.crop import Crop
+from ..lift.fusion import fused
+from ..lift.shape_look import SeenShape
 from ..lift.silhouette import Silhouette
 
 
 class Surfaces(NamedTuple):
-    """In crop units (`shapes.sample`)."""
+    """In any unit."""
 
     front: F64  # (s, s) towards the camera
     thickness: F64  # (s, s)
@@ -44,16 +47,31 @@ def aligned(found: F64, true: F64) -> F64:
     return scale * a + true.mean()
 
 
-def relief_surfaces(mask: Mask, tangents: F32, is_standing: bool = True) -> Surfaces:
+def relief(mask: Mask, tangents: F32, is_standing: bool = True) -> Body:
     """What the relief lifter makes of a mask (s, s) alone, seen by the crop's camera."""
+    settings = LiftSettings(is_standing=is_standing)
+    return Body.of(Silhouette.of(mask), camera_of(tangents, len(mask)), settings)
+
+
+def learned(mask: Mask, tangents: F32, raw: F32) -> Body:
+    """What it makes of that and of what the network says, (9, s, s)."""
     side = len(mask)
+    seen = SeenShape.of(raw, mask, Crop(0, 0, side, tangents))
+    return fused(relief(mask, tangents), seen, camera_of(tangents, side), 1.0, 1.0)
+
+
+def camera_of(tangents: F32, side: int) -> Camera:
+    """Of a photo that is the crop."""
     focal = side / float(tangents[2])
     centre = [0.5 * side - float(tangents[k]) * focal for k in (0, 1)]
-    camera = Camera(focal, centre[0], centre[1], side, side)
-    body = Body.of(Silhouette.of(mask), camera, LiftSettings(is_standing=is_standing))
+    return Camera(focal, centre[0], centre[1], side, side)
+
+
+def surfaces_of(body: Body, mask: Mask) -> Surfaces:
+    """At the pixels of a mask (h, w), in its px."""
     rows, columns = np.nonzero(mask)
     xy = np.column_stack([columns, rows]).astype(np.float64) + 0.5
-    heights = [body.sample(xy, sheet)[0] / side for sheet in (FRONT, BACK)]
-    surfaces = np.zeros((2, side, side))
+    heights = [body.height(xy, sheet) for sheet in (FRONT, BACK)]
+    surfaces = np.zeros((2, *mask.shape))
     surfaces[0][mask], surfaces[1][mask] = heights[0], heights[0] - heights[1]
     return Surfaces(surfaces[0], surfaces[1])

@@ -9,7 +9,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from ..lift.crop import Crop, rays
 from ..progress import Progress, silent
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards
-from .shape_eval import Score, Surfaces, relief_surfaces, score
+from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of
 from .shape_losses import losses
 from .shape_net import ShapeNet
 from .shapes.families import FAMILIES
@@ -171,18 +172,19 @@ def figures(folder: Path, net: ShapeNet) -> dict[str, Any]:
     """Scores on samples that were never trained on, by family and in all, and the curve."""
     kept = torch.load(folder / "checkpoint.pt", weights_only=True)
     scores = check(net, sorted((folder / "unseen").glob("*.npz")))
-    ways = next(iter(scores.values()))
+    families = sorted({family for family, _ in scores})
+    everything = [row for _, row in scores]
     history = kept["history"]
     bins = np.array_split(np.arange(len(history)), min(CURVE, len(history)))
     return {
         "plan": json.loads(kept["plan"]),
         "steps": kept["step"],
-        "means": {
-            way: Score(*np.mean([row[way] for row in scores.values()], 0))._asdict() for way in ways
-        },
+        "parameters": sum(p.numel() for p in net.parameters()),
+        "means": _middles(everything, np.mean),
+        "medians": _middles(everything, np.median),
         "families": {
-            name: {way: found._asdict() for way, found in row.items()}
-            for name, row in scores.items()
+            name: _middles([row for family, row in scores if family == name], np.mean)
+            for name in families
         },
         "curve": [
             {part: round(float(np.mean([history[k][part] for k in own])), 4) for part in history[0]}
@@ -191,26 +193,47 @@ def figures(folder: Path, net: ShapeNet) -> dict[str, Any]:
     }
 
 
+Scores = dict[str, Score]  # of one sample, by way
+
+
+def _middles(rows: list[Scores], middle: Callable[..., Any]) -> dict[str, dict[str, float]]:
+    """The middle score of each way."""
+    return {
+        way: {
+            name: round(float(middle([getattr(row[way], name) for row in rows])), 4)
+            for name in Score._fields
+        }
+        for way in rows[0]
+    }
+
+
 @torch.inference_mode()
-def check(net: ShapeNet, files: list[Path]) -> dict[str, dict[str, Score]]:
-    """Mean scores by family, of the network and of the relief."""
-    rows: dict[str, dict[str, list[Score]]] = {}
+def check(net: ShapeNet, files: list[Path]) -> list[tuple[str, Scores]]:
+    """Family and scores of each sample, of the network and of what does without."""
+    rows: list[tuple[str, Scores]] = []
     for file in files:
         arrays = dict(np.load(file))
         batch = batch_of(arrays)
-        found = net(batch.planes, batch.tokens).numpy().astype(np.float64)
+        found = net(batch.planes, batch.tokens).numpy()
         for k, family in enumerate(arrays["family"]):
-            mask = arrays["mask"][k]
-            true = Surfaces(arrays["front"][k].astype(float), arrays["depth"][k].astype(float))
+            mask, tangents = arrays["mask"][k], arrays["tangents"][k]
+            inflated = surfaces_of(relief(mask, tangents, is_standing=False), mask)
+            flat = np.full(mask.shape, float(inflated.thickness[mask].mean()))
             ways = {
-                "network": Surfaces(found[k, 0], found[k, 2]),
-                "relief": relief_surfaces(mask, arrays["tangents"][k]),
-                "inflation": relief_surfaces(mask, arrays["tangents"][k], is_standing=False),
+                "network": surfaces_of(learned(mask, tangents, found[k]), mask),
+                "relief": surfaces_of(relief(mask, tangents), mask),
+                "inflation": inflated,
+                "flat": Surfaces(np.zeros(mask.shape), flat),
             }
-            for way, surfaces in ways.items():
-                row = rows.setdefault(str(family), {}).setdefault(way, [])
-                row.append(score(surfaces, true, mask))
-    return {
-        family: {way: Score(*np.mean(scores, 0)) for way, scores in ways.items()}
-        for family, ways in rows.items()
-    }
+            true = _true(arrays, k)
+            rows.append((str(family), {way: score(own, true, mask) for way, own in ways.items()}))
+    return rows
+
+
+def _true(arrays: dict[str, np.ndarray], k: int) -> Surfaces:
+    """Of packed sample `k`, towards the camera's plane, px of the crop."""
+    tangents = arrays["tangents"][k]
+    side = len(arrays["mask"][k])
+    forward = side * rays(tangents, side)[..., 2]
+    away = Crop(0, 0, side, tangents).away
+    return Surfaces(forward * (arrays["front"][k] - away), forward * arrays["depth"][k])

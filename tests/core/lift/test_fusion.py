@@ -18,7 +18,8 @@ from objectmorpher_core.lift.shape_look import SeenShape
 from objectmorpher_core.lift.silhouette import Silhouette
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment.matte import build_matte
-from objectmorpher_core.training.shape_eval import Surfaces, score
+from objectmorpher_core.training import shape_eval
+from objectmorpher_core.training.shape_eval import Surfaces, score, surfaces_of
 from objectmorpher_core.training.shapes.sample import Sample, make_sample
 from tests import shapes
 
@@ -27,10 +28,7 @@ SURE, UNSURE = 1e-3, 10.0  # crop units, expected error
 
 
 def camera_of(sample: Sample) -> Camera:
-    """Of a photo that is the crop."""
-    focal = SIDE / float(sample.tangents[2])
-    centre = [0.5 * SIDE - float(t) * focal for t in sample.tangents[:2]]
-    return Camera(focal, centre[0], centre[1], SIDE, SIDE)
+    return shape_eval.camera_of(sample.tangents, SIDE)
 
 
 def truth(sample: Sample, error: float = SURE) -> SeenShape:
@@ -47,12 +45,9 @@ def body_of(sample: Sample, **settings) -> Body:
 
 
 def surfaces(body: Body, sample: Sample) -> Surfaces:
-    rows, columns = np.nonzero(sample.mask)
-    xy = np.column_stack([columns, rows]) + 0.5
-    sheets = [body.height(xy, side) / SIDE for side in (FRONT, BACK)]
-    found = np.zeros((2, *sample.mask.shape))
-    found[0][sample.mask], found[1][sample.mask] = sheets[0], sheets[0] - sheets[1]
-    return Surfaces(found[0], found[1])
+    """In crop units."""
+    found = surfaces_of(body, sample.mask)
+    return Surfaces(found.front / SIDE, found.thickness / SIDE)
 
 
 def along_axis(sample: Sample) -> Surfaces:
