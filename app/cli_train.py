@@ -29,7 +29,7 @@ def run_train(options: argparse.Namespace) -> None:
     with progress_bar("training") as progress:
         checkpoint = train(options.folder, plan, options.minutes, progress)
     net = trained(checkpoint)
-    found = figures(options.folder, net)
+    found = figures(checkpoint, net)
     from objectmorpher_core.training.export_shape import export
 
     weights = options.output or options.folder / "shape.onnx"

@@ -58,9 +58,11 @@ def _edited() -> Document:
 def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     """A photo that is large, one of 16 bits, and Gaussians that are drawn as they are in a file."""
     from .compose.composite import object_texture
+    from .lift.integration import solved
     from .pipeline import lift_mask, make_plate
     from .segment.closed_form import affine
 
+    solved(*np.zeros((6, 4, 4)), 1, 1.0)  # where the shape network's models are here
     affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None

@@ -28,7 +28,8 @@ PICTURED = ("duck", "bunny", "ring", "brick", "figure", "mug")
 
 def figures() -> None:
     rows = [row_of(name, measured(make_scene(name, FOLDER))) for name in MADE]
-    print(json.dumps({f"{way} {a}": (s.iou, s.psnr) for (a, way), s in means(rows).items()}))
+    told = {f"{way} {group}": (s.iou, s.psnr) for (group, way), s in means(rows).items()}
+    print(json.dumps(told))
 
 
 def main() -> None:
@@ -41,7 +42,7 @@ def main() -> None:
         rows.append(row_of(name, found))
         print(rows[-1], flush=True)
         if name in PICTURED:
-            shown.append((scene, {way: found[35, way][0] for way in PICTURED_WAYS}))
+            shown.append((scene, {way: found["yaw 35", way][0] for way in PICTURED_WAYS}))
     draw_solids(FOLDER / "solids.jpg", shown)
     draw_real(FOLDER / "photos.jpg")
     draw_backs(FOLDER / "backs.jpg")

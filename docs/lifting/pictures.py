@@ -39,7 +39,7 @@ def draw_solids(path: Path, shown: list[tuple[Scene, dict[str, Shot]]]) -> None:
     x0, y0, x1, y1 = BOX
     rows = []
     for scene, shots in shown:
-        pictures = [over_plate(s) for s in (scene.photo, scene.turned[35], *shots.values())]
+        pictures = [over_plate(s) for s in (scene.photo, scene.edited["yaw 35"], *shots.values())]
         rows.append([_bytes(p[y0:y1, x0:x1]) for p in pictures])
     labels = ["the photo", "35 degrees, true", "network", "relief", "card"]
     half = -(-len(rows) // 2)

@@ -1,4 +1,4 @@
-"""Solids turned about the upright: what is predicted from one photo, against the true view.
+"""Solids turned, moved and bent: what is predicted from one photo, against the true view.
 
 Five predictions. "network" is the product's own lift; "relief" is the same from the silhouette
 alone, and "depth" is that with a perfect depth network, whose scale and shift are unknown as any
@@ -22,7 +22,7 @@ from solids import Solid, load
 from objectmorpher_core.arrays import F64, Mask, Pixels
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import DeformSettings, LiftSettings, Matte, Placement
+from objectmorpher_core.document import DeformSettings, LiftSettings, Matte, Placement, Pose
 from objectmorpher_core.lift import Subject
 from objectmorpher_core.lift.depth_prior import Seen
 from objectmorpher_core.lift.relief import ReliefLifter
@@ -30,11 +30,11 @@ from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.pixels import crop
 from objectmorpher_core.progress import silent
 from objectmorpher_core.puppet import Puppet
+from objectmorpher_core.raster.texture import TextureLevels
 from objectmorpher_core.rotations import turn_matrix
 
 SIDE = 512  # px
 CAMERA = Camera.from_fov(SIDE, SIDE)
-ANGLES = (-35, -20, -10, 10, 20, 35)  # degrees of yaw
 SHARE = 0.55  # of the picture's width that a solid fills
 AT = np.array([245.0, 270.0])  # px, where its middle is
 WAYS = ("network", "relief", "depth", "card", "affine")
@@ -43,6 +43,50 @@ SEEN = LiftSettings(uses_depth=False)
 POINTS = 20_000  # on a solid's surface, for the affine warp
 SAME_DEPTH = 0.01  # of a point and of the nearest surface: it is seen
 FAINT = 0.02  # alpha, from which a pixel counts
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A motion of a solid about its middle."""
+
+    group: str  # of edits whose scores are averaged
+    yaw: float = 0.0  # degrees
+    pitch: float = 0.0
+    nearer: float = 0.0  # x its distance
+    bend: float = 0.0  # degrees between its upper and its lower end, away from the camera
+
+    @property
+    def turn(self) -> F64:
+        """(3, 3)"""
+        return turn_matrix(self.yaw, self.pitch, 0)
+
+    def moved(self, points: F64, centre: F64) -> F64:
+        """Where world points (n, 3) of a solid about `centre` (3,) go."""
+        around = (points - centre) @ self.turn.T
+        if self.bend:
+            around, _ = bent(around, float(np.ptp(around[:, 1])), self.bend)
+        return around + (1 - self.nearer) * centre
+
+
+EDITS = {
+    **{f"yaw {a}": Edit(f"turn {abs(a)}", yaw=a) for a in (-35, -20, -10, 10, 20, 35)},
+    **{f"pitch {a}": Edit("pitch 20", pitch=a) for a in (-20, 20)},
+    "nearer": Edit("nearer by 0.3", nearer=0.3),
+    **{f"bend {a}": Edit("bend 40", bend=a) for a in (-40, 40)},
+}
+GROUPS = tuple(dict.fromkeys(edit.group for edit in EDITS.values()))
+
+
+def bent(around: F64, height: float, degrees: float) -> tuple[F64, F64]:
+    """Points (n, 3) bent backwards, and the rotations (n, 3, 3) there; `height` is of the whole."""
+    radius = height / np.radians(degrees)
+    angle = around[:, 1] / radius
+    sine, cosine, far = np.sin(angle), np.cos(angle), around[:, 2] + radius
+    places = np.column_stack([around[:, 0], far * sine, far * cosine - radius])
+    turns = np.zeros((len(around), 3, 3))
+    turns[:, 0, 0], turns[:, 1, 1], turns[:, 2, 2] = 1, cosine, cosine
+    turns[:, 1, 2], turns[:, 2, 1] = sine, -sine
+    return places, turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +99,15 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A solid in a made photo, and what it looks like turned."""
+    """A solid in a made photo, and what it looks like after edits."""
 
     name: str
     photo: Shot
-    turned: dict[int, Shot]  # by degrees
+    edited: dict[str, Shot]  # by name
     centre: F64  # (3,) world, about which it turns
     shown: F64  # (n, 2) px of points that the photo shows
-    moved: dict[int, F64]  # (n, 2) px of them, by degrees
+    moved: dict[str, F64]  # (n, 2) px of them, by the edit's name
     inverse: F64  # (h, w) true inverse depth of the photo; what is behind is farther away
-    back: F64  # (h, w) true depth of where rays leave the solid; not finite beside it
 
     @property
     def pixels(self) -> Pixels:
@@ -92,18 +135,23 @@ def make_scene(name: str, meshes: Path) -> Scene:
     depth = CAMERA.focal / (SHARE * SIDE)
     rest = solid.vertices + CAMERA.unproject(AT, depth)
     centre = 0.5 * (rest.min(0) + rest.max(0))
-    worlds = {a: (rest - centre) @ turn_matrix(a, 0, 0).T + centre for a in (0, *ANGLES)}
-    views = {a: mesh_view.draw(solid, world, CAMERA) for a, world in worlds.items()}
-    shots = {a: Shot(view.color, view.alpha) for a, view in views.items()}
+    view = mesh_view.draw(solid, rest, CAMERA)
     of, weights = _sampled(solid, rest)
-    places = {a: CAMERA.project((w[of] * weights[:, :, None]).sum(1)) for a, w in worlds.items()}
     points = (rest[of] * weights[:, :, None]).sum(1)
-    column, row = np.clip(places[0].astype(int), 0, SIDE - 1).T
-    is_seen = np.abs(points[:, 2] - views[0].depth[row, column]) < SAME_DEPTH
-    photo = shots.pop(0)
-    moved = {a: places[a][is_seen] for a in ANGLES}
-    inverse = np.where(np.isfinite(views[0].depth), 1 / views[0].depth, 0.5 / views[0].depth.min())
-    return Scene(name, photo, shots, centre, places[0][is_seen], moved, inverse, views[0].back)
+    column, row = np.clip(CAMERA.project(points).astype(int), 0, SIDE - 1).T
+    points = points[np.abs(points[:, 2] - view.depth[row, column]) < SAME_DEPTH]
+    shots, moved = {}, {}
+    for key, edit in EDITS.items():
+        world = edit.moved(np.concatenate([rest, points]), centre)
+        shots[key] = _shot(mesh_view.draw(solid, world[: len(rest)], CAMERA))
+        moved[key] = CAMERA.project(world[len(rest) :])
+    inverse = np.where(np.isfinite(view.depth), 1 / view.depth, 0.5 / view.depth.min())
+    shown = CAMERA.project(points)
+    return Scene(name, _shot(view), shots, centre, shown, moved, inverse)
+
+
+def _shot(view: mesh_view.View) -> Shot:
+    return Shot(view.color, view.alpha)
 
 
 def _sampled(solid: Solid, world: F64) -> tuple[np.ndarray, F64]:
@@ -139,40 +187,45 @@ def score(shot: Shot, truth: Shot) -> Score:
     )
 
 
-def measured(scene: Scene) -> dict[tuple[int, str], tuple[Shot, Score]]:
-    """What each way predicts of each turn."""
+def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
+    """What each way predicts of each edit."""
     matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=ALONE)
     _, learned = lift_mask(scene.pixels, CAMERA, scene.mask, settings=SEEN)
     seen = Seen((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
     subject = Subject(scene.pixels, CAMERA, scene.mask, matte)
     deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
+    lifts = {"network": learned, "relief": lifted, "depth": deep}
+    puppets = {way: Puppet(own, DeformSettings(), CAMERA) for way, own in lifts.items()}
     texture = object_texture(matte)
-    puppets = {
-        "network": Puppet(learned, DeformSettings(), CAMERA),
-        "relief": Puppet(lifted, DeformSettings(), CAMERA),
-        "depth": Puppet(deep, DeformSettings(), CAMERA),
-    }
-
-    def relief(way: str, angle: int, shift: F64) -> Shot:
-        puppet = puppets[way]
-        place = Placement(move=(float(shift[0]), float(shift[1])), turn=(angle, 0, 0))
-        picture = puppet.draw(None, place, texture, CAMERA)
-        alpha = np.asarray(picture.alpha, np.float64)
-        return Shot(np.asarray(picture.color) / np.maximum(alpha, 1e-6)[..., None], alpha)
-
-    drawers: dict[str, Callable[[int, F64], Shot]] = {
-        "network": lambda angle, shift: relief("network", angle, shift),
-        "relief": lambda angle, shift: relief("relief", angle, shift),
-        "depth": lambda angle, shift: relief("depth", angle, shift),
-        "card": lambda angle, shift: _warped(matte, _card(scene, matte, angle), shift),
-        "affine": lambda angle, shift: _warped(matte, _affine(scene, angle), shift),
-    }
     found = {}
-    for angle, truth in scene.turned.items():
-        for way in WAYS:
-            shot = _aligned(lambda shift, w=way, a=angle: drawers[w](a, shift), truth)
-            found[angle, way] = (shot, score(shot, truth))
+    for key, truth in scene.edited.items():
+        edit = EDITS[key]
+        drawers: dict[str, Draw] = {
+            way: lambda shift, p=puppet, e=edit: _drawn(p, texture, e, shift)
+            for way, puppet in puppets.items()
+        }
+        if not edit.bend:
+            drawers["card"] = lambda shift, e=edit: _warped(matte, _card(scene, matte, e), shift)
+        drawers["affine"] = lambda shift, k=key: _warped(matte, _affine(scene, k), shift)
+        for way, draw in drawers.items():
+            shot = _aligned(draw, truth)
+            found[key, way] = (shot, score(shot, truth))
     return found
+
+
+def _drawn(puppet: Puppet, texture: TextureLevels, edit: Edit, shift: F64) -> Shot:
+    """The lift after an edit, moved by a shift (2,) px."""
+    lifted = puppet.lifted
+    away = -edit.nearer * lifted.centre[2] / (lifted.diameter * lifted.scale)
+    move = (float(shift[0]), float(shift[1]))
+    place = Placement(move=move, depth=float(away), turn=(edit.yaw, edit.pitch, 0))
+    pose = None
+    if edit.bend:
+        height = float(np.ptp(lifted.gaussians.means[:, 1]))
+        pose = Pose(*bent(lifted.control_points.astype(np.float64), height, edit.bend))
+    picture = puppet.draw(pose, place, texture, CAMERA)
+    alpha = np.asarray(picture.alpha, np.float64)
+    return Shot(np.asarray(picture.color) / np.maximum(alpha, 1e-6)[..., None], alpha)
 
 
 def _aligned(draw: Draw, truth: Shot) -> Shot:
@@ -190,20 +243,21 @@ def _middle(alpha: F64) -> F64:
     return np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1]) / 2
 
 
-def _card(scene: Scene, matte: Matte, angle: int) -> F64:
+def _card(scene: Scene, matte: Matte, edit: Edit) -> F64:
     """(3, 3) the homography of a flat board at the depth of the solid's middle."""
-    turn, depth = turn_matrix(angle, 0, 0), scene.centre[2]
+    turn, depth = edit.turn, scene.centre[2]
     intrinsics = np.array([[CAMERA.focal, 0, CAMERA.cx], [0, CAMERA.focal, CAMERA.cy], [0, 0, 1]])
     alpha = crop(matte.alpha, matte.box, (0, 0, SIDE, SIDE))
     middle = CAMERA.unproject(_middle(alpha.astype(np.float64)), depth)
-    moved = turn + np.outer(middle - turn @ middle, [0, 0, 1 / depth])
+    step = (1 - edit.nearer) * middle - turn @ middle
+    moved = turn + np.outer(step, [0, 0, 1 / depth])
     return intrinsics @ moved @ np.linalg.inv(intrinsics)
 
 
-def _affine(scene: Scene, angle: int) -> F64:
+def _affine(scene: Scene, key: str) -> F64:
     """(3, 3) the affine map that best takes what the photo shows to where it truly is then."""
     source = np.column_stack([scene.shown, np.ones(len(scene.shown))])
-    fitted, *_ = np.linalg.lstsq(source, scene.moved[angle])
+    fitted, *_ = np.linalg.lstsq(source, scene.moved[key])
     return np.vstack([fitted.T, [0, 0, 1]])
 
 
@@ -221,17 +275,20 @@ def _warped(matte: Matte, to_place: F64, shift: F64) -> Shot:
 
 @dataclass(frozen=True)
 class Row:
-    """The scores of one solid, means over both senses of a turn."""
+    """The scores of one solid, means over the edits of a group."""
 
     name: str
-    scores: dict[tuple[int, str], Score]  # by degrees and way
+    scores: dict[tuple[str, str], Score]  # by group and way
 
 
-def row_of(name: str, found: dict[tuple[int, str], tuple[Shot, Score]]) -> Row:
+def row_of(name: str, found: dict[tuple[str, str], tuple[Shot, Score]]) -> Row:
     scores = {}
-    for angle in sorted({abs(a) for a in ANGLES}):
+    for group in GROUPS:
         for way in WAYS:
-            scores[angle, way] = mean([found[s * angle, way][1] for s in (-1, 1)])
+            own = [each for (key, w), (_, each) in found.items()
+                   if w == way and EDITS[key].group == group]  # fmt: skip
+            if own:
+                scores[group, way] = mean(own)
     return Row(name, scores)
 
 
@@ -240,6 +297,6 @@ def mean(scores: Iterable[Score]) -> Score:
     return Score(float(np.mean([s.iou for s in chosen])), float(np.mean([s.psnr for s in chosen])))
 
 
-def means(rows: list[Row]) -> dict[tuple[int, str], Score]:
+def means(rows: list[Row]) -> dict[tuple[str, str], Score]:
     """Over all solids."""
     return {key: mean(row.scores[key] for row in rows) for key in rows[0].scores}

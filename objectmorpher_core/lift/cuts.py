@@ -45,7 +45,8 @@ class Cuts:
         right = (inside[:, 1:] & inside[:, :-1] & ~self.right).astype(np.float64)
         none = np.zeros(field.shape)
         weights = np.pad(down, ((0, 1), (0, 0))), np.pad(right, ((0, 0), (0, 1)))
-        change = solved(field, HELD * held, none, none, *weights, ROUNDS, CLOSE)
+        start = np.ascontiguousarray(field)  # the kernel is compiled for that
+        change = solved(start, HELD * held, none, none, *weights, ROUNDS, CLOSE)
         return np.where(near & inside, field + change, field)
 
     def beside(self) -> Mask:

@@ -92,13 +92,13 @@ def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
     px = crop.side * ways[..., 2]  # of depth along the axis, per crop unit along the ray
     front = camera.focal - px * distance
     back = camera.focal - px * (distance + seen.depth)
-    fields = np.stack(
+    stacked = np.stack(
         [
             front, back, crop.side * seen.front_error, crop.side * seen.depth_error, facing,
             seen.thickness / np.maximum(seen.depth, 1e-4), seen.edge,
         ], -1,
     )  # fmt: skip
-    fields = _continued(fields, mask)
+    fields = _continued(stacked.astype(np.float64), mask)
     cells = crop.grid_xy(outline.photo_xy(outline.cells)).reshape(-1, 2)
     found = bilinear(fields, cells).reshape(*outline.shape, -1)
     return Sheets(*np.moveaxis(found, -1, 0))

@@ -40,17 +40,11 @@ class Batch:
     away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
 
 
-def write_shards(
-    folder: Path,
-    first: int,
-    count: int,
-    families: tuple[str, ...] | None,
-    progress: Progress = silent,
-) -> None:
+def write_shards(folder: Path, first: int, count: int, progress: Progress = silent) -> None:
     """Files of samples with the seeds first.., those that are not there yet, in all cores."""
     folder.mkdir(parents=True, exist_ok=True)
     wanted = [
-        (folder / f"{seed:08d}.npz", seed, families)
+        (folder / f"{seed:08d}.npz", seed)
         for seed in range(first, first + count, SHARD)
         if not (folder / f"{seed:08d}.npz").exists()
     ]
@@ -63,9 +57,9 @@ def _begin() -> None:
     cv2.setNumThreads(1)
 
 
-def _write(job: tuple[Path, int, tuple[str, ...] | None]) -> None:
-    file, seed, families = job
-    samples = [make_sample(k, families=families) for k in range(seed, seed + SHARD)]
+def _write(job: tuple[Path, int]) -> None:
+    file, seed = job
+    samples = [make_sample(k) for k in range(seed, seed + SHARD)]
     arrays = packed(samples)
     arrays["tokens"] = _tokens(np.stack([s.rgb for s in samples]))
     partial = file.with_suffix(".part")
@@ -101,13 +95,18 @@ def _tokens(rgb: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(found.transpose(0, 3, 1, 2), np.float16)
 
 
-def batches(files: list[Path], size: int, rng: np.random.Generator) -> Iterator[Batch]:
-    """All samples of the files, mixed within some files at a time, half of them mirrored."""
+def batches(
+    files: list[Path], size: int, rng: np.random.Generator, held_out: tuple[str, ...] = ()
+) -> Iterator[Batch]:
+    """The samples of the files, mixed within some files at a time, half of them mirrored.
+
+    `held_out`: families that are left out.
+    """
     order = rng.permutation(len(files))
     for begin in range(0, len(order), 8):
         chosen = [dict(np.load(files[k])) for k in order[begin : begin + 8]]
         joined = {name: np.concatenate([c[name] for c in chosen]) for name in chosen[0]}
-        mixed = rng.permutation(len(joined["mask"]))
+        mixed = rng.permutation(np.flatnonzero(~np.isin(joined["family"], held_out)))
         for start in range(0, len(mixed) - size + 1, size):
             rows = mixed[start : start + size]
             picked = {name: array[rows] for name, array in joined.items()}

@@ -10,7 +10,7 @@ from ..arrays import F32, F64, Mask
 from ..camera import Camera
 from ..document import LiftSettings
 from ..lift.body import BACK, FRONT, Body
-from ..lift.crop import Crop
+from ..lift.crop import Crop, rays
 from ..lift.fusion import fused
 from ..lift.shape_look import SeenShape
 from ..lift.silhouette import Silhouette
@@ -65,6 +65,14 @@ def camera_of(tangents: F32, side: int) -> Camera:
     focal = side / float(tangents[2])
     centre = [0.5 * side - float(tangents[k]) * focal for k in (0, 1)]
     return Camera(focal, centre[0], centre[1], side, side)
+
+
+def true_surfaces(front: F32, depth: F32, tangents: F32) -> Surfaces:
+    """Of a sample's (s, s), towards the camera's plane, px of the crop."""
+    side = len(front)
+    forward = side * rays(tangents, side)[..., 2]
+    away = Crop(0, 0, side, tangents).away
+    return Surfaces(forward * (front - away), forward * depth)
 
 
 def surfaces_of(body: Body, mask: Mask) -> Surfaces:

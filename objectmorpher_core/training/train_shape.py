@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..lift.crop import Crop, rays
 from ..progress import Progress, silent
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards
-from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of
+from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of, true_surfaces
 from .shape_losses import losses
 from .shape_net import ShapeNet
-from .shapes.families import FAMILIES
 
 UNSEEN = 50_000_000  # the first seed that is never trained on
 CHECKED = 8 * SHARD  # unseen samples
@@ -43,7 +41,7 @@ class Plan:
     size: int = 16  # samples at a time
     rate: float = 1.5e-3
     decay: float = 0.02
-    held_out: tuple[str, ...] = ()  # families
+    held_out: tuple[str, ...] = ()  # families that are not trained on
     seed: int = 0
 
     @property
@@ -51,8 +49,9 @@ class Plan:
         return max(1, int(self.passes * self.samples / self.size))
 
     @property
-    def families(self) -> tuple[str, ...]:
-        return tuple(name for name in FAMILIES if name not in self.held_out)
+    def file(self) -> str:
+        """Name of the checkpoint."""
+        return "-without-".join(["checkpoint", *self.held_out]) + ".pt"
 
 
 def train(
@@ -64,8 +63,8 @@ def train(
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
-    files = _samples(folder / "samples", 0, plan.samples, plan.families, progress)
-    _samples(folder / "unseen", UNSEEN, CHECKED, None, progress)
+    files = _samples(folder / "samples", 0, plan.samples, progress)
+    _samples(folder / "unseen", UNSEEN, CHECKED, progress)
     state = _State.resumed(folder, plan)
     start, saved = time.monotonic(), time.monotonic()
     for batch in _endless(files, plan, state.step):
@@ -80,17 +79,16 @@ def train(
     return state.file
 
 
-def _samples(
-    folder: Path, first: int, count: int, families: tuple[str, ...] | None, progress: Progress
-) -> list[Path]:
-    write_shards(folder, first, count, families, progress)
+def _samples(folder: Path, first: int, count: int, progress: Progress) -> list[Path]:
+    write_shards(folder, first, count, progress)
     return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 
 def _endless(files: list[Path], plan: Plan, done: int) -> Iterator[Batch]:
     number = done * plan.size // max(plan.samples, 1)
     while True:
-        yield from batches(files, plan.size, np.random.default_rng([plan.seed, number, done]))
+        rng = np.random.default_rng([plan.seed, number, done])
+        yield from batches(files, plan.size, rng, plan.held_out)
         number += 1
 
 
@@ -110,7 +108,7 @@ class _State:
     @staticmethod
     def resumed(folder: Path, plan: Plan) -> _State:
         """As it was saved last, with the same plan; fresh where it was not."""
-        state = _State(folder / "checkpoint.pt", plan)
+        state = _State(folder / plan.file, plan)
         kept = torch.load(state.file, weights_only=True) if state.file.exists() else None
         if kept is not None and kept["plan"] == json.dumps(asdict(plan)):
             state.net.load_state_dict(kept["net"])
@@ -168,10 +166,10 @@ def trained(checkpoint: Path) -> ShapeNet:
     return net.eval()
 
 
-def figures(folder: Path, net: ShapeNet) -> dict[str, Any]:
+def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:
     """Scores on samples that were never trained on, by family and in all, and the curve."""
-    kept = torch.load(folder / "checkpoint.pt", weights_only=True)
-    scores = check(net, sorted((folder / "unseen").glob("*.npz")))
+    kept = torch.load(checkpoint, weights_only=True)
+    scores = check(net, sorted((checkpoint.parent / "unseen").glob("*.npz")))
     families = sorted({family for family, _ in scores})
     everything = [row for _, row in scores]
     history = kept["history"]
@@ -225,15 +223,6 @@ def check(net: ShapeNet, files: list[Path]) -> list[tuple[str, Scores]]:
                 "inflation": inflated,
                 "flat": Surfaces(np.zeros(mask.shape), flat),
             }
-            true = _true(arrays, k)
+            true = true_surfaces(arrays["front"][k], arrays["depth"][k], tangents)
             rows.append((str(family), {way: score(own, true, mask) for way, own in ways.items()}))
     return rows
-
-
-def _true(arrays: dict[str, np.ndarray], k: int) -> Surfaces:
-    """Of packed sample `k`, towards the camera's plane, px of the crop."""
-    tangents = arrays["tangents"][k]
-    side = len(arrays["mask"][k])
-    forward = side * rays(tangents, side)[..., 2]
-    away = Crop(0, 0, side, tangents).away
-    return Surfaces(forward * (arrays["front"][k] - away), forward * arrays["depth"][k])

@@ -19,7 +19,7 @@ from objectmorpher_core.lift.silhouette import Silhouette
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment.matte import build_matte
 from objectmorpher_core.training import shape_eval
-from objectmorpher_core.training.shape_eval import Surfaces, score, surfaces_of
+from objectmorpher_core.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
 from objectmorpher_core.training.shapes.sample import Sample, make_sample
 from tests import shapes
 
@@ -51,12 +51,9 @@ def surfaces(body: Body, sample: Sample) -> Surfaces:
 
 
 def along_axis(sample: Sample) -> Surfaces:
-    """The true surfaces, towards the camera's plane instead of along the rays."""
-    forward = rays(sample.tangents)[..., 2]
-    return Surfaces(
-        sample.front.astype(float) * forward - truth(sample).crop.away * forward,
-        sample.depth * forward,
-    )
+    """In crop units."""
+    true = true_surfaces(sample.front, sample.depth, sample.tangents)
+    return Surfaces(true.front / SIDE, true.thickness / SIDE)
 
 
 @pytest.mark.parametrize("kind", KINDS)
