@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
-from objectmorpher_core.lift import shape_look
-from objectmorpher_core.models import Added, State, Weight
+from objectmorpher_core.models import Added, State, Weight, shipped
 from objectmorpher_core.progress import Progress
-from objectmorpher_core.segment import dino_tokens
 
 from .. import job_functions
 from ..feedback import Action
@@ -112,9 +110,8 @@ class Models:
     @property
     def has_shape(self) -> bool:
         """Whether the shape network can look at what is lifted."""
-        needed = {dino_tokens.WEIGHT: "ok"}.items()
-        is_fed = needed <= {state.weight.id: state.state for state in self.states}.items()
-        return is_fed and shape_look.is_shipped()
+        is_fed = any(s.weight.id == shipped.TOKENS and s.state == "ok" for s in self.states)
+        return is_fed and shipped.is_shipped()
 
     def add(self, path: Path) -> None:
         """The user's depth model, tried before it is kept."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from importlib.resources import files
 from threading import Lock
 from typing import Any
 
@@ -17,10 +16,10 @@ import numpy as np
 from .. import models
 from ..arrays import F32, Mask, Pixels
 from ..camera import Camera
+from ..models import shipped
 from ..segment import dino_tokens
 from .crop import Crop, planes_of
 
-PACKAGE, WEIGHTS = "objectmorpher_core.lift", "shape.onnx"  # beside this file
 NO_EDGE = -12.0  # logit
 
 
@@ -58,19 +57,9 @@ def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
 
 def missing() -> str | None:
     """What the look needs and is not here, as one sentence."""
-    if models.path(dino_tokens.WEIGHT) is None:
-        return f"the model {dino_tokens.WEIGHT} is not here: `objectmorpher models get`"
-    return None if is_shipped() else "the shape network is missing from this installation"
-
-
-def shipped() -> bytes:
-    """The network's own weights, an ONNX file. Raises FileNotFoundError."""
-    return files(PACKAGE).joinpath(WEIGHTS).read_bytes()
-
-
-def is_shipped() -> bool:
-    """Whether the network's own weights came with the program."""
-    return files(PACKAGE).joinpath(WEIGHTS).is_file()
+    if models.path(shipped.TOKENS) is None:
+        return f"the model {shipped.TOKENS} is not here: `objectmorpher models get`"
+    return None if shipped.is_shipped() else "the shape network is missing from this installation"
 
 
 class ShapeNet:
@@ -107,8 +96,8 @@ class _Memory:
             if self._last is not None and self._last[0] == digest:
                 return self._last[1]
             if self._net is None:
-                self._net = ShapeNet(shipped())
-            tokens = dino_tokens.shared().tokens(rgb)
+                self._net = ShapeNet(shipped.shape_network())
+            tokens = dino_tokens.shared().inner_tokens(rgb)
             found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
             self._last = digest, found
             return found

@@ -14,10 +14,10 @@ VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5  # wire types
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type = FLOAT
 
 
-def with_interface(model: bytes, images: str, output: str) -> bytes:
-    """`model` with the one input `images`, (n, c, h, w) of any size, and the one output `output`.
+def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
+    """`model` with the one input `images`, (n, c, h, w) of any size, and the `outputs`.
 
-    `images` is the name of the model's input, `output` that of any tensor inside, both float32.
+    `images` is the name of the model's input, `outputs` are those of any tensors inside: float32.
     """
     sizes = b"".join(_bytes_field(1, _bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
     tensor = _bytes_field(1, FLOAT + _bytes_field(2, sizes))
@@ -32,7 +32,7 @@ def with_interface(model: bytes, images: str, output: str) -> bytes:
             graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
         ]
         body.append(_bytes_field(INPUT, _bytes_field(1, images.encode()) + _bytes_field(2, tensor)))
-        body.append(_bytes_field(OUTPUT, _bytes_field(1, output.encode())))
+        body += [_bytes_field(OUTPUT, _bytes_field(1, name.encode())) for name in outputs]
         parts.append(_bytes_field(GRAPH, b"".join(body)))
     return b"".join(parts)
 

@@ -15,6 +15,9 @@ from .subject import DEVIATION, MEAN
 WEIGHT = "dinov2-vits14"
 IMAGES = "input_image"
 TOKENS = "/backbone/layernorm/Add_1_output_0"  # (1, 1 + patches, 384), the class token first
+# What is about half way still tells where surfaces face (R^2 of normals by ridge regression from
+# one layer: 2 0.31, 5 0.44, 8 0.46, 10 0.40, the last 0.37); the last tells what things are.
+INNER = tuple(f"/backbone/encoder/layer.{k}/Add_1_output_0" for k in (5, 8))
 PATCH = 14  # px
 
 
@@ -32,17 +35,26 @@ class TokenNet:
             raise models.ModelError(f"the model {WEIGHT} is not here: `objectmorpher models get`")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
-        graph = with_interface(path.read_bytes(), IMAGES, TOKENS)
+        graph = with_interface(path.read_bytes(), IMAGES, TOKENS, *INNER)
         self._session: Any = onnxruntime.InferenceSession(
             graph, options, providers=["CPUExecutionProvider"]
         )
 
     def tokens(self, rgb: RGB) -> F32:
         """(h, w, 384) of a picture of h x w patches."""
+        return self._run(rgb, TOKENS)[0]
+
+    def inner_tokens(self, rgb: RGB) -> F32:
+        """(h, w, 768) of two inner layers, each token of mean 0 and deviation 1."""
+        layers = self._run(rgb, *INNER)
+        centred = [layer - layer.mean(-1, keepdims=True) for layer in layers]
+        return np.concatenate([c / (c.std(-1, keepdims=True) + 1e-6) for c in centred], -1)
+
+    def _run(self, rgb: RGB, *outputs: str) -> list[F32]:
         height, width = (n // PATCH for n in rgb.shape[:2])
         pixels = ((rgb.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        found = self._session.run([TOKENS], {IMAGES: pixels})[0][0, 1:]
-        return np.asarray(found.reshape(height, width, -1), np.float32)
+        found = self._session.run(list(outputs), {IMAGES: pixels})
+        return [np.asarray(f[0, 1:].reshape(height, width, -1), np.float32) for f in found]
 
 
 _opening = Lock()

@@ -31,7 +31,7 @@ def export(net: ShapeNet, path: Path) -> str:
     graph = model.graph
     narrow, casts = [], []
     for weight in graph.initializer:
-        if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 4:
+        if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 2:
             narrow.append(weight)
             continue
         half = numpy_helper.to_array(weight).astype("float16")

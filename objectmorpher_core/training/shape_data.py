@@ -29,7 +29,7 @@ class Batch:
     """Tensors (n, ., s, s) float32 for `shape_net.ShapeNet` and its losses."""
 
     planes: Tensor  # (n, 7, s, s)
-    tokens: Tensor  # (n, 384, g, g)
+    tokens: Tensor  # (n, 768, g, g)
     mask: Tensor  # (n, 1, s, s), as are the next four
     front: Tensor
     thickness: Tensor
@@ -86,12 +86,12 @@ _ENCODER: list[Any] = []
 
 
 def _tokens(rgb: np.ndarray) -> np.ndarray:
-    """(n, 384, g, g) float16 of crops (n, s, s, 3)."""
+    """(n, 768, g, g) float16 of crops (n, s, s, 3)."""
     from ..segment.dino_tokens import TokenNet
 
     if not _ENCODER:
         _ENCODER.append(TokenNet(threads=1))
-    found = np.stack([_ENCODER[0].tokens(one) for one in rgb])
+    found = np.stack([_ENCODER[0].inner_tokens(one) for one in rgb])
     return np.ascontiguousarray(found.transpose(0, 3, 1, 2), np.float16)
 
 

@@ -11,11 +11,12 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 GRID = 16  # tokens across
-WIDTH = 384  # of a token (DINOv2 ViT-S/14)
+WIDTH = 768  # of a token: two inner layers of DINOv2 ViT-S/14
 PLANES = 7  # red, green, blue, mask, distance to the outline, and the ray's two tangents
 OUTPUTS = 9  # front, thickness, depth, normal (3), edge, spread of front, spread of depth
 CHANNELS = (24, 48, 96, 160)  # from half the size to a sixteenth
 MIXED = 256  # at a sixteenth, with the tokens
+HEADS = 4  # of the attention there
 FINE = 32  # at half the size
 SCALES = {"front": 0.15, "thick": 0.2, "normal": 0.5}  # the usual size of what is predicted
 FACING = -0.5  # z of the normals before training, towards the camera
@@ -32,6 +33,26 @@ class Block(nn.Module):
         return F.relu(x + self.second(self.first(x)))
 
 
+class Attention(nn.Module):
+    """Every place looks at all others (Vaswani et al. 2017): a thing stands as a whole."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.before, self.between = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.mixed, self.out = nn.Linear(width, 3 * width), nn.Linear(width, width)
+        self.wide, self.narrow = nn.Linear(width, 4 * width), nn.Linear(4 * width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        n, c, h, w = x.shape
+        flat = x.flatten(2).transpose(1, 2)  # (n, places, c)
+        parts = self.mixed(self.before(flat)).view(n, h * w, 3, HEADS, c // HEADS)
+        query, key, value = parts.permute(2, 0, 3, 1, 4).unbind(0)
+        seen = F.scaled_dot_product_attention(query, key, value)
+        flat = flat + self.out(seen.transpose(1, 2).reshape(n, h * w, c))
+        flat = flat + self.narrow(F.gelu(self.wide(self.between(flat))))
+        return flat.transpose(1, 2).reshape(n, c, h, w)
+
+
 class ShapeNet(nn.Module):
     """(n, PLANES, s, s) and tokens (n, WIDTH, g, g) -> (n, OUTPUTS, s, s)."""
 
@@ -44,10 +65,12 @@ class ShapeNet(nn.Module):
         self.down4 = nn.Sequential(_conv(c, d, stride=2), Block(d))
         self.tokens = nn.Conv2d(WIDTH, d, 1)
         self.tokens_fine = nn.Conv2d(WIDTH, c // 2, 1)
-        self.middle = nn.Sequential(_conv(2 * d, MIXED, size=1), Block(MIXED), Block(MIXED))
+        self.middle = nn.Sequential(
+            _conv(2 * d, MIXED, size=1), Block(MIXED), Attention(MIXED), Attention(MIXED)
+        )
         self.up3 = nn.Sequential(_conv(MIXED + c + c // 2, 128), Block(128))
         self.up2 = nn.Sequential(_conv(128 + b, 64), Block(64))
-        self.up1 = nn.Sequential(_conv(64 + a, FINE), Block(FINE))
+        self.up1 = _conv(64 + a, FINE)
         self.head = nn.Conv2d(FINE, 4 * OUTPUTS, 1)  # of four pixels each (Shi et al. 2016)
 
     def forward(self, planes: Tensor, tokens: Tensor) -> Tensor:

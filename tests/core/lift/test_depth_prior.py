@@ -237,14 +237,14 @@ def test_with_true_depth_solids_turn_better_than_from_their_outline(
     import solids  # type: ignore[import-not-found]
     import turning  # type: ignore[import-not-found]
 
-    monkeypatch.setattr(turning, "ANGLES", (-35, -20, 20, 35))
-    monkeypatch.setattr(turning, "WAYS", ("relief", "depth"))
+    turns = {k: e for k, e in turning.EDITS.items() if e.group in ("turn 20", "turn 35")}
+    monkeypatch.setattr(turning, "EDITS", turns)
     gains = []
     for name in solids.MADE:
         found = turning.measured(turning.make_scene(name, LIFTING))
         plain, deep = (
             turning.mean(score for (_, own), (_, score) in found.items() if own == way)
-            for way in turning.WAYS
+            for way in ("relief", "depth")
         )
         gains.append((deep.psnr - plain.psnr, deep.iou - plain.iou))
     psnr, iou = np.mean(gains, axis=0)

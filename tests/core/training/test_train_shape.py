@@ -50,7 +50,7 @@ def test_it_learns(arrays):
     net, batch = ShapeNet(), batch_of(arrays)
     optimiser = torch.optim.AdamW(net.parameters(), 2e-3)
     seen = []
-    for _ in range(14):
+    for _ in range(24):
         loss = losses(net(batch.planes, batch.tokens), batch)["all"]
         optimiser.zero_grad()
         loss.backward()
