@@ -26,17 +26,18 @@ NORMAL_STEPS = 127.0  # a normal's coordinate is kept in a byte
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Tensors (n, ., s, s) float32 for `shape_net.ShapeNet` and its losses."""
+    """Tensors float32 for `shape_net.ShapeNet` and its losses, t = s or s / 2 (one phase)."""
 
     planes: Tensor  # (n, 7, s, s)
     tokens: Tensor  # (n, 768, g, g)
-    mask: Tensor  # (n, 1, s, s), as are the next four
+    phase: tuple[int, int] | None  # of the pixels that are compared; None: all
+    mask: Tensor  # (n, 1, t, t), as are the next four
     front: Tensor
     thickness: Tensor
     depth: Tensor
     edge: Tensor
-    normal: Tensor  # (n, 3, s, s)
-    rays: Tensor  # (n, 3, s, s) unit
+    normal: Tensor  # (n, 3, t, t)
+    rays: Tensor  # (n, 3, t, t) unit
     away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
 
 
@@ -126,27 +127,31 @@ def _mirrored(arrays: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.
 
 
 def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = None) -> Batch:
-    """Of packed samples; with `rng`, their masks are made a little wrong, as a click's are."""
+    """Of packed samples. With `rng` for training: of one phase, and with masks a little wrong."""
     import torch
 
     count = len(arrays["mask"])
     masks = [m if rng is None else _worn(m, rng) for m in arrays["mask"]]
     planes = [planes_of(arrays["rgb"][k], masks[k], arrays["tangents"][k]) for k in range(count)]
+    phase = None if rng is None else (int(rng.integers(2)), int(rng.integers(2)))
+    wanted = [slice(None)] * 2 if phase is None else [slice(at, None, 2) for at in phase]
+    own = (slice(None), *wanted)
 
     def image(name: str) -> Tensor:
-        return torch.from_numpy(arrays[name].astype(np.float32))[:, None]
+        return torch.from_numpy(arrays[name][own].astype(np.float32))[:, None]
 
-    normal = torch.from_numpy(arrays["normal"].astype(np.float32) / NORMAL_STEPS)
-    stacked = torch.from_numpy(np.stack(planes))
-    x, y = stacked[:, 5:6], stacked[:, 6:7]
-    ways = torch.cat([x, y, torch.ones_like(x)], 1)
-    tangents = torch.from_numpy(arrays["tangents"])
-    away = (1 + tangents[:, 0] ** 2 + tangents[:, 1] ** 2).sqrt() / tangents[:, 2]
+    normal = arrays["normal"][own].astype(np.float32).transpose(0, 3, 1, 2) / NORMAL_STEPS
+    stacked = np.stack(planes)
+    x, y = (stacked[:, plane : plane + 1, wanted[0], wanted[1]] for plane in (5, 6))
+    ways = np.concatenate([x, y, np.ones_like(x)], 1)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    tangents = arrays["tangents"]
+    away = np.sqrt(1 + tangents[:, 0] ** 2 + tangents[:, 1] ** 2) / tangents[:, 2]
     return Batch(
-        stacked, torch.from_numpy(arrays["tokens"].astype(np.float32)), image("mask"),
-        image("front"), image("thickness"), image("depth"), image("edge"),
-        normal.permute(0, 3, 1, 2), ways / ways.norm(dim=1, keepdim=True),
-        away[:, None, None, None],
+        torch.from_numpy(stacked), torch.from_numpy(arrays["tokens"].astype(np.float32)), phase,
+        image("mask"), image("front"), image("thickness"), image("depth"), image("edge"),
+        torch.from_numpy(np.ascontiguousarray(normal)), torch.from_numpy(ways),
+        torch.from_numpy(away.astype(np.float32))[:, None, None, None],
     )  # fmt: skip
 
 

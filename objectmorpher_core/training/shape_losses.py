@@ -8,8 +8,8 @@ from torch.nn import functional as F
 
 from .shape_data import Batch
 
-STEPS = (1, 4, 16)  # px, over which differences are compared
-SPAN = 2  # px each way, over which the surface must lie as its normal says
+STEPS = (1, 2, 8)  # places, over which differences are compared
+SPAN = 1  # places each way, over which the surface must lie as its normal says
 WEIGHTS = {
     "front": 4.0, "thickness": 2.0, "depth": 2.0, "slope": 4.0, "normal": 2.0, "agree": 0.05,
     "edge": 0.5, "spread": 0.1,
@@ -20,26 +20,25 @@ RARE = 6.0  # x weight of a pixel that is an edge
 
 
 def losses(found: Tensor, batch: Batch) -> dict[str, Tensor]:
-    """The parts of the loss, each a mean over the object's pixels of (n, OUTPUTS, s, s)."""
+    """The parts of the loss, each a mean over the object's pixels of (n, OUTPUTS, t, t)."""
     mask = batch.mask
     area = mask.sum((1, 2, 3), keepdim=True).clamp(min=1)
+    front, thickness, depth, normal, edge, *spreads = found.split([1, 1, 1, 3, 1, 1, 1], 1)
     # Of what is thin less is far off: errors count in proportion.
     scale = SIZE / (SIZE - USUAL + (batch.depth * mask).sum((1, 2, 3), keepdim=True) / area)
-    error = found[:, :1] - batch.front
+    error = front - batch.front
     # About which depth the object lies is not in the photo: the mean is free.
     error = (error - (error * mask).sum((1, 2, 3), keepdim=True) / area) * mask
-    thick, deep = (
-        (found[:, k : k + 1] - true) * mask for k, true in ((1, batch.thickness), (2, batch.depth))
-    )
+    thick, deep = (thickness - batch.thickness) * mask, (depth - batch.depth) * mask
     parts = {
         "front": _mean(scale * error.abs(), mask),
         "thickness": _mean(scale * thick.abs(), mask),
         "depth": _mean(scale * deep.abs(), mask),
         "slope": _slopes(scale * error, mask),
-        "normal": _mean((found[:, 3:6] - batch.normal).square().sum(1, keepdim=True), mask),
-        "agree": _agreement(found[:, :1], batch),
-        "edge": _edges(found[:, 6:7], batch),
-        "spread": _spread(error, found[:, 7:8], mask) + _spread(deep, found[:, 8:9], mask),
+        "normal": _mean((normal - batch.normal).square().sum(1, keepdim=True), mask),
+        "agree": _agreement(front, batch),
+        "edge": _edges(edge, batch),
+        "spread": _spread(error, spreads[0], mask) + _spread(deep, spreads[1], mask),
     }
     parts["all"] = torch.stack([WEIGHTS[name] * part for name, part in parts.items()]).sum()
     return parts
@@ -68,7 +67,7 @@ def _agreement(front: Tensor, batch: Batch) -> Tensor:
 
     Unlike the angle between normals it is linear in the depth, so a rough start is no cliff.
     """
-    points = batch.rays * (batch.away - front)  # (n, 3, s, s)
+    points = batch.rays * (batch.away - front)  # (n, 3, t, t)
     bad = (1 - batch.mask + batch.edge).clamp(max=1)
     clear = 1 - F.max_pool2d(bad, 2 * SPAN + 1, 1, SPAN)
     total = front.new_zeros(())

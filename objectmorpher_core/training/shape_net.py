@@ -73,18 +73,28 @@ class ShapeNet(nn.Module):
         self.up1 = _conv(64 + a, FINE)
         self.head = nn.Conv2d(FINE, 4 * OUTPUTS, 1)  # of four pixels each (Shi et al. 2016)
 
-    def forward(self, planes: Tensor, tokens: Tensor) -> Tensor:
+    def forward(
+        self, planes: Tensor, tokens: Tensor, phase: tuple[int, int] | None = None
+    ) -> Tensor:
+        """`phase`: row and column of the one pixel in each two by two that is wanted; None: all.
+
+        A quarter of the pixels, another one each time, teaches the same in half the time.
+        """
         x1 = self.down1(planes)
         x2 = self.down2(x1)
         x3 = self.down3(x2)
         x4 = self.down4(x3)
         coarse = _resized(self.tokens(tokens), x4)
         y = self.middle(torch.cat([x4, coarse], 1))
-        y = self.up3(torch.cat([_resized(y, x3), x3, _resized(self.tokens_fine(tokens), x3)], 1))
-        y = self.up2(torch.cat([_resized(y, x2), x2], 1))
-        y = self.up1(torch.cat([_resized(y, x1), x1], 1))
+        y = self.up3(torch.cat([_doubled(y), x3, _resized(self.tokens_fine(tokens), x3)], 1))
+        y = self.up2(torch.cat([_doubled(y), x2], 1))
+        y = self.up1(torch.cat([_doubled(y), x1], 1))
         with torch.autocast("cpu", enabled=False):  # eight bits are too few for a depth
-            raw = F.pixel_shuffle(self.head(y.float()), 2)
+            if phase is None:
+                raw = F.pixel_shuffle(self.head(y.float()), 2)
+            else:
+                own = slice(2 * phase[0] + phase[1], None, 4)
+                raw = F.conv2d(y.float(), self.head.weight[own], self.head.bias[own])
         front = SCALES["front"] * raw[:, :1]
         thick = SCALES["thick"] * F.softplus(raw[:, 1:3])  # never negative
         # Not made unit vectors here: those have no gradient once they are all alike.
@@ -105,3 +115,7 @@ def _conv(
 
 def _resized(x: Tensor, like: Tensor) -> Tensor:
     return F.interpolate(x, size=like.shape[-2:], mode="bilinear", align_corners=False)
+
+
+def _doubled(x: Tensor) -> Tensor:
+    return F.interpolate(x, scale_factor=2, mode="nearest")

@@ -123,7 +123,7 @@ class _State:
             group["lr"] = self.plan.rate * _schedule(self.step / self.plan.steps)
         with torch.autocast("cpu", dtype=torch.bfloat16):
             planes = batch.planes.contiguous(memory_format=torch.channels_last)
-            found = self.net(planes, batch.tokens)
+            found = self.net(planes, batch.tokens, batch.phase)
         parts = losses(found.float(), batch)
         self.optimiser.zero_grad(set_to_none=True)
         parts["all"].backward()
