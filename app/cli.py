@@ -223,6 +223,7 @@ def _add_train(parser: argparse.ArgumentParser) -> None:
     add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
     add("--minutes", type=float, metavar="M", help="at most; go on with another call")
     add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
+    add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
     add("--seed", type=int, default=0)
     add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
     add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")

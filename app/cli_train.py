@@ -25,9 +25,11 @@ def run_train(options: argparse.Namespace) -> None:
     unknown = sorted(set(held_out) - set(FAMILIES))
     if unknown:
         raise UsageError(f"there is no family {unknown[0]!r}; there are {', '.join(FAMILIES)}")
+    if options.start is not None and not options.start.is_file():
+        raise UsageError(f"there is no file {options.start}")
     plan = Plan(options.samples, options.passes, held_out=held_out, seed=options.seed)
     with progress_bar("training") as progress:
-        checkpoint = train(options.folder, plan, options.minutes, progress)
+        checkpoint = train(options.folder, plan, options.minutes, progress, options.start)
     net = trained(checkpoint)
     found = figures(checkpoint, net)
     from objectmorpher_core.training.export_shape import export

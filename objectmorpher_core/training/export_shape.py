@@ -1,4 +1,4 @@
-"""The trained decoder as one small ONNX file, which runs without torch."""
+"""The trained decoder as one small ONNX file, which runs without torch, and back again."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from .shape_net import GRID, PLANES, WIDTH, ShapeNet
 
 OPSET = 17
 INPUTS, OUTPUT = ("planes", "tokens"), "shape"
+HALF = ".half"  # ends the name of a weight that is kept in half precision
 
 
 def export(net: ShapeNet, path: Path) -> str:
     """Writes `path`, its weights in half precision; their SHA-256.
 
-    They are widened again where they are read: what is computed is single precision.
+    They are widened again where they are read: what is computed is single precision. Every weight
+    keeps its name and its form, so that training can go on from the file (`weights_of`); what can
+    be joined, as normalisations into convolutions, onnxruntime joins when it opens it.
     """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -25,7 +28,8 @@ def export(net: ShapeNet, path: Path) -> str:
     inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
     torch.onnx.export(
         net.eval(), inputs, path, input_names=list(INPUTS), output_names=[OUTPUT],
-        opset_version=OPSET, dynamo=False,
+        opset_version=OPSET, dynamo=False, do_constant_folding=False,
+        training=torch.onnx.TrainingMode.PRESERVE,
     )  # fmt: skip
     model = onnx.load(path)
     graph = model.graph
@@ -35,9 +39,9 @@ def export(net: ShapeNet, path: Path) -> str:
             narrow.append(weight)
             continue
         half = numpy_helper.to_array(weight).astype("float16")
-        narrow.append(numpy_helper.from_array(half, weight.name + ".half"))
+        narrow.append(numpy_helper.from_array(half, weight.name + HALF))
         casts.append(
-            helper.make_node("Cast", [weight.name + ".half"], [weight.name], to=TensorProto.FLOAT)
+            helper.make_node("Cast", [weight.name + HALF], [weight.name], to=TensorProto.FLOAT)
         )
     nodes = [*casts, *graph.node]
     del graph.initializer[:], graph.node[:]
@@ -47,3 +51,26 @@ def export(net: ShapeNet, path: Path) -> str:
     data = model.SerializeToString()
     path.write_bytes(data)
     return hashlib.sha256(data).hexdigest()
+
+
+def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:
+    """The weights in a file that `export` wrote, as `net.state_dict()` names them.
+
+    Raises ValueError for weights of another network.
+    """
+    import onnx
+    from onnx import numpy_helper
+
+    kept = {
+        tensor.name.removesuffix(HALF): numpy_helper.to_array(tensor).astype("float32")
+        for tensor in onnx.load(path).graph.initializer
+        if tensor.data_type in (onnx.TensorProto.FLOAT, onnx.TensorProto.FLOAT16)
+    }
+    state = dict(net.state_dict())
+    for name, value in state.items():
+        if not value.is_floating_point():  # how many batches a normalisation has seen
+            continue
+        if name not in kept or kept[name].shape != tuple(value.shape):
+            raise ValueError(f"{path} holds weights of another network: {name} is not as here")
+        state[name] = torch.from_numpy(kept[name].copy())
+    return state

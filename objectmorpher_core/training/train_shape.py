@@ -5,19 +5,22 @@ Everything is kept in one folder; called again it goes on where it was stopped.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from ..progress import Progress, silent
+from .export_shape import weights_of
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards
 from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of, true_surfaces
 from .shape_losses import losses
@@ -43,6 +46,7 @@ class Plan:
     decay: float = 0.02
     held_out: tuple[str, ...] = ()  # families that are not trained on
     seed: int = 0
+    start: str = ""  # SHA-256 of the weights that it goes on from; none: from nothing
 
     @property
     def steps(self) -> int:
@@ -55,20 +59,33 @@ class Plan:
 
 
 def train(
-    folder: Path, plan: Plan, minutes: float | None = None, progress: Progress = silent
+    folder: Path,
+    plan: Plan,
+    minutes: float | None = None,
+    progress: Progress = silent,
+    weights: Path | None = None,
 ) -> Path:
     """Trains in `folder`, for so many minutes at most; the path of the checkpoint.
 
-    Raises ValueError for fewer samples than a step takes.
+    It goes on from `weights`, exported before, where they are given.
+
+    Raises ValueError for fewer samples than a step takes, and for weights of another network or
+    of families that are held out.
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
+    if weights is not None and plan.held_out:
+        raise ValueError("weights that have seen all families cannot tell how well it does without")
+    start = None
+    if weights is not None:
+        start = weights_of(weights, ShapeNet())
+        plan = replace(plan, start=hashlib.sha256(weights.read_bytes()).hexdigest())
     files = _samples(folder / "samples", 0, plan.samples, progress)
     _samples(folder / "unseen", UNSEEN, CHECKED, progress)
-    state = _State.resumed(folder, plan)
-    start, saved = time.monotonic(), time.monotonic()
+    state = _State.resumed(folder, plan, start)
+    begun = saved = time.monotonic()
     for batch in _endless(files, plan, state.step):
-        if state.step >= plan.steps or (minutes and time.monotonic() - start > 60 * minutes):
+        if state.step >= plan.steps or (minutes and time.monotonic() - begun > 60 * minutes):
             break
         state.learn(batch)
         progress(state.step / plan.steps, f"loss {state.recent():.3f}")
@@ -95,10 +112,13 @@ def _endless(files: list[Path], plan: Plan, done: int) -> Iterator[Batch]:
 class _State:
     """The network, what trains it, and how far it is."""
 
-    def __init__(self, file: Path, plan: Plan) -> None:
+    def __init__(self, file: Path, plan: Plan, start: dict[str, Tensor] | None) -> None:
         torch.manual_seed(plan.seed)
         self.file, self.plan, self.step = file, plan, 0
-        self.net = ShapeNet().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        net = ShapeNet()
+        if start is not None:
+            net.load_state_dict(start)
+        self.net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.mean = {k: v.clone() for k, v in self.net.state_dict().items()}
         self.optimiser = torch.optim.AdamW(
             self.net.parameters(), plan.rate, weight_decay=plan.decay
@@ -106,9 +126,9 @@ class _State:
         self.history: list[dict[str, float]] = []
 
     @staticmethod
-    def resumed(folder: Path, plan: Plan) -> _State:
-        """As it was saved last, with the same plan; fresh where it was not."""
-        state = _State(folder / plan.file, plan)
+    def resumed(folder: Path, plan: Plan, start: dict[str, Tensor] | None = None) -> _State:
+        """As it was saved last, with the same plan; where it was not, as at the start."""
+        state = _State(folder / plan.file, plan, start)
         kept = torch.load(state.file, weights_only=True) if state.file.exists() else None
         if kept is not None and kept["plan"] == json.dumps(asdict(plan)):
             state.net.load_state_dict(kept["net"])

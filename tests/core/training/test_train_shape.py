@@ -11,10 +11,17 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from objectmorpher_core.lift.crop import SIDE  # noqa: E402
 from objectmorpher_core.training import shape_data, train_shape  # noqa: E402
 from objectmorpher_core.training.shape_data import batch_of, packed  # noqa: E402
 from objectmorpher_core.training.shape_losses import losses  # noqa: E402
-from objectmorpher_core.training.shape_net import GRID, OUTPUTS, WIDTH, ShapeNet  # noqa: E402
+from objectmorpher_core.training.shape_net import (  # noqa: E402
+    GRID,
+    OUTPUTS,
+    PLANES,
+    WIDTH,
+    ShapeNet,
+)
 from objectmorpher_core.training.shapes.sample import make_sample  # noqa: E402
 
 COUNT = 4
@@ -47,11 +54,11 @@ def test_the_truth_has_no_loss_but_what_cannot_be_known(arrays):
 
 def test_it_learns(arrays):
     torch.manual_seed(0)
-    net, batch = ShapeNet(), batch_of(arrays)
+    net, batch = ShapeNet(), batch_of(arrays, np.random.default_rng(0))
     optimiser = torch.optim.AdamW(net.parameters(), 2e-3)
     seen = []
     for _ in range(24):
-        loss = losses(net(batch.planes, batch.tokens), batch)["all"]
+        loss = losses(net(batch.planes, batch.tokens, batch.phase), batch)["all"]
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -105,6 +112,31 @@ def test_it_runs_without_torch(arrays, tmp_path):
     assert np.abs(found - expected).mean() < 2e-3 * max(1.0, np.abs(expected).mean())
 
 
+def test_training_goes_on_from_exported_weights(tmp_path):
+    pytest.importorskip("onnx")
+    from objectmorpher_core.training.export_shape import export, weights_of
+
+    torch.manual_seed(0)
+    net, path = ShapeNet().train(), tmp_path / "shape.onnx"
+    with torch.no_grad():  # no two weights are alike, as after training
+        for weight in net.parameters():
+            weight += 0.01 * torch.randn_like(weight)
+        net(torch.rand(2, PLANES, SIDE, SIDE), torch.randn(2, WIDTH, GRID, GRID))
+    export(net, path)
+    again = weights_of(path, ShapeNet())
+    for name, value in net.state_dict().items():
+        if value.is_floating_point():
+            assert torch.allclose(again[name], value, rtol=1e-3, atol=1e-3), name
+    state = train_shape._State.resumed(tmp_path, train_shape.Plan(), again)
+    assert torch.equal(state.net.state_dict()["tokens.weight"], again["tokens.weight"])
+    with pytest.raises(ValueError, match="all families"):
+        train_shape.train(tmp_path, train_shape.Plan(held_out=("boxes",)), weights=path)
+    other = ShapeNet()
+    other.tokens = torch.nn.Conv2d(WIDTH, 8, 1)
+    with pytest.raises(ValueError, match="another network"):
+        weights_of(path, other)
+
+
 def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
     pytest.importorskip("onnx")
     from app.cli import main
@@ -127,3 +159,5 @@ def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, ca
     assert "fewer than" in capsys.readouterr().err
     assert main([*words, "--hold-out", "boxes,unicorns"]) == 1
     assert "no family 'unicorns'" in capsys.readouterr().err
+    assert main([*words, "--start", str(tmp_path / "none.onnx")]) == 1
+    assert "no file" in capsys.readouterr().err
