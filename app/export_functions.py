@@ -15,7 +15,7 @@ from objectmorpher_core.progress import Progress, part
 from .export_plan import Plan, What
 
 if TYPE_CHECKING:
-    from objectmorpher_core.compose.composite import Composite
+    from objectmorpher_core.compose.layers import Layer
     from objectmorpher_core.image import Picture
 
 
@@ -24,8 +24,8 @@ def write_export(document: Document, plan: Plan, progress: Progress) -> None:
     from objectmorpher_core.files import write_all
 
     progress(0.02, "drawing")
-    if plan.what is What.LAYERS:
-        outputs = _layers(document, plan, progress)
+    if plan.is_folder:
+        outputs = _layer_files(document, plan, progress)
         is_new = not plan.path.exists()
         try:
             plan.path.mkdir(exist_ok=True)
@@ -48,6 +48,8 @@ def _encoded(document: Document, plan: Plan, progress: Progress) -> bytes:
         assert mask is not None, "the window asks for one first"
         return encode_mask(mask)
     draw = part(progress, 0.05, 0.6)
+    if plan.what is What.LAYERS:
+        return _openraster(document, plan, draw)
     if plan.what is What.CUTOUT:
         picture = _cutout(document, document.objects[plan.object], draw)
     elif plan.what is What.BACKGROUND:
@@ -63,16 +65,18 @@ def _encoded(document: Document, plan: Plan, progress: Progress) -> bytes:
 
 def _with_bits(picture: Picture, bits: int) -> Picture:
     """The picture with 8 or 16 bits a channel; 0 leaves them."""
+    alpha = None if picture.alpha is None else _sampled(picture.alpha, bits)
+    return replace(picture, pixels=_sampled(picture.pixels, bits), alpha=alpha)
+
+
+def _sampled(samples: np.ndarray, bits: int) -> np.ndarray:
+    """Samples of any shape with so many bits; 0 leaves them."""
     from objectmorpher_core.image import to_u8
 
-    def turned(samples: np.ndarray) -> np.ndarray:
-        if bits == 8:
-            return to_u8(samples)
-        is_narrow = bits == 16 and samples.dtype == np.uint8
-        return samples.astype(np.uint16) * np.uint16(257) if is_narrow else samples  # 255 -> 65535
-
-    alpha = None if picture.alpha is None else turned(picture.alpha)
-    return replace(picture, pixels=turned(picture.pixels), alpha=alpha)
+    if bits == 8:
+        return to_u8(samples)
+    is_narrow = bits == 16 and samples.dtype == np.uint8
+    return samples.astype(np.uint16) * np.uint16(257) if is_narrow else samples  # 255 -> 65535
 
 
 def _background(document: Document) -> Picture:
@@ -118,30 +122,42 @@ def _unmoved(document: Document, thing: EditObject) -> np.ndarray:
     return samples
 
 
-def _layers(document: Document, plan: Plan, progress: Progress) -> dict[Path, bytes]:
-    """Background, the objects from back to front, and all together; numbered in that order."""
-    from objectmorpher_core.compose.composite import composite
-    from objectmorpher_core.image import encode_picture
+def _openraster(document: Document, plan: Plan, progress: Progress) -> bytes:
+    from objectmorpher_core.openraster import encode_openraster
 
-    result = composite(document, progress=part(progress, 0.05, 0.3))
-    shown = [thing for thing in _back_to_front(document, result) if thing.is_visible]
-    layers: list[tuple[str, Picture]] = [("background", _background(document))]
-    for k, thing in enumerate(shown):
-        progress(0.3 + 0.4 * k / len(shown), "drawing")
-        name = re.sub(r"[^\w-]+", "-", thing.name).strip("-").lower() or "object"
-        layers.append((name, _cutout(document, thing, part(progress, 0.3, 0.3))))
-    layers.append(("composite", replace(document.photo.picture, pixels=result.pixels)))
+    merged, pile = _layers(document, plan, progress)
+    return encode_openraster(pile, merged)
+
+
+def _layer_files(document: Document, plan: Plan, progress: Progress) -> dict[Path, bytes]:
+    """The layers from below as large as the photo, and all together; numbered in that order."""
+    from objectmorpher_core.image import Picture, encode_picture
+    from objectmorpher_core.pixels import crop
+
+    merged, pile = _layers(document, plan, part(progress, 0.05, 0.7))
+    pile = [layer for layer in pile if layer.is_shown]
+    height, width = merged.pixels.shape[:2]
     stem = Path(document.photo.name).stem
     outputs = {}
-    for k, (name, picture) in enumerate(layers):
-        progress(0.7 + 0.25 * k / len(layers), "encoding")
-        data = encode_picture(_with_bits(picture, plan.bits), ".png")
+    for k, layer in enumerate(pile):
+        progress(0.7 + 0.25 * k / len(pile), "encoding")
+        samples = layer.pixels
+        alpha = None
+        if samples.shape[2] == 4:
+            samples = crop(samples, layer.box, (0, 0, width, height))
+            alpha = samples[..., 3]
+        name = re.sub(r"[^\w-]+", "-", layer.name).strip("-").lower() or "object"
+        data = encode_picture(Picture(samples[..., :3], alpha, icc=merged.icc), ".png")
         outputs[plan.path / f"{stem}-{k}-{name}.png"] = data
+    outputs[plan.path / f"{stem}-{len(pile)}-composite.png"] = encode_picture(merged, ".png")
     return outputs
 
 
-def _back_to_front(document: Document, result: Composite) -> list[EditObject]:
-    """The moved objects as they are drawn, over those that are as in the photo."""
-    moved = [thing.item for thing in result.moved]
-    still = [o for o in document.objects if o.mask is not None and not o.is_moved]
-    return still + moved
+def _layers(document: Document, plan: Plan, progress: Progress) -> tuple[Picture, list[Layer]]:
+    """The edited photo and its layers from below, with the bits that are wanted."""
+    from objectmorpher_core.compose.layers import layers
+
+    result, pile = layers(document, progress)
+    merged = replace(document.photo.picture, pixels=result.pixels)
+    deep = [replace(layer, pixels=_sampled(layer.pixels, plan.bits)) for layer in pile]
+    return _with_bits(merged, plan.bits), deep

@@ -26,6 +26,7 @@ class Format(Enum):
     JPEG = "JPEG"
     TIFF = "TIFF"
     WEBP = "WebP"
+    OPENRASTER = "OpenRaster"
 
     @property
     def endings(self) -> tuple[str, ...]:
@@ -34,7 +35,7 @@ class Format(Enum):
 
     @property
     def has_16_bits(self) -> bool:
-        return self in (Format.PNG, Format.TIFF)
+        return self in (Format.PNG, Format.TIFF, Format.OPENRASTER)
 
     @property
     def has_quality(self) -> bool:
@@ -46,14 +47,16 @@ _ENDINGS = {
     Format.JPEG: (".jpg", ".jpeg"),
     Format.TIFF: (".tif", ".tiff"),
     Format.WEBP: (".webp",),
+    Format.OPENRASTER: (".ora",),
 }
+_FLAT = (Format.PNG, Format.JPEG, Format.TIFF, Format.WEBP)
 _TRANSPARENT = (Format.PNG, Format.TIFF, Format.WEBP)
 FORMATS = {
-    What.PHOTO: tuple(Format),
+    What.PHOTO: _FLAT,
     What.CUTOUT: _TRANSPARENT,
     What.MASK: (Format.PNG,),
-    What.BACKGROUND: tuple(Format),
-    What.LAYERS: (Format.PNG,),
+    What.BACKGROUND: _FLAT,
+    What.LAYERS: (Format.OPENRASTER, Format.PNG),
 }
 NAMES = {  # what follows the photo's name
     What.PHOTO: "edited",
@@ -74,7 +77,16 @@ class Plan:
     """An export that was decided on."""
 
     what: What
-    path: Path  # the file; of layers the folder
+    path: Path  # the file; of layers as PNG the folder
     object: int = 0  # index of the one whose cut-out or mask it is
     bits: int = 0  # 8 or 16 a channel; 0: the photo's own
     quality: int = 95  # of JPEG, and of WebP where LOSSLESS is just that
+
+    @property
+    def is_folder(self) -> bool:
+        return is_folder(self.what, format_of(self.path.suffix))
+
+
+def is_folder(what: What, format: Format | None) -> bool:
+    """Whether it is written as several files in a folder: layers that are not in one file."""
+    return what is What.LAYERS and format is not Format.OPENRASTER

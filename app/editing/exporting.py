@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..export_functions import write_export
-from ..export_plan import FORMATS, NAMES, Format, Plan, What, format_of
+from ..export_plan import FORMATS, NAMES, Format, Plan, What, format_of, is_folder
 from ..tasks import WRITE
 from ..texts import t
 
 if TYPE_CHECKING:
     from ..editor import Editor
 
-KNOWN = "PNG, JPG, TIF, WEBP"
+KNOWN = "PNG, JPG, TIF, WEBP, ORA"
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,8 @@ class Exporting:
     def choose_format(self, format: Format) -> None:
         draft = self._draft
         typed = Path(draft.name)
-        name = str(typed.with_suffix(format.endings[0])) if typed.name else draft.name
+        ending = "" if is_folder(draft.what, format) else format.endings[0]
+        name = str(typed.with_suffix(ending)) if typed.name else draft.name
         self._change(replace(draft, format=format, name=name))
 
     def choose_bits(self, bits: int) -> None:
@@ -101,13 +102,19 @@ class Exporting:
     def set_path(self, path: Path) -> None:
         """A file was chosen in a file dialog."""
         self._change(replace(self._draft, folder=path.parent))
-        self.set_name(path.stem if self._draft.what is What.LAYERS else path.name)
+        several = is_folder(self._draft.what, format_of(path.suffix))
+        self.set_name(path.stem if several else path.name)
 
     # What it comes to
 
     @property
     def formats(self) -> tuple[Format, ...]:
         return FORMATS[self._draft.what]
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether several files are written into a folder."""
+        return is_folder(self._draft.what, self._draft.format)
 
     @property
     def own_bits(self) -> int:
@@ -135,11 +142,11 @@ class Exporting:
 
     @property
     def path(self) -> Path:
-        """The file, or the layers' folder."""
+        """The file, or the folder."""
         draft = self._draft
         name = Path(draft.name.strip())
         typed = draft.folder / (name.expanduser() if name.parts[:1] == ("~",) else name)
-        if draft.what is What.LAYERS or not typed.name or format_of(typed.suffix) is not None:
+        if self.is_folder or not typed.name or format_of(typed.suffix) is not None:
             return typed
         return typed.with_name(typed.name + draft.format.endings[0])
 
@@ -165,7 +172,7 @@ class Exporting:
             return t("Type a file name")
         if (reason := self.why_not(draft.what)) is not None:
             return reason
-        if draft.what is not What.LAYERS and _is_other_kind(ending, FORMATS[draft.what]):
+        if not self.is_folder and _is_other_kind(ending, FORMATS[draft.what]):
             known = ", ".join(f.value for f in FORMATS[draft.what])
             return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
         try:
@@ -187,7 +194,7 @@ class Exporting:
         self._start(plan)
 
     def export_to(self, path: Path) -> None:
-        """The edited photo into this file, in the format of its ending, without a dialog."""
+        """The edited photo, or its layers, into a file of the kind that its ending says."""
         editor, settings = self._editor, self._editor.settings
         format = format_of(path.suffix)
         if format is None:
@@ -200,7 +207,8 @@ class Exporting:
         else:
             is_webp = format is Format.WEBP
             quality = settings.webp_quality if is_webp else settings.quality
-            self._start(Plan(What.PHOTO, path, quality=quality))
+            what = What.LAYERS if format is Format.OPENRASTER else What.PHOTO
+            self._start(Plan(what, path, quality=quality))
 
     # Inside
 
@@ -224,7 +232,7 @@ class Exporting:
     def _named(self, draft: Draft) -> Draft:
         document = self._editor.committed
         stem = Path(document.photo.name).stem if document is not None else "photo"
-        ending = "" if draft.what is What.LAYERS else draft.format.endings[0]
+        ending = "" if is_folder(draft.what, draft.format) else draft.format.endings[0]
         return replace(draft, name=f"{stem}-{NAMES[draft.what]}{ending}")
 
     def _cannot_be_there(self, path: Path) -> str | None:
@@ -233,8 +241,8 @@ class Exporting:
             return t("There is no folder {folder}", folder=path.parent)
         if self._is_opened(path):
             return t("The export would overwrite the opened photo; choose another name")
-        is_folder = path.is_dir() and (not path.name or self._draft.what is not What.LAYERS)
-        return t("{name} is a folder", name=path.name or path) if is_folder else None
+        is_taken = path.is_dir() and (not path.name or not self.is_folder)
+        return t("{name} is a folder", name=path.name or path) if is_taken else None
 
     def _is_opened(self, path: Path) -> bool:
         source = self._editor.source

@@ -35,7 +35,7 @@ ABOUT = {
     What.CUTOUT: "The current object alone, where it is now, on nothing.",
     What.MASK: "The current object's selection in the opened photo, white on black.",
     What.BACKGROUND: "The photo with its objects painted out.",
-    What.LAYERS: "A folder of PNG files: background, objects from back to front, and the photo.",
+    What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
 }
 
 
@@ -97,7 +97,7 @@ def _draw_where(editor: Editor) -> bool:
     """Name and folder; True when Enter was pressed in the name."""
     exporting = editor.exporting
     assert exporting.draft is not None
-    _name(t("Folder") if exporting.draft.what is What.LAYERS else t("Name"))
+    _name(t("Folder") if exporting.is_folder else t("Name"))
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(FILL)

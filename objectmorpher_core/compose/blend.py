@@ -144,13 +144,23 @@ class Blend:
     """The photo with the edit blended in, as far as its rows have come."""
 
     def __init__(
-        self, photo: Pixels, margin: float, box: Box, rows: int | None = None, feather: float = 1.0
+        self,
+        photo: Pixels,
+        margin: float,
+        box: Box,
+        rows: int | None = None,
+        feather: float = 1.0,
+        keeps_weights: bool = False,
     ) -> None:
         """The edit is in `box`, and shows `margin` px around what it disturbs.
 
         At least `rows` are blended at a time. `feather`: see `blend_weights`.
         """
         self._feather = feather
+        x0, y0, x1, y1 = box
+        # (h, w) of the box: how much of the edit each pixel shows; None: not kept
+        self.weights = np.zeros((y1 - y0, x1 - x0), np.float32) if keeps_weights else None
+        self._corner = x0, y0
         self.pixels = photo.copy()
         self.footprint = np.zeros(photo.shape[:2], bool)
         self._photo, self._margin = photo, margin
@@ -186,6 +196,9 @@ class Blend:
         """Blends `rows` in by `weights` (h, w); the shares summed over the changed pixels."""
         x0, y0, x1, y1 = rows.box
         self.footprint[y0:y1, x0:x1] = footprint
+        if self.weights is not None:
+            left, top = self._corner
+            self.weights[y0 - top : y1 - top, x0 - left : x1 - left] = weights
         if not weights.any():
             return 0.0, 0.0, 0.0
         old = self._photo[y0:y1, x0:x1]

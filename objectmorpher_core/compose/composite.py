@@ -85,7 +85,14 @@ class Composite:
     outside_footprint_changed: int  # px, 0 by construction; counted, not assumed
     shares: Shares
     camera: Camera  # the photo's
-    moved: tuple[Moved, ...]  # back to front
+    stack: tuple[Moved, ...]  # back to front: what was drawn, also what rests near what moved
+    box: Box | None = None  # of the photo, outside which nothing was looked at; None: all of it
+    weights: F32 | None = None  # (h, w) of the box, how much of the edit is shown; if asked for
+
+    @property
+    def moved(self) -> tuple[Moved, ...]:
+        """Back to front."""
+        return tuple(thing for thing in self.stack if thing.item.is_moved)
 
 
 def composite(
@@ -93,23 +100,23 @@ def composite(
     puppets: dict[int, Puppet] | None = None,
     progress: Progress = silent,
     rows: int | None = None,
+    keeps_weights: bool = False,
 ) -> Composite:
     """The edited photo. `puppets` by object index save making them again.
 
     At least `rows` are blended at a time, by default a few times as many as they look around
-    them. It changes no pixel how many that are.
+    them. It changes no pixel how many that are. `keeps_weights`: for `layers`.
     """
     photo, camera = document.photo.pixels, document.photo.camera
     things = _stack(document, puppets or {})
-    moved = tuple(thing for thing in things if thing.item.is_moved)
-    if not moved:
+    if not any(thing.item.is_moved for thing in things):
         nothing = np.zeros(photo.shape[:2], bool)
         return Composite(photo, nothing, 0, 0, Shares(), camera, ())
     margin = document.feather * hole_margin(camera.width, camera.height)
     plate = plate_of_holes(document, holes(document))
     drawing = _Drawing(things, camera, margin, plate)
     _, y0, _, y1 = drawing.box
-    blend = Blend(photo, margin, drawing.box, rows, document.feather)
+    blend = Blend(photo, margin, drawing.box, rows, document.feather, keeps_weights)
     for top, bottom in drawing.strips():
         progress((top - y0) / (y1 - y0), "Drawing the object")
         for drawn in drawing.over_plate(photo, top, bottom):
@@ -117,7 +124,10 @@ def composite(
     pixels, footprint = blend.pixels, blend.footprint
     changed, outside = _count_changes(photo, pixels, footprint)
     shares = Shares(*blend.shares())
-    return Composite(pixels, footprint, changed, outside, shares, camera, moved)
+    weights = blend.weights
+    return Composite(
+        pixels, footprint, changed, outside, shares, camera, things, drawing.box, weights
+    )
 
 
 def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
@@ -329,15 +339,22 @@ def straight_cutout(result: Composite, dtype: np.dtype, size: tuple[int, int]) -
     They are drawn again, strip by strip: a composite does not keep what it has drawn.
     """
     width, height = size
-    cutout = np.zeros((height, width, 4), dtype)
     if not result.moved:
-        return cutout
-    camera = result.camera
-    drawing = _Drawing(result.moved, camera, hole_margin(camera.width, camera.height))
-    x0, _, x1, _ = drawing.box
+        return np.zeros((height, width, 4), dtype)
+    cutout, box = drawn_alone(result.moved, result.camera, dtype)
+    return crop(cutout, box, (0, 0, width, height))
+
+
+def drawn_alone(
+    things: tuple[Moved, ...], camera: Camera, dtype: np.dtype
+) -> tuple[np.ndarray, Box]:
+    """Some moved objects alone on nothing, (h, w, 4) straight alpha, and their box in the photo."""
+    drawing = _Drawing(things, camera, hole_margin(camera.width, camera.height))
+    x0, y0, x1, y1 = drawing.box
+    cutout = np.zeros((y1 - y0, x1 - x0, 4), dtype)
     for top, bottom in drawing.strips():
         drawn = drawing.alone(top, bottom)
         drawn[..., :3] /= np.maximum(drawn[..., 3:], 1e-6)
         drawn[drawn[..., 3] <= 0] = 0
-        cutout[top:bottom, x0:x1] = pixels_from_unit(drawn, dtype)
-    return cutout
+        cutout[top - y0 : bottom - y0] = pixels_from_unit(drawn, dtype)
+    return cutout, drawing.box

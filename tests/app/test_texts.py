@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from app import view
+from app.export_plan import What
 from app.filing import Dialog
 from app.texts import languages, t, use_language
 
@@ -28,7 +29,7 @@ SHOWING = {
 }  # fmt: skip
 TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
 TABLE_FILES = ("commands/gestures.py",)  # literals that are all texts
-ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog)
+ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog, What)
 
 
 def calls(path: Path) -> Iterator[ast.Call]:
@@ -65,11 +66,30 @@ def texts() -> set[str]:
             name = name_of(call)
             if name == "t" or name in TABLES:
                 found |= {t for arg in call.args[:1] for t in literals(arg)}
+                if call.args and isinstance(call.args[0], ast.Subscript):
+                    found |= looked_up(path, call.args[0])
     for name in TABLE_FILES:
         tree = ast.parse((APP / name).read_text(encoding="utf-8"))
         body = [node for node in tree.body if isinstance(node, ast.AnnAssign)]
         found |= {n.value for b in body for n in ast.walk(b) if _is_text(n)}  # type: ignore[attr-defined]
     return {text for text in found if text}
+
+
+def looked_up(path: Path, wanted: ast.Subscript) -> set[str]:
+    """The texts that TABLE[...] can be, of a dictionary in the same file."""
+    table = getattr(wanted.value, "id", "")
+    return {
+        value.value
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(node.value, ast.Dict)
+        if table in {getattr(target, "id", "") for target in _targets(node)}
+        for value in node.value.values
+        if isinstance(value, ast.Constant) and isinstance(value.value, str)
+    }
+
+
+def _targets(node: ast.Assign | ast.AnnAssign) -> list[ast.expr]:
+    return node.targets if isinstance(node, ast.Assign) else [node.target]
 
 
 def _is_text(node: ast.AST) -> bool:

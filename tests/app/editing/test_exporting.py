@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from PIL import Image
 
 from app.commands import run
 from app.editor import Editor
-from app.export_plan import Format, What
+from app.export_plan import FORMATS, Format, What
 from app.settings import Settings
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
@@ -51,7 +53,7 @@ def test_two_steps_export_the_photo(moved: Editor, tmp_path: Path) -> None:
     assert Image.open(tmp_path / "ball-edited.png").size == (WIDTH, HEIGHT)
 
 
-@pytest.mark.parametrize("format", list(Format))
+@pytest.mark.parametrize("format", FORMATS[What.PHOTO])
 def test_the_photo_in_every_format(moved: Editor, format: Format) -> None:
     path = export(moved, What.PHOTO, format)
     with Image.open(path) as image:
@@ -100,11 +102,32 @@ def test_mask_and_background(moved: Editor, ball: Document) -> None:
 def test_layers_over_each_other_are_the_photo(moved: Editor) -> None:
     folder = export(moved, What.LAYERS, Format.PNG)
     names = sorted(path.name for path in folder.iterdir())
-    assert names == ["ball-0-background.png", "ball-1-object-1.png", "ball-2-composite.png"]
-    back, thing, whole = (np.asarray(Image.open(folder / n)).astype(float) for n in names)
-    alpha = thing[..., 3:] / 255
-    stacked = back * (1 - alpha) + thing[..., :3] * alpha
-    assert np.abs(stacked - whole).mean() < 2.0  # the edit joins them more softly
+    assert names == [
+        "ball-0-photo.png", "ball-1-background.png", "ball-2-object-1.png", "ball-3-composite.png",
+    ]  # fmt: skip
+    bottom, *layers, whole = (np.asarray(Image.open(folder / n)).astype(float) for n in names)
+    stacked = bottom
+    for layer in layers:
+        alpha = layer[..., 3:] / 255
+        stacked = stacked * (1 - alpha) + layer[..., :3] * alpha
+    assert np.abs(stacked - whole).max() <= 2
+
+
+def test_layers_in_one_file(moved: Editor, tmp_path: Path) -> None:
+    path = export(moved, What.LAYERS, Format.OPENRASTER)
+    assert path.name == "ball-layers.ora"
+    with zipfile.ZipFile(path) as archive:
+        assert archive.read("mimetype") == b"image/openraster"
+        whole = np.asarray(Image.open(io.BytesIO(archive.read("mergedimage.png"))))
+    assert whole.shape == (HEIGHT, WIDTH, 3)
+    moved.exporting.open()
+    moved.exporting.choose_what(What.LAYERS)
+    moved.exporting.choose_format(Format.PNG)  # a folder again
+    assert moved.exporting.path == tmp_path / "ball-layers"
+    moved.exporting.close()
+    moved.exporting.export_to(tmp_path / "dropped.ora")
+    wait_for_jobs(moved)
+    assert (tmp_path / "dropped.ora").read_bytes() == path.read_bytes()
 
 
 def test_bit_depth_is_the_photos_own_until_another_is_chosen(moved: Editor) -> None:

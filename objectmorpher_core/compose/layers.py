@@ -1,0 +1,147 @@
+"""An edit as a pile of layers that any paint program can open, and that gives the export again.
+
+From below: the photo; what is invented behind its objects; shadows; the objects, back to front;
+and the photo once more, wherever the edit does not show. That last layer is what makes the pile
+exact: it covers all that lies under it as far as the composite does (`blend.blend_weights`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Pixels
+from ..document import Document, EditObject, Matte, Plate
+from ..pixels import crop, pixels_from_unit
+from ..progress import Progress, part, silent
+from .blend import Box
+from .composite import Composite, Moved, composite, drawn_alone
+from .order import holes
+from .plate import overlap, plate_of_holes
+from .shadow import Shade
+
+PHOTO, BACKGROUND, UNTOUCHED = "Photo", "Background", "Photo, untouched"
+EMPTY = "Background without all objects"
+SHADOW = "Shadow of {name}"
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A picture over those before it."""
+
+    name: str
+    pixels: Pixels  # (h, w, 3), or with straight alpha (h, w, 4), of the photo's bit depth
+    left: int = 0  # px, corner in the photo
+    top: int = 0
+    is_shown: bool = True
+
+    @property
+    def box(self) -> Box:
+        """x0, y0, x1, y1 px in the photo."""
+        height, width = self.pixels.shape[:2]
+        return self.left, self.top, self.left + width, self.top + height
+
+
+def layers(document: Document, progress: Progress = silent) -> tuple[Composite, list[Layer]]:
+    """The edited photo, and its layers from below.
+
+    Objects that were moved are layers, and those that they come near. Where none was moved all
+    are. What is hidden is none. Behind those that stay, the background is a hidden layer.
+    """
+    result = composite(document, progress=part(progress, 0.0, 0.5), keeps_weights=True)
+    photo, size = document.photo.pixels, document.photo.size
+    pile: list[Layer] = []
+    own = plate_of_holes(document, holes(document)) if result.stack else document.plate
+    if document.plate is not None and own is not document.plate:
+        pile.append(_background(EMPTY, document.plate, is_shown=False))
+    if own is not None and own.hole.any():
+        pile.append(_background(BACKGROUND, own))
+    shown = [thing for thing in result.stack if thing.item.is_visible]
+    for thing in shown:
+        if thing.shade is not None:
+            pile += _shadow(thing.item.name, thing.shade, size, photo.dtype)
+    for item in () if result.stack else _different(document):
+        assert item.matte is not None
+        pile += _clipped(item.name, *_resting(item.matte, photo.dtype), size)
+    for k, thing in enumerate(shown):
+        progress(0.5 + 0.4 * k / len(shown), "drawing")
+        pile += _clipped(thing.item.name, *_drawn(thing, document), size)
+    untouched = _untouched(document, result, pile)
+    return result, [Layer(PHOTO, photo), *pile, *untouched]
+
+
+def _background(name: str, plate: Plate, is_shown: bool = True) -> Layer:
+    hole = plate.hole * np.array(np.iinfo(plate.pixels.dtype).max, plate.pixels.dtype)
+    pixels = np.dstack([np.where(plate.hole[..., None], plate.pixels, 0), hole])
+    return Layer(name, pixels, plate.left, plate.top, is_shown)
+
+
+def _different(document: Document) -> list[EditObject]:
+    """The visible objects that were cut out; of copies one, for they are in the same place."""
+    found: dict[int, EditObject] = {}
+    for item in document.objects:
+        if item.matte is not None and item.is_visible:
+            found.setdefault(id(item.matte), item)
+    return list(found.values())
+
+
+def _drawn(thing: Moved, document: Document) -> tuple[np.ndarray, Box]:
+    dtype = document.photo.pixels.dtype
+    if not thing.item.is_moved:
+        return _resting(thing.matte, dtype)
+    return drawn_alone((thing,), document.photo.camera, dtype)
+
+
+def _resting(matte: Matte, dtype: np.dtype) -> tuple[np.ndarray, Box]:
+    """(h, w, 4) what the photo shows of an object."""
+    soft = np.dstack([matte.foreground, np.minimum(matte.alpha, 1.0)])
+    return pixels_from_unit(np.where(soft[..., 3:] > 0, soft, 0), dtype), matte.box
+
+
+def _shadow(name: str, shade: Shade, size: tuple[int, int], dtype: np.dtype) -> list[Layer]:
+    x0, y0, x1, y1 = shade.bounds
+    around = (int(np.floor(x0)), int(np.floor(y0)), int(np.ceil(x1)), int(np.ceil(y1)))
+    box = overlap(around, (0, 0, *size))
+    if box is None:
+        return []
+    there = shade.at(box)
+    ink = np.broadcast_to(np.array(shade.colour, np.float32), (*there.shape, 3))
+    return _trimmed(SHADOW.format(name=name), pixels_from_unit(np.dstack([ink, there]), dtype), box)
+
+
+def _clipped(name: str, pixels: np.ndarray, own: Box, size: tuple[int, int]) -> list[Layer]:
+    """What of a picture lies in the photo."""
+    box = overlap(own, (0, 0, *size))
+    return [] if box is None else _trimmed(name, crop(pixels, own, box), box)
+
+
+def _trimmed(name: str, pixels: np.ndarray, box: Box) -> list[Layer]:
+    """Without the rows and columns at its sides that are clear; none where all of it is."""
+    there = pixels[..., 3] > 0
+    rows, columns = np.flatnonzero(there.any(1)), np.flatnonzero(there.any(0))
+    if not len(rows):
+        return []
+    top, left = int(rows[0]), int(columns[0])
+    inner = pixels[top : rows[-1] + 1, left : columns[-1] + 1].copy()
+    inner[inner[..., 3] == 0] = 0
+    return [Layer(name, inner, box[0] + left, box[1] + top)]
+
+
+def _untouched(document: Document, result: Composite, pile: list[Layer]) -> list[Layer]:
+    """The photo over all that is drawn, as far as the edit does not show there."""
+    if not pile:
+        return []
+    width, height = document.photo.size
+    drawn = np.zeros((height, width), bool)
+    for layer in (each for each in pile if each.is_shown):
+        x0, y0, x1, y1 = layer.box
+        drawn[y0:y1, x0:x1] |= layer.pixels[..., 3] > 0
+    alpha = np.ones((height, width), np.float32)
+    if result.weights is not None and result.box is not None:
+        x0, y0, x1, y1 = result.box
+        alpha[y0:y1, x0:x1] -= result.weights
+    alpha[~drawn] = 0
+    photo = document.photo.pixels
+    samples = np.dstack([photo, pixels_from_unit(alpha, photo.dtype)])
+    return _trimmed(UNTOUCHED, samples, (0, 0, width, height))

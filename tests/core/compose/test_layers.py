@@ -1,0 +1,116 @@
+"""Layers over one another are the export, and what each of them is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objectmorpher_core import edits
+from objectmorpher_core.arrays import Pixels
+from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
+from objectmorpher_core.document import Document, Photo, Placement
+from objectmorpher_core.image import Picture
+from objectmorpher_core.joining import Shadow
+from tests import shapes
+
+OFF = 2.0  # of 255: each of the layers is rounded
+MOVES = {
+    "moved": Placement(move=(18.0, -7.0)),
+    "turned": Placement(turn=(25.0, 10.0, -15.0)),
+    "out of the photo": Placement(move=(900.0, 0.0)),
+    "half out of the photo": Placement(move=(70.0, 40.0)),
+    "large": Placement(scale=6.0),
+    "a little": Placement(move=(1.5, 2.5)),
+}
+
+
+def stacked(pile: Sequence[Layer]) -> np.ndarray:
+    """(H, W, 3) of 255, the shown layers blended as any program does."""
+    photo = pile[0].pixels
+    top = float(np.iinfo(photo.dtype).max)
+    picture = photo.astype(np.float64)
+    for layer in pile[1:]:
+        if layer.is_shown:
+            x0, y0, x1, y1 = layer.box
+            alpha = layer.pixels[..., 3:] / top
+            part = picture[y0:y1, x0:x1]
+            part += alpha * (layer.pixels[..., :3] - part)
+    return picture * 255 / top
+
+
+def moved(document: Document, placement: Placement, k: int = 0) -> Document:
+    return edits.set_placement(document, k, placement)
+
+
+def off(document: Document) -> tuple[np.ndarray, Pixels, list[Layer]]:
+    result, pile = layers(document)
+    top = float(np.iinfo(result.pixels.dtype).max)
+    return np.abs(stacked(pile) - result.pixels * (255 / top)), result.pixels, pile
+
+
+@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize("name", ["ellipse", "frame", "ring"])
+def test_layers_over_one_another_are_the_export(name, move):
+    difference, _, pile = off(moved(shapes.scene(name).document(), MOVES[move]))
+    assert difference.max() <= OFF
+    assert difference.mean() < 0.1
+    assert pile[0].name == PHOTO and (pile[-1].name == UNTOUCHED or move == "large")
+
+
+def test_where_nothing_moved_they_are_the_photo_and_the_objects_are_layers_too():
+    scene = shapes.scene("ellipse")
+    difference, pixels, pile = off(scene.document())
+    assert difference.max() == 0
+    assert np.array_equal(pixels, scene.pixels)
+    assert [layer.name for layer in pile] == [PHOTO, BACKGROUND, "Object 1", UNTOUCHED]
+    without = stacked(pile[:-1])  # the object over the plate instead of the photo itself
+    is_solid = scene.cutout()[1] >= 1
+    assert np.abs(without - scene.pixels)[is_solid].max() <= 1
+
+
+def test_a_shadow_is_a_layer_of_its_own():
+    document = moved(shapes.scene("ellipse").document(), MOVES["moved"])
+    item = replace(document.objects[0], shadow=Shadow(strength=0.8))
+    difference, _, pile = off(replace(document, objects=(item,)))
+    assert difference.max() <= OFF
+    (shadow,) = [layer for layer in pile if layer.name == "Shadow of Object 1"]
+    assert shadow.pixels[..., 3].max() > 60
+
+
+def test_copies_are_layers_and_what_is_hidden_is_none():
+    document = moved(shapes.scene("ellipse").document(), MOVES["moved"])
+    copy = replace(document.objects[0], name="Copy", placement=Placement(move=(-22.0, 9.0)))
+    both = replace(document, objects=(*document.objects, copy))
+    difference, _, pile = off(both)
+    assert difference.max() <= OFF
+    assert {"Object 1", "Copy"} <= {layer.name for layer in pile}
+    hidden = replace(both, objects=(document.objects[0], replace(copy, is_visible=False)))
+    difference, _, pile = off(hidden)
+    assert difference.max() <= OFF
+    assert "Copy" not in {layer.name for layer in pile}
+
+
+def test_one_that_rests_near_a_moved_one_stays_where_it_is():
+    document = shapes.scene("ellipse").document()
+    copy = replace(document.objects[0], name="Copy", placement=Placement(move=(12.0, 5.0)))
+    difference, _, pile = off(replace(document, objects=(*document.objects, copy)))
+    assert difference.max() <= OFF
+    names = [layer.name for layer in pile]
+    assert "Object 1" in names and "Copy" in names
+    assert [layer.name for layer in pile if not layer.is_shown] == [EMPTY] or EMPTY not in names
+
+
+def test_sixteen_bits_stay_sixteen_and_are_more_exact():
+    scene = shapes.scene("ellipse")
+    wide = scene.pixels.astype(np.uint16) * np.uint16(257)
+    document = scene.document()
+    assert document.plate is not None
+    plate = replace(document.plate, pixels=document.plate.pixels.astype(np.uint16) * 257)
+    photo = Photo(Picture(wide), scene.camera, shapes.png(scene.pixels), "made.png")
+    document = moved(replace(document, photo=photo, plate=plate), MOVES["turned"])
+    difference, _, pile = off(document)
+    assert difference.max() < 0.05
+    assert all(layer.pixels.dtype == np.uint16 for layer in pile)
