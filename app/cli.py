@@ -161,6 +161,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-mask", type=Path, metavar="FILE")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
+    add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
     add("--report", type=Path, metavar="R.json")

@@ -34,7 +34,7 @@ SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and the endings each may have
     "session": (".omorph",), "save_mask": (".png",), "save_plate": ENDINGS,
     "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": SPLAT_ENDINGS,
-    "report": (".json",),
+    "save_layers": (".ora",), "report": (".json",),
 }  # fmt: skip
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
@@ -64,9 +64,8 @@ def _edit_one(
 ) -> dict[Path, bytes]:
     mask = Path(script.mask).read_bytes() if script.mask else None
     with progress_bar("Opening") as progress:
-        edited = run_script(
-            photo.read_bytes(), photo.name, script, mask, progress, "save_plate" in extras
-        )
+        needs_plate = bool({"save_plate", "save_layers"} & set(extras))
+        edited = run_script(photo.read_bytes(), photo.name, script, mask, progress, needs_plate)
         with edited.stopwatch.stage("save"):
             outputs = {out: encode_picture(edited.picture, out.suffix)}
             for name, path in extras.items():
@@ -94,6 +93,11 @@ def _extra(name: str, edited: Edited, path: Path) -> bytes:
         cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
         picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
         return encode_picture(picture, path.suffix)
+    if name == "save_layers":
+        from objectmorpher_core.compose.layers import layers
+        from objectmorpher_core.openraster import encode_openraster
+
+        return encode_openraster(layers(document)[1], edited.picture)
     item = document.objects[0]
     return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
 
