@@ -162,6 +162,10 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
     add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
+    add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
+    add("--video", metavar="KIND", default="morph",
+        help="morph (photo to edit and back, the default), sway or turn")  # fmt: skip
+    add("--seconds", type=float, default=4.0, metavar="S", help="its length, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
     add("--report", type=Path, metavar="R.json")

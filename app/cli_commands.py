@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from objectmorpher_core.animation import Clip, frames
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.compose.composite import straight_cutout
 from objectmorpher_core.compose.plate import plate_picture
@@ -25,6 +26,8 @@ from objectmorpher_core.script import (
 )
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
+from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS
+from objectmorpher_core.video_file import encode_video
 
 from .cli_models import run_models
 from .cli_train import run_train
@@ -32,10 +35,16 @@ from .terminal import PROGRAM, UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and the endings each may have
-    "session": (".omorph",), "save_mask": (".png",), "save_plate": ENDINGS,
-    "save_object": (".png", ".tif", ".tiff", ".webp"), "save_splats": SPLAT_ENDINGS,
-    "save_layers": (".ora",), "report": (".json",),
-}  # fmt: skip
+    "session": (".omorph",),
+    "save_mask": (".png",),
+    "save_plate": ENDINGS,
+    "save_object": (".png", ".tif", ".tiff", ".webp"),
+    "save_splats": SPLAT_ENDINGS,
+    "save_layers": (".ora",),
+    "save_video": VIDEO_ENDINGS,
+    "report": (".json",),
+}
+NEED_PLATE = {"save_plate", "save_layers", "save_video"}  # fmt: skip
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
@@ -46,6 +55,7 @@ def run_edit(options: argparse.Namespace) -> None:
     named = [name for s in scripts for name in (s.mask, s.hidden, s.splats)]
     inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
     outputs: dict[Path, bytes] = {}
+    clip = Clip(options.video, options.seconds)
     for item in items:
         photo, out = Path(item.photo or ""), Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
@@ -55,28 +65,28 @@ def run_edit(options: argparse.Namespace) -> None:
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
         refuse_missing(item.script)
-        outputs |= _edit_one(item.script, photo, out, extras)
+        outputs |= _edit_one(item.script, photo, out, extras, clip)
     write_all(outputs)
 
 
 def _edit_one(
-    script: EditScript, photo: Path, out: Path, extras: dict[str, Path]
+    script: EditScript, photo: Path, out: Path, extras: dict[str, Path], clip: Clip
 ) -> dict[Path, bytes]:
     mask = Path(script.mask).read_bytes() if script.mask else None
     with progress_bar("Opening") as progress:
-        needs_plate = bool({"save_plate", "save_layers"} & set(extras))
+        needs_plate = bool(NEED_PLATE & set(extras))
         edited = run_script(photo.read_bytes(), photo.name, script, mask, progress, needs_plate)
         with edited.stopwatch.stage("save"):
             outputs = {out: encode_picture(edited.picture, out.suffix)}
             for name, path in extras.items():
                 if name != "report":
-                    outputs[path] = _extra(name, edited, path)
+                    outputs[path] = _extra(name, edited, path, clip)
         if "report" in extras:
             outputs[extras["report"]] = _json(edited.report())
     return outputs
 
 
-def _extra(name: str, edited: Edited, path: Path) -> bytes:
+def _extra(name: str, edited: Edited, path: Path, clip: Clip) -> bytes:
     """The bytes of one of the further outputs."""
     document = edited.document
     if name == "session":
@@ -98,6 +108,8 @@ def _extra(name: str, edited: Edited, path: Path) -> bytes:
         from objectmorpher_core.openraster import encode_openraster
 
         return encode_openraster(layers(document)[1], edited.picture)
+    if name == "save_video":
+        return encode_video(frames(document, clip), clip.rate, path.suffix)
     item = document.objects[0]
     return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
 

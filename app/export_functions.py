@@ -50,6 +50,8 @@ def _encoded(document: Document, plan: Plan, progress: Progress) -> bytes:
     draw = part(progress, 0.05, 0.6)
     if plan.what is What.LAYERS:
         return _openraster(document, plan, draw)
+    if plan.what is What.VIDEO:
+        return _video(document, plan, part(progress, 0.02, 0.95))
     if plan.what is What.CUTOUT:
         picture = _cutout(document, document.objects[plan.object], draw)
     elif plan.what is What.BACKGROUND:
@@ -127,6 +129,14 @@ def _openraster(document: Document, plan: Plan, progress: Progress) -> bytes:
 
     merged, pile = _layers(document, plan, progress)
     return encode_openraster(pile, merged)
+
+
+def _video(document: Document, plan: Plan, progress: Progress) -> bytes:
+    from objectmorpher_core.animation import Clip, frames
+    from objectmorpher_core.video_file import encode_video
+
+    clip = Clip(plan.motion.name.lower(), plan.seconds, object=plan.object)
+    return encode_video(frames(document, clip, progress), clip.rate, plan.path.suffix)
 
 
 def _layer_files(document: Document, plan: Plan, progress: Progress) -> dict[Path, bytes]:

@@ -17,6 +17,15 @@ class What(Enum):
     MASK = "Mask"
     BACKGROUND = "Background"
     LAYERS = "Layers"
+    VIDEO = "Video"
+
+
+class Motion(Enum):
+    """What a video shows; the names are those of `objectmorpher_core.animation.MOTIONS`."""
+
+    MORPH = "Photo to edit"
+    SWAY = "Sway"
+    TURN = "Turn around"
 
 
 class Format(Enum):
@@ -27,6 +36,9 @@ class Format(Enum):
     TIFF = "TIFF"
     WEBP = "WebP"
     OPENRASTER = "OpenRaster"
+    WEBM = "WebM"
+    MP4 = "MP4"
+    GIF = "GIF"
 
     @property
     def endings(self) -> tuple[str, ...]:
@@ -48,6 +60,9 @@ _ENDINGS = {
     Format.TIFF: (".tif", ".tiff"),
     Format.WEBP: (".webp",),
     Format.OPENRASTER: (".ora",),
+    Format.WEBM: (".webm",),
+    Format.MP4: (".mp4",),
+    Format.GIF: (".gif",),
 }
 _FLAT = (Format.PNG, Format.JPEG, Format.TIFF, Format.WEBP)
 _TRANSPARENT = (Format.PNG, Format.TIFF, Format.WEBP)
@@ -57,6 +72,7 @@ FORMATS = {
     What.MASK: (Format.PNG,),
     What.BACKGROUND: _FLAT,
     What.LAYERS: (Format.OPENRASTER, Format.PNG),
+    What.VIDEO: (Format.WEBM, Format.MP4, Format.GIF, Format.WEBP),
 }
 NAMES = {  # what follows the photo's name
     What.PHOTO: "edited",
@@ -64,7 +80,9 @@ NAMES = {  # what follows the photo's name
     What.MASK: "mask",
     What.BACKGROUND: "background",
     What.LAYERS: "layers",
+    What.VIDEO: "video",
 }
+LENGTHS = (1.0, 12.0)  # s, of a video
 
 
 def format_of(ending: str) -> Format | None:
@@ -81,6 +99,8 @@ class Plan:
     object: int = 0  # index of the one whose cut-out or mask it is
     bits: int = 0  # 8 or 16 a channel; 0: the photo's own
     quality: int = 95  # of JPEG, and of WebP where LOSSLESS is just that
+    motion: Motion = Motion.MORPH
+    seconds: float = 4.0
 
     @property
     def is_folder(self) -> bool:

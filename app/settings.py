@@ -41,6 +41,8 @@ class Settings:
     export_what: str = "Photo"  # the last export's, see `export_plan.py`
     export_format: str = "PNG"
     export_bits: int = 0  # 8 or 16; 0: the photo's own
+    export_motion: str = "Photo to edit"
+    export_seconds: float = 4.0
     export_folder: str = ""  # for photos that are no file of the user's
     declined_models: tuple[str, ...] = ()  # ids of those that are not offered any more
     gaussians: int = GAUSSIANS  # of a lifted object

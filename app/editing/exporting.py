@@ -7,7 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..export_functions import write_export
-from ..export_plan import FORMATS, NAMES, Format, Plan, What, format_of, is_folder
+from ..export_plan import (
+    FORMATS,
+    LENGTHS,
+    NAMES,
+    Format,
+    Motion,
+    Plan,
+    What,
+    format_of,
+    is_folder,
+)
 from ..tasks import WRITE
 from ..texts import t
 
@@ -26,6 +36,8 @@ class Draft:
     bits: int  # 0: the photo's own
     quality: int  # of JPEG
     webp_quality: int
+    motion: Motion
+    seconds: float  # of a video
     folder: Path
     name: str  # as typed: a file name, or a whole path
 
@@ -51,9 +63,13 @@ class Exporting:
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
         folder = file.parent if file else (last if is_kept else Path.home())
+        motion = next((m for m in Motion if m.value == settings.export_motion), Motion.MORPH)
+        motion = motion if self.why_no_motion(motion) is None else Motion.SWAY
+        seconds = min(max(settings.export_seconds, LENGTHS[0]), LENGTHS[1])
         draft = Draft(
-            what, format, settings.export_bits, settings.quality, settings.webp_quality, folder, ""
-        )
+            what, format, settings.export_bits, settings.quality, settings.webp_quality, motion,
+            seconds, folder, "",
+        )  # fmt: skip
         self.draft = self._named(self._fitting(draft))
 
     def close(self) -> None:
@@ -66,9 +82,20 @@ class Exporting:
         if what in (What.CUTOUT, What.MASK) and editor.mask is None:
             return t("Click an object in the photo first")
         has_plate = document is not None and document.plate is not None
-        if what in (What.BACKGROUND, What.LAYERS) and not has_plate:
+        if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
             return t("Lift an object first")
         return None
+
+    def why_no_motion(self, motion: Motion) -> str | None:
+        """Why a video cannot show this now, or None."""
+        document = self._editor.committed
+        objects = () if document is None else document.objects
+        if motion is Motion.MORPH:
+            is_moved = any(item.is_moved for item in objects)
+            return None if is_moved else t("Move or pose an object first")
+        current = self._editor.current
+        is_lifted = current < len(objects) and objects[current].lifted is not None
+        return None if is_lifted else t("Lift an object first")
 
     def choose_what(self, what: What) -> None:
         self._change(replace(self._draft, what=what), is_named=True)
@@ -90,6 +117,12 @@ class Exporting:
         self._change(
             replace(draft, webp_quality=quality) if is_webp else replace(draft, quality=quality)
         )
+
+    def choose_motion(self, motion: Motion) -> None:
+        self._change(replace(self._draft, motion=motion))
+
+    def choose_seconds(self, seconds: float) -> None:
+        self._change(replace(self._draft, seconds=seconds))
 
     def set_name(self, name: str) -> None:
         """As typed; an ending chooses the format."""
@@ -136,6 +169,11 @@ class Exporting:
         return self._draft.format.has_16_bits and self._draft.what is not What.MASK
 
     @property
+    def has_quality(self) -> bool:
+        """Whether there is a choice between size and truth."""
+        return self._draft.format.has_quality and self._draft.what is not What.VIDEO
+
+    @property
     def quality(self) -> int:
         draft = self._draft
         return draft.webp_quality if draft.format is Format.WEBP else draft.quality
@@ -172,6 +210,8 @@ class Exporting:
             return t("Type a file name")
         if (reason := self.why_not(draft.what)) is not None:
             return reason
+        if draft.what is What.VIDEO and (reason := self.why_no_motion(draft.motion)) is not None:
+            return reason
         if not self.is_folder and _is_other_kind(ending, FORMATS[draft.what]):
             known = ", ".join(f.value for f in FORMATS[draft.what])
             return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
@@ -189,7 +229,10 @@ class Exporting:
             self._replacing = path
             return
         self._remember(draft, path)
-        plan = Plan(draft.what, path, self._editor.current, self.bits, self.quality)
+        plan = Plan(
+            draft.what, path, self._editor.current, self.bits, self.quality, draft.motion,
+            draft.seconds,
+        )  # fmt: skip
         self.close()
         self._start(plan)
 
@@ -197,7 +240,8 @@ class Exporting:
         """The edited photo, or its layers, into a file of the kind that its ending says."""
         editor, settings = self._editor, self._editor.settings
         format = format_of(path.suffix)
-        if format is None:
+        what = What.LAYERS if format is Format.OPENRASTER else What.PHOTO
+        if format is None or format not in FORMATS[what]:
             editor.complain(
                 t("a photo cannot be written as {ending}; choose {known}",
                   ending=path.suffix, known=KNOWN)
@@ -207,7 +251,6 @@ class Exporting:
         else:
             is_webp = format is Format.WEBP
             quality = settings.webp_quality if is_webp else settings.quality
-            what = What.LAYERS if format is Format.OPENRASTER else What.PHOTO
             self._start(Plan(what, path, quality=quality))
 
     # Inside
@@ -253,6 +296,7 @@ class Exporting:
         editor.settings = replace(
             editor.settings, export_what=draft.what.value, export_format=draft.format.value,
             export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
+            export_motion=draft.motion.value, export_seconds=draft.seconds,
             export_folder=str(path.parent.absolute()),
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from ..editing.exporting import Exporting
 from ..editor import Editor
-from ..export_plan import LOSSLESS, Format, What
+from ..export_plan import LENGTHS, LOSSLESS, Format, Motion, What
 from ..filing import Dialog
 from ..texts import t
 from .modal import modal
@@ -36,6 +36,7 @@ ABOUT = {
     What.MASK: "The current object's selection in the opened photo, white on black.",
     What.BACKGROUND: "The photo with its objects painted out.",
     What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
+    What.VIDEO: "A film that can be played again and again, at most 1280 px wide.",
 }
 
 
@@ -81,7 +82,9 @@ def _draw_how(exporting: Exporting) -> None:
         bits = segmented("bits", depths, exporting.bits)
         if bits != exporting.bits:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
-    elif exporting.draft.format.has_quality:
+    elif exporting.draft.what is What.VIDEO:
+        _draw_motion(exporting)
+    elif exporting.has_quality:
         _name(t("Quality"))
         imgui.set_next_item_width(FILL)
         is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
@@ -91,6 +94,28 @@ def _draw_how(exporting: Exporting) -> None:
             exporting.choose_quality(quality)
         tooltip(t("Higher is larger and truer. Below lossless, every pixel changes a little."))
     imgui.dummy(theme.size(0, 0))
+
+
+def _draw_motion(exporting: Exporting) -> None:
+    """What a video shows, and for how long."""
+    draft = exporting.draft
+    assert draft is not None
+    _name(t("Motion"))
+    choices = tuple(
+        Choice(motion, t(motion.value), why_not=exporting.why_no_motion(motion))
+        for motion in Motion
+    )
+    motion = segmented("motion", choices, draft.motion)
+    if motion is not draft.motion:
+        exporting.choose_motion(motion)
+    _name(t("Length"))
+    imgui.set_next_item_width(FILL)
+    shortest, longest = LENGTHS
+    is_changed, seconds = imgui.slider_float(
+        "##seconds", draft.seconds, shortest, longest, "%.1f s"
+    )
+    if is_changed:
+        exporting.choose_seconds(round(2 * seconds) / 2)
 
 
 def _draw_where(editor: Editor) -> bool:

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
+from PIL import Image, ImageSequence
 
 from app import cli
 from objectmorpher_core.compose import BACKENDS
@@ -155,6 +156,23 @@ def test_every_further_output_is_written(folder):
         merged = cv2.imdecode(np.frombuffer(archive.read("mergedimage.png"), np.uint8), 1)
     assert np.array_equal(merged[..., ::-1], _pixels("out.png"))
     assert json.loads(Path("r.json").read_text())["version"] == 1
+
+
+def test_a_video_of_the_edit(folder, capsys):
+    wish = ["--save-video", "v.gif", "--seconds", "0.4"]
+    assert _edit(*TURN, *wish) == 0
+    with Image.open("v.gif") as video:
+        assert video.size == (160, 120)
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(video)) == 400  # ms
+    assert _edit("--video", "sway", *wish) == 0
+    Path("v.gif").unlink()
+    for wrong, sentence in (
+        ([], "nothing was moved"),
+        (["--video", "jump"], "one of morph, sway, turn"),
+        (["--seconds", "-1"], "a clip needs a length"),
+    ):
+        _expect_failure([*EDIT, *wish, *wrong], capsys, sentence)
+    assert not Path("v.gif").exists()
 
 
 def test_the_plate_can_be_had_without_an_edit(folder):
@@ -471,8 +489,8 @@ DESIGN_OPTIONS = {
     "--refine", "--splats", "--pin", "--handle", "--move", "--turn", "--scale", "--deform",
     "--links", "--faithful", "--nodes", "--stiffness", "--stretch-limit", "--split",
     "--script", "--session", "--save-mask",
-    "--save-plate", "--save-object", "--save-splats", "--save-layers", "--report", "--seed",
-    "--fov", "--shadow",
+    "--save-plate", "--save-object", "--save-splats", "--save-layers", "--save-video", "--video",
+    "--seconds", "--report", "--seed", "--fov", "--shadow",
 }  # fmt: skip
 
 

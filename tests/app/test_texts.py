@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from app import view
-from app.export_plan import What
+from app.export_plan import Motion, What
 from app.filing import Dialog
 from app.texts import languages, t, use_language
 
@@ -29,7 +29,7 @@ SHOWING = {
 }  # fmt: skip
 TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
 TABLE_FILES = ("commands/gestures.py",)  # literals that are all texts
-ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog, What)
+ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog, What, Motion)
 
 
 def calls(path: Path) -> Iterator[ast.Call]:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from app.commands import run
 from app.editor import Editor
-from app.export_plan import FORMATS, Format, What
+from app.export_plan import FORMATS, Format, Motion, What
 from app.settings import Settings
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
@@ -130,6 +130,30 @@ def test_layers_in_one_file(moved: Editor, tmp_path: Path) -> None:
     assert (tmp_path / "dropped.ora").read_bytes() == path.read_bytes()
 
 
+def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
+    exporting = moved.exporting
+    exporting.open()
+    exporting.choose_what(What.VIDEO)
+    exporting.choose_format(Format.GIF)
+    assert exporting.path.name == "ball-video.gif" and not exporting.has_quality
+    exporting.choose_seconds(1.0)
+    path = exporting.path
+    exporting.confirm()
+    wait_for_jobs(moved)
+    with Image.open(path) as video:
+        assert video.size == (WIDTH, HEIGHT)
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(video)) == 1000  # ms
+    moved.apply("Move object", edits.set_placement(ball, 0, Placement()))
+    exporting.open()  # as it was last, but for what cannot be shown
+    assert exporting.draft is not None and exporting.draft.what is What.VIDEO
+    assert exporting.draft.motion is Motion.SWAY and exporting.draft.seconds == 1.0
+    exporting.choose_motion(Motion.MORPH)
+    assert exporting.problem == "Move or pose an object first"
+    exporting.close()
+    exporting.export_to(path.with_suffix(".mp4"))  # a photo is no film
+    assert moved.message is not None and moved.message.is_error
+
+
 def test_bit_depth_is_the_photos_own_until_another_is_chosen(moved: Editor) -> None:
     exporting = moved.exporting
     exporting.open()
@@ -232,6 +256,6 @@ def test_no_name_that_is_typed_breaks_anything(editor: Editor, name: str) -> Non
 def test_what_is_not_there_cannot_be_chosen(editor: Editor) -> None:
     editor.exporting.open()
     assert editor.exporting.why_not(What.PHOTO) is None
-    for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS):
+    for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS, What.VIDEO):
         assert editor.exporting.why_not(what)
     editor.exporting.close()

@@ -1,0 +1,142 @@
+"""From the photo to the edit and back, in frames and in files."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from objectmorpher_core import edits
+from objectmorpher_core.animation import Clip, frames, share_at
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.shrinking import shrunk
+from objectmorpher_core.video_file import ENDINGS, VideoError, encode_video
+from tests import shapes
+
+
+@cache
+def edited() -> Document:
+    """An object with one handle dragged, moved and turned."""
+    scene = shapes.scene("ellipse")
+    document = scene.document()
+    point = scene.lifted.control_points[7].astype(np.float64)
+    document = edits.add_handle(document, 0, point, point + (0.2, -0.1, 0.0))
+    pose = scene.puppet.deformer.solve(document.objects[0].handles).pose
+    document = edits.set_pose(document, 0, pose)
+    return edits.set_placement(document, 0, Placement(move=(14.0, -6.0), turn=(20.0, 0, 0)))
+
+
+def difference(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.abs(one.astype(float) - other).mean())
+
+
+def test_a_morph_begins_as_the_photo_comes_to_the_edit_and_goes_back():
+    document = edited()
+    clip = Clip(seconds=1.0, rate=20)
+    found = list(frames(document, clip))
+    assert len(found) == 20
+    photo, edit = document.photo.pixels, composite(document).pixels
+    assert np.array_equal(found[0], photo)
+    assert np.array_equal(found[10], edit)
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    assert max(gaps) < 0.6 * difference(photo, edit)  # no jump, not even from the last to the first
+    away = [difference(frame, photo) for frame in found]
+    assert away[4] < away[6] < away[9]
+
+
+def test_the_share_is_still_at_both_ends():
+    shares = [share_at(k / 100) for k in range(100)]
+    assert shares[0] == shares[14] == 0 and shares[50] == shares[64] == 1
+    assert min(shares) == 0 and max(shares) == 1
+    assert max(abs(a - b) for a, b in zip(shares, [*shares[1:], shares[0]], strict=True)) < 0.06
+
+
+@pytest.mark.parametrize("motion", ["sway", "turn"])
+def test_an_object_turns_without_a_jump(motion):
+    document = shapes.scene("ellipse").document()
+    found = list(frames(document, Clip(motion, seconds=1.0, rate=24)))
+    assert np.array_equal(found[0], document.photo.pixels)
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    assert 0 < max(gaps) < 6 * np.median(gaps) + 1
+
+
+def test_nothing_to_be_seen_is_said_in_a_sentence():
+    document = shapes.scene("ellipse").document()
+    with pytest.raises(ValueError, match="nothing was moved"):
+        list(frames(document, Clip()))
+    with pytest.raises(ValueError, match="lift an object first"):
+        list(frames(document, Clip("turn", object=3)))
+    for wrong in ({"motion": "jump"}, {"seconds": 0.0}, {"rate": 0.2}, {"seconds": 9e5}):
+        with pytest.raises(ValueError, match="clip"):
+            Clip(**wrong)
+
+
+@pytest.mark.parametrize("times", [2, 3])  # of 160 x 120 px: edges are much of it
+def test_the_edit_of_a_smaller_photo_is_the_smaller_edit(times):
+    document = edited()
+    small = shrunk(document, times)
+    width, height = small.photo.size
+    whole = composite(document).pixels[: height * times, : width * times]
+    expected = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    found = composite(small).pixels
+    assert found.shape == expected.shape
+    moved = difference(expected, small.photo.pixels)
+    assert difference(found, expected) < 0.3 * moved
+    rest = composite(shrunk(shapes.scene("ellipse").document(), times))
+    assert rest.changed == 0
+
+
+def test_a_photo_does_not_vanish():
+    with pytest.raises(ValueError, match="cannot be"):
+        shrunk(edited(), 500)
+
+
+def drifting(count: int = 12) -> list[np.ndarray]:
+    base = shapes.picture(shapes.mask("ellipse"))
+    return [np.roll(cv2.GaussianBlur(base, (0, 0), 3), 3 * k, 1) for k in range(count)]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_every_frame_is_in_the_file_and_looks_as_it_did(ending, tmp_path, capfd):
+    sent = drifting()
+    data = encode_video(iter(sent), 20.0, ending)
+    assert capfd.readouterr().err == ""
+    path = tmp_path / f"clip{ending}"
+    path.write_bytes(data)
+    if ending in (".gif", ".webp"):
+        image = Image.open(io.BytesIO(data))
+        assert image.n_frames == len(sent) and image.info["loop"] == 0
+        found = []
+        for k in range(image.n_frames):
+            image.seek(k)
+            found.append(np.asarray(image.convert("RGB")))
+    else:
+        reader, found = cv2.VideoCapture(str(path)), []
+        assert reader.get(cv2.CAP_PROP_FPS) == pytest.approx(20, rel=0.01)
+        while (read := reader.read())[0]:
+            found.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
+        reader.release()
+    assert len(found) == len(sent)
+    for one, other in zip(found, sent, strict=True):
+        assert difference(one, other) < 8
+
+
+def test_what_is_no_video_is_refused():
+    with pytest.raises(VideoError, match=r"cannot be written as \.avi"):
+        encode_video(drifting(2), 10, ".avi")
+    with pytest.raises(VideoError, match="needs a frame"):
+        encode_video([], 10, ".gif")
+
+
+def test_a_pose_without_handles_comes_about_too():
+    document = edited()
+    bare = replace(document.objects[0], handles=())
+    found = list(frames(document.with_object(0, bare), Clip(seconds=0.5, rate=12)))
+    assert np.array_equal(found[0], document.photo.pixels)
+    assert difference(found[2], found[0]) > 0
