@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from objectmorpher_core import edits
+from objectmorpher_core import edits, rig_edits
 from objectmorpher_core.arrays import F64, I32, Mask
 from objectmorpher_core.document import Document, Pose
 from objectmorpher_core.rig import Rig
@@ -91,7 +91,7 @@ class Rigging:
         if len(nodes) == 0:
             return
         if kind is PoseMode.FREEZE:
-            edit = edits.thaw if is_erasing else edits.freeze
+            edit = rig_edits.thaw if is_erasing else rig_edits.freeze
             self._hold(t("Erase") if is_erasing else t("Freeze"), edit, nodes)
         elif is_erasing:
             self._set(t("Erase"), _erased(self.rig, kind, nodes, self._count))
@@ -113,7 +113,7 @@ class Rigging:
         if len(whole) < 2:
             self._editor.say(t("A rigid group needs a larger stroke"))
             return
-        self._apply(t("Rigid group"), edits.make_body, whole)
+        self._apply(t("Rigid group"), rig_edits.make_body, whole)
 
     def cut(self, way: F64) -> None:
         """Parts what is left of a line (S, 2), image px, from what is right of it."""
@@ -129,7 +129,7 @@ class Rigging:
         if len(first) == 0 or len(second) == 0:
             editor.say(t("Draw the cut across the object"))
             return
-        self._apply(t("Cut"), edits.cut, first, second)
+        self._apply(t("Cut"), rig_edits.cut, first, second)
 
     def glue(self, way: F64) -> None:
         """Joins what is under the brush at the beginning of a line to what is at its end."""
@@ -146,7 +146,7 @@ class Rigging:
         if along < TOGETHER * straight.min():
             editor.say(t("These parts hang together already"))
             return
-        self._apply(t("Glue"), edits.glue, first, second)
+        self._apply(t("Glue"), rig_edits.glue, first, second)
 
     def unseam(self, kind: PoseMode, nodes: I32) -> None:
         """Takes back the cuts, or the glue, that these control points are part of."""
@@ -163,7 +163,7 @@ class Rigging:
         """Takes back what was said about a region."""
         rig = self.rig
         if region.kind is PoseMode.FREEZE:
-            self._hold(t("Remove region"), edits.thaw, region.nodes)
+            self._hold(t("Remove region"), rig_edits.thaw, region.nodes)
             return
         if region.seam >= 0:
             seams = tuple(s for i, s in enumerate(rig.seams) if i != region.seam)
@@ -193,7 +193,7 @@ class Rigging:
         return len(thing.lifted.control_points)
 
     def _set(self, label: str, rig: Rig) -> None:
-        self._apply(label, edits.set_rig, rig)
+        self._apply(label, rig_edits.set_rig, rig)
 
     def _apply(
         self, label: str, edit: Callable[..., Document], *arguments: Any, start: Pose | None = None
