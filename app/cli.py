@@ -161,6 +161,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-mask", type=Path, metavar="FILE")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
+    add("--save-depth", type=Path, metavar="FILE", help="its nearness, 16 bit: white is nearest")
     add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
     add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
     add("--video", metavar="KIND", default="morph",

@@ -11,6 +11,7 @@ from typing import Any
 from objectmorpher_core.animation import Clip, frames
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.compose.composite import straight_cutout
+from objectmorpher_core.compose.depth_map import depth_map, nearness
 from objectmorpher_core.compose.plate import plate_picture
 from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
@@ -40,6 +41,7 @@ EXTRAS = {  # further outputs of `edit` and the endings each may have
     "save_plate": ENDINGS,
     "save_object": (".png", ".tif", ".tiff", ".webp"),
     "save_splats": SPLAT_ENDINGS,
+    "save_depth": (".png", ".tif", ".tiff"),
     "save_layers": (".ora",),
     "save_video": VIDEO_ENDINGS,
     "report": (".json",),
@@ -103,6 +105,9 @@ def _extra(name: str, edited: Edited, path: Path, clip: Clip) -> bytes:
         cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
         picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
         return encode_picture(picture, path.suffix)
+    if name == "save_depth":
+        near = nearness(depth_map(document, {0: edited.puppet}))
+        return encode_picture(Picture(near[..., None].repeat(3, 2), is_grey=True), path.suffix)
     if name == "save_layers":
         from objectmorpher_core.compose.layers import layers
         from objectmorpher_core.openraster import encode_openraster

@@ -15,6 +15,7 @@ class What(Enum):
     PHOTO = "Photo"
     CUTOUT = "Object cut-out"
     MASK = "Mask"
+    DEPTH = "Depth"
     BACKGROUND = "Background"
     LAYERS = "Layers"
     VIDEO = "Video"
@@ -70,6 +71,7 @@ FORMATS = {
     What.PHOTO: _FLAT,
     What.CUTOUT: _TRANSPARENT,
     What.MASK: (Format.PNG,),
+    What.DEPTH: (Format.PNG, Format.TIFF),
     What.BACKGROUND: _FLAT,
     What.LAYERS: (Format.OPENRASTER, Format.PNG),
     What.VIDEO: (Format.WEBM, Format.MP4, Format.GIF, Format.WEBP),
@@ -78,6 +80,7 @@ NAMES = {  # what follows the photo's name
     What.PHOTO: "edited",
     What.CUTOUT: "object",
     What.MASK: "mask",
+    What.DEPTH: "depth",
     What.BACKGROUND: "background",
     What.LAYERS: "layers",
     What.VIDEO: "video",

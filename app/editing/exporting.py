@@ -82,6 +82,9 @@ class Exporting:
         if what in (What.CUTOUT, What.MASK) and editor.mask is None:
             return t("Click an object in the photo first")
         has_plate = document is not None and document.plate is not None
+        objects = () if document is None else document.objects
+        if what is What.DEPTH and not any(item.lifted is not None for item in objects):
+            return t("Lift an object first")
         if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
             return t("Lift an object first")
         return None
@@ -159,6 +162,8 @@ class Exporting:
     def bits(self) -> int:
         """Bits a channel of what will be written."""
         draft = self._draft
+        if draft.what is What.DEPTH:
+            return 16
         if not self.has_bits:
             return 8
         return draft.bits or self.own_bits
@@ -166,7 +171,7 @@ class Exporting:
     @property
     def has_bits(self) -> bool:
         """Whether there is a choice of bit depth."""
-        return self._draft.format.has_16_bits and self._draft.what is not What.MASK
+        return self._draft.format.has_16_bits and self._draft.what not in (What.MASK, What.DEPTH)
 
     @property
     def has_quality(self) -> bool:

@@ -34,6 +34,7 @@ ABOUT = {
     What.PHOTO: "The whole photo with the edit in it.",
     What.CUTOUT: "The current object alone, where it is now, on nothing.",
     What.MASK: "The current object's selection in the opened photo, white on black.",
+    What.DEPTH: "How near the objects are: the nearest point white, twice as far half as bright.",
     What.BACKGROUND: "The photo with its objects painted out.",
     What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
     What.VIDEO: "A film that can be played again and again, at most 1280 px wide.",

@@ -141,7 +141,8 @@ def test_two_runs_with_the_same_seed_give_the_same_bytes(folder):
 def test_every_further_output_is_written(folder):
     assert _edit(
         "--move", "10,5", "--save-mask", "m.png", "--save-plate", "p.png", "--save-object",
-        "o.png", "--save-splats", "s.ply", "--save-layers", "l.ora", "--report", "r.json",
+        "o.png", "--save-splats", "s.ply", "--save-layers", "l.ora", "--save-depth",
+        "d.png", "--report", "r.json",
     ) == 0  # fmt: skip
     mask = cv2.imread("m.png", cv2.IMREAD_UNCHANGED)
     assert mask.dtype == np.uint8
@@ -152,6 +153,9 @@ def test_every_further_output_is_written(folder):
     assert np.array_equal(plate[:10], PIXELS[:10])
     assert cv2.imread("o.png", cv2.IMREAD_UNCHANGED).shape == (120, 160, 4)
     assert Path("s.ply").read_bytes().startswith(b"ply")
+    depth = cv2.imread("d.png", cv2.IMREAD_UNCHANGED)
+    assert depth.dtype == np.uint16 and depth.shape == (120, 160)
+    assert depth.max() == 65535 and 0.2 < (depth > 0).sum() / MASK.sum() < 2
     with zipfile.ZipFile("l.ora") as archive:
         merged = cv2.imdecode(np.frombuffer(archive.read("mergedimage.png"), np.uint8), 1)
     assert np.array_equal(merged[..., ::-1], _pixels("out.png"))
@@ -489,7 +493,8 @@ DESIGN_OPTIONS = {
     "--refine", "--splats", "--pin", "--handle", "--move", "--turn", "--scale", "--deform",
     "--links", "--faithful", "--nodes", "--stiffness", "--stretch-limit", "--split",
     "--script", "--session", "--save-mask",
-    "--save-plate", "--save-object", "--save-splats", "--save-layers", "--save-video", "--video",
+    "--save-plate", "--save-object", "--save-splats", "--save-layers", "--save-depth",
+    "--save-video", "--video",
     "--seconds", "--report", "--seed", "--fov", "--shadow",
 }  # fmt: skip
 

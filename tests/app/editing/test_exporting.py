@@ -130,6 +130,14 @@ def test_layers_in_one_file(moved: Editor, tmp_path: Path) -> None:
     assert (tmp_path / "dropped.ora").read_bytes() == path.read_bytes()
 
 
+def test_depth_is_grey_and_sixteen_bits_deep(moved: Editor) -> None:
+    near = np.asarray(Image.open(export(moved, What.DEPTH, Format.PNG)))
+    assert near.dtype.itemsize >= 2 and near.shape == (HEIGHT, WIDTH)
+    x, y = (round(v) for v in CENTRE)
+    assert near[y - 4, x + 25] > 0.9 * 65535  # the ball bulges towards the camera
+    assert near[4, 4] == 0
+
+
 def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
     exporting = moved.exporting
     exporting.open()
@@ -256,6 +264,6 @@ def test_no_name_that_is_typed_breaks_anything(editor: Editor, name: str) -> Non
 def test_what_is_not_there_cannot_be_chosen(editor: Editor) -> None:
     editor.exporting.open()
     assert editor.exporting.why_not(What.PHOTO) is None
-    for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS, What.VIDEO):
+    for what in (What.CUTOUT, What.MASK, What.BACKGROUND, What.LAYERS, What.VIDEO, What.DEPTH):
         assert editor.exporting.why_not(what)
     editor.exporting.close()
