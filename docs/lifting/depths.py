@@ -25,7 +25,7 @@ def depth_scores(meshes: Path) -> dict[str, dict[str, Score]]:
     found = {}
     for name in SOLIDS:
         solid = load(name, meshes)
-        views = [_scores(solid.turned(yaw), mesh_view) for yaw in YAWS]
+        views = [_scores(solid.turned(yaw)) for yaw in YAWS]
         found[name] = {way: _mean([view[way] for view in views]) for way in WAYS}
     return found
 

@@ -63,9 +63,9 @@ can tell, and all ways carry the floor that shows through them.
 """
 REAL = """## Photos
 
-Lifted from a click with the default settings and turned. There is no truth to compare with: look
-at them. What the photo did not show is invented: the background by the inpainter, sides and backs
-by the rule below.
+Lifted from a click (the motorcycle under its true mask) with the default settings and turned. There
+is no truth to compare with: look at them. What the photo did not show is invented: the background
+by the inpainter, sides and backs by the rule below.
 
 ![Photos with their object turned](photos.jpg)
 

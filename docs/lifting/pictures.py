@@ -8,12 +8,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from motorcycle import read_pair
 from PIL import Image, ImageDraw, ImageFont
 from turning import Scene, Shot, over_plate
 
 from objectmorpher_core import edits
 from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import AS_SEEN, Document, LiftSettings, Placement
+from objectmorpher_core.document import AS_SEEN, Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.image import Picture, encode_picture
 from objectmorpher_core.pipeline import export, lift_mask, make_plate, open_photo, select
 from objectmorpher_core.script import EditScript
 
@@ -25,6 +27,7 @@ CLICKS = {
     "flower": EditScript(click=((310.0, 240.0),)),
     "rocket": EditScript(click=((322.0, 200.0),)),
 }
+MOTORCYCLE = "motorcycle"  # by its true mask
 GAP, LABEL, FONT_SIZE, QUALITY = 6, 24, 15, 86
 INK = (35, 35, 40)
 BOX = (75, 95, 425, 445)  # px of the made photos that is shown
@@ -50,7 +53,7 @@ def draw_solids(path: Path, shown: list[tuple[Scene, dict[str, Shot]]]) -> None:
 def draw_real(path: Path) -> None:
     """Photos, turned, with the network and without."""
     rows = []
-    for name in CLICKS:
+    for name in (*CLICKS, MOTORCYCLE):
         learned, plain = (_lifted(name, replace(AS_SEEN, trust=trust)) for trust in (1.0, 0.0))
         row = [learned.photo.pixels]
         for turn in TURNS.values():
@@ -87,6 +90,10 @@ def draw_thickness(path: Path) -> None:
 
 @cache
 def _selected(name: str) -> Document:
+    if name == MOTORCYCLE:
+        pair = read_pair()
+        document = open_photo(encode_picture(Picture(pair.left), ".png"), name)
+        return edits.set_mask(document, 0, pair.mask, Prompt())
     return select(open_photo((SAMPLES / f"{name}.jpg").read_bytes(), name), CLICKS[name])
 
 

@@ -22,7 +22,7 @@ from .thickness import Thickness
 
 # How far off the silhouette's body is expected to be: crop units, and per its half-thickness.
 # Chosen on made-up objects that the network was not trained on.
-FRONT_ERROR, THICKNESS_ERROR = (0.02, 0.5), (0.02, 0.5)
+FRONT_ERROR, THICKNESS_ERROR = (0.12, 3.0), (0.08, 2.0)
 ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns away; it ends there
 RIM = 0.035  # x extent from the outline, over which a body that is round there closes
 INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
