@@ -93,7 +93,7 @@ def _selected(name: str) -> Document:
     if name == MOTORCYCLE:
         pair = read_pair()
         document = open_photo(encode_picture(Picture(pair.left), ".png"), name)
-        return edits.set_mask(document, 0, pair.mask, Prompt())
+        return edits.set_mask(edits.add_object(document), 0, pair.mask, Prompt())
     return select(open_photo((SAMPLES / f"{name}.jpg").read_bytes(), name), CLICKS[name])
 
 

@@ -49,9 +49,9 @@ where DINOv2's weights are not there).
 - **Licence**: Apache-2.0 as the program. It was trained from nothing on pictures that the program
   draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0).
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:
-  {steps} steps of {batch} samples; about an hour for the samples and more than one for the
-  training on two cores, without a GPU. Called again it goes on where it was stopped. The same plan
-  draws the same samples.
+  {steps} steps of {batch} samples; half an hour for the samples and an hour and a quarter for the
+  training on two cores, without a GPU. Called again it goes on where it was stopped; `--start` goes
+  on from weights that ship. The same plan draws the same samples.
 
 ## What it has seen
 
@@ -72,7 +72,8 @@ edges:
 
 On samples that were never trained on. *front*: mean distance of the front from the true one, after
 the best scale and shift, over the object's mean thickness; *thickness*: likewise, as it is. The
-network is joined with the silhouette as the lifter does it; *relief* is the lifter without it,
+network is joined with the silhouette as the lifter does it (how much it is believed, two numbers,
+was chosen on these samples); *relief* is the lifter without it,
 *inflation* that without looking how things stand, *flat* a board as thick as that is on average.
 
 {means}
