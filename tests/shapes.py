@@ -337,7 +337,9 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     """`inside` of the photo `pixels` lifted by the relief, to about `count` Gaussians."""
     height, width = inside.shape
     view = camera(width, height)
-    matte, lifted = lift_mask(pixels, view, inside, "relief", LiftSettings(count), seed=seed)
+    matte, lifted = lift_mask(
+        pixels, view, inside, "relief", LiftSettings(count, trust=0), seed=seed
+    )
     texture = object_texture(matte)
     puppet = Puppet(lifted, DeformSettings(), view)
     return Scene(pixels, inside, view, matte, lifted, texture, puppet)

@@ -56,7 +56,7 @@ def made_document() -> Document:
     document = edits.set_mask(document, 0, mask, Prompt())
     photo = document.photo
     matte, lifted = pipeline.lift_mask(
-        photo.pixels, photo.camera, mask, "relief", LiftSettings(GAUSSIANS)
+        photo.pixels, photo.camera, mask, "relief", LiftSettings(GAUSSIANS, trust=0)
     )
     document = edits.set_lifted(document, 0, matte, lifted)
     plate = pipeline.make_plate(photo.pixels, mask, "telea")
