@@ -26,8 +26,8 @@ from .thickness import Thickness
 # the front is known well. Chosen on made-up objects that the network was not trained on; there
 # twice as much is best, but a photograph is not what the network was trained on, either.
 INFLATED_ERROR = (0.02, 0.5)
-FLOATING, STANDING, CYLINDER, BOX = 4.0, 2.0, 1.5, 0.4  # x, of the front
-THICKNESS, PRISM_THICKNESS = 4.0, 2.0  # x, of what is behind it
+FLOATING, STANDING = (4.0, 4.0), (2.0, 4.0)  # x, of the front and of what is behind it
+CYLINDER, BOX = (1.5, 2.0), (0.4, 0.8)
 ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns away; it ends there
 RIM = 0.035  # x extent from the outline, over which a body that is round there closes
 INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
@@ -137,8 +137,8 @@ def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
 def _doubts(standing: Standing) -> tuple[float, float]:
     """Of the silhouette's front and thickness, x `INFLATED_ERROR`."""
     if standing.prism is not None:
-        return (CYLINDER if standing.prism.is_round else BOX), PRISM_THICKNESS
-    return (STANDING if standing.is_known else FLOATING), THICKNESS
+        return CYLINDER if standing.prism.is_round else BOX
+    return STANDING if standing.is_known else FLOATING
 
 
 def _share(error: F64, own: F64) -> F64:
