@@ -62,7 +62,8 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     from .pipeline import lift_mask, make_plate
     from .segment.closed_form import affine
 
-    solved(*np.zeros((6, 4, 4)), 1, 1.0)  # where the shape network's models are here
+    empty = np.zeros((4, 4))
+    solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
     affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Pixels
 from ..document import Document, EditObject, Matte, Plate
 from ..pixels import crop, pixels_from_unit
 from ..progress import Progress, part, silent
@@ -31,7 +30,7 @@ class Layer:
     """A picture over those before it."""
 
     name: str
-    pixels: Pixels  # (h, w, 3), or with straight alpha (h, w, 4), of the photo's bit depth
+    pixels: np.ndarray  # (h, w, 3), or with straight alpha (h, w, 4), of the photo's bit depth
     left: int = 0  # px, corner in the photo
     top: int = 0
     is_shown: bool = True
@@ -72,7 +71,7 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
 
 
 def _background(name: str, plate: Plate, is_shown: bool = True) -> Layer:
-    hole = plate.hole * np.array(np.iinfo(plate.pixels.dtype).max, plate.pixels.dtype)
+    hole = pixels_from_unit(plate.hole.astype(np.float32), plate.pixels.dtype)
     pixels = np.dstack([np.where(plate.hole[..., None], plate.pixels, 0), hole])
     return Layer(name, pixels, plate.left, plate.top, is_shown)
 

@@ -94,7 +94,9 @@ class ShapeNet(nn.Module):
                 raw = F.pixel_shuffle(self.head(y.float()), 2)
             else:
                 own = slice(2 * phase[0] + phase[1], None, 4)
-                raw = F.conv2d(y.float(), self.head.weight[own], self.head.bias[own])
+                bias = self.head.bias
+                assert bias is not None
+                raw = F.conv2d(y.float(), self.head.weight[own], bias[own])
         front = SCALES["front"] * raw[:, :1]
         thick = SCALES["thick"] * F.softplus(raw[:, 1:3])  # never negative
         # Not made unit vectors here: those have no gradient once they are all alike.
