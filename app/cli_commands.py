@@ -11,11 +11,13 @@ from typing import Any
 from objectmorpher_core.animation import Clip, frames
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.compose.composite import straight_cutout
-from objectmorpher_core.compose.depth_map import depth_map, nearness
+from objectmorpher_core.compose.depth_map import depth_picture
+from objectmorpher_core.compose.layers import layers
 from objectmorpher_core.compose.plate import plate_picture
 from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import ENDINGS, Picture, encode_mask, encode_picture
+from objectmorpher_core.openraster import encode_openraster
 from objectmorpher_core.pipeline import Edited, open_photo, refuse_missing, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.script import (
@@ -46,7 +48,7 @@ EXTRAS = {  # further outputs of `edit` and the endings each may have
     "save_video": VIDEO_ENDINGS,
     "report": (".json",),
 }
-NEED_PLATE = {"save_plate", "save_layers", "save_video"}  # fmt: skip
+NEED_PLATE = {"save_plate", "save_layers", "save_video"}
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
@@ -106,12 +108,8 @@ def _extra(name: str, edited: Edited, path: Path, clip: Clip) -> bytes:
         picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
         return encode_picture(picture, path.suffix)
     if name == "save_depth":
-        near = nearness(depth_map(document, {0: edited.puppet}))
-        return encode_picture(Picture(near[..., None].repeat(3, 2), is_grey=True), path.suffix)
+        return encode_picture(depth_picture(document, {0: edited.puppet}), path.suffix)
     if name == "save_layers":
-        from objectmorpher_core.compose.layers import layers
-        from objectmorpher_core.openraster import encode_openraster
-
         return encode_openraster(layers(document)[1], edited.picture)
     if name == "save_video":
         return encode_video(frames(document, clip), clip.rate, path.suffix)

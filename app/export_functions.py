@@ -57,14 +57,15 @@ def _encoded(document: Document, plan: Plan, progress: Progress) -> bytes:
     elif plan.what is What.BACKGROUND:
         picture = _background(document)
     elif plan.what is What.DEPTH:
-        picture = _depth(document, draw)
+        from objectmorpher_core.compose.depth_map import depth_picture
+
+        picture = depth_picture(document, progress=draw)
     else:
         from objectmorpher_core.pipeline import export
 
         picture = export(document, progress=draw)
     progress(0.6, "encoding")
-    bits = 0 if plan.what is What.DEPTH else plan.bits  # 8 are too few for it
-    return encode_picture(_with_bits(picture, bits), plan.path.suffix, plan.quality,
+    return encode_picture(_with_bits(picture, plan.bits), plan.path.suffix, plan.quality,
                           webp_quality=plan.quality)  # fmt: skip
 
 
@@ -90,15 +91,6 @@ def _background(document: Document) -> Picture:
 
     pixels = document.photo.pixels if document.plate is None else plate_picture(document)
     return replace(document.photo.picture, pixels=pixels)
-
-
-def _depth(document: Document, progress: Progress) -> Picture:
-    """16-bit grey, see `depth_map.nearness`."""
-    from objectmorpher_core.compose.depth_map import depth_map, nearness
-    from objectmorpher_core.image import Picture
-
-    near = nearness(depth_map(document, progress=progress))
-    return Picture(np.repeat(near[..., None], 3, axis=2), is_grey=True)
 
 
 def _cutout(document: Document, thing: EditObject, progress: Progress) -> Picture:

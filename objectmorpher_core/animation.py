@@ -127,13 +127,12 @@ class _Film:
 
     def _solved(self, k: int, item: EditObject, share: float) -> Pose | None:
         """The pose that the handles give; None where it is not they that made it."""
-        is_shifted = item.rig.shifts is not None
-        if not item.handles and not is_shifted:
+        shifts = item.rig.shifts
+        if not item.handles and shifts is None:
             return None
         deformer = self.puppets[k].deformer
-        if item.rig.shifts is not None:
-            rig = replace(item.rig, shifts=share * item.rig.shifts)
-            deformer = deformer.with_rig(rig)
+        if shifts is not None:
+            deformer = deformer.with_rig(replace(item.rig, shifts=share * shifts))
         handles = tuple(_handle(handle, share) for handle in item.handles)
         solved = deformer.solve(
             handles, item.has_auto_anchors, self._last.get(k), tolerance=TOLERANCE

@@ -274,6 +274,15 @@ def resized(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
     return cv2.resize(pixels, (width, height), interpolation=method)
 
 
+def at_most(pixels: np.ndarray, longest: int) -> np.ndarray:
+    """Pixels (H, W[, C]), made smaller where their longer side is more than `longest` px."""
+    height, width = pixels.shape[:2]
+    if max(width, height) <= longest:
+        return pixels
+    shrink = longest / max(width, height)
+    return resized(pixels, max(round(width * shrink), 1), max(round(height * shrink), 1))
+
+
 def encode_mask(mask: Mask) -> bytes:
     """8-bit grey PNG file of a mask (H, W): 0 and 255."""
     return png.encode(np.where(mask, np.uint8(255), np.uint8(0))[..., None], None, None)

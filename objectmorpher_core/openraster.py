@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .compose.layers import Layer
-from .image import Picture, encode_picture, resized, to_u8
+from .image import Picture, at_most, encode_picture, to_u8
 
 ENDING = ".ora"
 MIME = "image/openraster"
@@ -71,11 +71,8 @@ def _printable(name: str) -> str:
 
 
 def _thumbnail(merged: Picture) -> Picture:
-    height, width = merged.pixels.shape[:2]
-    shrink = min(THUMBNAIL / max(width, height), 1.0)
-    size = (max(round(width * shrink), 1), max(round(height * shrink), 1))
-    alpha = None if merged.alpha is None else resized(to_u8(merged.alpha), *size)
-    return Picture(resized(to_u8(merged.pixels), *size), alpha, icc=merged.icc)
+    alpha = None if merged.alpha is None else at_most(to_u8(merged.alpha), THUMBNAIL)
+    return Picture(at_most(to_u8(merged.pixels), THUMBNAIL), alpha, icc=merged.icc)
 
 
 def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:

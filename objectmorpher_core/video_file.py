@@ -15,11 +15,10 @@ from itertools import chain
 from pathlib import Path
 
 import cv2
-import numpy as np
 from PIL import Image
 
 from .arrays import RGB
-from .image import resized
+from .image import at_most
 
 CODECS = {".webm": "VP90", ".mp4": "mp4v"}
 PICTURES = (".gif", ".webp")
@@ -103,10 +102,7 @@ def _palettes() -> Callable[[RGB], Image.Image]:
     palette: list[Image.Image] = []
 
     def reduced(frame: RGB) -> Image.Image:
-        height, width = frame.shape[:2]
-        shrink = min(GIF_LONGEST / max(width, height), 1.0)
-        size = (max(round(width * shrink), 1), max(round(height * shrink), 1))
-        image = Image.fromarray(frame if shrink == 1 else np.asarray(resized(frame, *size)))
+        image = Image.fromarray(at_most(frame, GIF_LONGEST))
         if not palette:
             palette.append(image.quantize(256, Image.Quantize.MEDIANCUT))
         return image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)

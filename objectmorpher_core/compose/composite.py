@@ -170,7 +170,7 @@ class _Drawing:
         margin = int(np.ceil(self._margin)) + 2
         boxes = [thing.matte.box for thing in self._things if thing.item.is_moved]
         boxes += [box for shown in self._drawables.values() if (box := shown.box()) is not None]
-        boxes += [_whole(shade.bounds) for shade in self._shades]
+        boxes += [whole_box(shade.bounds) for shade in self._shades]
         if self._plate is not None and self._plate.painted is not None:
             boxes.append(self._plate.box)
         x0, y0 = (int(low) - margin for low in np.min(boxes, axis=0)[:2])
@@ -242,7 +242,7 @@ def _part(picture: Picture3D, first: int, last: int) -> Picture3D:
     return replace(part, alpha=np.minimum(part.alpha, 1.0))
 
 
-def _whole(bounds: tuple[float, float, float, float]) -> Box:
+def whole_box(bounds: tuple[float, float, float, float]) -> Box:
     """The pixels that a box touches."""
     x0, y0, x1, y1 = bounds
     return int(np.floor(x0)), int(np.floor(y0)), int(np.ceil(x1)), int(np.ceil(y1))

@@ -6,10 +6,12 @@ import numpy as np
 
 from ..arrays import F32
 from ..document import Document
+from ..image import Picture
 from ..progress import Progress, silent
 from ..puppet import Puppet, puppet_of
 from ..raster import tiles
 from .composite import object_texture
+from .plate import overlap
 
 SOLID = 0.5  # alpha from which on a pixel shows an object
 TOP = 65535
@@ -30,7 +32,9 @@ def depth_map(
             continue
         puppet = (puppets or {}).get(k) or puppet_of(item, camera)
         drawable = tiles.prepare(puppet.posed(item.pose, item.placement), camera, camera)
-        if (box := _inside(drawable.box(), camera.width, camera.height)) is None:
+        whole = drawable.box()
+        box = None if whole is None else overlap(whole, (0, 0, camera.width, camera.height))
+        if box is None:
             continue
         picture = tiles.draw(drawable, object_texture(item.matte), box)
         depth = np.where(picture.alpha > SOLID, picture.depth, np.float32(np.inf))
@@ -39,14 +43,12 @@ def depth_map(
     return nearest
 
 
-def _inside(
-    box: tuple[int, int, int, int] | None, width: int, height: int
-) -> tuple[int, int, int, int] | None:
-    """What of a box lies in the photo."""
-    if box is None:
-        return None
-    x0, y0, x1, y1 = max(box[0], 0), max(box[1], 0), min(box[2], width), min(box[3], height)
-    return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+def depth_picture(
+    document: Document, puppets: dict[int, Puppet] | None = None, progress: Progress = silent
+) -> Picture:
+    """The `nearness` of the objects, 16-bit grey."""
+    near = nearness(depth_map(document, puppets, progress))
+    return Picture(np.repeat(near[..., None], 3, axis=2), is_grey=True)
 
 
 def nearness(depth: F32) -> np.ndarray:

@@ -15,7 +15,7 @@ from ..document import Document, EditObject, Matte, Plate
 from ..pixels import crop, pixels_from_unit
 from ..progress import Progress, part, silent
 from .blend import Box
-from .composite import Composite, Moved, composite, drawn_alone
+from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes
 from .plate import overlap, plate_of_holes
 from .shadow import Shade
@@ -60,7 +60,7 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
     for thing in shown:
         if thing.shade is not None:
             pile += _shadow(thing.item.name, thing.shade, size, photo.dtype)
-    for item in () if result.stack else _different(document):
+    for item in () if result.stack else _distinct(document):
         assert item.matte is not None
         pile += _clipped(item.name, *_resting(item.matte, photo.dtype), size)
     for k, thing in enumerate(shown):
@@ -76,7 +76,7 @@ def _background(name: str, plate: Plate, is_shown: bool = True) -> Layer:
     return Layer(name, pixels, plate.left, plate.top, is_shown)
 
 
-def _different(document: Document) -> list[EditObject]:
+def _distinct(document: Document) -> list[EditObject]:
     """The visible objects that were cut out; of copies one, for they are in the same place."""
     found: dict[int, EditObject] = {}
     for item in document.objects:
@@ -99,9 +99,7 @@ def _resting(matte: Matte, dtype: np.dtype) -> tuple[np.ndarray, Box]:
 
 
 def _shadow(name: str, shade: Shade, size: tuple[int, int], dtype: np.dtype) -> list[Layer]:
-    x0, y0, x1, y1 = shade.bounds
-    around = (int(np.floor(x0)), int(np.floor(y0)), int(np.ceil(x1)), int(np.ceil(y1)))
-    box = overlap(around, (0, 0, *size))
+    box = overlap(whole_box(shade.bounds), (0, 0, *size))
     if box is None:
         return []
     there = shade.at(box)
