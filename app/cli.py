@@ -116,7 +116,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("backends").add_argument
     add("--lift", metavar="NAME", help="auto or relief")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
-    add("--refine", metavar="NAME", help="auto or none")
+    add("--refine", metavar="NAME", help="none (also auto) or harmonise: light")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add = parser.add_argument_group("the object's shape").add_argument
     add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
@@ -230,7 +230,7 @@ def _add_train(parser: argparse.ArgumentParser) -> None:
     add("--minutes", type=float, metavar="M", help="at most; go on with another call")
     add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
     add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
-    add("--seed", type=int, default=0)
+    add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
     add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
     add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
     parser.set_defaults(run=_lazily("train"))

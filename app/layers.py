@@ -24,6 +24,7 @@ from .painter import PAINTED
 from .view import Shown, View
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.relight import Relit
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.reference import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
@@ -102,6 +103,7 @@ class _Work:
     shown: Layer
     since: float  # s, monotonic, when the splats or the view changed last
     is_asked: bool = False
+    relit: tuple[Layer, Relit, Layer] | None = None  # `shown`, the light, and `shown` in it
 
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px
@@ -146,8 +148,9 @@ class Layers:
         part = work.request.part
         if part.is_painted:
             return work.shown
-        gain = self._derived.lights.of(document, part.k).gain
-        return work.shown if gain == work.shown.gain else replace(work.shown, gain=gain)
+        look = self._derived.lights.of(document, part.k)
+        shown = work.shown if look.relit is None else _relit(work, look.relit)
+        return shown if look.gain == shown.gain else replace(shown, gain=look.gain)
 
     def parts(self, document: Document, shown: Shown) -> list[Part]:
         """What a view is put together from, back to front."""
@@ -329,6 +332,19 @@ def _sharp_layer(
         picture, texture, factor, covered, corner, view.zoom, is_marked=part.is_marked
     )
     return Layer(_floats(covered), rgba, invented, is_draft=True)
+
+
+def _relit(work: _Work, relit: Relit) -> Layer:
+    """What is shown of a part, in a light that varies over it."""
+    shown, kept = work.shown, work.relit
+    if kept is not None and kept[0] is shown and kept[1] is relit:
+        return kept[2]
+    left, top, zoom = work.view[:3]
+    x0, y0 = shown.box[:2]
+    rgba = relit.lit_rgba(shown.pixels, left + x0 / zoom, top + y0 / zoom, zoom)
+    result = replace(shown, rgba=rgba)
+    work.relit = shown, relit, result
+    return result
 
 
 def _floats(box: Box) -> tuple[float, float, float, float]:

@@ -70,11 +70,12 @@ class Lights:
         from objectmorpher_core.compose.lighting import NOTHING
 
         item = document.objects[k]
-        if not item.is_moved or not item.is_visible or not (item.shadow.strength or item.harmony):
+        has_any = item.shadow.strength or item.harmony or item.relight
+        if not item.is_moved or not item.is_visible or not has_any:
             self._kept.pop(k, None)
             return NOTHING
         splats, now = self._derived.posed(document, k), time.monotonic()
-        sources = (splats, item.shadow, item.harmony, document.plate)
+        sources = (splats, item.shadow, item.harmony, item.relight, document.plate)
         kept = self._kept.get(k)
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, k, self._is_hurried)()

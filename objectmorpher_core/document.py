@@ -308,6 +308,7 @@ class EditObject:
     found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
     shadow: Shadow = field(default_factory=Shadow)
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
+    relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
     shape: LiftSettings = field(default_factory=LiftSettings)
 
     @property
@@ -343,10 +344,8 @@ class EditObject:
         self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
-        return replace(
-            self, matte=matte, lifted=lifted, shape=shape or self.shape, handles=(), rig=Rig(),
-            pose=None,
-        )  # fmt: skip
+        fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
+        return replace(fresh, matte=matte, lifted=lifted)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from .document import (
     Pose,
     Prompt,
 )
-from .joining import LEAST_FEATHER, MOST_FEATHER, Shadow
+from .joining import LEAST_FEATHER, MOST_FEATHER, USUAL_HARMONY, USUAL_RELIGHT, Shadow
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 
@@ -337,6 +337,19 @@ def set_harmony(document: Document, k: int, harmony: float) -> Document:
     if not 0 <= harmony <= 1:
         raise EditError(f"a harmony of {harmony:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], harmony=float(harmony)))
+
+
+def set_relight(document: Document, k: int, relight: float) -> Document:
+    """How far the light on object `k` stays where it was while the object turns, in [0, 1]."""
+    if not 0 <= relight <= 1:
+        raise EditError(f"a relighting of {relight:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], relight=float(relight)))
+
+
+def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
+    """Object `k` in the light of its new place and of how it is turned, or in that of the photo."""
+    harmony, relight = (USUAL_HARMONY, USUAL_RELIGHT) if is_harmonised else (0.0, 0.0)
+    return set_relight(set_harmony(document, k, harmony), k, relight)
 
 
 def set_feather(document: Document, feather: float) -> Document:

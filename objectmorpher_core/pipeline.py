@@ -221,6 +221,8 @@ def run_script(
             step = part(progress, 0.6, 0.85)
             plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
             document = edits.set_plate(document, plate)
+    if script.refine == "harmonise":
+        document = edits.harmonised(document, 0).with_backend("refine", script.refine)
     return _finished(document, puppet, energies, progress, stopwatch)
 
 
@@ -287,8 +289,9 @@ def refuse_missing(script: EditScript) -> None:
     for kind, name, known in chosen:  # also where the stage will not run
         if name != "auto" and name not in known:
             raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
-    if script.refine not in ("auto", "none"):
-        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: none")
+    if script.refine not in ("auto", *compose.REFINERS):
+        known = ", ".join(compose.REFINERS)
+        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: {known}")
 
 
 def _pose(

@@ -251,8 +251,9 @@ def _check_joining(document: Document) -> None:
         raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
     for item in document.objects:
         item.shadow.check()
-        if not 0 <= item.harmony <= 1:
-            raise ValueError(f"an object's harmony is {item.harmony:g}, not between 0 and 1")
+        for name, value in {"harmony": item.harmony, "relighting": item.relight}.items():
+            if not 0 <= value <= 1:
+                raise ValueError(f"an object's {name} is {value:g}, not between 0 and 1")
 
 
 def _check_coverage(item: EditObject) -> None:

@@ -11,6 +11,8 @@ uniform sampler2D marks;  // share that shows the object but nothing of the phot
 uniform float opacity;
 
 uniform vec3 gain;        // of the light at the new place
+uniform sampler2D relit;  // less 1, of the light where the object turned
+uniform vec4 relit_box;   // x0, y0, x1, y1 canvas px
 
 in vec2 xy;
 out vec4 color;
@@ -22,6 +24,9 @@ void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
     vec2 at = (xy - box.xy) / (box.zw - box.xy);
     color = lit(texture(layer, at), gain);
+#ifdef HAS_RELIT
+    color = lit(color, vec3(1 + texture(relit, (xy - relit_box.xy) / (relit_box.zw - relit_box.xy)).r));
+#endif
 #ifdef HAS_MARKS
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel
     float share = color.a - texture(marks, at).g;

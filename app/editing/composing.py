@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 VARIANTS, REPAIR = "variants", "repair"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
-USUAL_HARMONY = 0.8  # strength, when it is turned on
 USUAL_SHADOW = 0.55
 GRAIN = 2  # canvas px per px of the picture of a stroke
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
@@ -263,6 +262,9 @@ class Composing:
     def preview_harmony(self, harmony: float) -> None:
         self._preview(lambda document, k: edits.set_harmony(document, k, harmony))
 
+    def preview_relight(self, relight: float) -> None:
+        self._preview(lambda document, k: edits.set_relight(document, k, relight))
+
     def preview_feather(self, feather: float) -> None:
         self._preview(lambda document, _: edits.set_feather(document, feather))
 
@@ -278,13 +280,18 @@ class Composing:
         """One of `compose.REFINERS`."""
         item = self._item
         if item is not None and name != self.refiner:
-            self.preview_harmony(USUAL_HARMONY if name == "harmonise" else 0.0)
+            is_wanted = name == "harmonise"
+            self._preview(lambda document, k: edits.harmonised(document, k, is_wanted))
             self._editor.commit(t("Adjust light"))
 
     @property
     def refiner(self) -> str:
-        item = self._item
-        return "harmonise" if item is not None and item.harmony > 0 else "none"
+        """What the document says; not a preview, so that no field vanishes while it is dragged."""
+        editor = self._editor
+        if editor.committed is None or self._item is None:
+            return "none"
+        item = editor.committed.objects[editor.current]
+        return "harmonise" if item.harmony or item.relight else "none"
 
     @property
     def _item(self) -> EditObject | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from objectmorpher_core.document import Document
 
 from ..editor import Editor
@@ -16,7 +18,6 @@ MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that 
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
 OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
-NEUTRAL = (1.0, 1.0, 1.0)
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
@@ -102,14 +103,14 @@ def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float
 
 def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject, ...]:
     camera, photo, derived = document.photo.camera, document.photo, editor.derived
-    return tuple(
-        SplatObject(
-            derived.painter.painted(document, part.k, part.look),
-            derived.shape(photo, document.objects[part.k]).texture,
-            camera,
-            is_marked=part.is_marked,
-            is_tint=part.look is Shown.STRAIN,
-            gain=NEUTRAL if part.is_painted else derived.lights.of(document, part.k).gain,
-        )
-        for part in derived.layers.parts(document, shown)
-    )
+    found = []
+    for part in derived.layers.parts(document, shown):
+        splats = derived.painter.painted(document, part.k, part.look)
+        texture = derived.shape(photo, document.objects[part.k]).texture
+        is_tint = part.look is Shown.STRAIN
+        item = SplatObject(splats, texture, camera, is_marked=part.is_marked, is_tint=is_tint)
+        if not part.is_painted:
+            look = derived.lights.of(document, part.k)
+            item = replace(item, gain=look.gain, relit=look.relit)
+        found.append(item)
+    return tuple(found)

@@ -15,10 +15,12 @@ from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.relight import Relit
+
     from .splat_pass import SplatPicture
 
-LAYER, MARKS = range(2)  # texture units
-_UNITS = {"layer": LAYER, "marks": MARKS, "blend": BLEND}
+LAYER, MARKS, RELIT = range(3)  # texture units
+_UNITS = {"layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND}
 TINT = 0.6  # opacity
 
 
@@ -29,6 +31,7 @@ class LayerPass:
         self._context = context
         self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
         self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
+        self._factors: moderngl.Texture | None = None
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -49,9 +52,28 @@ class LayerPass:
         is_marked = item.is_marked and picture.detail is not None
         if picture.detail is not None:
             picture.detail.use(MARKS)
-        program, quad = self._programs("DETAIL", *_defines(scene, is_marked, item.is_tint))
-        set_uniforms(program, box=(0, 0, view.width, view.height), **_appearance(item))
+        defines = ["DETAIL", *_defines(scene, is_marked, item.is_tint)]
+        values = _appearance(item)
+        if item.relit is not None:
+            defines.append("HAS_RELIT")
+            values["relit_box"] = self._use_factors(item.relit, view)
+        program, quad = self._programs(*defines)
+        set_uniforms(program, box=(0, 0, view.width, view.height), **values)
         self._render(program, quad, scene, view)
+
+    def _use_factors(self, relit: Relit, view: View) -> tuple[float, float, float, float]:
+        """Uploads them, with nothing around them; where on the canvas they lie."""
+        factors = np.pad(relit.factor, 1)
+        if self._factors is not None:
+            self._factors.release()
+        self._factors = self._upload(factors[..., None])
+        self._factors.filter = moderngl.LINEAR, moderngl.LINEAR
+        self._factors.repeat_x = self._factors.repeat_y = False
+        self._factors.use(RELIT)
+        corner = np.array([relit.left, relit.top]) - relit.pitch
+        low = view.canvas_from_image(corner)
+        high = view.canvas_from_image(corner + relit.pitch * np.array(factors.shape[::-1]))
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def _render(
         self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: View

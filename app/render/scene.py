@@ -14,6 +14,7 @@ from objectmorpher_core.document import Plate
 from ..layers import Layer
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.relight import Relit
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.texture import TextureLevels
 
@@ -40,6 +41,7 @@ class SplatObject:
     is_marked: bool = False  # hatched where it shows nothing of the photo
     is_tint: bool = False  # lies over everything, translucent
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
+    relit: Relit | None = None  # and of each place
 
 
 @dataclass(frozen=True, eq=False)

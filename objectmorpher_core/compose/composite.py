@@ -36,8 +36,8 @@ from .blend import (
     with_touched,
 )
 from .blend import STILL as STILL
-from .harmonize import NEUTRAL, Gain, lit
-from .lighting import NOTHING, Lighting
+from .harmonize import lit
+from .lighting import NOTHING, Lighting, Lit
 from .lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .plate import hole_margin, plate_crop, plate_of_holes
@@ -65,8 +65,7 @@ class Moved:
     item: EditObject
     splats: PosedSplats
     has_hole: bool = True  # nothing stands where it was
-    gain: Gain = NEUTRAL  # of its colours
-    shade: Shade | None = None  # that it throws
+    look: Lit = NOTHING  # the light on it, and the shadow that it throws
 
     @property
     def matte(self) -> Matte:
@@ -147,7 +146,7 @@ def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
         if item.is_moved:
             look = lighting.of(item, splats, partial(puppet.posed, None, Placement()))
         has_hole = leaves_a_hole(objects, k)
-        things.append(Moved(item, splats, has_hole, look.gain, look.shade))
+        things.append(Moved(item, splats, has_hole, look))
     return tuple(things)
 
 
@@ -159,7 +158,7 @@ class _Drawing:
     ) -> None:
         """`margin`: px of the photo around what is disturbed."""
         self._things, self._plate, self._margin = things, plate, margin
-        self._shades = [thing.shade for thing in things if thing.shade is not None]
+        self._shades = [t.look.shade for t in things if t.look.shade is not None]
         shown = [k for k, t in enumerate(things) if t.item.is_moved and t.item.is_visible]
         self._drawables = {k: tiles.prepare(things[k].splats, camera, camera) for k in shown}
         self._textures = {k: object_texture(things[k].matte) for k in shown}
@@ -226,10 +225,11 @@ class _Drawing:
             return None
         part = (self.box[0], top, self.box[2], bottom)
         picture = tiles.draw(self._drawables[k], self._textures[k], part)
-        gain = self._things[k].gain
-        if gain == NEUTRAL:
-            return picture
-        return replace(picture, color=lit(picture.color, picture.alpha, gain))
+        look = self._things[k].look
+        color = lit(picture.color, picture.alpha, look.gain)
+        if look.relit is not None:
+            color = look.relit.lit(color, picture.alpha, self.box[0], top)
+        return replace(picture, color=color)
 
 
 def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:

@@ -58,8 +58,8 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
         pile.append(_background(BACKGROUND, own))
     shown = [thing for thing in result.stack if thing.item.is_visible]
     for thing in shown:
-        if thing.shade is not None:
-            pile += _shadow(thing.item.name, thing.shade, size, photo.dtype)
+        if thing.look.shade is not None:
+            pile += _shadow(thing.item.name, thing.look.shade, size, photo.dtype)
     for item in () if result.stack else _distinct(document):
         assert item.matte is not None
         pile += _clipped(item.name, *_resting(item.matte, photo.dtype), size)

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..arrays import F32
-from ..document import Document, EditObject, Matte
+from ..arrays import F32, F64
+from ..document import Document, EditObject, LiftedObject, Matte
 from ..raster.posed import PosedSplats
 from ..raster.texture import TextureLevels, build_levels
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
+from .light_estimate import estimate_light
+from .relight import Relit, relight
 from .shadow import Shade, cast
 from .silhouette import silhouette, sketch
 
@@ -21,6 +23,7 @@ class Lit:
 
     gain: Gain = NEUTRAL
     shade: Shade | None = None
+    relit: Relit | None = None
 
 
 NOTHING = Lit()
@@ -36,6 +39,7 @@ class Lighting:
 
     def __init__(self, document: Document) -> None:
         self._document = document
+        self._lights: dict[int, tuple[LiftedObject, F64]] = {}  # by the id of what was lifted
 
     @cached_property
     def light(self) -> F32:
@@ -55,11 +59,11 @@ class Lighting:
         `is_sketch`: the shadow is a coarse one, in the time that a frame of a drag has.
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
-        if not item.is_visible or not (has_shadow or has_light):
+        if not item.is_visible or not (has_shadow or has_light or item.relight):
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
         camera = self._document.photo.camera
-        shade, gain = None, NEUTRAL
+        shade, gain, relit = None, NEUTRAL, None
         if has_shadow:
             if is_sketch:
                 shape = sketch(splats, camera)
@@ -70,4 +74,15 @@ class Lighting:
             before, now = sketch(rest(), camera), sketch(splats, camera)
             if before is not None and now is not None:
                 gain = at_strength(light_gain(self.light, camera.width, before, now), item.harmony)
-        return Lit(gain, shade)
+        if item.relight > 0:
+            relit = relight(splats, self._light_of(item), item.relight, camera, is_sketch)
+        return Lit(gain, shade, relit)
+
+    def _light_of(self, item: EditObject) -> F64:
+        """b (3,), see `light_estimate`; estimated once."""
+        lifted, matte = item.lifted, item.matte
+        assert lifted is not None and matte is not None
+        kept = self._lights.get(id(lifted))
+        if kept is None:
+            kept = self._lights[id(lifted)] = (lifted, estimate_light(lifted, matte))
+        return kept[1]

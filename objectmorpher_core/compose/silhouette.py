@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64
+from ..arrays import F32, F64, Mask
 from ..camera import Camera
 from ..raster import tiles
 from ..raster.posed import PosedSplats
@@ -26,6 +26,9 @@ SKETCHED = 4000  # Gaussians in a sketch
 AROUND = 2.0  # x the spacing of the Gaussians, how far the object may reach past their middles
 
 
+Corners = tuple[tuple[float, float], tuple[float, float]]  # photo px
+
+
 @dataclass(frozen=True, eq=False)
 class Silhouette:
     """An object's alpha on a grid of its own."""
@@ -36,39 +39,81 @@ class Silhouette:
     pitch: float  # photo px per px of the grid
 
 
+@dataclass(frozen=True)
+class Grid:
+    """A window on what the photo's camera sees, about an object."""
+
+    left: float  # photo px, its corner; may be beside the photo
+    top: float
+    pitch: float  # photo px per px of the grid
+    width: int
+    height: int
+
+    def camera(self, camera: Camera) -> Camera:
+        """What sees it."""
+        return camera.windowed(self.left, self.top, self.width, self.height, 1 / self.pitch)
+
+    def cells(self, means: F64, camera: Camera) -> tuple[np.ndarray, Mask]:
+        """Number of the cell (n,) in which each world point (N, 3) is seen; those (N,) that are."""
+        is_there = means[:, 2] > 0
+        x, y = ((camera.project(means[is_there]) - (self.left, self.top)) / self.pitch).T
+        is_inside = (x >= 0) & (y >= 0) & (x < self.width) & (y < self.height)
+        index = y[is_inside].astype(np.int64) * self.width + x[is_inside].astype(np.int64)
+        is_there[is_there] = is_inside
+        return index, is_there
+
+
 def silhouette(splats: PosedSplats, texture: TextureLevels, camera: Camera) -> Silhouette | None:
     """The object as the photo's `camera` sees it; None where it is not seen."""
-    box = _box(splats, camera, splats.means)
-    if box is None:
+    grid = fine_grid(splats, camera)
+    if grid is None:
         return None
-    (left, top), (right, bottom) = box
-    pitch = max((right - left) / FINE, (bottom - top) / FINE, 1.0)
-    width, height = _cells(right - left, pitch), _cells(bottom - top, pitch)
-    window = camera.windowed(left, top, width, height, 1 / pitch)
-    drawn = tiles.draw_rgba(tiles.prepare(splats, window, camera), texture)
+    drawn = tiles.draw_rgba(tiles.prepare(splats, grid.camera(camera), camera), texture)
     alpha = drawn[..., 3].astype(np.float32) / np.float32(255)
-    return Silhouette(alpha, left, top, pitch)
+    return Silhouette(alpha, grid.left, grid.top, grid.pitch)
 
 
 def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
     """The same in a millisecond: where some of the Gaussians are, and close around them."""
-    solid = np.flatnonzero(splats.rest.lifted.texture.solidity > SOLID)
-    means = splats.means[solid[:: max(len(solid) // SKETCHED, 1)]]
-    found = _box(splats, camera, means)
-    if found is None:
+    few = sketched(splats)
+    grid = sketch_grid(splats, few, camera)
+    if grid is None:
         return None
-    (left, top), (right, bottom) = found
-    few = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(means)))
-    pitch = max((right - left) / COARSE, (bottom - top) / COARSE, few, 1.0)
-    width, height = _cells(right - left, pitch), _cells(bottom - top, pitch)
-    seen = camera.project(means[means[:, 2] > 0])
-    x, y = ((seen - (left, top)) / pitch).T
-    is_inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-    index = y[is_inside].astype(np.int64) * width + x[is_inside].astype(np.int64)
-    count = np.bincount(index, minlength=width * height).reshape(height, width)
+    index, _ = grid.cells(splats.means[few], camera)
+    count = np.bincount(index, minlength=grid.width * grid.height).reshape(grid.height, grid.width)
     around = cv2.blur(count.astype(np.float32), (3, 3), borderType=cv2.BORDER_CONSTANT)
     usual = float(np.median(around[around > 0])) if len(index) else 1.0
-    return Silhouette(np.clip(2 * around / usual, 0, 1).astype(np.float32), left, top, pitch)
+    alpha = np.clip(2 * around / usual, 0, 1).astype(np.float32)
+    return Silhouette(alpha, grid.left, grid.top, grid.pitch)
+
+
+def sketched(splats: PosedSplats) -> np.ndarray:
+    """Which of the Gaussians a sketch is made of."""
+    solid = np.flatnonzero(splats.rest.lifted.texture.solidity > SOLID)
+    return solid[:: max(len(solid) // SKETCHED, 1)]
+
+
+def fine_grid(splats: PosedSplats, camera: Camera) -> Grid | None:
+    """About all of an object; None where it is not seen."""
+    return _grid(_box(splats, camera, splats.means), FINE, 1.0)
+
+
+def sketch_grid(splats: PosedSplats, few: np.ndarray, camera: Camera) -> Grid | None:
+    """About the Gaussians `few`, with a few of them in each cell."""
+    box = _box(splats, camera, splats.means[few])
+    if box is None:
+        return None
+    (left, top), (right, bottom) = box
+    return _grid(box, COARSE, float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(few))))
+
+
+def _grid(box: Corners | None, most: int, least: float) -> Grid | None:
+    """Of at most `most` px, none smaller than `least` px of the photo, nor than one."""
+    if box is None:
+        return None
+    (left, top), (right, bottom) = box
+    pitch = max((right - left) / most, (bottom - top) / most, least, 1.0)
+    return Grid(left, top, pitch, _cells(right - left, pitch), _cells(bottom - top, pitch))
 
 
 def _cells(length: float, pitch: float) -> int:
@@ -76,9 +121,7 @@ def _cells(length: float, pitch: float) -> int:
     return max(int(np.ceil(length / pitch)), 1)
 
 
-def _box(
-    splats: PosedSplats, camera: Camera, means: F64
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
+def _box(splats: PosedSplats, camera: Camera, means: F64) -> Corners | None:
     """Corners around `means` (N, 3), photo px; none farther beside the photo than that is large."""
     means = means[means[:, 2] > 0]
     if not len(means):
@@ -100,16 +143,22 @@ def sampled(values: F32, corner: tuple[float, float], pitch: float, box: Box) ->
     """
     x0, y0, x1, y1 = box
     padded = np.pad(values, 1)
-
-    def places(first: int, last: int, start: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-        at = (np.arange(first, last) + 0.5 - start) / pitch + 0.5  # in the padded grid
-        at = np.clip(at, 0, count + 1)
-        index = np.minimum(at.astype(np.int64), count)
-        return index, (at - index).astype(np.float32)
-
-    rows, down = places(y0, y1, corner[1], values.shape[0])
-    columns, across = places(x0, x1, corner[0], values.shape[1])
+    rows, down = cell_places(y0, y1, corner[1], pitch, values.shape[0])
+    columns, across = cell_places(x0, x1, corner[0], pitch, values.shape[1])
     above, below = padded[rows], padded[rows + 1]
     lines = above + down[:, None] * (below - above)
     near, far = lines[:, columns], lines[:, columns + 1]
     return np.asarray(near + across * (far - near), np.float32)
+
+
+def cell_places(
+    first: int, last: int, start: float, pitch: float, count: int
+) -> tuple[np.ndarray, F32]:
+    """Where the pixels first..last lie on an axis of `count` cells, padded by one on each side.
+
+    The cell before each (n,), and how far on the way to the next it is (n,).
+    """
+    at = (np.arange(first, last) + 0.5 - start) / pitch + 0.5
+    at = np.clip(at, 0, count + 1)
+    index = np.minimum(at.astype(np.int64), count)
+    return index, (at - index).astype(np.float32)

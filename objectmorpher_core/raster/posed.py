@@ -54,18 +54,25 @@ class RestSplats:
         """Whether any of the Gaussians shows the photo."""
         return bool(self.lifted.texture.visibility.any())
 
-    def painted(self, colors: np.ndarray) -> RestSplats:
-        """The same object in plain `colors` (N, 3), with nothing of the photo on it."""
+    def painted(self, colors: np.ndarray, has_edge: bool = True) -> RestSplats:
+        """The same object in plain `colors` (N, 3), with nothing of the photo on it.
+
+        Without what carries its soft edge if not `has_edge`.
+        """
         other = copy.copy(self)
         gaussians = replace(self.lifted.gaussians, colors=np.asarray(colors, np.float32))
+        if not has_edge:
+            is_solid = self.lifted.texture.solidity > 0.5
+            gaussians = replace(gaussians, opacities=gaussians.opacities * is_solid)
         other.lifted = replace(self.lifted, gaussians=gaussians)
         # The photo's part ends where the motion stretches it too much: here everywhere.
         other.zoom = frozen(np.full(len(self), ENDLESS))
         other.is_textured = False
         blocks = self.blocks.copy()
-        table = np.zeros((blocks.shape[0] * LANES, 3))
-        table[: len(self)] = gaussians.colors
-        blocks[:, COLOUR:] = table.reshape(-1, LANES, 3).transpose(0, 2, 1)
+        table = np.zeros((blocks.shape[0] * LANES, 4))
+        table[: len(self)] = np.column_stack([gaussians.colors, gaussians.opacities])
+        table = table.reshape(-1, LANES, 4).transpose(0, 2, 1)
+        blocks[:, COLOUR:], blocks[:, OPACITY] = table[:, :3], table[:, 3]
         blocks[:, ZOOM] = ENDLESS
         other.blocks = frozen(blocks)
         return other
@@ -127,9 +134,9 @@ class PosedSplats:
     def __len__(self) -> int:
         return len(self.rest)
 
-    def painted(self, colors: np.ndarray) -> PosedSplats:
+    def painted(self, colors: np.ndarray, has_edge: bool = True) -> PosedSplats:
         """The same in plain `colors` (N, 3), see `RestSplats.painted`."""
-        return replace(self, rest=self.rest.painted(colors))
+        return replace(self, rest=self.rest.painted(colors, has_edge))
 
     @property
     def is_layered(self) -> bool:

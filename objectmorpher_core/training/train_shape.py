@@ -26,7 +26,8 @@ from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of, tr
 from .shape_losses import losses
 from .shape_net import ShapeNet
 
-UNSEEN = 50_000_000  # the first seed that is never trained on
+UNSEEN = 50_000_000  # the first seed of a sample that is never trained on
+APART = 1_000_000  # between the samples' first seeds of two plans, whose seeds are neighbours
 CHECKED = 8 * SHARD  # unseen samples
 WARM_UP = 0.04  # share of the steps, during which the rate rises
 STEEPEST = 5.0  # length of a gradient that is not shortened
@@ -45,12 +46,17 @@ class Plan:
     rate: float = 1.5e-3
     decay: float = 0.02
     held_out: tuple[str, ...] = ()  # families that are not trained on
-    seed: int = 0
+    seed: int = 0  # another one has other samples
     start: str = ""  # SHA-256 of the weights that it goes on from; none: from nothing
 
     @property
     def steps(self) -> int:
         return max(1, int(self.passes * self.samples / self.size))
+
+    @property
+    def first(self) -> int:
+        """Seed of the first sample."""
+        return self.seed * APART
 
     @property
     def file(self) -> str:
@@ -69,18 +75,20 @@ def train(
 
     It goes on from `weights`, exported before, where they are given.
 
-    Raises ValueError for fewer samples than a step takes, and for weights of another network or
-    of families that are held out.
+    Raises ValueError for fewer samples than a step takes, for a seed whose samples others have, and
+    for weights of another network or of families that are held out.
     """
     if plan.samples < plan.size:
         raise ValueError(f"{plan.samples} samples are fewer than the {plan.size} of one step")
+    if not 0 <= plan.seed < UNSEEN // APART or plan.samples > APART:
+        raise ValueError(f"a seed is from 0 to {UNSEEN // APART - 1}, with {APART} samples at most")
     if weights is not None and plan.held_out:
         raise ValueError("weights that have seen all families cannot tell how well it does without")
     start = None
     if weights is not None:
         start = weights_of(weights, ShapeNet())
         plan = replace(plan, start=hashlib.sha256(weights.read_bytes()).hexdigest())
-    files = _samples(folder / "samples", 0, plan.samples, progress)
+    files = _samples(folder / "samples", plan.first, plan.samples, progress)
     _samples(folder / "unseen", UNSEEN, CHECKED, progress)
     state = _State.resumed(folder, plan, start)
     begun = saved = time.monotonic()

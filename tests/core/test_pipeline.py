@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import pipeline, segment
+from objectmorpher_core import edits, pipeline, segment
 from objectmorpher_core.compose.composite import straight_cutout
 from objectmorpher_core.document import Placement
 from objectmorpher_core.edits import EditError
@@ -272,6 +272,19 @@ def test_impossible_wishes_are_refused_in_one_sentence(options, sentence):
     with pytest.raises(ValueError, match=sentence) as caught:
         _run(**options)
     assert "\n" not in str(caught.value)
+
+
+def test_the_light_stays_while_a_script_turns_an_object():
+    """`--refine harmonise` is what Harmonise does in the window; none and auto are without."""
+    plain, auto, lit = (
+        _run(turn=[35, 0, 0], refine=name) for name in ("none", "auto", "harmonise")
+    )
+    assert np.array_equal(plain.picture.pixels, auto.picture.pixels)
+    assert not np.array_equal(plain.picture.pixels, lit.picture.pixels)
+    again = edits.harmonised(plain.document, 0)
+    assert np.array_equal(export(again).pixels, lit.picture.pixels)
+    assert lit.report()["backends"]["refine"] == "harmonise"
+    assert lit.report()["pixels"]["outside_footprint_changed"] == 0
 
 
 def test_a_target_outside_the_photo_is_allowed():

@@ -166,15 +166,18 @@ def _draw_light(editor: Editor) -> None:
     assert editor.object is not None
     choices = tuple(Choice(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
     editor.composing.choose_refiner(segmented("refiner", choices, editor.composing.refiner))
-    harmony = editor.object.harmony
-    if harmony == 0:
-        note(t("Harmonise gives the object the light of its new place."))
+    if editor.composing.refiner == "none":
+        note(t("Harmonise gives the object the light of its new place and of how it is turned."))
         return
-    number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, 80.0, 1.0, 100.0)
-    change = number_field(number, 100 * harmony)
-    strength = change.value / 100
-    preview = editor.composing.preview_harmony
-    _take(editor, change, lambda: preview(strength), t("Adjust light"))
+    item, composing = editor.object, editor.composing
+    rows = (
+        (t("Place"), 80.0, item.harmony, composing.preview_harmony),
+        (t("Turning"), 100.0, item.relight, composing.preview_relight),
+    )
+    for name, usual, share, preview in rows:
+        change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
+        _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
+    note(t("Light around its new place; light that stays where it was while it turns."))
 
 
 def _draw_edge(editor: Editor) -> None:

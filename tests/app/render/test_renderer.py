@@ -121,7 +121,8 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     picture = replace(document.photo.picture, pixels=dark)
     document = replace(document, photo=replace(document.photo, picture=picture))
     document = edits.set_plate(document, make_plate(dark, plate_cover(document), "telea"))
-    document = edits.set_placement(document, 0, Placement(move=(30.0, -8.0), scale=0.8))
+    place = Placement(move=(30.0, -8.0), scale=0.8, turn=(35.0, 0.0, 0.0))
+    document = edits.set_relight(edits.set_placement(document, 0, place), 0, 1.0)
     document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
     document = edits.set_feather(edits.set_harmony(document, 0, 1.0), 1.5)
     derived, view = Derived(), _view()
@@ -129,8 +130,8 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     view.set_zoom(1.0, (80, 60), SIZE)
     view.left = view.top = 0.0
     layers = derived.layers.draw(document, view) if kind == "tiles" else ()
-    splats, gain = derived.posed(document, 0), derived.lights.of(document, 0).gain
-    item = SplatObject(splats, scene.texture, scene.camera, gain=gain)
+    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
+    item = SplatObject(splats, scene.texture, scene.camera, gain=look.gain, relit=look.relit)
     objects = (item,) if kind == "gl" else ()
     shown = Scene(
         document.photo.pixels, (0.0, 0.0, 0.0), document.plate,
@@ -140,5 +141,7 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     exported = composite(document).pixels.astype(np.float32) / 255
     plain = composite(edits.set_shadow(document, 0, Shadow())).pixels.astype(np.float32) / 255
     assert np.abs(plain - exported).max() > 0.1  # there is a shadow
-    assert max(gain) < 1  # and another light
+    assert max(look.gain) < 1  # and another light
+    turned = composite(edits.set_relight(document, 0, 0.0)).pixels.astype(np.float32) / 255
+    assert np.abs(turned - exported).max() > PIXEL  # that stays while it turns
     assert np.abs(window - exported).mean() <= PIXEL
