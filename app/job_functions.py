@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.compose.repair import Patch
     from objectmorpher_core.gaussians import Gaussians
     from objectmorpher_core.importing import Import, Scene
+    from objectmorpher_core.joining import Shadow
     from objectmorpher_core.lift.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
@@ -249,6 +250,33 @@ def repair(patch: Patch, margin: float, choice: Choice, progress: Progress) -> t
 
     inpainter = compose.load(choice.backend)
     return fill_patch(patch, margin, inpainter, progress, choice.seed), inpainter.name
+
+
+@dataclass(frozen=True, eq=False)
+class Cutout:
+    """An object in its photo, and all that hides the background (H, W)."""
+
+    pixels: Pixels
+    matte: Matte
+    covered: Mask
+
+
+def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Shadow, Plate] | None:
+    """A shadow like the object's in the photo, and the background without that one.
+
+    None where no shadow of it is sure.
+    """
+    from objectmorpher_core import compose
+    from objectmorpher_core.compose.old_shadow import shadowless_plate
+    from objectmorpher_core.compose.shadow_fit import find_old_shadow
+
+    progress(0.0, "Looking for its shadow")
+    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered)
+    if old is None:
+        return None
+    inpainter, step = compose.load(choice.backend), part(progress, 0.1, 1.0)
+    plate = shadowless_plate(cutout.pixels, cutout.covered, old, inpainter, step, choice.seed)
+    return old.shadow, plate
 
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:

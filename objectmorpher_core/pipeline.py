@@ -17,7 +17,9 @@ from . import compose, edits, lift, segment
 from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import Composite, composite, object_texture
+from .compose.old_shadow import OldShadow, shadowless_plate
 from .compose.plate import build_plate, plate_cover
+from .compose.shadow_fit import find_old_shadow
 from .document import (
     AS_SEEN,
     GAUSSIANS,
@@ -219,11 +221,27 @@ def run_script(
         with stopwatch.stage("inpaint"):
             covered, pixels = plate_cover(document), document.photo.pixels
             step = part(progress, 0.6, 0.85)
-            plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
+            old = _old_shadow(document, script, covered)
+            if old is None:
+                plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
+            else:
+                inpainter = compose.load(script.inpaint)
+                plate = shadowless_plate(pixels, covered, old, inpainter, step, script.seed)
+                document = edits.set_shadow(document, 0, old.shadow)
             document = edits.set_plate(document, plate)
     if script.refine == "harmonise":
         document = edits.harmonised(document, 0).with_backend("refine", script.refine)
     return _finished(document, puppet, energies, progress, stopwatch)
+
+
+def _old_shadow(document: Document, script: EditScript, covered: Mask) -> OldShadow | None:
+    """The shadow that an object leaves behind, and takes along; None where it stays there."""
+    item = document.objects[0]
+    place = item.placement
+    stays = place.move == (0, 0) and place.depth == 0 and place.scale == 1
+    if script.shadow == "none" or stays or item.matte is None:
+        return None
+    return find_old_shadow(document.photo.pixels, item.matte, covered)
 
 
 def lift_settings(document: Document, script: EditScript) -> LiftSettings:

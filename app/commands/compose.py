@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from objectmorpher_core import compose
 
-from ..editing.composing import VARIANTS
+from ..editing.composing import SHADOW, VARIANTS
 from ..editor import Editor
 from ..tasks import PLATE
 from ..texts import sentence, t
@@ -57,6 +57,12 @@ def not_moved(editor: Editor) -> str | None:
     return None if is_moved else t("Move the object first")
 
 
+def _cannot_take(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(SHADOW):
+        return t("Its shadow is being looked for")
+    return not_moved(editor) or editor.composing.trouble
+
+
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
     "fill_again": Command(
@@ -64,6 +70,9 @@ COMMANDS: dict[str, Command] = {
     ),
     "variants": Command(
         "Try 3 variants", "", lambda e: e.composing.try_variants(), _cannot_vary
+    ),
+    "take_shadow": Command(
+        "Shadow as in the photo", "", lambda e: e.composing.take_shadow(), _cannot_take
     ),
     "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
 }  # fmt: skip

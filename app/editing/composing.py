@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from ..editor import Editor
 
-VARIANTS, REPAIR = "variants", "repair"  # kinds of jobs, besides PLATE
+VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
 USUAL_SHADOW = 0.55
 GRAIN = 2  # canvas px per px of the picture of a stroke
@@ -275,6 +275,37 @@ class Composing:
             is_new = item.shadow.strength == 0
             self.preview_shadow(replace(item.shadow, strength=USUAL_SHADOW if is_new else 0.0))
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
+
+    def take_shadow(self) -> None:
+        """Imitates the object's shadow in the photo, and takes that one off the background."""
+        editor, document, k = self._editor, self._editor.committed, self._editor.current
+        if document is None or document.plate is None or not editor.is_lifted:
+            return
+        masks, item = _masks(document), document.objects[k]
+        assert item.matte is not None
+        cutout = job_functions.Cutout(
+            document.photo.pixels, item.matte, editor.derived.lights.hidden(document)
+        )
+
+        def accept(answer: tuple[Shadow, Plate] | None) -> None:
+            if answer is None:
+                editor.say(t("No shadow of it is sure; paint it out of the background (B)"))
+                return
+            self._ready.append(lambda: self._take_shadow(masks, k, *answer))
+
+        editor.jobs.start(
+            t("Looking for its shadow"), job_functions.take_shadow, cutout,
+            self._choice(document.plate.seed + 1), done=accept, failed=editor.complain_of,
+            kind=SHADOW,
+        )  # fmt: skip
+
+    def _take_shadow(
+        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow, plate: Plate
+    ) -> None:
+        editor, document = self._editor, self._editor.committed
+        if document is not None and same(masks, _masks(document)):
+            changed = edits.set_shadow(edits.set_plate(document, plate), k, shadow)
+            editor.apply(t("Shadow as in the photo"), changed)
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""

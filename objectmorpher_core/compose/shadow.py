@@ -19,6 +19,7 @@ import numpy as np
 
 from ..arrays import F32, F64
 from ..joining import Shadow
+from ..pixels import crop
 from .blend import Box
 from .silhouette import Silhouette, sampled
 
@@ -61,7 +62,7 @@ class Shade:
 
 
 @dataclass(frozen=True, eq=False)
-class _Standing:
+class Standing:
     """A silhouette, and where it stands; all in px of its grid."""
 
     alpha: F32  # (h, w)
@@ -76,9 +77,9 @@ def cast(shadow: Shadow, shape: Silhouette) -> Shade | None:
         return None
     widest = max(BLURS[-1] * shadow.softness, BAND_BLUR)
     pad = int(np.ceil(3 * widest * max(shape.alpha.shape))) + 4
-    standing = _stood(np.pad(shape.alpha, pad))
+    standing = stand(np.pad(shape.alpha, pad))
     near, drop = _contact(standing), round(BAND_DROP * standing.height)
-    far, left, top = _thrown(shadow, standing, _blurred(shadow, standing))
+    far, left, top = _thrown(shadow, standing)
     x0, y0 = min(left, 0), min(top, drop)
     x1 = max(left + far.shape[1], near.shape[1])
     y1 = max(top + far.shape[0], drop + near.shape[0])
@@ -98,7 +99,8 @@ def cast(shadow: Shadow, shape: Silhouette) -> Shade | None:
     return Shade(alpha, left_px, top_px, shape.pitch, shadow.colour)
 
 
-def _stood(alpha: F32) -> _Standing:
+def stand(alpha: F32) -> Standing:
+    """Where what has that silhouette (h, w) stands. Raises ValueError where it has none."""
     solid = alpha > SOLID
     rows = np.arange(1, alpha.shape[0] + 1, dtype=np.float64)[:, None]
     lower = (solid * rows).max(0)  # of each column; 0 where there is none
@@ -109,10 +111,10 @@ def _stood(alpha: F32) -> _Standing:
     there = columns[lower > 0]
     held = np.interp(columns, there, held[there])
     level = cv2.GaussianBlur(held[None], (0, 0), max(LEVEL * np.ptp(there), 0.5))[0]
-    return _Standing(alpha, np.asarray(level, np.float64), share.astype(np.float32), height)
+    return Standing(alpha, np.asarray(level, np.float64), share.astype(np.float32), height)
 
 
-def _blurred(shadow: Shadow, standing: _Standing) -> F32:
+def _blurred(shadow: Shadow, standing: Standing) -> F32:
     """The silhouette, more blurred and weaker the higher above the ground."""
     share = _above(standing) / np.float32(standing.height)
     mixed = np.zeros_like(standing.alpha)
@@ -123,13 +125,13 @@ def _blurred(shadow: Shadow, standing: _Standing) -> F32:
     return np.asarray(mixed * (1 - FADE * np.clip(share, 0, 1)), np.float32)
 
 
-def _above(standing: _Standing) -> F32:
+def _above(standing: Standing) -> F32:
     """(h, w) px above the ground of each pixel's middle."""
     rows = np.arange(standing.alpha.shape[0], dtype=np.float32)[:, None] + np.float32(0.5)
     return np.asarray(standing.ground.astype(np.float32) - rows, np.float32)
 
 
-def _contact(standing: _Standing) -> F32:
+def _contact(standing: Standing) -> F32:
     """What touches the ground, blurred, 1 at its darkest."""
     band = np.clip(1 - np.abs(_above(standing)) / (BAND * standing.height), 0, 1)
     touching = np.asarray(standing.alpha * band * standing.share, np.float32)
@@ -137,12 +139,31 @@ def _contact(standing: _Standing) -> F32:
     return near / max(float(near.max()), 1e-6)
 
 
-def _thrown(shadow: Shadow, standing: _Standing, values: F32) -> tuple[F32, int, int]:
-    """Each pixel of `values` where its shadow falls; the picture's corner on the grid.
+def thrown(shadow: Shadow, standing: Standing) -> F32:
+    """(h, w) on the silhouette's own grid: what of the light its shadow takes, in [0, 1]."""
+    far, left, top = _thrown(shadow, standing)
+    return _moved(far, left, top, standing.alpha.shape)
+
+
+def contact_of(standing: Standing) -> F32:
+    """(h, w) likewise of the dark band right below it."""
+    near = _contact(standing)
+    return _moved(near, 0, round(BAND_DROP * standing.height), near.shape)
+
+
+def _moved(part: F32, left: int, top: int, shape: tuple[int, ...]) -> F32:
+    """A picture at that place of a larger or smaller one (h, w) of zeros."""
+    height, width = shape
+    box, own = (0, 0, width, height), (left, top, left + part.shape[1], top + part.shape[0])
+    return crop(part, own, box)
+
+
+def _thrown(shadow: Shadow, standing: Standing) -> tuple[F32, int, int]:
+    """Each pixel of the silhouette where its shadow falls; the picture's corner on the grid.
 
     Pixels that fall on one another are averaged, each weighing what it is: clear ones nothing.
     """
-    angle = np.radians(shadow.direction)
+    values, angle = _blurred(shadow, standing), np.radians(shadow.direction)
     across, down = np.cos(angle) * shadow.length, np.sin(angle) * shadow.length * GROUND
     fine = int(np.ceil(max(1.0, abs(across), abs(down))))  # so that no gaps are left
     large = cv2.resize(values, None, fx=1, fy=2 * fine, interpolation=cv2.INTER_LINEAR)

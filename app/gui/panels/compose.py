@@ -117,6 +117,7 @@ def _draw_shadow(editor: Editor) -> None:
         note(f"{reason}.")
         return
     assert editor.object is not None
+    command_button(editor, "take_shadow", width=-1)
     shadow, preview = editor.object.shadow, editor.composing.preview_shadow
     number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
     change = number_field(number, 100 * shadow.strength)

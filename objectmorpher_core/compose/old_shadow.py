@@ -1,0 +1,92 @@
+"""The shadow that an object throws in the photo, taken off the ground.
+
+Where it falls the ground is not invented. It is divided by the light that is missing there: the
+photo's own texture stays (promise 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import F32, Mask, Pixels
+from ..document import Plate
+from ..joining import Shadow
+from ..pixels import crop, pixels_from_unit, unit_pixels
+from ..progress import Progress, silent
+from . import Inpainter
+from .plate import Box, build_plate, cut
+from .shadow import GAMMA
+from .silhouette import sampled
+
+SEEN = 1 / 512  # of encoded light: less is no shadow
+
+
+@dataclass(frozen=True, eq=False)
+class OldShadow:
+    """What an object takes of the ground's light, and the numbers of a shadow that is alike."""
+
+    shadow: Shadow
+    depth: F32  # (h, w) natural logarithm of the light that is missing, 0 along its border
+    left: float  # photo px, its corner
+    top: float
+    pitch: float  # photo px per px of it
+
+    def missing(self, box: Box) -> F32:
+        """(h, w) natural logarithm of linear light, at the pixels of a box of the photo."""
+        return sampled(self.depth, (self.left, self.top), self.pitch, box)
+
+    def bounds(self, width: int, height: int) -> Box:
+        """x0, y0, x1, y1 px around it, within a photo of that size."""
+        rows, columns = np.flatnonzero(self.depth.any(1)), np.flatnonzero(self.depth.any(0))
+        if not len(rows):
+            return 0, 0, 0, 0
+        x0, x1 = (self.left + self.pitch * (c + d) for c, d in ((columns[0], -1), (columns[-1], 2)))
+        y0, y1 = (self.top + self.pitch * (r + d) for r, d in ((rows[0], -1), (rows[-1], 2)))
+        return (
+            int(np.clip(np.floor(x0), 0, width)), int(np.clip(np.floor(y0), 0, height)),
+            int(np.clip(np.ceil(x1), 0, width)), int(np.clip(np.ceil(y1), 0, height)),
+        )  # fmt: skip
+
+
+def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask]:
+    """The pixels (h, w, 3) of a `box` of the photo in full light, and where that is another one."""
+    x0, y0, x1, y1 = box
+    part, missing = pixels[y0:y1, x0:x1], old.missing(box)
+    gain = np.exp(missing / np.float32(GAMMA))
+    is_changed = gain > 1 + SEEN
+    lit = pixels_from_unit(np.minimum(unit_pixels(part) * gain[..., None], 1), pixels.dtype)
+    return np.where(is_changed[..., None], lit, part), is_changed
+
+
+def shadowless_plate(
+    pixels: Pixels,
+    covered: Mask,
+    old: OldShadow,
+    inpainter: Inpainter,
+    progress: Progress = silent,
+    seed: int = 0,
+) -> Plate:
+    """As `build_plate`, of the photo in full light: the shadow is gone beside the objects, too.
+
+    There it is painted, as by hand: shown wherever something has moved.
+    """
+    height, width = covered.shape
+    shade = old.bounds(width, height)
+    lit = pixels.copy()
+    x0, y0, x1, y1 = shade
+    lit[y0:y1, x0:x1], _ = without_shadow(pixels, old, shade)
+    own = build_plate(lit, covered, inpainter, progress, seed)
+    box = (
+        *np.minimum(own.box[:2], shade[:2]).tolist(),
+        *np.maximum(own.box[2:], shade[2:]).tolist(),
+    )
+    x0, y0, x1, y1 = box
+    hole = crop(own.hole, own.box, box)
+    result, is_changed = without_shadow(pixels, old, box)
+    painted = is_changed & ~covered[y0:y1, x0:x1] & ~hole
+    result = np.where(painted[..., None], result, pixels[y0:y1, x0:x1])
+    inner = cut(result, box, own.box)
+    np.copyto(inner, own.pixels, where=own.hole[..., None])
+    return Plate(x0, y0, result, hole | painted, own.backend, seed, painted)

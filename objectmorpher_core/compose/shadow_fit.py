@@ -1,0 +1,318 @@
+"""The shadow that an object throws in the photo: where it is, and numbers of one that is alike.
+
+Shadows of the object's own silhouette (`shadow`) are tried in all directions and lengths, each
+together with a smooth ground, against the logarithm of the brightness around the object. What
+explains it best, by a robust regression (Huber's loss, iteratively reweighted; Holland and Welsch
+1977), is the shadow, if it is dark enough, if the ground is even enough to tell, and if it takes
+light of all colours alike: another material begins with another colour. Its numbers are those of a
+shadow that looks like it, for where the object goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ..arrays import F32, F64, Mask, Pixels
+from ..document import Matte
+from ..joining import MOST_SHADOW, Shadow
+from ..pixels import unit_pixels
+from .old_shadow import OldShadow
+from .shadow import DARKEST, GAMMA, Standing, contact_of, stand, thrown
+
+CELLS = 64  # along the object's longer side
+AROUND = 1.0  # x that side, how far around the object one looks
+NEAR = 0.6  # x that side, over which what is seen weighs less
+ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
+BLACK = 0.02  # of linear light, below which a logarithm says little
+LUMA = np.array([0.3, 0.5, 0.2], np.float32)
+FREE = 0.02  # of a cell, that the object may cover
+DIRECTIONS = range(0, 360, 20)  # degrees
+LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
+SOFTNESS = 0.35
+FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
+SOFTER = 0.2
+FULL = 0.75  # of the light, that a full shadow is taken to leave out
+ROUNDS = 5
+HUBER = 1.3  # x the scale of what is usual
+LEAST_SCALE = 0.02
+LEAST_DARK = 0.12  # natural logarithm of light, that a shadow takes at its darkest
+LEAST_GAIN = (0.06, 0.25)  # of the loss without a shadow, and more for each unit of noise
+MOST_NOISE = 0.45  # natural logarithm: on a ground more varied than that nothing is told
+MOST_COLOUR = 0.5  # x its darkness, that a shadow changes colours by
+LEAST_CELLS = 200
+MEASURED = 0.7  # share of what is measured in what is taken off; the rest is what was fitted
+EDGE = (0.02, 0.1)  # natural logarithm of what was fitted, over which what is measured counts
+REACH = 2.0  # cells beyond that
+SMOOTH = (1.0, 4.0)  # cells, and for each unit of noise: over which the dark is measured
+SURE = 2.5  # x what is usual on lit ground
+CORE = 0.3  # of the darkest that was fitted
+GROWN = 2  # times
+MOST_GROWN = 2.5  # x its area before
+LEAST_LEFT = 0.2  # of the ground, that is lit
+DEEPEST = 2.5  # natural logarithm of light that is ever given back
+
+
+def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) -> OldShadow | None:
+    """The shadow of what was cut out of the photo `pixels` (H, W, 3); None where none is sure.
+
+    `others` (H, W): what else hides the ground.
+    """
+    if not (matte.alpha > 0.5).any():
+        return None
+    seen = _look(pixels, matte, others)
+    ground = _ground(seen)
+    if ground is None:
+        return None
+    found = _searched(seen, ground)
+    if found is None or not _is_sure(seen, ground, found):
+        return None
+    depth = _missing(seen, ground, found)
+    return OldShadow(_imitated(found), depth, seen.left, seen.top, seen.pitch)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """The object's surroundings on a small grid."""
+
+    brightness: F32  # (h, w) natural logarithm of linear light
+    colour: F32  # (h, w, 2) logarithms of ratios
+    cover: F32  # (h, w) of the object
+    free: Mask  # (h, w) ground, or whatever else is not the object
+    standing: Standing
+    left: float
+    top: float
+    pitch: float
+
+
+def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen:
+    height, width = pixels.shape[:2]
+    rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
+    size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+    pitch = max(max(size) / CELLS, 1.0)
+    around = int(AROUND * max(size) / pitch)
+    left = matte.left + columns[0] - around * pitch
+    top = matte.top + rows[0] - around * pitch
+    cells = tuple(int(np.ceil(s / pitch)) + 2 * around for s in size)
+
+    def small(image: np.ndarray, x: float, y: float) -> F32:
+        """An image whose corner is at photo px x, y, on the grid."""
+        side = max(round(pitch), 1)
+        image = cv2.blur(np.asarray(image, np.float32), (side, side))
+        shift = (left - x + pitch / 2 - 0.5, top - y + pitch / 2 - 0.5)
+        matrix = np.array([[pitch, 0, shift[0]], [0, pitch, shift[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpAffine(image, matrix, cells, flags=flags), np.float32)
+
+    x0, y0 = max(int(left) - 1, 0), max(int(top) - 1, 0)
+    x1, y1 = (
+        min(int(left + cells[0] * pitch) + 2, width),
+        min(int(top + cells[1] * pitch) + 2, height),
+    )
+    light = small(unit_pixels(pixels[y0:y1, x0:x1]) ** np.float32(GAMMA), x0, y0)
+    inside = small(np.ones((y1 - y0, x1 - x0)), x0, y0) > 0.999
+    cover = small(matte.alpha, matte.left, matte.top)
+    hidden = cover
+    if others is not None:
+        hidden = np.maximum(hidden, small(others[y0:y1, x0:x1], x0, y0))
+    free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
+    logarithm = np.log(light + BLACK)
+    colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
+    return _Seen(
+        logarithm @ LUMA, colour, cover, free, stand(cover), float(left), float(top), pitch
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """Where it is asked for, and how it varies without a shadow."""
+
+    index: np.ndarray  # (n,) of the cells
+    weight: F64  # (n,)
+    basis: F64  # (n, 6)
+    everywhere: F64  # (h, w, 6) the same of all cells
+    brightness: F64  # (n,)
+    contact: F64  # (n,) natural logarithm of the light that a contact takes
+    loss: float
+    scale: float  # of what is not explained
+
+
+def _ground(seen: _Seen) -> _Ground | None:
+    """None where too little of it is seen."""
+    rows, columns = seen.cover.shape
+    base, height = float(seen.standing.ground.max()), seen.standing.height
+    y, x = np.mgrid[:rows, :columns]
+    x, y = (x + 0.5 - columns / 2) / CELLS, (y + 0.5 - base) / CELLS
+    away = cv2.distanceTransform((seen.cover < 0.5).astype(np.uint8), cv2.DIST_L2, 5) / CELLS
+    is_asked = seen.free & (y > -ABOVE * height / CELLS) & (away < AROUND)
+    index = np.flatnonzero(is_asked)
+    if len(index) < LEAST_CELLS or height < 2:
+        return None
+    everywhere = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+    weight = np.exp(-((away.ravel()[index] / NEAR) ** 2)).astype(np.float64)
+    basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
+    contact = _taken(contact_of(seen.standing)).ravel()[index].astype(np.float64)
+    brightness = brightness.astype(np.float64)
+    _, loss, scale = _regressed(basis, brightness, weight)
+    return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
+
+
+def _taken(shadow: F32) -> F32:
+    """Natural logarithm of the light that a shadow of opacity (h, w) takes."""
+    return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
+
+
+def _regressed(
+    basis: F64, values: F64, weight: F64, scale: float | None = None
+) -> tuple[F64, float, float]:
+    """Coefficients, mean loss and scale of the robust fit of `values` (n,) by a basis (n, k)."""
+    weights, found, used = weight, np.zeros(basis.shape[1]), 0.0
+    rest = values
+    for _ in range(ROUNDS):
+        weighted = basis * weights[:, None]
+        ridge = 1e-6 * len(values) * np.eye(basis.shape[1])
+        found = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ values)
+        rest = values - basis @ found
+        used = 1.4826 * float(np.median(np.abs(rest))) + LEAST_SCALE
+        weights = weight / np.maximum(np.abs(rest) / (HUBER * used), 1)
+    off = np.abs(rest) / (used if scale is None else scale)
+    loss = np.where(off < HUBER, off * off / 2, HUBER * off - HUBER**2 / 2)
+    return np.asarray(found), float((weight * loss).sum() / weight.sum()), used
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A shadow that was tried."""
+
+    shadow: Shadow
+    gain: float  # of the loss
+    thrown: F32  # (h, w) natural logarithm of the light that it takes at strength 1
+    ground: F64  # (6,)
+    dark: float  # how much of it there is
+    contact: float
+
+
+def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
+    """None where it would be no shadow but a light."""
+    taken = _taken(thrown(shadow, seen.standing))
+    column = taken.ravel()[ground.index].astype(np.float64)
+    if column.max() < LEAST_DARK:
+        return None
+    basis = np.column_stack([ground.basis, -column, -ground.contact])
+    found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+    if found[7] < 0:
+        basis = basis[:, :7]
+        found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+        found = np.append(found, 0.0)
+    if found[6] <= 0:
+        return None
+    gain = 1 - loss / max(ground.loss, 1e-12)
+    return _Found(shadow, gain, taken, found[:6], float(found[6]), float(found[7]))
+
+
+def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
+    """The best of all directions and lengths, then of some that lie around it."""
+    best: _Found | None = None
+    for shadow in _coarsely():
+        tried = _tried(seen, ground, shadow)
+        if tried is not None and (best is None or tried.gain > best.gain):
+            best = tried
+    if best is None:
+        return None
+    for step, factor in FINER:
+        for shadow in _around(best.shadow, step, factor):
+            tried = _tried(seen, ground, shadow)
+            if tried is not None and tried.gain > best.gain:
+                best = tried
+    return best
+
+
+def _coarsely() -> Iterator[Shadow]:
+    for direction in DIRECTIONS:
+        for length in LENGTHS:
+            yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0)
+
+
+def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
+    for turn in (-step, 0.0, step):
+        for longer in (1 / factor, 1.0, factor):
+            for softer in (-SOFTER, 0.0, SOFTER):
+                yield replace(
+                    shadow, direction=(shadow.direction + turn) % 360,
+                    length=min(shadow.length * longer, MOST_SHADOW),
+                    softness=float(np.clip(shadow.softness + softer, 0.05, 1)),
+                )  # fmt: skip
+
+
+def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
+    """Whether it is dark, tells more than the ground alone does, and has no colour."""
+    darkest = found.dark * float(found.thrown.max())
+    least, noisy = LEAST_GAIN
+    is_told = found.gain > least + noisy * ground.scale and ground.scale < MOST_NOISE
+    if darkest < LEAST_DARK or not is_told:
+        return False
+    column = found.thrown.ravel()[ground.index].astype(np.float64)
+    basis = np.column_stack([ground.basis, -column])
+    changes = [
+        abs(float(_regressed(basis, channel, ground.weight)[0][6]))
+        for channel in seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
+    ]
+    return max(changes) < MOST_COLOUR * found.dark
+
+
+def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
+    """(h, w) natural logarithm of the light that is missing: mostly as it is measured.
+
+    What was tried is only about where the shadow is. It grows over all that is as dark beside it,
+    and the ground is told once more from what is left.
+    """
+    contact = _taken(contact_of(seen.standing))
+    fitted = np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
+    low, high = EDGE
+    member = np.clip((fitted - low) / (high - low), 0, 1).astype(np.float32)
+    coefficients, free = found.ground, seen.free.astype(np.float32)
+    blur = SMOOTH[0] + SMOOTH[1] * ground.scale
+    spread = cv2.GaussianBlur(free, (0, 0), blur)
+    smooth = np.zeros_like(fitted)
+    for _ in range(GROWN):
+        measured = (ground.everywhere @ coefficients).astype(np.float32) - seen.brightness
+        blurred = cv2.GaussianBlur(measured * free, (0, 0), blur)
+        smooth = np.asarray(blurred / np.maximum(spread, 1e-3), np.float32)
+        lit = smooth.ravel()[ground.index][member.ravel()[ground.index] < 0.1]
+        usual = 1.4826 * float(np.median(np.abs(lit))) if len(lit) else 0.0
+        member = _spread(member, smooth, fitted, max(LEAST_DARK, SURE * usual), seen.free)
+        weight = ground.weight * (1 - member.ravel()[ground.index])
+        if weight.sum() > LEAST_LEFT * ground.weight.sum():
+            coefficients, *_ = _regressed(ground.basis, ground.brightness, weight)
+    share = MEASURED * np.clip(spread, 0, 1)
+    depth = fitted + share * (np.clip(smooth, 0, DEEPEST) - fitted)
+    depth = np.clip(depth, 0, DEEPEST) * member
+    depth[[0, -1]] = 0
+    depth[:, [0, -1]] = 0
+    return np.asarray(depth, np.float32)
+
+
+def _spread(member: F32, dark: F32, fitted: F32, least: float, free: Mask) -> F32:
+    """(h, w) what belongs to the shadow: what is at least so dark and hangs together with it."""
+    core = (fitted > CORE * fitted.max()) & (dark > least)
+    _, labels = cv2.connectedComponents(((dark > least) & free).astype(np.uint8))
+    own = np.isin(labels, np.setdiff1d(np.unique(labels[core & free]), [0]))
+    if own.sum() > MOST_GROWN * (member > 0.5).sum():  # it has run out over something dark
+        return member
+    ramp = np.where(own, np.clip((dark - 0.5 * least) / (0.5 * least), 0, 1), 0)
+    side = 2 * int(np.ceil(REACH)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    grown = cv2.dilate(np.maximum(ramp.astype(np.float32), member), kernel)
+    return np.asarray(cv2.GaussianBlur(grown, (0, 0), REACH / 2), np.float32)
+
+
+def _imitated(found: _Found) -> Shadow:
+    """The numbers of a shadow that takes as much light (see `shadow`)."""
+    darkest = 1 - np.exp(-found.dark * float(found.thrown.max()))
+    below = 1 - np.exp(-found.contact * float(_taken(np.ones((1, 1), np.float32)).max()))
+    strength = float(np.clip(max(darkest, below) / DARKEST, 0, 1))
+    contact = float(np.clip(below / max(strength * DARKEST, 1e-6), 0, 1))
+    return replace(found.shadow, strength=strength, contact=contact)
