@@ -38,17 +38,20 @@ class Solid:
 
         The light is painted on: it turns with the solid.
         """
-        if self.texture is None:
-            base = _marble(points, self.seed)
-        else:
-            at = (self.uv[face] * corners[:, :, None]).sum(1)
-            size = np.array(self.texture.shape[1::-1])
-            at = np.clip(np.mod(at, size), 0, size - 1.001)
-            base = _bilinear(self.texture, at) / 255
-        shade = AMBIENT + (1 - AMBIENT) * np.clip(self._normals(face, corners) @ LIGHT, 0, 1)
-        return base * shade[:, None]
+        shade = AMBIENT + (1 - AMBIENT) * np.clip(self.normals(face, corners) @ LIGHT, 0, 1)
+        return self.albedo(points, face, corners) * shade[:, None]
 
-    def _normals(self, face: I32, corners: F64) -> F64:
+    def albedo(self, points: F64, face: I32, corners: F64) -> F64:
+        """The same without light."""
+        if self.texture is None:
+            return _marble(points, self.seed)
+        at = (self.uv[face] * corners[:, :, None]).sum(1)
+        size = np.array(self.texture.shape[1::-1])
+        at = np.clip(np.mod(at, size), 0, size - 1.001)
+        return _bilinear(self.texture, at) / 255
+
+    def normals(self, face: I32, corners: F64) -> F64:
+        """(n, 3) outward, unit, at rest."""
         mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
         normals = (mesh.vertex_normals[self.faces[face]] * corners[:, :, None]).sum(1)
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)

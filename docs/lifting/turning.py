@@ -1,10 +1,11 @@
 """Solids turned, moved and bent: what is predicted from one photo, against the true view.
 
-Five predictions. "network" is the product's own lift; "relief" is the same from the silhouette
-alone, and "depth" is that with a perfect depth network, whose scale and shift are unknown as any
-network's are. The card is the cut-out on a flat board at the solid's true distance, turned (a
-homography). The affine one is the best that any warp of the picture with six numbers could do:
-fitted to the true places of the points that the photo shows.
+Six predictions. "network" is the product's own lift; "relief" is the same from the silhouette
+alone, "inflation" that without looking how things stand, and "depth" is the relief with a perfect
+depth network, whose scale and shift are unknown as any network's are. The card is the cut-out on a
+flat board at the solid's true distance, turned (a homography). The affine one is the best that any
+warp of the picture with six numbers could do: fitted to the true places of the points that the
+photo shows.
 """
 
 from __future__ import annotations
@@ -37,9 +38,10 @@ SIDE = 512  # px
 CAMERA = Camera.from_fov(SIDE, SIDE)
 SHARE = 0.55  # of the picture's width that a solid fills
 AT = np.array([245.0, 270.0])  # px, where its middle is
-WAYS = ("network", "relief", "depth", "card", "affine")
+WAYS = ("network", "relief", "inflation", "depth", "card", "affine")
 ALONE = LiftSettings(uses_depth=False, trust=0)  # the silhouette
 SEEN = LiftSettings(uses_depth=False)
+INFLATED = LiftSettings(uses_depth=False, trust=0, is_standing=False)
 POINTS = 20_000  # on a solid's surface, for the affine warp
 SAME_DEPTH = 0.01  # of a point and of the nearest surface: it is seen
 FAINT = 0.02  # alpha, from which a pixel counts
@@ -194,7 +196,8 @@ def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
     seen = Seen((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
     subject = Subject(scene.pixels, CAMERA, scene.mask, matte)
     deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
-    lifts = {"network": learned, "relief": lifted, "depth": deep}
+    _, inflated = lift_mask(scene.pixels, CAMERA, scene.mask, settings=INFLATED)
+    lifts = {"network": learned, "relief": lifted, "inflation": inflated, "depth": deep}
     puppets = {way: Puppet(own, DeformSettings(), CAMERA) for way, own in lifts.items()}
     texture = object_texture(matte)
     found = {}

@@ -39,12 +39,15 @@ FULL = 0.75  # of the light, that a full shadow is taken to leave out
 ROUNDS = 5
 HUBER = 1.3  # x the scale of what is usual
 LEAST_SCALE = 0.02
-LEAST_DARK = 0.12  # natural logarithm of light, that a shadow takes at its darkest
-LEAST_GAIN = (0.06, 0.25)  # of the loss without a shadow, and more for each unit of noise
-MOST_NOISE = 0.45  # natural logarithm: on a ground more varied than that nothing is told
-MOST_COLOUR = 0.5  # x its darkness, that a shadow changes colours by
+LEAST_DARK = 0.25  # natural logarithm of light, that a shadow takes at its darkest
+LEAST_GAIN = 0.04  # of the loss without a shadow
+MOST_NOISE = 0.6  # natural logarithm: on a ground more varied than that nothing is told
+COARSE = 4.0  # cells, over which unevenness is measured
+STANDS_OUT = 4.0  # x that, for a shadow
+MOST_COLOUR = 0.4  # x its darkness, that a shadow changes colours by
+DARKER = 0.12  # natural logarithm, from which a cell counts as dark
 LEAST_CELLS = 200
-MEASURED = 0.7  # share of what is measured in what is taken off; the rest is what was fitted
+MEASURED = 0.7  # least share of what is measured in what is taken off; the rest was fitted
 EDGE = (0.02, 0.1)  # natural logarithm of what was fitted, over which what is measured counts
 REACH = 2.0  # cells beyond that
 SMOOTH = (1.0, 4.0)  # cells, and for each unit of noise: over which the dark is measured
@@ -71,7 +74,7 @@ def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) ->
     if found is None or not _is_sure(seen, ground, found):
         return None
     depth = _missing(seen, ground, found)
-    return OldShadow(_imitated(found), depth, seen.left, seen.top, seen.pitch)
+    return OldShadow(_imitated(found), depth, seen.left, seen.top, seen.pitch, ground.scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +202,7 @@ def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     """None where it would be no shadow but a light."""
     taken = _taken(thrown(shadow, seen.standing))
     column = taken.ravel()[ground.index].astype(np.float64)
-    if column.max() < LEAST_DARK:
+    if column.max() < DARKER:
         return None
     basis = np.column_stack([ground.basis, -column, -ground.contact])
     found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
@@ -248,11 +251,11 @@ def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
 
 
 def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
-    """Whether it is dark, tells more than the ground alone does, and has no colour."""
+    """Whether it is darker than the ground is uneven, tells something, and has no colour."""
     darkest = found.dark * float(found.thrown.max())
-    least, noisy = LEAST_GAIN
-    is_told = found.gain > least + noisy * ground.scale and ground.scale < MOST_NOISE
-    if darkest < LEAST_DARK or not is_told:
+    if darkest < LEAST_DARK or found.gain < LEAST_GAIN or ground.scale > MOST_NOISE:
+        return False
+    if darkest < STANDS_OUT * _unevenness(seen, ground, found):
         return False
     column = found.thrown.ravel()[ground.index].astype(np.float64)
     basis = np.column_stack([ground.basis, -column])
@@ -263,14 +266,30 @@ def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
     return max(changes) < MOST_COLOUR * found.dark
 
 
+def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
+    """How much the ground varies besides, over lengths as large as shadows."""
+    free = seen.free.astype(np.float32)
+    fitted = ground.everywhere @ found.ground - _fitted(seen, found)
+    rest = (seen.brightness - fitted).astype(np.float32) * free
+    spread = cv2.GaussianBlur(free, (0, 0), COARSE)
+    blurred = cv2.GaussianBlur(rest, (0, 0), COARSE) / np.maximum(spread, FREE)
+    squares = np.asarray(blurred, np.float64).ravel()[ground.index] ** 2
+    return float(np.sqrt(np.average(squares, weights=ground.weight)))
+
+
+def _fitted(seen: _Seen, found: _Found) -> F32:
+    """(h, w) natural logarithm of the light that the shadow takes which was found."""
+    contact = _taken(contact_of(seen.standing))
+    return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
+
+
 def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
     """(h, w) natural logarithm of the light that is missing: mostly as it is measured.
 
     What was tried is only about where the shadow is. It grows over all that is as dark beside it,
     and the ground is told once more from what is left.
     """
-    contact = _taken(contact_of(seen.standing))
-    fitted = np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
+    fitted = _fitted(seen, found)
     low, high = EDGE
     member = np.clip((fitted - low) / (high - low), 0, 1).astype(np.float32)
     coefficients, free = found.ground, seen.free.astype(np.float32)
@@ -283,11 +302,11 @@ def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
         smooth = np.asarray(blurred / np.maximum(spread, 1e-3), np.float32)
         lit = smooth.ravel()[ground.index][member.ravel()[ground.index] < 0.1]
         usual = 1.4826 * float(np.median(np.abs(lit))) if len(lit) else 0.0
-        member = _spread(member, smooth, fitted, max(LEAST_DARK, SURE * usual), seen.free)
+        member = _spread(member, smooth, fitted, max(DARKER, SURE * usual), seen.free)
         weight = ground.weight * (1 - member.ravel()[ground.index])
         if weight.sum() > LEAST_LEFT * ground.weight.sum():
             coefficients, *_ = _regressed(ground.basis, ground.brightness, weight)
-    share = MEASURED * np.clip(spread, 0, 1)
+    share = max(1 - ground.scale, MEASURED) * np.clip(spread, 0, 1)
     depth = fitted + share * (np.clip(smooth, 0, DEEPEST) - fitted)
     depth = np.clip(depth, 0, DEEPEST) * member
     depth[[0, -1]] = 0
