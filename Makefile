@@ -111,7 +111,7 @@ rendering: .make/test
 # against known truths; PAGES="matting lifting" makes some of them.
 .PHONY: evidence
 evidence: .make/test
-	@for page in $(or $(PAGES),selection matting lifting registration formats); do
+	@for page in $(or $(PAGES),selection matting lifting registration formats compositing); do
 	    $(PYTHON) docs/$$page/make_$$page.py
 	done
 

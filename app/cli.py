@@ -154,7 +154,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
     add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
     add("--scale", type=float, metavar="S")
-    add("--shadow", metavar="auto|none", help="default auto")
+    add("--shadow", metavar="auto|none", help="default auto: its own goes with it, where found")
     add = parser.add_argument_group("scripts and further outputs").add_argument
     add("--script", type=Path, metavar="EDIT.json", help="the same options from a file")
     add("--session", type=Path, metavar="S.omorph")

@@ -14,6 +14,7 @@ from objectmorpher_core.compose.light_estimate import estimate_light
 from objectmorpher_core.compose.lighting import object_texture
 from objectmorpher_core.compose.relight import relight
 from objectmorpher_core.document import DeformSettings, LiftSettings, Placement
+from objectmorpher_core.joining import USUAL_RELIGHT
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
@@ -67,7 +68,7 @@ def _under(name: str, meshes: Path, lamp: Lamp) -> list[Turned]:
             splats = puppet.posed(None, place)
             picture = tiles.draw(tiles.prepare(splats, CAMERA, CAMERA), texture)
             colour = picture.color
-            relit = relight(splats, light, 1.0, CAMERA) if is_relit else None
+            relit = relight(splats, light, USUAL_RELIGHT, CAMERA) if is_relit else None
             if relit is not None:
                 colour = relit.lit(colour, picture.alpha, 0, 0)
             alpha = np.asarray(picture.alpha, np.float64)

@@ -30,9 +30,9 @@ out is compared with the true view:
 - **PSNR**: dB, over the true background, over all pixels that either of the two covers.
 
 *network* is the product as it ships, *relief* the same without the network (`--trust 0`),
-*inflation* that without looking how things stand, *depth* the relief with the true inverse depth, as
-a perfect depth network would see it: scale and shift are not given. Beside them stand two ways to do
-without a shape:
+*inflation* that without looking how things stand, *depth* the relief with the true inverse depth,
+as a perfect depth network would see it: scale and shift are not given. Beside them stand two ways
+to do without a shape:
 
 - **card**: the cut-out on a flat board at the solid's true distance, moved so. A homography.
 - **affine**: the best that any affine warp of the cut-out can do: it is fitted to the true places

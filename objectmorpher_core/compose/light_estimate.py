@@ -31,7 +31,7 @@ GRAIN = 0.4  # share of their variance that is a cell's own
 COLOURS = 0.3  # standard deviation of them that is expected, logarithm
 BELIEF = 40.0  # cells that it would take to change that expectation's mind by half
 ABOVE = np.array([0.0, -0.1, -0.05])  # b before anything is seen: from above and from the viewer
-SPREAD = 0.2  # standard deviation of that, each coordinate
+SPREAD = 0.13  # standard deviation of that, each coordinate
 ROUNDS = 3
 
 

@@ -183,7 +183,7 @@ def _regressed(
         weights = weight / np.maximum(np.abs(rest) / (HUBER * used), 1)
     off = np.abs(rest) / (used if scale is None else scale)
     loss = np.where(off < HUBER, off * off / 2, HUBER * off - HUBER**2 / 2)
-    return np.asarray(found), float((weight * loss).sum() / weight.sum()), used
+    return np.asarray(found, np.float64), float((weight * loss).sum() / weight.sum()), used
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,13 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core import compose
-from objectmorpher_core.joining import LEAST_FEATHER, MOST_FEATHER, MOST_SHADOW
+from objectmorpher_core.joining import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    MOST_SHADOW,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+)
 
 from ...commands import run
 from ...commands.compose import not_moved
@@ -172,8 +178,8 @@ def _draw_light(editor: Editor) -> None:
         return
     item, composing = editor.object, editor.composing
     rows = (
-        (t("Place"), 80.0, item.harmony, composing.preview_harmony),
-        (t("Turning"), 100.0, item.relight, composing.preview_relight),
+        (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
+        (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
     )
     for name, usual, share, preview in rows:
         change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)

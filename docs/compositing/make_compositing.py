@@ -1,0 +1,69 @@
+"""Writes docs/compositing/README.md: what happens to light, shadow and background.
+
+python docs/compositing/make_compositing.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent
+sys.path += [str(FOLDER.parent), str(FOLDER.parent / "lifting")]  # what other pages have, too
+
+import lights  # noqa: E402
+import plates  # noqa: E402
+import shadows  # noqa: E402
+from meshes import fetched  # noqa: E402
+from page import write_page  # noqa: E402
+from photos import shadow_pairs  # noqa: E402
+from solids import SOLIDS  # noqa: E402
+
+SHOWN = {("ball", "left", "yaw 35"), ("duck", "above", "pitch 25"), ("figure", "left", "yaw -35"),
+         ("box", "left", "yaw -35")}  # fmt: skip
+QUALITY = 88
+TILE = 200  # px
+
+
+def main() -> None:
+    meshes = fetched()
+    turned, shaded = [], []
+    for number, name in enumerate(SOLIDS):
+        turned += lights.measured(name, meshes)
+        shaded += shadows.measured(name, number, meshes)
+        print(name, flush=True)
+    filled, pictures = {}, []
+    for name in plates.HOLES:
+        photo, cut, filled[name] = plates.measured(name)
+        pictures.append([photo, cut, *(found.picture for found in filled[name].values())])
+        print(name, flush=True)
+    _write("plates.jpg", pictures)
+    shown = [case for case in turned if (case.name, case.lamp, case.turn) in SHOWN]
+    _write("lights.jpg", [[_bytes(p)[110:400, 110:400] for p in case.pictures] for case in shown])
+    found = [case for case in shaded if case.is_found][:8]
+    rows = [[p[120:440, 96:416] for p in case.pictures] for case in found]
+    _write("shadows.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
+    _write("photos.jpg", shadow_pairs(), 420)
+    (FOLDER / "README.md").write_text(write_page(turned, shaded, filled), encoding="utf-8")
+
+
+def _bytes(picture: np.ndarray) -> np.ndarray:
+    return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+
+
+def _write(name: str, rows: list[list[np.ndarray]], width: int = TILE) -> None:
+    """Rows of pictures (h, w, 3), all as wide."""
+
+    def sized(picture: np.ndarray) -> np.ndarray:
+        height = round(picture.shape[0] * width / picture.shape[1])
+        return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+
+    sheet = np.vstack([np.hstack([sized(p) for p in row]) for row in rows])
+    cv2.imwrite(str(FOLDER / name), sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+if __name__ == "__main__":
+    main()

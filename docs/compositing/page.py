@@ -1,0 +1,154 @@
+"""The text of the page, and its tables."""
+
+from __future__ import annotations
+
+import numpy as np
+from lights import Turned
+from plates import HOLES, WAYS, Filled
+from shadows import Shaded
+
+HEAD = """# Putting it back, measured
+
+Made by `python docs/compositing/make_compositing.py`; every number comes from that one command.
+"""
+LIGHT = """## Light that stays while a thing turns
+
+Ten solids (those of [lifting](../lifting/README.md)) are drawn in linear light under one lamp and
+light from all around, lifted, and turned by 20 to 35 degrees; the lamp stays. The truth is drawn,
+too. *plain* carries the photo's pixels along as they are; *harmonised* is the same with Harmonise
+at its usual strength. Root mean square errors over all that either covers, the edge included, from
+which most of it comes: where a solid's shape is guessed wrong no light helps.
+
+{summary}
+
+{table}
+
+![The photo, turned without, harmonised, and true](lights.jpg)
+"""
+SHADOW = """## The old shadow
+
+The solids stand on grounds with photographed textures, each under three lamps that throw a shadow
+one sees. Mean differences, in levels of 255, from the ground in full light: in the shadow as it is
+in the photo, as it is after it was found and taken off (`--shadow auto`, Shadow as in the photo),
+and beside it, where nothing should change.
+
+{summary}
+
+{table}
+
+![The photo, without the shadow it was found to have, and as it truly is](shadows.jpg)
+
+What is not found stays, and can be painted out of the background (B). A ground with marks of its
+own as large as a shadow hides it; so does an outline that stands nowhere.
+
+On photographs: the saucer's shadow and the motorcycle's.
+
+![Photos with the shadow and without](photos.jpg)
+"""
+PLATE = """## The background
+
+Holes are cut where the background is known, and filled in. PSNR and SSIM in the hole say how near
+the fill is to what was there, *unlike* how differently DINOv2 sees it (1 - cosine of its tokens):
+a smooth blur is near and unlike, a sharp guess is far and alike. *PatchMatch* is pypatchmatch at
+the photo's resolution, the others are OpenCV's.
+
+{table}
+
+![What was there, the hole, ours, PatchMatch, Telea, Navier-Stokes](plates.jpg)
+
+Ours searches a small picture and takes the detail from the photo: as good as plain PatchMatch, in a
+part of the time, which at 24 MP decides. Neither understands what it copies: beside a face it may
+copy a face (*flag and wall*). Variants, and the brush, are for that.
+"""
+
+
+def write_page(
+    turned: list[Turned], shaded: list[Shaded], filled: dict[str, dict[str, Filled]]
+) -> str:
+    return "\n".join(
+        [
+            HEAD,
+            LIGHT.format(summary=_light_summary(turned), table=_light_table(turned)),
+            SHADOW.format(summary=_shadow_summary(shaded), table=_shadow_table(shaded)),
+            PLATE.format(table=_plate_table(filled)),
+        ]
+    )
+
+
+def _light_summary(turned: list[Turned]) -> str:
+    ratios = np.array([case.ratio for case in turned])
+    plain, relit = (
+        np.mean([-20 * np.log10(getattr(case, name)) for case in turned])
+        for name in ("plain", "relit")
+    )
+    worse = int((ratios > 1.05).sum())
+    return (
+        f"Over {len(turned)} cases: {plain:.2f} dB plain, {relit:.2f} dB harmonised. The error is "
+        f"{100 * (1 - ratios.mean()):.1f} % smaller on average, {100 * (1 - ratios.min()):.0f} % "
+        f"in the best case and {100 * (ratios.max() - 1):.0f} % larger in the worst; it is more "
+        f"than 5 % larger in {worse} of them."
+    )
+
+
+def _light_table(turned: list[Turned]) -> str:
+    names = list(dict.fromkeys(case.name for case in turned))
+    lamps = list(dict.fromkeys(case.lamp for case in turned))
+    rows = []
+    for name in names:
+        cells = []
+        for lamp in lamps:
+            own = [case for case in turned if (case.name, case.lamp) == (name, lamp)]
+            plain, relit = (np.mean([getattr(c, w) for c in own]) for w in ("plain", "relit"))
+            cells.append(f"{255 * plain:.1f} → {255 * relit:.1f}")
+        rows.append([name, *cells])
+    return _table(["levels of 255", *(f"lamp {lamp}" for lamp in lamps)], rows)
+
+
+def _shadow_summary(shaded: list[Shaded]) -> str:
+    found = [case for case in shaded if case.is_found]
+    cast = [case for case in shaded if case.before > 0]
+    before, after = (np.mean([getattr(c, w) for c in found]) for w in ("before", "after"))
+    beside = np.mean([case.beside for case in found])
+    imagined = sum(case.is_imagined for case in shaded)
+    return (
+        f"Found: {len(found)} of {len(cast)}. Where found, {before:.1f} levels become {after:.1f}; "
+        f"beside it {beside:.1f}. On the same grounds without a shadow, {imagined} of "
+        f"{len(shaded)} are imagined."
+    )
+
+
+def _shadow_table(shaded: list[Shaded]) -> str:
+    names = list(dict.fromkeys(case.name for case in shaded))
+    suns = list(dict.fromkeys(case.sun for case in shaded))
+    rows = []
+    for name in names:
+        own = {case.sun: case for case in shaded if case.name == name}
+        rows.append([name, *(_shadow_cell(own[sun]) for sun in suns)])
+    return _table(["", *(f"lamp {sun}" for sun in suns)], rows)
+
+
+def _shadow_cell(case: Shaded) -> str:
+    if case.before == 0:
+        return f"{case.ground}: hidden"
+    after = f"{case.after:.1f}" if case.is_found else "not found"
+    return f"{case.ground}: {case.before:.1f} → {after}"
+
+
+def _plate_table(filled: dict[str, dict[str, Filled]]) -> str:
+    rows = [[name, *(_plate_cell(found[way]) for way in WAYS)] for name, found in filled.items()]
+    means = [
+        [float(np.mean([getattr(filled[name][way], part) for name in HOLES]))
+         for part in ("psnr", "ssim", "unlike", "seconds")]
+        for way in WAYS
+    ]  # fmt: skip
+    rows.append(["**mean**", *(f"{p:.1f}, {s:.3f}, {u:.3f}; {t:.2f} s" for p, s, u, t in means)])
+    return _table(["PSNR dB, SSIM, unlike", *WAYS], rows)
+
+
+def _plate_cell(filled: Filled) -> str:
+    return f"{filled.psnr:.1f}, {filled.ssim:.3f}, {filled.unlike:.3f}"
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

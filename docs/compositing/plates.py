@@ -1,0 +1,117 @@
+"""Holes in photos whose background is known, filled in by us and by others."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from skimage import data
+from skimage.metrics import structural_similarity
+
+from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.compose import load
+from objectmorpher_core.progress import silent
+from objectmorpher_core.segment import dino_tokens
+
+SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
+PATCH = 7  # px, of plain PatchMatch: the authors' usual
+SEED = 0
+TILE = 14 * 16  # px of the crop that DINOv2 compares
+
+
+def _file(name: str) -> Pixels:
+    picture = cv2.imread(str(next(SAMPLES.glob(f"{name}.*"))))
+    assert picture is not None, name
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
+def _grey(picture: Pixels) -> Pixels:
+    return np.repeat(picture[..., None], 3, 2)
+
+
+# name -> photo, and the middle and radii of the hole, as shares of its sides: all background
+HOLES: dict[str, tuple[Callable[[], Pixels], tuple[float, float], tuple[float, float]]] = {
+    "table": (data.coffee, (0.87, 0.6), (0.09, 0.2)),
+    "launch tower": (lambda: _file("rocket"), (0.36, 0.55), (0.07, 0.2)),
+    "flag and wall": (data.astronaut, (0.2, 0.2), (0.12, 0.15)),
+    "garage": (lambda: data.stereo_motorcycle()[0], (0.55, 0.2), (0.1, 0.14)),
+    "leaves": (lambda: _file("flower"), (0.8, 0.3), (0.1, 0.18)),
+    "floor": (lambda: data.stereo_motorcycle()[0], (0.18, 0.85), (0.12, 0.1)),
+    "bricks": (lambda: _grey(data.brick()), (0.5, 0.5), (0.14, 0.18)),
+    "gravel": (lambda: _grey(data.gravel()), (0.5, 0.5), (0.14, 0.18)),
+}
+Filler = Callable[[Pixels, Mask], Pixels]
+
+
+def _plain(pixels: Pixels, hole: Mask) -> Pixels:
+    from patchmatch import inpaint, set_random_seed
+
+    set_random_seed(SEED)
+    return inpaint(pixels, hole, patch_size=PATCH)
+
+
+def _opencv(how: int) -> Filler:
+    def fill(pixels: Pixels, hole: Mask) -> Pixels:
+        return np.asarray(cv2.inpaint(pixels, hole.astype(np.uint8), 5, how), np.uint8)
+
+    return fill
+
+
+WAYS: dict[str, Filler] = {
+    "ours": lambda pixels, hole: load("patchmatch").inpaint(pixels, hole, silent, SEED),
+    "PatchMatch": _plain,
+    "Telea": _opencv(cv2.INPAINT_TELEA),
+    "Navier-Stokes": _opencv(cv2.INPAINT_NS),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Filled:
+    """One fill of one hole."""
+
+    psnr: float  # dB, in the hole
+    ssim: float  # in the hole
+    unlike: float  # 1 - cosine of DINOv2's tokens, those that the hole touches
+    seconds: float
+    picture: Pixels  # around the hole
+
+
+def measured(name: str) -> tuple[Pixels, Pixels, dict[str, Filled]]:
+    """What was there, with the hole, and the fills of each way."""
+    make, middle, radii = HOLES[name]
+    photo = make()
+    height, width = photo.shape[:2]
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    hole = ((x - middle[0]) / radii[0]) ** 2 + ((y - middle[1]) / radii[1]) ** 2 < 1
+    column, row = int(middle[0] * width), int(middle[1] * height)
+    side = min(TILE, height, width)
+    left = int(np.clip(column - side // 2, 0, width - side))
+    top = int(np.clip(row - side // 2, 0, height - side))
+    around = (slice(top, top + side), slice(left, left + side))
+    cut = photo.copy()
+    cut[hole] = 255
+    found = {}
+    for way, fill in WAYS.items():
+        begun = time.perf_counter()
+        filled = fill(photo * ~hole[..., None], hole)
+        found[way] = _scored(photo, filled, hole, around, time.perf_counter() - begun)
+    return photo[around], cut[around], found
+
+
+def _scored(
+    photo: Pixels, filled: Pixels, hole: Mask, around: tuple[slice, slice], seconds: float
+) -> Filled:
+    error = ((filled.astype(float) - photo)[hole] ** 2).mean()
+    _, alike = structural_similarity(photo, filled, channel_axis=2, full=True)
+    tokens = [
+        dino_tokens.shared().tokens(cv2.resize(p[around], (TILE, TILE))) for p in (photo, filled)
+    ]
+    one, other = (t / np.linalg.norm(t, axis=-1, keepdims=True) for t in tokens)
+    share = cv2.resize(hole[around].astype(np.float32), (16, 16), interpolation=cv2.INTER_AREA)
+    unlike = 1 - (one * other).sum(-1)[share > 0.2].mean()
+    psnr = 10 * np.log10(255**2 / max(error, 1e-9))
+    return Filled(psnr, float(alike[hole].mean()), float(unlike), seconds, filled[around])
