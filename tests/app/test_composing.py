@@ -9,12 +9,16 @@ from strokes import press, stroke
 
 from app.commands import COMMANDS, run
 from app.editor import Editor
+from app.layers import FRAME
 from app.tools.compose_tool import ComposeTool
 from app.view import ToolName
 from objectmorpher_core import edits
-from objectmorpher_core.compose.plate import plate_picture
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.joining import Shadow
+from objectmorpher_core.compose.plate import plate_cover, plate_picture
+from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.joining import USUAL_HARMONY, USUAL_RELIGHT, Shadow
+from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
+from tests.shadowed import inside, photo_of, thrown
+from tests.shapes import png
 
 
 @pytest.fixture
@@ -165,3 +169,77 @@ def test_a_dragged_shadow_is_coarse_until_the_pointer_rests(editor: Editor, ball
     assert exact.pitch < sketched.pitch
     for a, b in zip(exact.bounds, sketched.bounds, strict=True):
         assert abs(a - b) < 20
+
+
+def standing(shadow: np.ndarray | None) -> Document:
+    """A thing on the ground, lifted, with a background, moved aside."""
+    pixels = photo_of(shadow)
+    document = open_photo(png(pixels), "thing.png")
+    document = edits.set_mask(edits.add_object(document), 0, inside(), Prompt())
+    made = lift_mask(pixels, document.photo.camera, inside(), "relief", LiftSettings(800, trust=0))
+    document = edits.set_lifted(document, 0, *made)
+    document = edits.set_plate(document, make_plate(pixels, plate_cover(document), "telea"))
+    return edits.set_placement(document, 0, Placement(move=(-60.0, 0.0)))
+
+
+def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
+    shade = thrown(35.0, 0.8)
+    document = standing(shade)
+    editor.start(document)
+    run(editor, "take_shadow")
+    assert COMMANDS["take_shadow"].why_not(editor) == "Its shadow is being looked for"
+    wait_for_jobs(editor)
+    assert editor.object is not None and editor.history is not None
+    assert editor.history.undo_label == "Shadow as in the photo"
+    assert editor.object.shadow.strength > 0.4
+    assert editor.document is not None
+    own = (shade > 0.3) & ~plate_cover(document)
+    brighter = plate_picture(editor.document)[own].mean() - plate_picture(document)[own].mean()
+    assert brighter > 20
+    editor.undo()  # both at once
+    assert editor.document is document
+
+
+def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) -> None:
+    document = standing(None)
+    editor.start(document)
+    run(editor, "take_shadow")
+    wait_for_jobs(editor)
+    assert editor.document is document
+    assert editor.message is not None
+    assert editor.message.text.startswith("No shadow of it is sure")
+
+
+def test_what_has_not_moved_keeps_its_shadow(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    assert COMMANDS["take_shadow"].why_not(editor) == "Move the object first"
+
+
+def test_harmonise_offers_both_lights_and_one_step_takes_both(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(edits.set_placement(ball, 0, Placement(turn=(25.0, 0.0, 0.0))))
+    editor.composing.choose_refiner("harmonise")
+    assert editor.object is not None
+    assert editor.object.harmony == USUAL_HARMONY and editor.object.relight == USUAL_RELIGHT
+    editor.composing.preview_harmony(0.0)
+    editor.commit("Adjust light")
+    editor.composing.preview_relight(0.0)
+    assert editor.object.relight == 0
+    assert editor.composing.refiner == "harmonise"  # until the pointer is let go
+    editor.commit("Adjust light")
+    assert editor.composing.refiner == "none"
+
+
+def test_the_canvas_shows_the_light_that_stays(editor: Editor, ball: Document) -> None:
+    turned = edits.set_placement(ball, 0, Placement(turn=(35.0, 0.0, 0.0)))
+    editor.start(turned)
+    editor.derived.layers.frame_time = np.inf  # one frame, exact
+    plain = editor.derived.layers.draw(turned, editor.view)[0]
+    lit = edits.set_relight(turned, 0, 1.0)
+    relit = editor.derived.layers.draw(lit, editor.view)[0]
+    again = editor.derived.layers.draw(lit, editor.view)[0]
+    editor.derived.layers.frame_time = FRAME
+    assert again is relit  # made once
+    assert np.array_equal(plain.pixels[..., 3], relit.pixels[..., 3])
+    assert np.abs(plain.pixels.astype(int) - relit.pixels).max() > 4

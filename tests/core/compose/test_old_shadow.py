@@ -13,58 +13,18 @@ from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.old_shadow import OldShadow, shadowless_plate, without_shadow
-from objectmorpher_core.compose.shadow import GAMMA
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
 from objectmorpher_core.document import Matte, Placement
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.script import script_from
 from tests import shapes
+from tests.shadowed import HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
 
-WIDTH, HEIGHT = 260, 200  # px
-MIDDLE, RADII = (130.0, 90.0), (30.0, 42.0)  # px, of a thing that stands
-FOOT = MIDDLE[1] + RADII[1]
-DARK = 0.6  # of the light, that the shadow takes
 WAYS = [(35.0, 0.8), (150.0, 0.8), (-20.0, 1.1)]  # degrees and lengths of shadows
 
 
-def _inside() -> np.ndarray:
-    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
-    x, y = np.abs(x - MIDDLE[0]) / RADII[0], (y - MIDDLE[1]) / RADII[1]
-    return (x < 1) & (np.abs(y) < 1) & (y > 2 * x - 2)  # upright, its shoulders cut
-
-
-def _thrown(direction: float, length: float) -> np.ndarray:
-    """(H, W) in [0, 1]: the outline, sheared along the ground about its foot, and blurred."""
-    angle = np.radians(direction)
-    across, down = length * np.cos(angle), 0.5 * length * np.sin(angle)
-    # (x, y) of the thing, h = FOOT - y above the ground -> (x + across h, FOOT + down h)
-    matrix = np.array([[1, -across, across * FOOT], [0, -down, FOOT + down * FOOT]])
-    drawn = cv2.warpAffine(_inside().astype(np.float32), matrix, (WIDTH, HEIGHT))
-    return cv2.GaussianBlur(drawn, (0, 0), 3.0)
-
-
-def _ground(seed: int = 0) -> np.ndarray:
-    """(H, W, 3) encoded, lit from one side, with grain."""
-    rng = np.random.default_rng(seed)
-    x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(-1, 1, HEIGHT))
-    light = 0.6 + 0.08 * x + 0.1 * y
-    grain = cv2.GaussianBlur(rng.normal(size=(HEIGHT, WIDTH)), (0, 0), 1.0)
-    lit = light + 0.03 * grain / grain.std()
-    return np.clip(lit[..., None] * np.array([1.0, 0.9, 0.75]), 0, 1)
-
-
-def _photo(shadow: np.ndarray | None, ground: np.ndarray | None = None) -> np.ndarray:
-    """(H, W, 3) u8 of a thing on the ground with a shadow (H, W)."""
-    ground = _ground() if ground is None else ground
-    if shadow is not None:
-        ground = ground * (1 - DARK * shadow[..., None]) ** (1 / GAMMA)
-    soft = cv2.GaussianBlur(_inside().astype(np.float64), (0, 0), 0.7)[..., None]
-    thing = np.array([0.2, 0.45, 0.75])
-    return np.rint((soft * thing + (1 - soft) * ground) * 255).astype(np.uint8)
-
-
 def _matte() -> Matte:
-    soft = cv2.GaussianBlur(_inside().astype(np.float32), (0, 0), 0.7)
+    soft = cv2.GaussianBlur(inside().astype(np.float32), (0, 0), 0.7)
     return Matte(0, 0, soft, np.full((HEIGHT, WIDTH, 3), 0.5, np.float32))
 
 
@@ -76,7 +36,7 @@ def _found(pixels: np.ndarray) -> OldShadow:
 
 @pytest.mark.parametrize(("direction", "length"), WAYS)
 def test_a_shadow_is_found_with_its_direction_and_length(direction, length):
-    shadow = _found(_photo(_thrown(direction, length))).shadow
+    shadow = _found(photo_of(thrown(direction, length))).shadow
     assert abs((shadow.direction - direction + 180) % 360 - 180) < 25
     assert length / 1.5 < shadow.length < length * 1.5
     assert 0.4 < shadow.strength < 0.85
@@ -85,14 +45,14 @@ def test_a_shadow_is_found_with_its_direction_and_length(direction, length):
 @pytest.mark.parametrize(("direction", "length"), WAYS)
 @pytest.mark.parametrize("bits", [8, 16])
 def test_it_is_lifted_off_the_ground_that_stays_as_it_is(direction, length, bits):
-    shade = _thrown(direction, length)
-    dark, lit = _photo(shade), _photo(None)
+    shade = thrown(direction, length)
+    dark, lit = photo_of(shade), photo_of(None)
     scale = 1 if bits == 8 else 257
     kind = np.uint8 if bits == 8 else np.uint16
     dark, lit = dark.astype(kind) * kind(scale), lit.astype(kind) * kind(scale)
     box = (0, 0, WIDTH, HEIGHT)
     result, is_changed = without_shadow(dark, _found(dark), box)
-    ground = cv2.dilate(_inside().astype(np.uint8), np.ones((9, 9))) == 0
+    ground = cv2.dilate(inside().astype(np.uint8), np.ones((9, 9))) == 0
     true = (shade > 0.3) & ground
     before, after = (np.abs(p.astype(float) - lit)[true].mean() / scale for p in (dark, result))
     assert after < 0.4 * before
@@ -106,24 +66,24 @@ def test_it_is_lifted_off_the_ground_that_stays_as_it_is(direction, length, bits
 
 @pytest.mark.parametrize("seed", range(4))
 def test_an_even_ground_has_no_shadow(seed):
-    assert find_old_shadow(_photo(None, _ground(seed)), _matte()) is None
+    assert find_old_shadow(photo_of(None, ground_of(seed)), _matte()) is None
 
 
 def test_another_colour_is_no_shadow():
     """A blue cloth that lies where a shadow would."""
-    shade, ground = _thrown(35.0, 0.8)[..., None], _ground()
+    shade, ground = thrown(35.0, 0.8)[..., None], ground_of()
     cloth = ground * np.array([0.25, 0.5, 1.3])
-    assert find_old_shadow(_photo(None, ground + shade * (cloth - ground)), _matte()) is None
+    assert find_old_shadow(photo_of(None, ground + shade * (cloth - ground)), _matte()) is None
 
 
 def test_on_a_ground_of_many_things_nothing_is_told():
     rng = np.random.default_rng(1)
     patches = rng.uniform(0.02, 1, (10, 13, 3)).repeat(20, 0).repeat(20, 1)
-    assert find_old_shadow(_photo(_thrown(35.0, 0.8), patches), _matte()) is None
+    assert find_old_shadow(photo_of(thrown(35.0, 0.8), patches), _matte()) is None
 
 
 def test_what_fills_or_leaves_the_photo_is_no_error():
-    pixels = _photo(_thrown(35.0, 0.8))
+    pixels = photo_of(thrown(35.0, 0.8))
 
     def solid(left: int, top: int, width: int, height: int, alpha: float = 1) -> Matte:
         colours = np.zeros((height, width, 3), np.float32)
@@ -135,9 +95,9 @@ def test_what_fills_or_leaves_the_photo_is_no_error():
 
 
 def test_the_background_is_without_it():
-    shade = _thrown(35.0, 0.8)
-    dark, lit = _photo(shade), _photo(None)
-    covered = cv2.dilate(_inside().astype(np.uint8), np.ones((5, 5))) > 0
+    shade = thrown(35.0, 0.8)
+    dark, lit = photo_of(shade), photo_of(None)
+    covered = cv2.dilate(inside().astype(np.uint8), np.ones((5, 5))) > 0
     plate = shadowless_plate(dark, covered, _found(dark), load("telea"))
     x0, y0, x1, y1 = plate.box
     assert plate.painted is not None
@@ -152,15 +112,15 @@ def test_the_background_is_without_it():
 
 
 def test_a_script_that_moves_a_thing_takes_its_shadow_along():
-    dark = _photo(_thrown(35.0, 0.8))
+    dark = photo_of(thrown(35.0, 0.8))
     script = {"move": [-70, 0], "inpaint": "telea", "gaussians": 800}
-    photo, mask = shapes.png(dark), shapes.mask_png(_inside())
+    photo, mask = shapes.png(dark), shapes.mask_png(inside())
     with_it = run_script(photo, "a.png", script_from(script), mask)
     without = run_script(photo, "a.png", script_from(script | {"shadow": "none"}), mask)
     assert with_it.document.objects[0].shadow.strength > 0.4
     assert without.document.objects[0].shadow.strength == 0
-    old = (_thrown(35.0, 0.8) > 0.3) & ~cv2.dilate(_inside().astype(np.uint8), np.ones((9, 9))) > 0
-    lit = _photo(None).astype(float)
+    old = (thrown(35.0, 0.8) > 0.3) & ~cv2.dilate(inside().astype(np.uint8), np.ones((9, 9))) > 0
+    lit = photo_of(None).astype(float)
     error = [np.abs(e.composite.pixels.astype(float) - lit)[old].mean() for e in (with_it, without)]
     assert error[0] < 0.5 * error[1]
     assert with_it.report()["pixels"]["outside_footprint_changed"] == 0
@@ -171,9 +131,9 @@ def test_a_script_that_moves_a_thing_takes_its_shadow_along():
 
 
 def test_put_back_the_photo_is_there_again():
-    dark = _photo(_thrown(35.0, 0.8))
+    dark = photo_of(thrown(35.0, 0.8))
     script = script_from({"move": [-70, 0], "inpaint": "telea", "gaussians": 800})
-    moved = run_script(shapes.png(dark), "a.png", script, shapes.mask_png(_inside())).document
+    moved = run_script(shapes.png(dark), "a.png", script, shapes.mask_png(inside())).document
     back = edits.set_placement(moved, 0, Placement())
     assert np.array_equal(composite(back).pixels, dark)
     still = replace(moved.objects[0], placement=Placement(), pose=None)
