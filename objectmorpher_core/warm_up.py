@@ -50,7 +50,8 @@ def _edited() -> Document:
     cv2.circle(mask, (SIZE // 2, SIZE // 2), SIZE // 4, 1, -1)
     middle = (SIZE / 2, SIZE / 2)
     handle = HandleMove(middle, (middle[0] + 3, middle[1]))
-    script = EditScript(gaussians=400, handle=(handle,), turn=(10.0, 0.0, 0.0))
+    turn = (10.0, 0.0, 0.0)
+    script = EditScript(gaussians=400, handle=(handle,), turn=turn, refine="harmonise")
     photo = encode_picture(Picture(pixels), ".png")
     return run_script(photo, "warm-up", script, encode_mask(mask.astype(bool))).document
 
@@ -58,12 +59,15 @@ def _edited() -> Document:
 def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     """A photo that is large, one of 16 bits, and Gaussians that are drawn as they are in a file."""
     from .compose.composite import object_texture
+    from .compose.relight import Relit
     from .lift.integration import solved
     from .pipeline import lift_mask, make_plate
     from .segment.closed_form import affine
 
     empty = np.zeros((4, 4))
     solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
+    small = np.zeros((4, 4), np.float32)
+    Relit(small, 0.0, 0.0, 1.0).lit_rgba(np.zeros((4, 4, 4), np.uint8), 0.0, 0.0, 1.0)
     affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None

@@ -98,17 +98,13 @@ def shadowless_plate(
     shade = old.bounds(width, height)
     lit = pixels.copy()
     x0, y0, x1, y1 = shade
-    lit[y0:y1, x0:x1], _ = without_shadow(pixels, old, shade)
+    lit[y0:y1, x0:x1], is_changed = without_shadow(pixels, old, shade)
     own = build_plate(lit, covered, inpainter, progress, seed)
-    box = (
-        *np.minimum(own.box[:2], shade[:2]).tolist(),
-        *np.maximum(own.box[2:], shade[2:]).tolist(),
-    )
-    x0, y0, x1, y1 = box
+    x0, y0 = min(own.left, shade[0]), min(own.top, shade[1])
+    x1, y1 = max(own.box[2], shade[2]), max(own.box[3], shade[3])
+    box = (x0, y0, x1, y1)
     hole = crop(own.hole, own.box, box)
-    result, is_changed = without_shadow(pixels, old, box)
-    painted = is_changed & ~covered[y0:y1, x0:x1] & ~hole
-    result = np.where(painted[..., None], result, pixels[y0:y1, x0:x1])
-    inner = cut(result, box, own.box)
-    np.copyto(inner, own.pixels, where=own.hole[..., None])
+    painted = crop(is_changed, shade, box) & ~covered[y0:y1, x0:x1] & ~hole
+    result = np.where(painted[..., None], lit[y0:y1, x0:x1], pixels[y0:y1, x0:x1])
+    np.copyto(cut(result, box, own.box), own.pixels, where=own.hole[..., None])
     return Plate(x0, y0, result, hole | painted, own.backend, seed, painted)

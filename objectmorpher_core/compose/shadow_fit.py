@@ -29,6 +29,7 @@ NEAR = 0.6  # x that side, over which what is seen weighs less
 ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
 BLACK = 0.02  # of linear light, below which a logarithm says little
 LUMA = np.array([0.3, 0.5, 0.2], np.float32)
+LOOKED = 6  # px of the photo across each of them are enough
 FREE = 0.02  # of a cell, that the object may cover
 DIRECTIONS = range(0, 360, 20)  # degrees
 LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
@@ -101,12 +102,15 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen:
     top = matte.top + rows[0] - around * pitch
     cells = tuple(int(np.ceil(s / pitch)) + 2 * around for s in size)
 
+    step = max(int(pitch) // LOOKED, 1)  # of a large photo not every pixel is looked at
+
     def small(image: np.ndarray, x: float, y: float) -> F32:
-        """An image whose corner is at photo px x, y, on the grid."""
-        side = max(round(pitch), 1)
+        """Every `step`th px of an image whose corner is at photo px x, y, on the grid."""
+        scale = pitch / step
+        side = max(round(scale), 1)
         image = cv2.blur(np.asarray(image, np.float32), (side, side))
-        shift = (left - x + pitch / 2 - 0.5, top - y + pitch / 2 - 0.5)
-        matrix = np.array([[pitch, 0, shift[0]], [0, pitch, shift[1]]])
+        shift = [(at + pitch / 2 - 0.5) / step for at in (left - x, top - y)]
+        matrix = np.array([[scale, 0, shift[0]], [0, scale, shift[1]]])
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return np.asarray(cv2.warpAffine(image, matrix, cells, flags=flags), np.float32)
 
@@ -115,12 +119,13 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen:
         min(int(left + cells[0] * pitch) + 2, width),
         min(int(top + cells[1] * pitch) + 2, height),
     )
-    light = small(unit_pixels(pixels[y0:y1, x0:x1]) ** np.float32(GAMMA), x0, y0)
-    inside = small(np.ones((y1 - y0, x1 - x0)), x0, y0) > 0.999
-    cover = small(matte.alpha, matte.left, matte.top)
+    window = np.s_[y0:y1:step, x0:x1:step]
+    light = small(unit_pixels(pixels[window]) ** np.float32(GAMMA), x0, y0)
+    inside = small(np.ones(pixels[window].shape[:2]), x0, y0) > 0.999
+    cover = small(matte.alpha[::step, ::step], matte.left, matte.top)
     hidden = cover
     if others is not None:
-        hidden = np.maximum(hidden, small(others[y0:y1, x0:x1], x0, y0))
+        hidden = np.maximum(hidden, small(others[window], x0, y0))
     free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
     logarithm = np.log(light + BLACK)
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
