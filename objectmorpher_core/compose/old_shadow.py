@@ -17,10 +17,11 @@ from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from . import Inpainter
-from .plate import Box, build_plate, cut
+from .plate import Box, build_plate, cut, hole_margin
 from .shadow import GAMMA
 from .silhouette import sampled
 
+LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
 SEEN = 1 / 512  # of encoded light: less is no shadow
 BLACK = 0.02  # of linear light, below which a logarithm says little
 REACH = 2.0  # cells of what is missing, over which it is sharpened
@@ -92,19 +93,25 @@ def shadowless_plate(
 ) -> Plate:
     """As `build_plate`, of the photo in full light: the shadow is gone beside the objects, too.
 
-    There it is painted, as by hand: shown wherever something has moved.
+    There it is painted, as by hand: shown wherever something has moved. Where it is so dark that
+    the photo shows little of the ground, that is invented.
     """
     height, width = covered.shape
     shade = old.bounds(width, height)
     lit = pixels.copy()
     x0, y0, x1, y1 = shade
     lit[y0:y1, x0:x1], is_changed = without_shadow(pixels, old, shade)
-    own = build_plate(lit, covered, inpainter, progress, seed)
+    lost = crop(old.missing(shade) > LOST, shade, (0, 0, width, height)) & ~covered
+    filled = covered | lost
+    own = build_plate(lit, covered if filled.all() else filled, inpainter, progress, seed)
     x0, y0 = min(own.left, shade[0]), min(own.top, shade[1])
     x1, y1 = max(own.box[2], shade[2]), max(own.box[3], shade[3])
     box = (x0, y0, x1, y1)
     hole = crop(own.hole, own.box, box)
-    painted = crop(is_changed, shade, box) & ~covered[y0:y1, x0:x1] & ~hole
-    result = np.where(painted[..., None], lit[y0:y1, x0:x1], pixels[y0:y1, x0:x1])
+    is_bare = ~covered[y0:y1, x0:x1]
+    lightened = crop(is_changed, shade, box) & is_bare & ~hole
+    result = np.where(lightened[..., None], lit[y0:y1, x0:x1], pixels[y0:y1, x0:x1])
     np.copyto(cut(result, box, own.box), own.pixels, where=own.hole[..., None])
+    reach = cv2.distanceTransform((~lost[y0:y1, x0:x1]).astype(np.uint8), cv2.DIST_L2, 5)
+    painted = lightened | (hole & is_bare & (reach < hole_margin(width, height)))
     return Plate(x0, y0, result, hole | painted, own.backend, seed, painted)

@@ -45,6 +45,8 @@ LEAST_GAIN = 0.04  # of the loss without a shadow
 MOST_NOISE = 0.6  # natural logarithm: on a ground more varied than that nothing is told
 COARSE = 4.0  # cells, over which unevenness is measured
 STANDS_OUT = 4.0  # x that, for a shadow
+EXPLAINED = 0.6  # x what it would explain where it is, if it were all of it
+CUT_OFF = 0.15  # x its width, along the photo's lower edge
 MOST_COLOUR = 0.4  # x its darkness, that a shadow changes colours by
 DARKER = 0.12  # natural logarithm, from which a cell counts as dark
 LEAST_CELLS = 200
@@ -65,7 +67,7 @@ def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) ->
 
     `others` (H, W): what else hides the ground.
     """
-    if not (matte.alpha > 0.5).any():
+    if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
     seen = _look(pixels, matte, others)
     ground = _ground(seen)
@@ -76,6 +78,15 @@ def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) ->
         return None
     depth = _missing(seen, ground, found)
     return OldShadow(_imitated(found), depth, seen.left, seen.top, seen.pitch, ground.scale)
+
+
+def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
+    """Whether the photo's lower edge cuts it off: then it stands on no ground that one sees."""
+    solid = matte.alpha > 0.5
+    last = len(pixels) - 1 - matte.top  # row of the matte
+    if last >= len(solid):
+        return False
+    return bool(solid[max(last - 1, 0) : last + 1].any(0).sum() > CUT_OFF * solid.any(0).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +273,8 @@ def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
         return False
     if darkest < STANDS_OUT * _unevenness(seen, ground, found):
         return False
+    if not _is_where_it_is_dark(seen, ground, found):
+        return False
     column = found.thrown.ravel()[ground.index].astype(np.float64)
     basis = np.column_stack([ground.basis, -column])
     changes = [
@@ -269,6 +282,16 @@ def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
         for channel in seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
     ]
     return max(changes) < MOST_COLOUR * found.dark
+
+
+def _is_where_it_is_dark(seen: _Seen, ground: _Ground, found: _Found) -> bool:
+    """Whether it explains of its own cells what one as dark would on a ground as varied."""
+    fitted = _fitted(seen, found).ravel()[ground.index].astype(np.float64)
+    without = ground.brightness - ground.basis @ found.ground
+    core = fitted > CORE * fitted.max()
+    explained = 1 - float(((without + fitted)[core] ** 2).mean() / (without[core] ** 2).mean())
+    dark = float(without[core].mean()) ** 2
+    return explained > EXPLAINED * dark / (dark + ground.scale**2)
 
 
 def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
