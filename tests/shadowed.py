@@ -39,11 +39,13 @@ def ground_of(seed: int = 0) -> np.ndarray:
     return np.clip(lit[..., None] * np.array([1.0, 0.9, 0.75]), 0, 1)
 
 
-def photo_of(shadow: np.ndarray | None, ground: np.ndarray | None = None) -> np.ndarray:
-    """(H, W, 3) u8 of a thing on the ground with a shadow (H, W)."""
+def photo_of(
+    shadow: np.ndarray | None, ground: np.ndarray | None = None, dark: float = DARK
+) -> np.ndarray:
+    """(H, W, 3) u8 of a thing on the ground with a shadow (H, W), that takes so much light."""
     ground = ground_of() if ground is None else ground
     if shadow is not None:
-        ground = ground * (1 - DARK * shadow[..., None]) ** (1 / GAMMA)
+        ground = ground * (1 - dark * shadow[..., None]) ** (1 / GAMMA)
     soft = cv2.GaussianBlur(inside().astype(np.float64), (0, 0), 0.7)[..., None]
     thing = np.array([0.2, 0.45, 0.75])
     return np.rint((soft * thing + (1 - soft) * ground) * 255).astype(np.uint8)

@@ -18,7 +18,7 @@ from objectmorpher_core.document import Matte, Placement
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.script import script_from
 from tests import shapes
-from tests.shadowed import HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
+from tests.shadowed import DARK, HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
 
 WAYS = [(35.0, 0.8), (150.0, 0.8), (-20.0, 1.1)]  # degrees and lengths of shadows
 
@@ -94,9 +94,18 @@ def test_what_fills_or_leaves_the_photo_is_no_error():
     assert find_old_shadow(pixels, solid(20, 20, 9, 9, alpha=0)) is None
 
 
-def test_the_background_is_without_it():
+def test_what_the_photo_cuts_off_below_stands_on_no_ground_that_one_sees():
+    pixels, whole = photo_of(thrown(35.0, 0.8)), _matte()
+    for rows in (125, 60):  # its foot is at 132
+        matte = Matte(0, 0, whole.alpha[:rows], whole.foreground[:rows])
+        assert find_old_shadow(pixels[:rows], matte) is None
+
+
+@pytest.mark.parametrize("taken", [DARK, 0.9])
+def test_the_background_is_without_it(taken):
+    """Also where the shadow is so dark that the ground has to be invented."""
     shade = thrown(35.0, 0.8)
-    dark, lit = photo_of(shade), photo_of(None)
+    dark, lit = photo_of(shade, dark=taken), photo_of(None)
     covered = cv2.dilate(inside().astype(np.uint8), np.ones((5, 5))) > 0
     plate = shadowless_plate(dark, covered, _found(dark), load("telea"))
     x0, y0, x1, y1 = plate.box
