@@ -42,6 +42,7 @@ class TeleaInpainter:
             small_hole = (weight < 0.5).astype(np.uint8)
             small[..., c] = cv2.inpaint(level, small_hole, RADIUS, cv2.INPAINT_TELEA)
         large = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
-        filled[hole] = large[hole].astype(rgb.dtype)
+        most = np.iinfo(rgb.dtype).max  # beyond it OpenCV goes by a level now and then
+        filled[hole] = np.minimum(large[hole], most).astype(rgb.dtype)
         progress(1.0, "Filled the background")
         return filled

@@ -150,6 +150,19 @@ def test_16_bit_gradient_shows_no_bands():
     np.testing.assert_allclose(means, ramp[90:150, 0, 0], atol=257)
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_black_and_white_stay_black_and_white(inpainter, kind, share):
+    """Where OpenCV goes a level beyond white, nothing turns black."""
+    level = kind(share * np.iinfo(kind).max)
+    plain = np.full((120, 140, 3), level, kind)
+    y, x = np.mgrid[:120, :140]
+    hole = np.hypot(x - 70, y - 60) < 40
+    plain[hole] = kind(np.iinfo(kind).max) - level
+    filled = inpainter.inpaint(plain, hole, silent).astype(float)
+    assert np.abs(filled - float(level)).max() <= 0.02 * np.iinfo(kind).max
+
+
 def test_unknown_name():
     with pytest.raises(InpaintError, match="there is no inpainter 'lama'"):
         load("lama")
