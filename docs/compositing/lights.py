@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import worlds
+from turning import middle_of
 from worlds import CAMERA, LIGHTS, Lamp
 
 from objectmorpher_core.arrays import F64
@@ -75,7 +76,7 @@ def _under(name: str, meshes: Path, lamp: Lamp) -> list[Turned]:
             return np.asarray(colour, np.float64) + (1 - alpha[..., None]) * PLATE, alpha
 
         # From one photo nobody knows about which depth a thing turns: for both a shift is free.
-        shift = _middle(truth.alpha) - _middle(drawn(np.zeros(2), False)[1])
+        shift = middle_of(truth.alpha) - middle_of(drawn(np.zeros(2), False)[1])
         found = [drawn(shift, is_relit) for is_relit in (False, True)]
         counts = np.maximum(truth.alpha, found[0][1]) > FAINT
         errors = [float(np.sqrt(((own - true)[counts] ** 2).mean())) for own, _ in found]
@@ -86,9 +87,3 @@ def _under(name: str, meshes: Path, lamp: Lamp) -> list[Turned]:
 
 def _over(colour: F64, alpha: F64) -> F64:
     return colour * alpha[..., None] + PLATE * (1 - alpha[..., None])
-
-
-def _middle(alpha: F64) -> F64:
-    """(2,) px of the middle of the box of what is covered."""
-    rows, columns = (np.flatnonzero((alpha > 0.5).any(axis)) for axis in (1, 0))
-    return np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1]) / 2

@@ -56,9 +56,9 @@ the photo's resolution, the others are OpenCV's.
 
 ![What was there, the hole, ours, PatchMatch, Telea, Navier-Stokes](plates.jpg)
 
-Ours searches a small picture and takes the detail from the photo: as good as plain PatchMatch, in a
-part of the time, which at 24 MP decides. Neither understands what it copies: beside a face it may
-copy a face (*flag and wall*). Variants, and the brush, are for that.
+Ours searches a small picture and takes the detail from the photo: nearly as good as plain
+PatchMatch, in a part of the time, which at 24 MP decides. Neither understands what it copies:
+beside a face it may copy a face (*flag and wall*). Variants, and the brush, are for that.
 """
 
 

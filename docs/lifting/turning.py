@@ -237,10 +237,10 @@ def _aligned(draw: Draw, truth: Shot) -> Shot:
     From one photo nobody knows how far behind the picture the middle of a thing is, about which
     it turns: for all ways a shift is free.
     """
-    return draw(_middle(truth.alpha) - _middle(draw(np.zeros(2)).alpha))
+    return draw(middle_of(truth.alpha) - middle_of(draw(np.zeros(2)).alpha))
 
 
-def _middle(alpha: F64) -> F64:
+def middle_of(alpha: F64) -> F64:
     """(2,) px of the middle of the box of what is covered."""
     rows, columns = (np.flatnonzero((alpha > 0.5).any(axis)) for axis in (1, 0))
     return np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1]) / 2
@@ -251,7 +251,7 @@ def _card(scene: Scene, matte: Matte, edit: Edit) -> F64:
     turn, depth = edit.turn, scene.centre[2]
     intrinsics = np.array([[CAMERA.focal, 0, CAMERA.cx], [0, CAMERA.focal, CAMERA.cy], [0, 0, 1]])
     alpha = crop(matte.alpha, matte.box, (0, 0, SIDE, SIDE))
-    middle = CAMERA.unproject(_middle(alpha.astype(np.float64)), depth)
+    middle = CAMERA.unproject(middle_of(alpha.astype(np.float64)), depth)
     step = (1 - edit.nearer) * middle - turn @ middle
     moved = turn + np.outer(step, [0, 0, 1 / depth])
     return intrinsics @ moved @ np.linalg.inv(intrinsics)

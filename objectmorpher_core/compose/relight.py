@@ -31,7 +31,6 @@ FAINT = 1e-3  # of the weight of what is continued
 LEAST_ROWS = 128  # of a picture, for which a second thread is woken
 FILLED = 3.0  # px of the picture of factors, over which they are continued beyond the object
 
-
 # What painted Gaussians ask nothing of.
 NO_PHOTO = build_levels(np.zeros((1, 1, 3), np.float32), np.zeros((1, 1), np.float32), 0, 0)
 
@@ -136,7 +135,7 @@ def relight(
 
 def turned_normals(splats: PosedSplats) -> F64:
     """(N, 3) outward, world, unit: where the normals at rest are now, by the cofactors of F."""
-    normals = splats.rest.lifted.gaussians.normals.astype(np.float64)
+    normals = splats.rest.normals @ splats.rest.world_from_object[:3, :3]  # along the object's axes
     turned = _by_cofactors(np.ascontiguousarray(splats.skinned.linear, np.float64), normals)
     turned = turned @ splats.world_from_object[:3, :3].T  # a similarity
     return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
@@ -160,12 +159,8 @@ def _by_cofactors(linear, vectors):
 
 def _factors(splats: PosedSplats, normals: F64, light: F64) -> F64:
     """(N,) what each of the Gaussians is multiplied by, whose `normals` are those (N, 3) now."""
-    before = splats.rest.normals
-    # What the photo did not show has the colours of the front, and so its light.
-    views = splats.rest.lifted.world_points(splats.rest.means)
-    away = (before * views).sum(1) / (views * views).sum(1)
-    before = before - (2 * np.maximum(away, 0))[:, None] * views
-    return np.clip(np.exp((normals - before) @ light), LEAST, MOST)
+    turned = normals - splats.rest.shown_normals
+    return np.clip(np.exp(turned @ light), LEAST, MOST)
 
 
 def _drawn(splats: PosedSplats, factors: F64, grid: Grid, camera: Camera) -> F32:

@@ -20,14 +20,13 @@ from ..arrays import F32, F64, Mask, Pixels
 from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
-from .old_shadow import OldShadow
+from .old_shadow import BLACK, OldShadow
 from .shadow import DARKEST, GAMMA, Standing, contact_of, stand, thrown
 
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
 ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
-BLACK = 0.02  # of linear light, below which a logarithm says little
 LUMA = np.array([0.3, 0.5, 0.2], np.float32)
 LOOKED = 6  # px of the photo across each of them are enough
 FREE = 0.02  # of a cell, that the object may cover

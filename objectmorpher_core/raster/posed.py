@@ -96,6 +96,16 @@ class RestSplats:
         return frozen(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
     @cached_property
+    def shown_normals(self) -> F64:
+        """(N, 3) normals of what their colours are of, world, unit.
+
+        What the photo did not show has the colours of the front: there it is the mirrored normal.
+        """
+        views = self.lifted.world_points(self.means)
+        away = (self.normals * views).sum(1) / (views * views).sum(1)
+        return frozen(self.normals - (2 * np.maximum(away, 0))[:, None] * views)
+
+    @cached_property
     def cosines(self) -> F64:
         """(N,) of the normal with the direction to the camera."""
         world = self.lifted.world_points(self.means)

@@ -193,9 +193,8 @@ def test_the_picture_of_a_moved_object_moves_with_it():
     for move in ([0, 0.001], [20, -10]):
         rows, columns = np.nonzero(_shown(_run(move=move, trust=0.0)))
         middles.append(np.array([columns.mean(), rows.mean()]))
-    assert (
-        np.abs(middles[1] - middles[0] - [20, -10]).max() < 1.0
-    )  # perspective, of a body as deep as its silhouette says
+    # perspective, of a body as deep as its silhouette says
+    assert np.abs(middles[1] - middles[0] - [20, -10]).max() < 1.0
 
 
 def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
