@@ -92,6 +92,9 @@ def results() -> list[Result]:
     _, learned = lift_mask(pair.left, camera, pair.mask, settings=replace(alone, trust=1.0))
     seen = Seen(_filled(pair.disparity), (0, 0, width, height))
     subject = Subject(pair.left, camera, pair.mask, matte)
+    _, inflated = lift_mask(
+        pair.left, camera, pair.mask, settings=replace(alone, is_standing=False)
+    )
     deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
     board = ReliefLifter(shape=_slab).lift(subject, alone, silent)
     known = pair.disparity[pair.mask & (pair.disparity > 0)]
@@ -99,12 +102,14 @@ def results() -> list[Result]:
     slab = _card_shot(matte, card, (height, width))
     color, error = _relief_shot(pair, matte, lifted, camera)
     seen_color, seen_error = _relief_shot(pair, matte, learned, camera)
+    plain_color, plain_error = _relief_shot(pair, matte, inflated, camera)
     deep_color, deep_error = _relief_shot(pair, matte, deep, camera)
     board_color, board_error = _relief_shot(pair, matte, board, camera)
     flat = float(np.sqrt(((known - card) ** 2).mean()))
     return [
         Result("network", *_compared(pair, seen_color), seen_error),
         Result("relief", *_compared(pair, color), error),
+        Result("inflation", *_compared(pair, plain_color), plain_error),
         Result("relief with true depth", *_compared(pair, deep_color), deep_error),
         Result("constant thickness", *_compared(pair, board_color), board_error),
         Result("card at the median disparity", *_compared(pair, slab), flat),
