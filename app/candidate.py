@@ -20,7 +20,6 @@ from . import job_functions
 from .job_functions import Choice
 from .jobs import JobError
 from .tasks import SELECT, Question
-from .view import SelectMode, ToolName
 
 if TYPE_CHECKING:
     from .editor import Editor
@@ -98,16 +97,13 @@ class Candidates:
         return jobs.is_idle or (jobs.current is not None and jobs.current.kind == CANDIDATE)
 
     def _is_wished(self) -> bool:
-        """Whether a click would begin a selection."""
+        """Whether the user may want to know what a click here would select."""
         editor = self._editor
         return (
-            editor.document is not None
+            editor.is_click_awaited
+            and editor.document is not None
             and editor.document.photo is not self._slow
             and editor.hover.place is not None
-            and editor.view.tool is ToolName.SELECT
-            and editor.view.selecting.mode is SelectMode.CLICK
-            and editor.mask is None
-            and editor.tasks.question is None
             and not editor.hand.is_busy
         )
 

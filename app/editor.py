@@ -45,7 +45,7 @@ from .shape import Shapes
 from .tasks import SELECT, Tasks
 from .texts import sentence, t
 from .tools.pointer import Hand, Pointer
-from .view import Shown, ToolName, View
+from .view import SelectMode, Shown, ToolName, View
 
 
 class Editor:
@@ -110,6 +110,17 @@ class Editor:
     @property
     def is_lifted(self) -> bool:
         return self.object is not None and self.object.lifted is not None
+
+    @property
+    def is_click_awaited(self) -> bool:
+        """Whether a click would begin a selection."""
+        return (
+            self.document is not None
+            and self.view.tool is ToolName.SELECT
+            and self.view.selecting.mode is SelectMode.CLICK
+            and self.mask is None
+            and self.tasks.question is None
+        )
 
     @property
     def photo_size(self) -> tuple[int, int] | None:

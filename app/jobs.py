@@ -20,10 +20,12 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.progress import Cancelled
 
+from .logs import crash_folder, note_crashes
 from .wire import Reader, Writer
 
 log = logging.getLogger(__name__)
@@ -104,8 +106,9 @@ class Worker:
         self.answers: queue.SimpleQueue[tuple[str, int, Any]] = queue.SimpleQueue()
         self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.process = context.Process(
-            target=_work, args=(theirs, self.stop, warm), daemon=True, name="objectmorpher-worker"
-        )
+            target=_work, args=(theirs, self.stop, warm, crash_folder()), daemon=True,
+            name="objectmorpher-worker",
+        )  # fmt: skip
         self.process.start()
         theirs.close()
         self._connection = ours
@@ -334,9 +337,11 @@ def _accept(job: Job, value: Any) -> None:
         job.failed(JobError.of(error, job.title))
 
 
-def _work(connection: Connection, stop: Any, warm: tuple[str, ...]) -> None:
+def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Path | None) -> None:
     """The worker's main loop; ends with the pipe."""
     _lower_priority()
+    if crashes is not None:
+        note_crashes(crashes)
     for module in warm:
         importlib.import_module(module)
     reader, writer = Reader(connection), Writer(connection)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import faulthandler
 import logging
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
+from typing import IO
 
 from .settings import settings_path
 
@@ -12,6 +14,7 @@ log = logging.getLogger(__name__)
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 NAME = "objectmorpher.log"
+CRASHES = "objectmorpher-crashes.log"
 SIZE = 1_000_000  # bytes, after which a new file is begun; one old one is kept
 
 
@@ -33,3 +36,32 @@ def start_log(folder: Path) -> None:
         return
     file.setFormatter(logging.Formatter(FORMAT))
     logging.getLogger().addHandler(file)
+    note_crashes(folder)
+
+
+def note_crashes(folder: Path) -> None:
+    """Where this process is ended by a fault of native code, what its threads did is noted.
+
+    In a file of its own: it stays open, and the log's is replaced when it is full. What an
+    environment with PYTHONFAULTHANDLER asked for already is left as it is.
+    """
+    if faulthandler.is_enabled():
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / CRASHES
+        is_full = path.exists() and path.stat().st_size > SIZE
+        file = path.open("w" if is_full else "a", encoding="utf-8")
+    except OSError as error:
+        log.warning("Crashes are not noted: %s", error)
+        return
+    _noted[folder] = file
+    faulthandler.enable(file)
+
+
+def crash_folder() -> Path | None:
+    """Where this process notes crashes, for those that it starts; None if it does not."""
+    return next(iter(_noted), None)
+
+
+_noted: dict[Path, IO[str]] = {}  # open as long as the process: faulthandler has but its number

@@ -50,13 +50,16 @@ def keys_of(editor: Editor, name: str) -> str:
 
 
 def take_next_step(editor: Editor) -> None:
-    """What the primary button does; where it only says what to do, a click on what is marked."""
+    """What the primary button does; where it asks for a click, one where the pointer is.
+
+    Also before the candidate is marked: a slow machine, or a worker that ended, marks none.
+    """
     name = next_step(editor)[1]
     if editor.hand.is_busy:
         return
     if name is not None:
         run(editor, name)
-    elif editor.candidates.shown is not None and editor.hover.place is not None:
+    elif editor.is_click_awaited and editor.hover.place is not None:
         editor.selection.add_click(*editor.hover.place, is_foreground=True)
 
 

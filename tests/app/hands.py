@@ -28,8 +28,11 @@ CALM = 12  # looks without a job: what still changes then is a caret
 class Hands:
     """Mouse, keyboard and eyes on the display."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
-        self._environment = environment
+    def __init__(
+        self, environment: dict[str, str], window: subprocess.Popen[bytes] | None = None
+    ) -> None:
+        """`window`: the program whose user this is; where it ends, waiting for it does."""
+        self._environment, self._window = environment, window
         self._display = environment["DISPLAY"]
         self._landmarks = Path(environment["OBJECTMORPHER_LANDMARKS"])
 
@@ -157,6 +160,10 @@ class Hands:
     def wait(self, is_reached: Callable[[], bool], what: str) -> None:
         end = time.monotonic() + PATIENCE
         while not is_reached():
+            if self._window is not None and (code := self._window.poll()) is not None:
+                if is_reached():
+                    return
+                pytest.fail(f"{what} did not happen; the program ended with {code}")
             if time.monotonic() > end:
                 Image.fromarray(self.picture()).save(f"window-test-{what.replace(' ', '-')}.png")
                 pytest.fail(f"{what} did not happen; a picture of the screen was saved")
@@ -171,7 +178,7 @@ def opened(environment: dict[str, str], path: Path | None, *options: str) -> Ite
     command = [sys.executable, "-m", "app", *options, *([] if path is None else [str(path)])]
     title = "ObjectMorpher" if path is None else path.name
     with subprocess.Popen(command, env=environment, cwd=ROOT) as window:
-        hands = Hands(environment)
+        hands = Hands(environment, window)
         try:
             hands.wait(lambda: title in hands.title(), "opening")
             yield hands
@@ -213,4 +220,5 @@ def window_environment(display: str, folder: Path, settings: str) -> dict[str, s
         "OBJECTMORPHER_SETTINGS": str(path),
         "OBJECTMORPHER_DATA": str(folder / "data"),
         "OBJECTMORPHER_LANDMARKS": str(folder / "landmarks.json"),
+        "PYTHONFAULTHANDLER": "1",
     }

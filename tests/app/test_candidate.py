@@ -88,12 +88,30 @@ def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:
     assert not editor.candidates.is_due
 
 
-def test_enter_takes_the_candidate_then_lifts_it(editor: Editor) -> None:
+def test_enter_is_a_click_also_where_no_candidate_comes(editor: Editor) -> None:
+    """Of a slow machine, or while none is there yet; a second Enter does not ask for a part."""
     wait_for_jobs(editor)
-    rest_on(editor, 5.0, 5.0)
+    rest_on(editor, *CENTRE)
     editor.candidates.shown = None
     take_next_step(editor)
-    assert editor.document is not None and not editor.document.objects, "nothing is marked yet"
+    take_next_step(editor)
+    wait_for_jobs(editor)
+    assert editor.object is not None and editor.object.mask is not None
+    prompt = editor.object.prompt
+    assert [(c.x, c.y) for c in prompt.clicks] == [CENTRE]
+    assert prompt.level == editor.view.selecting.level
+
+
+def test_enter_beside_the_photo_asks_for_nothing(editor: Editor) -> None:
+    wait_for_jobs(editor)
+    rest_on(editor, -50.0, -50.0)
+    take_next_step(editor)
+    wait_for_jobs(editor)
+    assert editor.document is not None and not editor.document.objects
+
+
+def test_enter_takes_the_candidate_then_lifts_it(editor: Editor) -> None:
+    wait_for_jobs(editor)
     rest_on(editor, *CENTRE)
     wait_until(editor, lambda: editor.candidates.shown is not None)
     take_next_step(editor)

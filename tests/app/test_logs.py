@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 CODE = """
@@ -14,6 +17,26 @@ from app.logs import start_log
 start_log(Path(sys.argv[1]))
 logging.getLogger("app.jobs").info("Lifted")
 logging.getLogger("app.jobs").warning("Odd")
+"""
+
+FAULT = """
+import os, sys, time
+from pathlib import Path
+from app.jobs import Jobs
+from app.logs import start_log
+
+def end(progress=None):
+    os.abort()
+
+if __name__ == "__main__":
+    start_log(Path(sys.argv[1]))
+    if sys.argv[2] == "here":
+        end()
+    jobs, ends = Jobs(), []
+    jobs.start("Ending", end, done=ends.append, failed=ends.append)
+    while not ends:
+        jobs.poll()
+        time.sleep(0.01)
 """
 
 
@@ -37,3 +60,18 @@ def test_without_a_place_for_it_the_program_goes_on(tmp_path: Path) -> None:
     said = _run(tmp_path / "file")
     assert "There is no log file" in said
     assert "Odd" in said
+
+
+@pytest.mark.parametrize("where", ["here", "worker"])
+def test_a_fault_of_native_code_is_noted(tmp_path: Path, where: str) -> None:
+    """What no Python code can catch: the stacks are in a file before the process is gone."""
+    program = tmp_path / "program.py"  # in a file: the worker imports what it runs
+    program.write_text(FAULT, encoding="utf-8")
+    command = [sys.executable, str(program), str(tmp_path), where]
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONFAULTHANDLER"}
+    environment["PYTHONPATH"] = str(ROOT)
+    ended = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True)
+    assert (ended.returncode != 0) == (where == "here")
+    noted = (tmp_path / "objectmorpher-crashes.log").read_text()
+    assert "Fatal Python error: Aborted" in noted
+    assert ("_work" in noted) == (where == "worker")
