@@ -349,7 +349,9 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
         try:
             number, function, arguments = reader.read()
         except (EOFError, OSError, KeyboardInterrupt):
-            return
+            # At once: native libraries' threads still run, and what an orderly end takes from
+            # under them may end in a fault. Nothing is left to be written.
+            os._exit(0)
         try:
             answer = "done", number, function(*arguments, progress=_reporter(writer, number, stop))
         except Cancelled:
@@ -359,7 +361,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
         try:
             writer.write(answer)
         except BrokenPipeError:  # the window was killed: nobody is there to be told
-            return
+            os._exit(0)
         except Exception as error:  # such as an answer that cannot be sent
             writer.write(("failed", number, JobError.of(error, function.__name__)))
 

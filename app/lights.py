@@ -23,6 +23,9 @@ from .view import View
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.lighting import Lighting, Lit
+    from objectmorpher_core.compose.shadow_fit import Standings
+    from objectmorpher_core.joining import Shadow
+    from objectmorpher_core.raster.posed import PosedSplats
 
     from .derived import Derived
 
@@ -75,7 +78,9 @@ class Lights:
             self._kept.pop(k, None)
             return NOTHING
         splats, now = self._derived.posed(document, k), time.monotonic()
-        sources = (splats, item.shadow, item.harmony, item.relight, document.plate)
+        sources = (
+            splats, item.shadow, item.harmony, item.relight, document.plate, document.horizon,
+        )  # fmt: skip
         kept = self._kept.get(k)
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, k, self._is_hurried)()
@@ -107,12 +112,14 @@ class Lights:
         splats = (derived.draft if is_coarse else derived.posed)(document, k)
         posed = puppet.draft if is_coarse else puppet.posed
         rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
-        return lambda: lighting.of(item, splats, lambda: rest, shape.texture, is_sketch)
+        return lambda: lighting.of(item, splats, lambda: rest, is_sketch)
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.lighting import Lighting
 
-        return self._lightings(lambda: Lighting(document), document.photo, document.plate)
+        return self._lightings(
+            lambda: Lighting(document), document.photo, document.plate, document.horizon
+        )
 
     # The picture
 
@@ -138,6 +145,24 @@ class Lights:
                 kept.shade = Layer(box, rgba, is_coarse=True)
             found.append(kept.shade)
         return tuple(found)
+
+    def standings(self, document: Document, k: int) -> Standings:
+        """How object `k` stands at rest, on each ground that there may be."""
+        from objectmorpher_core.compose.lighting import standings
+
+        shadow = document.objects[k].shadow
+        return standings(self._rest(document, k), document.photo.camera, document.horizon, shadow)
+
+    def ground(self, document: Document, k: int, shadow: Shadow) -> float:
+        """From how many degrees above the ground one looks at object `k` on it."""
+        from objectmorpher_core.compose.lighting import ground_seen_from
+
+        rest, camera = self._rest(document, k), document.photo.camera
+        return ground_seen_from(rest, camera, document.horizon, shadow)
+
+    def _rest(self, document: Document, k: int) -> PosedSplats:
+        puppet = self._derived.shape(document.photo, document.objects[k]).puppet
+        return self._rests(lambda: puppet.posed(None, Placement()), puppet, False)
 
     def hidden(self, document: Document) -> Mask:
         """(H, W) what the objects hide."""

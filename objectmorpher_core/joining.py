@@ -20,9 +20,12 @@ class Shadow:
     softness: float = 0.4  # in [0, 1]: how blurred its far end is
     contact: float = 0.7  # in [0, 1]: how dark the ground is right below the object
     colour: tuple[float, float, float] = (0.02, 0.02, 0.04)  # sRGB in [0, 1], near black
+    ground: float | None = None  # degrees above it from which one looks; None: by the horizon
 
     def check(self) -> None:
         """Raises ValueError where a number makes no sense."""
+        if self.ground is not None and not 0 <= self.ground <= 90:
+            raise ValueError(f"a ground seen from {self.ground:g} degrees is not 0 to 90 above it")
         shares = {"strength": self.strength, "softness": self.softness, "contact": self.contact}
         for name, value in shares.items():
             if not 0 <= value <= 1:

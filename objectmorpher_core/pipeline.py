@@ -17,6 +17,7 @@ from . import compose, edits, lift, segment
 from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import Composite, composite, object_texture
+from .compose.lighting import standings
 from .compose.old_shadow import OldShadow, shadowless_plate
 from .compose.plate import build_plate, plate_cover
 from .compose.shadow_fit import find_old_shadow
@@ -221,7 +222,7 @@ def run_script(
         with stopwatch.stage("inpaint"):
             covered, pixels = plate_cover(document), document.photo.pixels
             step = part(progress, 0.6, 0.85)
-            old = _old_shadow(document, script, covered)
+            old = _old_shadow(document, script, puppet, covered)
             if old is None:
                 plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
             else:
@@ -234,14 +235,18 @@ def run_script(
     return _finished(document, puppet, energies, progress, stopwatch)
 
 
-def _old_shadow(document: Document, script: EditScript, covered: Mask) -> OldShadow | None:
+def _old_shadow(
+    document: Document, script: EditScript, puppet: Puppet, covered: Mask
+) -> OldShadow | None:
     """The shadow that an object leaves behind, and takes along; None where it stays there."""
     item = document.objects[0]
     place = item.placement
     stays = place.move == (0, 0) and place.depth == 0 and place.scale == 1
     if script.shadow == "none" or stays or item.matte is None:
         return None
-    return find_old_shadow(document.photo.pixels, item.matte, covered)
+    rest = puppet.posed(None, Placement())
+    bodies = standings(rest, document.photo.camera, document.horizon, item.shadow)
+    return find_old_shadow(document.photo.pixels, item.matte, bodies, covered)
 
 
 def lift_settings(document: Document, script: EditScript) -> LiftSettings:

@@ -10,6 +10,7 @@ from objectmorpher_core.compose.shadow import GAMMA
 WIDTH, HEIGHT = 260, 200  # px
 MIDDLE, RADII = (130.0, 90.0), (30.0, 42.0)  # px, of a thing that stands
 FOOT = MIDDLE[1] + RADII[1]
+GROUND = 30.0  # degrees, from which it is seen
 DARK = 0.6  # of the light, that the shadow takes
 
 
@@ -22,7 +23,7 @@ def inside() -> np.ndarray:
 def thrown(direction: float, length: float) -> np.ndarray:
     """(H, W) in [0, 1]: the outline, sheared along the ground about its foot, and blurred."""
     angle = np.radians(direction)
-    across, down = length * np.cos(angle), 0.5 * length * np.sin(angle)
+    across, down = length * np.cos(angle), np.sin(np.radians(GROUND)) * length * np.sin(angle)
     # (x, y) of the thing, h = FOOT - y above the ground -> (x + across h, FOOT + down h)
     matrix = np.array([[1, -across, across * FOOT], [0, -down, FOOT + down * FOOT]])
     drawn = cv2.warpAffine(inside().astype(np.float32), matrix, (WIDTH, HEIGHT))

@@ -268,6 +268,12 @@ class Composing:
     def preview_feather(self, feather: float) -> None:
         self._preview(lambda document, _: edits.set_feather(document, feather))
 
+    def ground(self, shadow: Shadow) -> float:
+        """From how many degrees above the ground one looks at the current object on it."""
+        editor = self._editor
+        assert editor.document is not None
+        return editor.derived.lights.ground(editor.document, editor.current, shadow)
+
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""
         item = self._item
@@ -283,8 +289,12 @@ class Composing:
             return
         masks, item = _masks(document), document.objects[k]
         assert item.matte is not None
+        lights = editor.derived.lights
         cutout = job_functions.Cutout(
-            document.photo.pixels, item.matte, editor.derived.lights.hidden(document)
+            document.photo.pixels,
+            item.matte,
+            lights.hidden(document),
+            lights.standings(document, k),
         )
 
         def accept(answer: tuple[Shadow, Plate] | None) -> None:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from ..arrays import F32, F64
+from ..camera import Camera
 from ..document import Document, EditObject, LiftedObject, Matte
+from ..joining import Shadow
 from ..raster.posed import PosedSplats
 from ..raster.texture import TextureLevels, build_levels
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .light_estimate import estimate_light
 from .relight import Relit, relight
-from .shadow import Shade, cast
-from .silhouette import silhouette, sketch
+from .shadow import Shade, Standing, cast, ground_normal
+from .shadow_fit import Standings
+from .silhouette import SKETCHED, sketch, sketched
+
+GROUNDS = (30.0, 55.0)  # degrees above it: from these one may look, besides the usual
+CAST = 40_000  # Gaussians, of which a shadow is made
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +59,6 @@ class Lighting:
         item: EditObject,
         splats: PosedSplats,
         rest: Callable[[], PosedSplats],
-        texture: TextureLevels | None = None,
         is_sketch: bool = False,
     ) -> Lit:
         """Of a moved object whose Gaussians are `splats` now and were at `rest`.
@@ -65,11 +72,9 @@ class Lighting:
         camera = self._document.photo.camera
         shade, gain, relit = None, NEUTRAL, None
         if has_shadow:
-            if is_sketch:
-                shape = sketch(splats, camera)
-            else:
-                shape = silhouette(splats, texture or object_texture(item.matte), camera)
-            shade = None if shape is None else cast(item.shadow, shape)
+            most, horizon = SKETCHED if is_sketch else CAST, self._document.horizon
+            standing = stand(splats, camera, horizon, item.shadow, most)
+            shade = None if standing is None else cast(item.shadow, standing)
         if has_light:
             before, now = sketch(rest(), camera), sketch(splats, camera)
             if before is not None and now is not None:
@@ -86,3 +91,50 @@ class Lighting:
         if kept is None:
             kept = self._lights[id(lifted)] = (lifted, estimate_light(lifted, matte))
         return kept[1]
+
+
+def stand(
+    splats: PosedSplats,
+    camera: Camera,
+    horizon: float | None = None,
+    shadow: Shadow | None = None,
+    most: int = SKETCHED,
+) -> Standing | None:
+    """How an object whose Gaussians are `splats` stands; None where none of it is solid.
+
+    The ground is as `shadow` and `horizon` say; of about `most` of the Gaussians.
+    """
+    few = sketched(splats, most)
+    if not len(few):
+        return None
+    normal = _normal_under(splats, camera, horizon, shadow or Shadow())
+    return Standing(splats.means[few], normal, camera)
+
+
+def standings(
+    splats: PosedSplats, camera: Camera, horizon: float | None = None, shadow: Shadow | None = None
+) -> Standings:
+    """The same on each ground that there may be; none where none of it is solid."""
+    shadow = shadow or Shadow()
+    is_told = shadow.ground is not None or horizon is not None
+    grounds = (shadow.ground,) if is_told else (None, *GROUNDS)
+    found = {g: stand(splats, camera, horizon, replace(shadow, ground=g)) for g in grounds}
+    return {ground: body for ground, body in found.items() if body is not None}
+
+
+def ground_seen_from(
+    splats: PosedSplats, camera: Camera, horizon: float | None, shadow: Shadow
+) -> float:
+    """From how many degrees above the ground the camera looks at an object on it."""
+    centre = splats.rest.lifted.centre
+    normal = _normal_under(splats, camera, horizon, shadow)
+    sine = float(normal @ centre / np.linalg.norm(centre))
+    return float(np.degrees(np.arcsin(np.clip(sine, 0, 1))))
+
+
+def _normal_under(
+    splats: PosedSplats, camera: Camera, horizon: float | None, shadow: Shadow
+) -> F64:
+    """(3,) of the ground where the object was at rest: it stays where it is."""
+    row = float(camera.project(splats.rest.lifted.centre)[1])
+    return ground_normal(camera, horizon, shadow, row)

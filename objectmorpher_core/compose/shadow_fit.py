@@ -1,6 +1,6 @@
 """The shadow that an object throws in the photo: where it is, and numbers of one that is alike.
 
-Shadows of the object's own silhouette (`shadow`) are tried in all directions and lengths, each
+Shadows of the object's own body (`shadow`) are tried in all directions and lengths, each
 together with a smooth ground, against the logarithm of the brightness around the object. What
 explains it best, by a robust regression (Huber's loss, iteratively reweighted; Holland and Welsch
 1977), is the shadow, if it is dark enough, if the ground is even enough to tell, and if it takes
@@ -10,7 +10,7 @@ shadow that looks like it, for where the object goes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,7 +21,8 @@ from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
 from .old_shadow import BLACK, OldShadow
-from .shadow import DARKEST, GAMMA, Standing, contact_of, stand, thrown
+from .shadow import DARKEST, GAMMA, Standing
+from .silhouette import Grid
 
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
@@ -60,15 +61,20 @@ MOST_GROWN = 2.5  # x its area before
 LEAST_LEFT = 0.2  # of the ground, that is lit
 DEEPEST = 2.5  # natural logarithm of light that is ever given back
 
+Standings = Mapping[float | None, Standing]  # by what a shadow says of the ground
 
-def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) -> OldShadow | None:
+
+def find_old_shadow(
+    pixels: Pixels, matte: Matte, standings: Standings, others: Mask | None = None
+) -> OldShadow | None:
     """The shadow of what was cut out of the photo `pixels` (H, W, 3); None where none is sure.
 
-    `others` (H, W): what else hides the ground.
+    `standings`: the same thing's body at rest, on each ground that it may stand on. `others`
+    (H, W): what else hides the ground.
     """
-    if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
+    if not standings or not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
-    seen = _look(pixels, matte, others)
+    seen = _look(pixels, matte, standings, others)
     ground = _ground(seen)
     if ground is None:
         return None
@@ -76,7 +82,9 @@ def find_old_shadow(pixels: Pixels, matte: Matte, others: Mask | None = None) ->
     if found is None or not _is_sure(seen, ground, found):
         return None
     depth = _missing(seen, ground, found)
-    return OldShadow(_imitated(found), depth, seen.left, seen.top, seen.pitch, ground.scale)
+    return OldShadow(
+        _imitated(found), depth, seen.grid.left, seen.grid.top, seen.grid.pitch, ground.scale
+    )
 
 
 def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
@@ -96,13 +104,12 @@ class _Seen:
     colour: F32  # (h, w, 2) logarithms of ratios
     cover: F32  # (h, w) of the object
     free: Mask  # (h, w) ground, or whatever else is not the object
-    standing: Standing
-    left: float
-    top: float
-    pitch: float
+    standings: Standings
+    contacts: dict[float | None, F32]  # (h, w) natural logarithm of light that a full one takes
+    grid: Grid
 
 
-def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen:
+def _look(pixels: Pixels, matte: Matte, standings: Standings, others: Mask | None) -> _Seen:
     height, width = pixels.shape[:2]
     rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
     size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
@@ -139,9 +146,9 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen:
     free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
     logarithm = np.log(light + BLACK)
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
-    return _Seen(
-        logarithm @ LUMA, colour, cover, free, stand(cover), float(left), float(top), pitch
-    )
+    grid = Grid(float(left), float(top), pitch, cells[0], cells[1])
+    contacts = {ground: _taken(body.contact(grid)) for ground, body in standings.items()}
+    return _Seen(logarithm @ LUMA, colour, cover, free, standings, contacts, grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +160,6 @@ class _Ground:
     basis: F64  # (n, 6)
     everywhere: F64  # (h, w, 6) the same of all cells
     brightness: F64  # (n,)
-    contact: F64  # (n,) natural logarithm of the light that a contact takes
     loss: float
     scale: float  # of what is not explained
 
@@ -161,7 +167,10 @@ class _Ground:
 def _ground(seen: _Seen) -> _Ground | None:
     """None where too little of it is seen."""
     rows, columns = seen.cover.shape
-    base, height = float(seen.standing.ground.max()), seen.standing.height
+    covered = np.flatnonzero((seen.cover > 0.5).any(1))
+    if not len(covered):
+        return None
+    base, height = float(covered[-1] + 1), float(np.ptp(covered) + 1)
     y, x = np.mgrid[:rows, :columns]
     x, y = (x + 0.5 - columns / 2) / CELLS, (y + 0.5 - base) / CELLS
     away = cv2.distanceTransform((seen.cover < 0.5).astype(np.uint8), cv2.DIST_L2, 5) / CELLS
@@ -172,10 +181,9 @@ def _ground(seen: _Seen) -> _Ground | None:
     everywhere = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
     weight = np.exp(-((away.ravel()[index] / NEAR) ** 2)).astype(np.float64)
     basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
-    contact = _taken(contact_of(seen.standing)).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
     _, loss, scale = _regressed(basis, brightness, weight)
-    return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
+    return _Ground(index, weight, basis, everywhere, brightness, loss, scale)
 
 
 def _taken(shadow: F32) -> F32:
@@ -215,11 +223,12 @@ class _Found:
 
 def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     """None where it would be no shadow but a light."""
-    taken = _taken(thrown(shadow, seen.standing))
+    taken = _taken(seen.standings[shadow.ground].far(shadow, seen.grid))
     column = taken.ravel()[ground.index].astype(np.float64)
     if column.max() < DARKER:
         return None
-    basis = np.column_stack([ground.basis, -column, -ground.contact])
+    contact = seen.contacts[shadow.ground].ravel()[ground.index].astype(np.float64)
+    basis = np.column_stack([ground.basis, -column, -contact])
     found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
     if found[7] < 0:
         basis = basis[:, :7]
@@ -234,7 +243,7 @@ def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
 def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
     """The best of all directions and lengths, then of some that lie around it."""
     best: _Found | None = None
-    for shadow in _coarsely():
+    for shadow in _coarsely(seen.standings):
         tried = _tried(seen, ground, shadow)
         if tried is not None and (best is None or tried.gain > best.gain):
             best = tried
@@ -248,10 +257,11 @@ def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
     return best
 
 
-def _coarsely() -> Iterator[Shadow]:
-    for direction in DIRECTIONS:
-        for length in LENGTHS:
-            yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0)
+def _coarsely(grounds: Iterable[float | None]) -> Iterator[Shadow]:
+    for ground in grounds:
+        for direction in DIRECTIONS:
+            for length in LENGTHS:
+                yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0, ground=ground)
 
 
 def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
@@ -306,7 +316,7 @@ def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
 
 def _fitted(seen: _Seen, found: _Found) -> F32:
     """(h, w) natural logarithm of the light that the shadow takes which was found."""
-    contact = _taken(contact_of(seen.standing))
+    contact = seen.contacts[found.shadow.ground]
     return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
 
 

@@ -13,9 +13,7 @@ import numpy as np
 
 from ..arrays import F32, F64, Mask
 from ..camera import Camera
-from ..raster import tiles
 from ..raster.posed import PosedSplats
-from ..raster.texture import TextureLevels
 from .blend import Box
 
 FINE = 176  # px, longer side of a silhouette
@@ -63,18 +61,11 @@ class Grid:
         return index, is_there
 
 
-def silhouette(splats: PosedSplats, texture: TextureLevels, camera: Camera) -> Silhouette | None:
-    """The object as the photo's `camera` sees it; None where it is not seen."""
-    grid = fine_grid(splats, camera)
-    if grid is None:
-        return None
-    drawn = tiles.draw_rgba(tiles.prepare(splats, grid.camera(camera), camera), texture)
-    alpha = drawn[..., 3].astype(np.float32) / np.float32(255)
-    return Silhouette(alpha, grid.left, grid.top, grid.pitch)
-
-
 def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
-    """The same in a millisecond: where some of the Gaussians are, and close around them."""
+    """The object as the photo's camera sees it; None where it is not seen.
+
+    It takes a millisecond: where some of the Gaussians are, and close around them.
+    """
     few = sketched(splats)
     grid = sketch_grid(splats, few, camera)
     if grid is None:
@@ -87,10 +78,10 @@ def sketch(splats: PosedSplats, camera: Camera) -> Silhouette | None:
     return Silhouette(alpha, grid.left, grid.top, grid.pitch)
 
 
-def sketched(splats: PosedSplats) -> np.ndarray:
-    """Which of the Gaussians a sketch is made of."""
+def sketched(splats: PosedSplats, most: int = SKETCHED) -> np.ndarray:
+    """Which of the Gaussians a sketch is made of, about `most` of those that are solid."""
     solid = np.flatnonzero(splats.rest.lifted.texture.solidity > SOLID)
-    return solid[:: max(len(solid) // SKETCHED, 1)]
+    return solid[:: max(len(solid) // most, 1)]
 
 
 def fine_grid(splats: PosedSplats, camera: Camera) -> Grid | None:
@@ -122,13 +113,21 @@ def _cells(length: float, pitch: float) -> int:
 
 
 def _box(splats: PosedSplats, camera: Camera, means: F64) -> Corners | None:
-    """Corners around `means` (N, 3), photo px; none farther beside the photo than that is large."""
-    means = means[means[:, 2] > 0]
-    if not len(means):
+    """Corners around Gaussians with these `means` (N, 3), see `box_around`."""
+    return box_around(means, camera, AROUND * splats.rest.spacing * splats.scale)
+
+
+def box_around(points: F64, camera: Camera, reach: float) -> Corners | None:
+    """Corners around world points (N, 3) that reach so far, world units; photo px.
+
+    None farther beside the photo than that is large; None at all where nothing is seen.
+    """
+    points = points[points[:, 2] > 0]
+    if not len(points):
         return None
-    seen, size = camera.project(means), np.array([camera.width, camera.height], np.float64)
-    zoom = camera.focal / max(float(np.median(means[:, 2])), 1e-9)
-    reach = AROUND * splats.rest.spacing * splats.scale * zoom + 2
+    seen, size = camera.project(points), np.array([camera.width, camera.height], np.float64)
+    zoom = camera.focal / max(float(np.median(points[:, 2])), 1e-9)
+    reach = reach * zoom + 2
     low = np.maximum(np.floor(seen.min(0) - reach), -size)
     high = np.minimum(np.ceil(seen.max(0) + reach), 2 * size)
     if (high <= low).any():

@@ -141,6 +141,13 @@ def _draw_shadow(editor: Editor) -> None:
         change = number_field(number, unit * getattr(shadow, name))
         changed = replace(shadow, **{name: change.value / unit})
         _take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
+    usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
+    number = Number(t("Ground from"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
+    change = number_field(number, usual if ground is None else ground)
+    tooltip(t("How steeply one looks down on the ground: 0° along it, 90° from above"))
+    ground = None if change.value == usual else change.value
+    changed = replace(shadow, ground=ground)
+    _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
     _draw_direction(editor)
 
 

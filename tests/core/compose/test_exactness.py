@@ -11,17 +11,17 @@ import pytest
 from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.lighting import object_texture
+from objectmorpher_core.compose.lighting import object_texture, standings
 from objectmorpher_core.compose.old_shadow import shadowless_plate
 from objectmorpher_core.compose.plate import hole_margin, plate_cover
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.compose.silhouette import silhouette
 from objectmorpher_core.document import Document, EditObject, Photo, Placement, Prompt
 from objectmorpher_core.image import Picture
 from objectmorpher_core.joining import Shadow
 from objectmorpher_core.pipeline import lift_mask, make_plate
 from objectmorpher_core.puppet import Puppet, puppet_of
 from objectmorpher_core.raster.texture import TextureLevels
+from tests.outlines import silhouette
 from tests.photos import NAMES, photo
 from tests.shapes import camera, png
 
@@ -116,7 +116,9 @@ def test_moved_back_it_is_the_photo_byte_for_byte(name, bits):
     edited = _edited(document, np.random.default_rng([7, NAMES.index(name), bits]))
     assert (composite(edited, {0: puppet}).pixels != document.photo.pixels).any()
     item = edited.objects[0]
-    old = find_old_shadow(document.photo.pixels, item.matte) if item.matte else None
+    assert item.matte is not None
+    bodies = standings(puppet.posed(None, Placement()), document.photo.camera)
+    old = find_old_shadow(document.photo.pixels, item.matte, bodies)
     if old is not None:  # also where its shadow was taken off the ground
         pixels, covered = document.photo.pixels, plate_cover(document)
         plate = shadowless_plate(pixels, covered, old, load("telea"))

@@ -11,10 +11,11 @@ from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light_estimate import ABOVE, estimate_light
 from objectmorpher_core.compose.relight import LEAST, MOST, Relit, relight, turned_normals
-from objectmorpher_core.compose.silhouette import sampled, silhouette
+from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import Placement
 from objectmorpher_core.session_file import SessionError, decode_session, encode_session
 from tests import shapes
+from tests.outlines import silhouette
 
 MIDDLE, RADIUS = (80.0, 60.0), 42.0  # px, of a ball
 AMBIENT = 0.35

@@ -8,23 +8,31 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits
+from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.shadow import cast
-from objectmorpher_core.compose.silhouette import Silhouette, sampled, silhouette
+from objectmorpher_core.compose.lighting import stand
+from objectmorpher_core.compose.shadow import Standing, cast, ground_normal
+from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import Document, Placement
 from objectmorpher_core.joining import Shadow
 from objectmorpher_core.session_file import SessionError, decode_session, encode_session
 from tests import shapes
+from tests.outlines import silhouette, standing, upright
 
 MOVE = Placement(move=(14.0, -9.0), scale=0.7)
 F32_ROUNDING = 1e-5
 DARK = Shadow(strength=0.7)
 
 
-def _block(width: int = 40, height: int = 60, pad: int = 4) -> Silhouette:
-    alpha = np.zeros((height + 2 * pad, width + 2 * pad), np.float32)
-    alpha[pad:-pad, pad:-pad] = 1
-    return Silhouette(alpha, 100.0, 50.0, 1.0)
+CAMERA = Camera.from_fov(260, 200)
+FOOT = np.array([124.0, 114.0])  # px, amid what the block stands on
+
+
+def _block() -> Standing:
+    """A board of 40 x 60 px."""
+    mask = np.zeros((200, 260), bool)
+    mask[54:114, 104:144] = True
+    return standing(mask, CAMERA)
 
 
 def _moved(name: str = "ellipse", placement: Placement = MOVE) -> Document:
@@ -33,7 +41,10 @@ def _moved(name: str = "ellipse", placement: Placement = MOVE) -> Document:
 
 def test_no_strength_is_no_shadow():
     assert cast(Shadow(), _block()) is None
-    assert cast(DARK, replace(_block(), alpha=np.zeros((9, 9), np.float32))) is None
+    behind = Standing(np.array([[0.0, 0.0, -1.0]]), np.array([0.0, 1.0, 0.0]), CAMERA)
+    assert cast(DARK, behind) is None
+    with pytest.raises(ValueError, match="without a single"):
+        Standing(np.zeros((0, 3)), np.array([0.0, 1.0, 0.0]), CAMERA)
 
 
 @pytest.mark.parametrize("direction", [0, 60, 90, 170, -90, -30])
@@ -43,9 +54,8 @@ def test_a_shadow_falls_where_it_is_told(direction):
     x0, y0, x1, y1 = shade.bounds
     y, x = np.mgrid[y0:y1, x0:x1] + 0.5
     middle = np.array([(x * shade.alpha).sum(), (y * shade.alpha).sum()]) / shade.alpha.sum()
-    foot = np.array([100.0 + 24, 50.0 + 64])
     towards = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
-    assert (middle - foot) @ towards > 5
+    assert (middle - FOOT) @ towards > 3
 
 
 def test_a_shadow_ends_clear_and_is_never_more_than_all():
@@ -71,7 +81,67 @@ def test_the_contact_is_right_below_the_object():
     shade = cast(replace(DARK, length=0.0, softness=0.0, strength=1.0, contact=1.0), _block())
     assert shade is not None
     row = int(np.argmax(shade.alpha.max(1))) + 0.5 + shade.top
-    assert abs(row - (50 + 64)) < 6
+    assert abs(row - FOOT[1]) < 6
+
+
+@pytest.mark.parametrize("ground", [10.0, 30.0, 60.0])
+def test_it_lies_on_the_ground_that_is_seen_so(ground):
+    """The end of a board's shadow towards the viewer, against the same by ray and plane."""
+    mask = np.zeros((200, 260), bool)
+    mask[30:100, 110:150] = True
+    points = upright(mask, CAMERA, ground)
+    normal = ground_normal(CAMERA, None, Shadow(ground=ground), 99.0)
+    sharp = Shadow(1.0, 90.0, 0.5, 0.0, 0.0)
+    shade = cast(sharp, Standing(points, normal, CAMERA))
+    assert shade is not None
+    top = points[points[:, 1].argmin()]
+    height = float((points @ normal).max() - top @ normal)
+    end = top + height * (normal + 0.5 * np.cross(normal, [1.0, 0.0, 0.0]))
+    rows = np.flatnonzero((shade.alpha > 0.25 * shade.alpha.max()).any(1))
+    last = shade.top + shade.pitch * (rows[-1] + 1)
+    assert abs(last - CAMERA.project(end)[1]) < 0.12 * 70
+
+
+def test_what_turns_throws_another_shadow():
+    """A board that is seen edge-on still throws the shadow of a board, under a lamp beside it."""
+    across = np.stack(np.meshgrid(np.linspace(-0.3, 0.3, 80), np.linspace(-0.6, 0, 120)), -1)
+    flat = np.column_stack([across.reshape(-1, 2), np.zeros(across[..., 0].size)])
+    away = flat[:, [2, 1, 0]]
+    normal = ground_normal(CAMERA, None, Shadow(ground=25.0), CAMERA.cy)
+    sharp, sizes = Shadow(1.0, 0.0, 1.0, 0.0, 0.0), []
+    for board in (flat, away):
+        shade = cast(sharp, Standing(board + [0.0, 0.2, 3.0], normal, CAMERA))
+        assert shade is not None
+        rows = np.flatnonzero((shade.alpha > 0.3).any(1))
+        sizes.append(np.ptp(rows) * shade.pitch)
+    deep = 0.6 * np.sin(np.radians(25)) * CAMERA.focal / 3  # px, of the board that points away
+    assert sizes[1] > max(deep, 2 * sizes[0])
+
+
+def test_the_horizon_tells_how_the_ground_is_seen():
+    high = ground_normal(CAMERA, -300.0, Shadow(), 150.0)
+    level = ground_normal(CAMERA, CAMERA.cy, Shadow(), 150.0)
+    np.testing.assert_allclose(level, [0, 1, 0], atol=1e-12)
+    assert high[2] > 0.5
+    told = ground_normal(CAMERA, -300.0, Shadow(ground=10.0), 150.0)
+    ray = CAMERA.unproject(np.array([CAMERA.cx, 150.0]), 1.0)
+    assert np.degrees(np.arcsin(told @ ray / np.linalg.norm(ray))) == pytest.approx(10, abs=1e-9)
+    below = ground_normal(CAMERA, 180.0, Shadow(), 150.0)  # a horizon under the thing tells nothing
+    np.testing.assert_allclose(below, ground_normal(CAMERA, None, Shadow(), 150.0))
+
+
+def test_a_sketch_of_a_shadow_is_near_the_exact_one():
+    scene = shapes.scene("ellipse")
+    document = edits.set_shadow(_moved(), 0, replace(DARK, softness=0.5))
+    splats, item = scene.puppet.posed(None, MOVE), document.objects[0]
+    box, found = (0, 0, shapes.WIDTH, shapes.HEIGHT), []
+    for most in (1500, 40_000):
+        own = stand(splats, scene.camera, None, item.shadow, most)
+        assert own is not None
+        shade = cast(item.shadow, own)
+        assert shade is not None
+        found.append(shade.at(box))
+    assert np.abs(found[0] - found[1]).mean() < 0.15 * found[1].mean()
 
 
 @pytest.mark.parametrize("name", ["ellipse", "thin", "ring", "frame"])
@@ -154,8 +224,10 @@ def test_a_blend_of_one_is_the_usual_and_others_keep_to_their_footprint():
 
 def test_nonsense_is_refused():
     document = shapes.scene("ellipse").document()
-    for shadow in (Shadow(strength=1.2), Shadow(length=-1), Shadow(direction=np.nan)):
-        with pytest.raises(edits.EditError, match="shadow"):
+    for shadow in (
+        Shadow(strength=1.2), Shadow(length=-1), Shadow(direction=np.nan), Shadow(ground=91.0),
+    ):  # fmt: skip
+        with pytest.raises(edits.EditError, match=r"shadow|ground"):
             edits.set_shadow(document, 0, shadow)
     with pytest.raises(edits.EditError, match="harmony of 2"):
         edits.set_harmony(document, 0, 2.0)
@@ -164,7 +236,7 @@ def test_nonsense_is_refused():
 
 
 def test_a_session_keeps_shadow_light_and_edge():
-    document = edits.set_shadow(_moved(), 0, replace(DARK, direction=-40))
+    document = edits.set_shadow(_moved(), 0, replace(DARK, direction=-40, ground=33.0))
     document = edits.set_feather(edits.set_harmony(document, 0, 0.5), 2.0)
     loaded = decode_session(encode_session(document))
     assert loaded.objects[0].shadow == document.objects[0].shadow

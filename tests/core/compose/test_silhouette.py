@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.compose.silhouette import sampled, silhouette, sketch
+from objectmorpher_core.compose.silhouette import sampled, sketch
 from objectmorpher_core.document import Placement
 from tests import shapes
+from tests.outlines import silhouette
 
 MOVE = Placement(move=(14.0, -9.0), scale=0.7)
 F32_ROUNDING = 1e-5
