@@ -17,7 +17,7 @@ from ..raster.texture import TextureLevels, build_levels
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .light_estimate import estimate_light
 from .relight import Relit, relight
-from .shadow import Shade, Standing, cast, ground_normal
+from .shadow import COARSE, FINE, Shade, Standing, cast, ground_normal
 from .shadow_fit import Standings
 from .silhouette import SKETCHED, sketch, sketched
 
@@ -72,9 +72,9 @@ class Lighting:
         camera = self._document.photo.camera
         shade, gain, relit = None, NEUTRAL, None
         if has_shadow:
-            most, horizon = SKETCHED if is_sketch else CAST, self._document.horizon
-            standing = stand(splats, camera, horizon, item.shadow, most)
-            shade = None if standing is None else cast(item.shadow, standing)
+            most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
+            standing = stand(splats, camera, self._document.horizon, item.shadow, most)
+            shade = None if standing is None else cast(item.shadow, standing, cells)
         if has_light:
             before, now = sketch(rest(), camera), sketch(splats, camera)
             if before is not None and now is not None:

@@ -28,7 +28,7 @@ from .silhouette import Grid, box_around, sampled
 
 GAMMA = 2.2  # of the encoded values
 USUAL_GROUND = 15.0  # degrees, from which a ground is seen whose horizon is not known
-FINE = 176  # cells, longer side of a shadow
+FINE, COARSE = 176, 64  # cells, longer side of a shadow, and of a sketch of one
 PER_CELL = 1.5  # Gaussians, so that no holes are left
 SPRAY = 0.3  # %, of the Gaussians that may lie below what stands on the ground, or far above all
 BLURS = (0.012, 0.07, 0.2)  # x height, at softness 1: near the ground, half up, at the top
@@ -79,9 +79,9 @@ def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: fl
     return np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
-def cast(shadow: Shadow, standing: Standing) -> Shade | None:
-    """The shadow of an object; None where there is none."""
-    if shadow.strength <= 0 or (grid := standing.grid(shadow)) is None:
+def cast(shadow: Shadow, standing: Standing, cells: int = FINE) -> Shade | None:
+    """The shadow of an object, of at most so many `cells`; None where there is none."""
+    if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
         return None
     far, near = standing.far(shadow, grid), standing.contact(grid)
     light = np.asarray((1 - far) * (1 - np.float32(shadow.contact) * near), np.float32)
@@ -112,15 +112,15 @@ class Standing:
         sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
         self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
 
-    def grid(self, shadow: Shadow) -> Grid | None:
-        """What is fine enough for the whole shadow; None where none is seen."""
+    def grid(self, shadow: Shadow, cells: int = FINE) -> Grid | None:
+        """About the whole shadow, at most so many `cells` long; None where none is seen."""
         points = np.concatenate([self._fallen(shadow), self._feet[self._is_low]])
         box = box_around(points, self._camera, 0.0)
         if box is None:
             return None
         (left, top), (right, bottom) = box
         evenly = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(points)))
-        pitch = max((right - left) / FINE, (bottom - top) / FINE, evenly, 1.0)
+        pitch = max((right - left) / cells, (bottom - top) / cells, evenly, 1.0)
         blur = max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
         room = 3 * blur * self._size + 4 * pitch
         width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
