@@ -61,7 +61,11 @@ def _draw_facts(editor: Editor) -> None:
     if mask is None and editor.view.selecting.mode is SelectMode.CLICK:
         note(t("Left click adds what belongs to the object, right click removes what does not."))
     elif mask is not None and not editor.is_lifted:
-        note(t("Right-click what does not belong to the object, then lift it."))
-        draw_command(editor, "import_shape")
+        if editor.object is not None and editor.object.stays_in_front:
+            note(t("It stays where it is, in front of what is edited."))
+        else:
+            note(t("Right-click what does not belong to the object, then lift it."))
+            draw_command(editor, "import_shape")
+        draw_command(editor, "keep_in_front")
     draw_lift_warning(editor)
     draw_offer(editor)

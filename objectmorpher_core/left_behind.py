@@ -1,0 +1,54 @@
+"""What a script's objects leave behind: the plate of all, and their shadows in the photo."""
+
+from __future__ import annotations
+
+from . import compose, edits
+from .compose.old_shadow import OldShadow, shadowless_plate
+from .compose.plate import build_plate, plate_cover
+from .compose.shadow_fit import find_old_shadow
+from .document import Document, EditObject, Matte
+from .progress import Progress
+from .script import EditScript
+
+
+def with_plate(
+    document: Document, script: EditScript, casting: frozenset[int], progress: Progress
+) -> Document:
+    """The document with what is behind all its objects; `casting` take their own shadow along.
+
+    An object that has left its place takes its shadow off the ground, where that is sure. It, and
+    every copy of it that is elsewhere, throws one like it.
+    """
+    covered, pixels = plate_cover(document), document.photo.pixels
+    gone: list[OldShadow] = []
+    for matte in _distinct(document, casting):
+        alike = [k for k in casting if document.objects[k].matte is matte]
+        old = find_old_shadow(pixels, matte, covered)
+        if old is None:
+            continue
+        for k in alike:
+            if document.objects[k].is_visible:
+                document = edits.set_shadow(document, k, old.shadow)
+        if not any(o.matte is matte and not has_left(o) for o in document.objects):
+            gone.append(old)
+    inpainter = compose.load(script.inpaint)
+    if gone:
+        plate = shadowless_plate(pixels, covered, gone, inpainter, progress, script.seed)
+    else:
+        plate = build_plate(pixels, covered, inpainter, progress, script.seed)
+    return edits.set_plate(document, plate)
+
+
+def has_left(item: EditObject) -> bool:
+    """Whether it is not where its shadow in the photo is: turned and bent it still stands there."""
+    place = item.placement
+    return not item.is_visible or place.move != (0, 0) or place.depth != 0 or place.scale != 1
+
+
+def _distinct(document: Document, casting: frozenset[int]) -> list[Matte]:
+    """Their mattes, each once: copies share theirs."""
+    found: dict[int, Matte] = {}
+    for k in sorted(casting):
+        if (matte := document.objects[k].matte) is not None:
+            found.setdefault(id(matte), matte)
+    return list(found.values())
