@@ -18,6 +18,7 @@ from .view import View
 if TYPE_CHECKING:
     from objectmorpher_core.raster.texture import TextureLevels
 
+MOST = 12  # pictures that are remembered
 PIXELS_FROM = 4.0  # magnification from which the photo shows single pixels, and so does this
 
 
@@ -25,7 +26,7 @@ class Fronts:
     """The pictures of each view, remembered."""
 
     def __init__(self) -> None:
-        self._levels = Memo()
+        self._levels = Memo(MOST)
         self._kept: dict[int, tuple[Matte, tuple[float, ...], Layer | None]] = {}
 
     def layer(self, item: EditObject, view: View) -> Layer | None:
@@ -35,13 +36,11 @@ class Fronts:
         kept = self._kept.get(id(matte))
         if kept is None or kept[0] is not matte or kept[1] != view.place:
             levels = self._levels(lambda: _levels(matte), matte)
+            self._kept.pop(id(matte), None)
+            if len(self._kept) == MOST:
+                del self._kept[next(iter(self._kept))]  # the oldest
             kept = self._kept[id(matte)] = (matte, view.place, _drawn(levels, view))
         return kept[2]
-
-    def forget(self, objects: tuple[EditObject, ...]) -> None:
-        """Drops what is of none of these objects."""
-        there = {id(item.matte) for item in objects}
-        self._kept = {key: kept for key, kept in self._kept.items() if key in there}
 
 
 def _levels(matte: Matte) -> TextureLevels:

@@ -202,7 +202,6 @@ class Layers:
             if part.k in lifted and self._derived.posed(document, part.k) is work.source
         }
         self._derived.forget(lifted)
-        self._derived.fronts.forget(document.objects)
         self._derived.painter.forget(len(document.objects))
 
     def _is_there(self, document: Document, part: Part, view: View) -> bool:

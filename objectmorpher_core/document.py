@@ -346,7 +346,7 @@ class EditObject:
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
         fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
-        return replace(fresh, matte=matte, lifted=lifted)
+        return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False)
 
 
 @dataclass(frozen=True, eq=False)

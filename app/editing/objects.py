@@ -173,10 +173,8 @@ class Objects:
         there = [k for k, o in enumerate(objects) if o.lifted or k in fronts]
         if len(there) < 2:
             return there
-        posed = self._editor.derived.posed
-        return back_to_front(
-            objects, {k: None if k in fronts else posed(document, k) for k in there}
-        )
+        posed = partial(self._editor.derived.posed, document)
+        return back_to_front(objects, {k: None if k in fronts else posed(k) for k in there})
 
     def listed(self) -> list[int]:
         """All that are selected, as a list shows them: what is in front first."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, segment
+from objectmorpher_core import edits, pipeline, segment
 from objectmorpher_core.compose.composite import object_texture, straight_cutout
 from objectmorpher_core.document import Placement
 from objectmorpher_core.edits import EditError
