@@ -92,7 +92,7 @@ def test_its_picture_is_the_photo_at_every_zoom(document, zoom):
     assert layer.rgba.shape == (y1 - y0, x1 - x0, 4)
     y, x = np.mgrid[y0:y1, x0:x1] + 0.5
     at = view.image_from_canvas(np.stack([x, y], -1))
-    deep = (np.abs(at[..., 0] - 120) < 5) & (at[..., 1] > 2) & (at[..., 1] < 118)
+    deep = (np.abs(at[..., 0] - 120) < 3) & (at[..., 1] > 4) & (at[..., 1] < 116)
     assert deep.any()
     assert (layer.rgba[..., 3][deep] == 255).all()
     if zoom >= 4:  # single pixels
