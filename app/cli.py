@@ -166,7 +166,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         "--script",
         type=Path,
         metavar="EDIT.json",
-        help="the same options from a file, and\n        further objects: see docs/scripts.md",
+        help="the same options from a file, and further objects (docs/formats.md)",
     )
     add("--session", type=Path, metavar="S.omorph")
     add("--save-mask", type=Path, metavar="FILE")
