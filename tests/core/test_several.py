@@ -206,3 +206,13 @@ def test_what_fails_says_which_object(case):
     objects, sentence = FAILING[case]
     with pytest.raises(ScriptError, match=sentence):
         _run(_item(objects=objects))
+
+
+def test_a_click_says_what_stays_in_front():
+    edited = _run(_item(move=[62, 8, -0.4], front=[[115, 65]], segment="grabcut"))
+    _exact(edited)
+    item = edited.document.objects[1]
+    assert item.name == "Front 1" and item.stays_in_front and item.mask is not None
+    assert (item.mask & RIGHT).sum() > 0.7 * (item.mask | RIGHT).sum()
+    with pytest.raises(ScriptError, match="--front 1: "):
+        _run(_item(front=[[-5, 2]], segment="grabcut"))

@@ -18,7 +18,6 @@ ICONS = {
     "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
     "remove_islands": Icon.BROOM, "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT,
     "harden": Icon.IMAGE, "subject": Icon.PERSON, "import_shape": Icon.CUBE,
-    "keep_in_front": Icon.LOCK,
 }  # fmt: skip
 
 
@@ -67,7 +66,6 @@ def _hint(name: str) -> str:
         "import_shape": t(
             "A splat or mesh file takes the object's place, where it is in the photo"
         ),
-        "keep_in_front": t("It is not edited, and covers what moves behind it"),
         "harden": t("Make the edge hard again: lifting finds it in the photo"),
     }
     return hints.get(name, "")
