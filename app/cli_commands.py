@@ -19,7 +19,7 @@ from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import ENDINGS, Picture, encode_mask, encode_picture
 from objectmorpher_core.openraster import encode_openraster
-from objectmorpher_core.pipeline import Edited, open_photo, refuse_missing, replay, run_script
+from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.progress import Progress
 from objectmorpher_core.script import (
@@ -29,6 +29,7 @@ from objectmorpher_core.script import (
     parse_scripts,
     script_from,
 )
+from objectmorpher_core.scripted import refuse_missing
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from . import compose, edits, lift, segment
+from . import compose, edits, lift, scripted, segment
 from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import OPAQUE, Composite, composite
@@ -38,7 +38,6 @@ from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
-from .scripted import copied, ordered, placed, posed, refuse_missing, told_of, with_settings
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
@@ -221,20 +220,20 @@ def run_script(
     nothing moved. `others`: the photo's further objects. Raises the one-sentence errors of the
     stages, all of them ValueErrors.
     """
-    refuse_missing(script, others)
+    scripted.refuse_missing(script, others)
     stopwatch = Stopwatch()
     with stopwatch.stage("load"):
         run = _Run(open_photo(data, name, script.fov, script.seed), stopwatch)
-    wishes = (FurtherObject(script), *others.objects)
+    wishes = scripted.with_inherited((FurtherObject(script), *others.objects))
     for k, wanted in enumerate(wishes):
         step = part(progress, 0.6 * k / len(wishes), 0.6 * (k + 1) / len(wishes))
         own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
-        with told_of(k + 1, others):
+        with scripted.told_of(k + 1, others):
             if k > 0 and own.mask is not None:
                 mask = Path(own.mask).read_bytes()
             run.add(replace(wanted, script=own), mask if k == 0 or own.mask else None, step)
     run.keep_fronts(script, progress)
-    document = ordered(run.document, others)
+    document = scripted.ordered(run.document, others)
     if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
@@ -265,18 +264,18 @@ class _Run:
             self._keep(k)
             return
         if wanted.duplicate is not None:
-            self.document = copied(self.document, k, wanted)
+            self.document = scripted.copied(self.document, k, wanted)
         else:
             with self._stopwatch.stage("lift"):
                 self.document = _lift(self.document, k, script, part(progress, 0.5, 0.8))
-            self.document = with_settings(self.document, k, script)
+            self.document = scripted.with_settings(self.document, k, script)
         puppet = self.puppets[k] = puppet_of(self.document.objects[k], self.document.photo.camera)
         step = part(progress, 0.8, 1.0)
-        self.document, self.energies[k] = posed(
+        self.document, self.energies[k] = scripted.posed(
             self.document, k, puppet, script, step, self._stopwatch
         )
         if wanted.duplicate is None:
-            self.document = placed(self.document, k, script)
+            self.document = scripted.placed(self.document, k, script)
         if script.shadow == "auto" and has_left(self.document.objects[k]):
             self.casting.add(k)
 

@@ -52,6 +52,18 @@ def told_of(number: int, others: Others) -> Iterator[None]:
         raise ScriptError(f"object {number}: {error}") from error
 
 
+def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
+    """Copies are told about shadow and light what their originals are, unless they say it."""
+    result: list[FurtherObject] = []
+    for wanted in wishes:
+        if wanted.duplicate is not None:
+            of = result[wanted.duplicate - 1].script
+            kept = {name: getattr(of, name) for name in {"shadow", "refine"} - wanted.said}
+            wanted = replace(wanted, script=replace(wanted.script, **kept))
+        result.append(wanted)
+    return result
+
+
 def with_settings(document: Document, k: int, script: EditScript) -> Document:
     """Object `k` with the control points and the way of deforming that the script asks for."""
     if script.nodes is not None:

@@ -216,3 +216,14 @@ def test_a_click_says_what_stays_in_front():
     assert (item.mask & RIGHT).sum() > 0.7 * (item.mask | RIGHT).sum()
     with pytest.raises(ScriptError, match="--front 1: "):
         _run(_item(front=[[-5, 2]], segment="grabcut"))
+
+
+def test_a_copy_takes_light_and_shadow_from_its_original_unless_it_says_so():
+    copies = [
+        {"duplicate": 1, "move": [60, 20]},
+        {"duplicate": 1, "move": [0, 40], "refine": "none"},
+    ]
+    edited = _run(_item(move=[5, 5], refine="harmonise", shadow="none", objects=copies))
+    own, copy, plain = edited.document.objects
+    assert own.harmony == copy.harmony > 0 == plain.harmony
+    assert [item.shadow.strength for item in (own, copy, plain)] == [0, 0, 0]
