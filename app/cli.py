@@ -19,7 +19,8 @@ from .terminal import PROGRAM
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
-COMMANDS = ("edit", "select", "replay", "info", "convert", "models", "bench", "train")
+FAILURES = (ValueError, OSError, RuntimeError)  # that are one sentence for the user
+COMMANDS = ("edit", "batch", "select", "replay", "info", "convert", "models", "bench", "train")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -38,8 +39,8 @@ def main(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write(f"{PROGRAM}: interrupted\n")
         return 130
-    except (ValueError, OSError, RuntimeError) as error:
-        sys.stderr.write(f"{PROGRAM}: {_sentence(error)}\n")
+    except FAILURES as error:
+        sys.stderr.write(f"{PROGRAM}: {sentence(error)}\n")
         return FAILED
     except MemoryError:
         sys.stderr.write(f"{PROGRAM}: there is not enough memory for this photo\n")
@@ -57,6 +58,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
     _add_edit(commands.add_parser("edit", help="edit a photo without a window"))
+    _add_batch(commands.add_parser("batch", help="run many edit scripts, whatever becomes of each"))
     _add_select(commands.add_parser("select", help="write the mask of the chosen object"))
     _add_replay(commands.add_parser("replay", help="render a saved session again"))
     _add_info(commands.add_parser("info", help="what a session holds"))
@@ -155,8 +157,17 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
     add("--scale", type=float, metavar="S")
     add("--shadow", metavar="auto|none", help="default auto: its own goes with it, where found")
+    add("--remove", action="store_true", default=None, help="it is gone, what is behind it shows")
+    add("--front", action="append", type=_list(2, 2), metavar="X,Y",
+        help="on a thing that stays in front of what is edited")  # fmt: skip
+    add("--front-mask", metavar="M.png", help="a mask of such a thing")
     add = parser.add_argument_group("scripts and further outputs").add_argument
-    add("--script", type=Path, metavar="EDIT.json", help="the same options from a file")
+    add(
+        "--script",
+        type=Path,
+        metavar="EDIT.json",
+        help="the same options from a file, and further objects (docs/formats.md)",
+    )
     add("--session", type=Path, metavar="S.omorph")
     add("--save-mask", type=Path, metavar="FILE")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
@@ -171,6 +182,21 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
     add("--report", type=Path, metavar="R.json")
     parser.set_defaults(run=_lazily("edit"))
+
+
+def _add_batch(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs scripts one after the other, a line for each. A failure does not stop the others; "
+        "an output that is newer than all it is made from is left as it is."
+    )
+    add = parser.add_argument
+    add("scripts", type=Path, nargs="+", metavar="SCRIPT", help="edit scripts, or folders of them")
+    add("-o", "--out", type=Path, metavar="FOLDER", help="of outputs that a script does not name")
+    add("--photo", type=Path, action="append", metavar="PHOTO",
+        help="photos, or folders of them, for scripts that name none")  # fmt: skip
+    add("--overwrite", action="store_true", help="also what is newer already")
+    add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
+    parser.set_defaults(run=_lazily("batch"))
 
 
 def _add_select(parser: argparse.ArgumentParser) -> None:
@@ -284,7 +310,7 @@ def _handle(text: str) -> dict[str, Any]:
     return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
 
 
-def _sentence(error: BaseException) -> str:
+def sentence(error: BaseException) -> str:
     """One line for the user: what failed, in the words of whoever noticed."""
     if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
         reason = {FileNotFoundError: "does not exist", PermissionError: "cannot be read"}

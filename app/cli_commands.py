@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import ENDINGS, Picture, encode_mask, encode_picture
 from objectmorpher_core.openraster import encode_openraster
-from objectmorpher_core.pipeline import Edited, open_photo, refuse_missing, replay, run_script
+from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
+from objectmorpher_core.progress import Progress
 from objectmorpher_core.script import (
     BatchItem,
     EditScript,
@@ -27,11 +29,13 @@ from objectmorpher_core.script import (
     parse_scripts,
     script_from,
 )
+from objectmorpher_core.scripted import refuse_missing
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS
 from objectmorpher_core.video_file import encode_video
 
+from .cli_batch import run_batch
 from .cli_models import run_models
 from .cli_train import run_train
 from .terminal import PROGRAM, UsageError, progress_bar
@@ -55,38 +59,43 @@ LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 def run_edit(options: argparse.Namespace) -> None:
     """`objectmorpher edit`"""
     items = _items(options)
-    scripts = [i.script for i in items]
-    named = [name for s in scripts for name in (s.mask, s.hidden, s.splats)]
+    scripts = [s for i in items for s in (i.script, *(o.script for o in i.others.objects))]
+    named = [name for s in scripts for name in files_of(s)]
     inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
     outputs: dict[Path, bytes] = {}
     clip = Clip(options.video, options.seconds)
     for item in items:
-        photo, out = Path(item.photo or ""), Path(item.out or "")
+        out = Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
-        _check_outputs(inputs, {out: ENDINGS})
-        _check_outputs(inputs, {path: EXTRAS[name] for name, path in extras.items()})
+        check_outputs(inputs, {out: ENDINGS})
+        check_outputs(inputs, {path: EXTRAS[name] for name, path in extras.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
-        refuse_missing(item.script)
-        outputs |= _edit_one(item.script, photo, out, extras, clip)
+        refuse_missing(item.script, item.others)
+        outputs |= _edit_one(item, extras, clip)
     write_all(outputs)
 
 
-def _edit_one(
-    script: EditScript, photo: Path, out: Path, extras: dict[str, Path], clip: Clip
-) -> dict[Path, bytes]:
+def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
+    """One edit of a batch, or the only one."""
+    photo, script = Path(item.photo or ""), item.script
     mask = Path(script.mask).read_bytes() if script.mask else None
+    data = photo.read_bytes()
+    return run_script(data, photo.name, script, mask, progress, needs_plate, item.others)
+
+
+def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path, bytes]:
+    out = Path(item.out or "")
     with progress_bar("Opening") as progress:
-        needs_plate = bool(NEED_PLATE & set(extras))
-        edited = run_script(photo.read_bytes(), photo.name, script, mask, progress, needs_plate)
+        edited = edited_by(item, progress, bool(NEED_PLATE & set(extras)))
         with edited.stopwatch.stage("save"):
             outputs = {out: encode_picture(edited.picture, out.suffix)}
             for name, path in extras.items():
                 if name != "report":
                     outputs[path] = _extra(name, edited, path, clip)
         if "report" in extras:
-            outputs[extras["report"]] = _json(edited.report())
+            outputs[extras["report"]] = json_bytes(edited.report())
     return outputs
 
 
@@ -108,12 +117,12 @@ def _extra(name: str, edited: Edited, path: Path, clip: Clip) -> bytes:
         picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
         return encode_picture(picture, path.suffix)
     if name == "save_depth":
-        return encode_picture(depth_picture(document, {0: edited.puppet}), path.suffix)
+        return encode_picture(depth_picture(document, edited.puppets), path.suffix)
     if name == "save_layers":
         return encode_openraster(layers(document)[1], edited.picture)
     if name == "save_video":
         return encode_video(frames(document, clip), clip.rate, path.suffix)
-    item = document.objects[0]
+    item = document.objects[edited.first]
     return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
 
 
@@ -121,7 +130,7 @@ def run_select(options: argparse.Namespace) -> None:
     """`objectmorpher select`"""
     script = _script(options)
     inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
-    _check_outputs(inputs, {options.out: (".png",)})
+    check_outputs(inputs, {options.out: (".png",)})
     refuse_missing(script)
     mask = Path(script.mask).read_bytes() if script.mask else None
     with progress_bar("Selecting") as progress:
@@ -137,12 +146,12 @@ def run_replay(options: argparse.Namespace) -> None:
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
-    _check_outputs([options.session], wanted)
+    check_outputs([options.session], wanted)
     with progress_bar("Opening") as progress:
         edited = replay(decode_session(options.session.read_bytes()), progress)
         outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
         if options.report:
-            outputs[options.report] = _json(edited.report())
+            outputs[options.report] = json_bytes(edited.report())
     write_all(outputs)
 
 
@@ -152,7 +161,7 @@ def run_info(options: argparse.Namespace) -> None:
 
     info = describe(decode_session(options.session.read_bytes()))
     if options.json:
-        sys.stdout.write(_json(info).decode())
+        sys.stdout.write(json_bytes(info).decode())
         return
     for key, value in info.items():
         if key != "objects":
@@ -196,7 +205,7 @@ def run_convert(options: argparse.Namespace) -> None:
     count = COUNT if options.count is None else options.count
     if not LEAST_COUNT <= count <= MOST_COUNT:
         raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")
-    _check_outputs([options.source], {options.out: SPLAT_ENDINGS})
+    check_outputs([options.source], {options.out: SPLAT_ENDINGS})
     with progress_bar("Converting") as progress:
         gaussians = read(options.source, count, options.flip)
         progress(0.7, "Writing")
@@ -208,7 +217,7 @@ def run_bench(options: argparse.Namespace) -> None:
     """`objectmorpher bench`"""
     from . import bench
 
-    figures = _json(bench.run_bench(options.what, options.quick))
+    figures = json_bytes(bench.run_bench(options.what, options.quick))
     if options.json:
         write_all({options.json: figures})
     else:
@@ -223,8 +232,8 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
     else:
         read = parse_scripts(options.script.read_text(encoding="utf-8"))
         folder = options.script.parent
-        items = [_beside(item, folder) for item in read]
-        items = [BatchItem(i.script.merged(said, _said(options)), i.photo, i.out) for i in items]
+        items = [beside(item, folder) for item in read]
+        items = [replace(i, script=i.script.merged(said, _said(options))) for i in items]
     if len(items) > 1:
         single = [name for name in EXTRAS if getattr(options, name)]
         if options.photo or options.out or single:
@@ -237,17 +246,34 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
         raise UsageError("which photo? objectmorpher edit PHOTO -o OUT.png")
     if out is None:
         raise UsageError("where to? add -o OUT.png")
-    return [BatchItem(items[0].script, str(photo), str(out))]
+    return [replace(items[0], photo=str(photo), out=str(out))]
 
 
-def _beside(item: BatchItem, folder: Path) -> BatchItem:
+def beside(item: BatchItem, folder: Path) -> BatchItem:
     """File names of a script are relative to the script."""
-    from dataclasses import replace
 
     def at(name: str | None) -> str | None:
         return None if name is None else str(folder / name)
 
-    return BatchItem(replace(item.script, mask=at(item.script.mask)), at(item.photo), at(item.out))
+    def found(name: str | None) -> str | None:
+        """Beside the script, or, as in older ones, where the command is run."""
+        is_beside = name is None or (folder / name).exists() or not Path(name).exists()
+        return at(name) if is_beside else name
+
+    def own(script: EditScript) -> EditScript:
+        return replace(
+            script, mask=at(script.mask), front_mask=at(script.front_mask),
+            hidden=found(script.hidden), splats=found(script.splats),
+        )  # fmt: skip
+
+    objects = tuple(replace(each, script=own(each.script)) for each in item.others.objects)
+    others = replace(item.others, objects=objects)
+    return BatchItem(own(item.script), at(item.photo), at(item.out), others)
+
+
+def files_of(script: EditScript) -> tuple[str | None, ...]:
+    """What an edit reads beside the photo."""
+    return script.mask, script.front_mask, script.hidden, script.splats
 
 
 def _script(options: argparse.Namespace) -> EditScript:
@@ -263,7 +289,7 @@ def _said(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> None:
+def check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> None:
     """Refuses, before any work, what could not be written or would overwrite an input."""
     read = {path.resolve() for path in inputs}
     for path, endings in outputs.items():
@@ -281,7 +307,7 @@ def _mask(document: Document) -> Mask:
     return mask
 
 
-def _json(value: Any) -> bytes:
+def json_bytes(value: Any) -> bytes:
     return (json.dumps(value, indent=2) + "\n").encode()
 
 
@@ -293,6 +319,7 @@ def _line(value: Any) -> str:
 
 __all__ = [
     "PROGRAM",
+    "run_batch",
     "run_convert",
     "run_edit",
     "run_info",

@@ -25,6 +25,7 @@ from objectmorpher_core.document import (
 )
 
 from .blend import build_blend
+from .fronts import Fronts
 from .layers import Layers
 from .lights import Lights
 from .memo import Memo
@@ -74,7 +75,7 @@ class Derived:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
         self._drafts: dict[int, Memo] = {}
-        self.layers = Layers(self)
+        self.layers, self.fronts = Layers(self), Fronts()
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
         self.lights = Lights(self)

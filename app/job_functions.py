@@ -133,6 +133,13 @@ def lift(
     return matte, lifted
 
 
+def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:
+    """The soft cut-out of what stays in front of the edit."""
+    from objectmorpher_core.pipeline import cut_front
+
+    return cut_front(pixels, mask)
+
+
 def import_object(
     path: Path, scene: Scene, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
@@ -277,7 +284,7 @@ def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Sha
     if old is None:
         return None
     inpainter, step = compose.load(choice.backend), part(progress, 0.1, 1.0)
-    plate = shadowless_plate(cutout.pixels, cutout.covered, old, inpainter, step, choice.seed)
+    plate = shadowless_plate(cutout.pixels, cutout.covered, (old,), inpainter, step, choice.seed)
     return old.shadow, plate
 
 

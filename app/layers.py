@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -135,13 +135,21 @@ class Layers:
         """The pictures of the objects that a view shows, back to front."""
         self._forget(document)
         parts = self.parts(document, shown)
-        missing = [part for part in parts if not self._is_there(document, part, view)]
+        rendered = [part for part in parts if not is_front(document, part.k)]
+        missing = [part for part in rendered if not self._is_there(document, part, view)]
         for part in missing:
             self._render(document, part, view, self.frame_time / len(missing))
-        self._drawn = [self._works[part] for part in parts if part in self._works]
+        self._drawn = [self._works[part] for part in rendered if part in self._works]
         for work in self._drawn:
             self._want_exact(work)
-        return tuple(self._lit(document, work) for work in self._drawn)
+        found = (self._shown(document, part, view) for part in parts)
+        return tuple(layer for layer in found if layer is not None)
+
+    def _shown(self, document: Document, part: Part, view: View) -> Layer | None:
+        """The picture of a part that is rendered, or stays in front."""
+        if is_front(document, part.k):
+            return self._derived.fronts.layer(document.objects[part.k], view)
+        return self._lit(document, self._works[part]) if part in self._works else None
 
     def _lit(self, document: Document, work: _Work) -> Layer:
         """Its picture in the light of where it is."""
@@ -164,10 +172,15 @@ class Layers:
             if k in drawn:
                 parts.append(Part(k, Shown.COMPOSITE))
             parts.append(Part(k, Shown.STRAIN))
-        return parts
+        return parts + [Part(k, Shown.COMPOSITE) for k in drawn if is_front(document, k)]
 
-    def order(self, document: Document, shown: Shown = Shown.COMPOSITE) -> dict[int, PosedSplats]:
-        """The visible objects back to front; over the photo only those that the export draws."""
+    def order(
+        self, document: Document, shown: Shown = Shown.COMPOSITE
+    ) -> Mapping[int, PosedSplats | None]:
+        """The visible objects back to front; over the photo only those that the export draws.
+
+        What stays in front has no Gaussians.
+        """
         from objectmorpher_core.compose.order import back_to_front, stack
 
         objects = document.objects
@@ -175,7 +188,9 @@ class Layers:
         if shown in (Shown.COMPOSITE, Shown.PROVENANCE):
             drawn = stack(document, posed)
             return {k: splats for k, splats in drawn.items() if objects[k].is_visible}
-        there = {k: posed(k) for k, o in enumerate(objects) if o.lifted and o.is_visible}
+        is_there = [o.lifted is not None and o.is_visible and not is_front(document, k)
+                    for k, o in enumerate(objects)]  # fmt: skip
+        there = {k: posed(k) for k, here in enumerate(is_there) if here}
         return {k: there[k] for k in back_to_front(objects, there)}
 
     def _forget(self, document: Document) -> None:
@@ -270,6 +285,13 @@ class Layers:
             work.shown = _layer(work.box, rendered, work.request.part)
 
         self.ask(work.request, accept)
+
+
+def is_front(document: Document, k: int) -> bool:
+    """Whether object `k` stays in front, and is shown as the photo has it."""
+    from objectmorpher_core.compose.order import stands_in_front
+
+    return stands_in_front(document.objects[k])
 
 
 def _mean_rate(before: float, seconds: float, pixels: float) -> float:

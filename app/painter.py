@@ -161,11 +161,15 @@ def _count_shares(derived: Derived, document: Document) -> Shares:
     if hole is not None:
         inpainted = cv2.resize(hole.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     lifted, through_all = np.zeros_like(inpainted), 1 - inpainted
-    for k in derived.layers.order(document):
-        texture = derived.shape(document.photo, document.objects[k]).texture
-        picture = tiles.render(derived.draft(document, k), texture, view.camera(camera), camera)
-        through = 1 - np.minimum(picture.alpha, 1)
-        lifted = through * lifted + np.maximum(picture.alpha - picture.from_photo, 0)
+    for k, splats in derived.layers.order(document).items():
+        if splats is None:
+            through, own = 1 - _front_alpha(derived, document, k, view), np.float32(0)
+        else:
+            texture = derived.shape(document.photo, document.objects[k]).texture
+            picture = tiles.render(derived.draft(document, k), texture, view.camera(camera), camera)
+            through = 1 - np.minimum(picture.alpha, 1)
+            own = np.maximum(picture.alpha - picture.from_photo, 0)
+        lifted = through * lifted + own
         inpainted, through_all = through * inpainted, through * through_all
     is_changed = (edited > 0) & (through_all < 1 - LEAST)
     if not is_changed.any():
@@ -174,3 +178,13 @@ def _count_shares(derived: Derived, document: Document) -> Shares:
     by_inpainter = float((inpainted * edited)[is_changed].mean())
     changed = float(is_changed.mean())
     return Shares(1 - by_lifter - by_inpainter, by_lifter, by_inpainter, changed)
+
+
+def _front_alpha(derived: Derived, document: Document, k: int, view: View) -> F32:
+    """(h, w) of what stays in front, on a view's canvas."""
+    alpha = np.zeros((view.height, view.width), np.float32)
+    layer = derived.fronts.layer(document.objects[k], view)
+    if layer is not None:
+        x0, y0, x1, y1 = (int(v) for v in layer.box)
+        alpha[y0:y1, x0:x1] = layer.rgba[..., 3] / np.float32(255)
+    return alpha

@@ -16,6 +16,7 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import (
     Document,
+    EditObject,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 REHEARSE = "rehearse"  # kind of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
+FRONT = "front"
 
 
 class Combine(Enum):
@@ -71,12 +73,14 @@ class Tasks:
         self.question: Question | None = None  # asked, not answered yet
         self._plate: tuple[tuple[Mask | None, ...], Plate] | None = None  # of these masks
         self._no_plate: tuple[Mask | None, ...] | None = None  # asked or failed for these masks
+        # What stays in front, as it was asked for last: its mask, and the answer
+        self._front: tuple[Mask | None, Matte | None] | None = None
         self._unreadable: Photo | None = None  # reading it has ended the worker
         editor.jobs.restarted = self._read_again
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self._plate = self._no_plate = None
+        self.question = self._plate = self._no_plate = self._front = None
 
     def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
@@ -182,6 +186,35 @@ class Tasks:
             kind=REHEARSE, done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
 
+    def ensure_fronts(self) -> bool:
+        """Sees to it that what stays in front is cut out; each frame."""
+        document = self._editor.document
+        objects = document.objects if document else ()
+        for k, item in enumerate(objects):
+            if item.stays_in_front and item.matte is None and item.mask is not None:
+                return self._ensure_front(k, item)
+        return False
+
+    def _ensure_front(self, k: int, item: EditObject) -> bool:
+        editor, document, mask = self._editor, self._editor.document, item.mask
+        assert document is not None
+        if self._front is not None and self._front[0] is mask:
+            matte = self._front[1]
+            if matte is None:  # asked, or failed
+                return False
+            self._amend(lambda now: edits.keep_in_front(now, k, matte))
+            return True
+
+        def accept(matte: Matte) -> None:
+            self._front = (mask, matte)
+
+        self._front = (mask, None)
+        editor.jobs.start(
+            t("Cutting it out"), job_functions.cut_front, document.photo.pixels, item.selection,
+            done=accept, failed=editor.complain_of, kind=FRONT,
+        )  # fmt: skip
+        return True
+
     def ensure_plate(self) -> bool:
         """Sees to it that lifted objects have a background behind them; each frame."""
         document = self._editor.document
@@ -228,12 +261,15 @@ class Tasks:
         self._no_plate = None
 
     def _add_plate(self, plate: Plate) -> None:
+        self._amend(lambda document: edits.set_plate(document, plate))
+
+    def _amend(self, change: Callable[[Document], Document]) -> None:
         """A computed addition to the current step, not a step of its own."""
         editor = self._editor
         assert editor.history is not None
-        editor.history.amend(edits.set_plate(editor.history.document, plate))
+        editor.history.amend(change(editor.history.document))
         if editor.preview is not None:
-            editor.preview = edits.set_plate(editor.preview, plate)
+            editor.preview = change(editor.preview)
 
     def render_exact(self, request: Request, accept: Callable[[Rendered], None]) -> None:
         """Asks for an exact picture of the view, which shows a draft meanwhile."""

@@ -310,6 +310,7 @@ class EditObject:
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
     relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
     shape: LiftSettings = field(default_factory=LiftSettings)
+    stays_in_front: bool = False  # covers what is edited, as it does in the photo
 
     @property
     def is_moved(self) -> bool:
@@ -337,7 +338,7 @@ class EditObject:
         return EditObject(
             self.name, prompt=prompt, mask=mask, coverage=coverage,
             found=None if found is None else frozen(found, np.bool_), deform=self.deform,
-            shape=self.shape,
+            shape=self.shape, stays_in_front=self.stays_in_front,
         )  # fmt: skip
 
     def with_lifted(
@@ -345,7 +346,7 @@ class EditObject:
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
         fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
-        return replace(fresh, matte=matte, lifted=lifted)
+        return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False)
 
 
 @dataclass(frozen=True, eq=False)

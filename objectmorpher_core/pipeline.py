@@ -13,40 +13,40 @@ from typing import Any
 
 import numpy as np
 
-from . import compose, edits, lift, segment
+from . import compose, edits, lift, scripted, segment
 from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
-from .compose.composite import Composite, composite, object_texture
-from .compose.lighting import standings
-from .compose.old_shadow import OldShadow, shadowless_plate
-from .compose.plate import build_plate, plate_cover
-from .compose.shadow_fit import find_old_shadow
+from .compose.composite import OPAQUE, Composite, composite
+from .compose.plate import build_plate
 from .document import (
     AS_SEEN,
     GAUSSIANS,
     Click,
-    DeformSettings,
     Document,
     LiftedObject,
     LiftSettings,
     Matte,
     Photo,
-    Placement,
     Plate,
     Prompt,
 )
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .importing import Scene, Source, place_import, register_file
+from .left_behind import has_left, with_plate
+from .pixels import crop, unit_pixels
 from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
 from .report import Stopwatch, build_report
-from .script import EditScript, ScriptError
+from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
 from .splat_files import COUNT
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
+NO_CHOICE: dict[str, Any] = {
+    "click": (), "not_click": (), "box": None, "subject": False, "mask": None,
+}  # fmt: skip
 
 
 def open_photo(data: bytes, name: str, fov: float | None = None, seed: int = 0) -> Document:
@@ -103,10 +103,31 @@ def lift_mask(
     """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians."""
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
-    margin = int(np.ceil(MATTE_MARGIN * band_width(camera.width, camera.height))) + 8
-    matte = build_matte(pixels, mask, margin)
+    matte = _cut_out(pixels, mask)
     subject = lift.Subject(pixels, camera, is_selected(mask), matte)
     return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
+
+
+def _cut_out(pixels: Pixels, mask: Selection) -> Matte:
+    height, width = mask.shape
+    margin = int(np.ceil(MATTE_MARGIN * band_width(width, height))) + 8
+    return build_matte(pixels, mask, margin)
+
+
+def cut_front(pixels: Pixels, mask: Selection) -> Matte:
+    """The soft cut-out of what stays in front under `mask` (H, W), bool or soft u8.
+
+    Where it is opaque, or short of it by less than shows, it is the photo to the last bit.
+    """
+    matte = _cut_out(pixels, mask)
+    height, width = mask.shape
+    is_whole = matte.alpha >= OPAQUE
+    own = unit_pixels(crop(pixels, (0, 0, width, height), matte.box))
+    is_photo = is_whole & crop(np.ones((height, width), bool), (0, 0, width, height), matte.box)
+    return replace(
+        matte, alpha=np.where(is_whole, np.float32(1), matte.alpha),
+        foreground=np.where(is_photo[..., None], own, matte.foreground),
+    )  # fmt: skip
 
 
 def make_plate(
@@ -140,14 +161,24 @@ class Edited:
     document: Document
     composite: Composite
     picture: Picture
-    puppet: Puppet
-    energies: tuple[float, ...]
+    puppets: dict[int, Puppet]  # by the indices of the lifted objects
+    energies: dict[int, tuple[float, ...]]  # of the solves
     stopwatch: Stopwatch
+
+    @property
+    def first(self) -> int:
+        """Index of the first object that is lifted."""
+        return min(self.puppets)
+
+    @property
+    def puppet(self) -> Puppet:
+        """Of that object."""
+        return self.puppets[self.first]
 
     def report(self) -> dict[str, Any]:
         """The figures of DESIGN section 6, up to now."""
         return build_report(
-            self.document, self.puppet, self.energies, self.composite, self.stopwatch
+            self.document, self.puppets, self.energies, self.composite, self.stopwatch
         )
 
 
@@ -169,20 +200,9 @@ def select(
 
     Raises SelectionError, ImageError, EditError or ScriptError.
     """
-    prompt = prompt_of(script)
-    if mask is None and prompt.is_empty:
-        raise ScriptError("no object is chosen: use --click, --box, --subject or --mask")
-    with (stopwatch or Stopwatch()).stage("segment"):
-        if mask is not None:
-            found, backend = read_mask(mask, document.photo.size), "mask"
-        else:
-            pixels = document.photo.pixels
-            segmenter = segment.load(script.segment)
-            reading = read_photo(pixels, segmenter, part(progress, 0.0, 0.6))
-            answer = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
-            found, backend = answer.mask, answer.backend
-    document = edits.set_mask(edits.add_object(document), 0, found, prompt)
-    return document.with_backend("segment", backend)
+    run = _Run(document, stopwatch or Stopwatch())
+    run.choose(script, mask, progress)
+    return run.document
 
 
 def run_script(
@@ -192,61 +212,119 @@ def run_script(
     mask: bytes | None = None,
     progress: Progress = silent,
     needs_plate: bool = False,
+    others: Others = ALONE,
 ) -> Edited:
     """The main job: `data` (a picture file called `name`) edited as `script` says.
 
     `mask` is the bytes of the script's mask picture. `needs_plate` makes the plate even where
-    nothing moved. Raises the one-sentence errors of the stages, all of them ValueErrors.
+    nothing moved. `others`: the photo's further objects. Raises the one-sentence errors of the
+    stages, all of them ValueErrors.
     """
-    refuse_missing(script)
+    scripted.refuse_missing(script, others)
     stopwatch = Stopwatch()
     with stopwatch.stage("load"):
-        document = open_photo(data, name, script.fov, script.seed)
-    document = select(document, script, mask, part(progress, 0.0, 0.3), stopwatch)
-    with stopwatch.stage("lift"):
-        document = _lift(document, script, part(progress, 0.3, 0.5))
-    if script.nodes is not None:
-        document = edits.resample(document, 0, script.nodes)
-    settings = DeformSettings(
-        script.deform,
-        script.links,
-        script.faithful,
-        script.stiffness,
-        script.stretch_limit,
-        script.split,
-    )
-    document = edits.set_deform(document, 0, settings)
-    puppet = puppet_of(document.objects[0], document.photo.camera)
-    document, energies = _pose(document, puppet, script, progress, stopwatch)
-    if document.objects[0].is_moved or needs_plate:
+        run = _Run(open_photo(data, name, script.fov, script.seed), stopwatch)
+    wishes = scripted.with_inherited((FurtherObject(script), *others.objects))
+    for k, wanted in enumerate(wishes):
+        step = part(progress, 0.6 * k / len(wishes), 0.6 * (k + 1) / len(wishes))
+        own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
+        with scripted.told_of(k + 1, others):
+            if k > 0 and own.mask is not None:
+                mask = Path(own.mask).read_bytes()
+            run.add(replace(wanted, script=own), mask if k == 0 or own.mask else None, step)
+    run.keep_fronts(script, progress)
+    document = scripted.ordered(run.document, others)
+    if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
-            covered, pixels = plate_cover(document), document.photo.pixels
             step = part(progress, 0.6, 0.85)
-            old = _old_shadow(document, script, puppet, covered)
-            if old is None:
-                plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
+            casting = {k: run.puppets[k] for k in run.casting}
+            document = with_plate(document, script, casting, step)
+    for k, wanted in enumerate(wishes):
+        if wanted.script.refine == "harmonise":
+            document = edits.harmonised(document, k).with_backend("refine", "harmonise")
+    return _finished(document, run.puppets, run.energies, progress, stopwatch)
+
+
+class _Run:
+    """A script that is being carried out, object by object."""
+
+    def __init__(self, document: Document, stopwatch: Stopwatch) -> None:
+        self.document = document
+        self.puppets: dict[int, Puppet] = {}
+        self.energies: dict[int, tuple[float, ...]] = {}
+        self.casting: set[int] = set()  # objects that take their shadow in the photo along
+        self._stopwatch = stopwatch
+        self._readings: dict[str, Reading] = {}  # by the segmenter's name
+
+    def add(self, wanted: FurtherObject, mask: bytes | None, progress: Progress) -> None:
+        """The next object, as far as it can be without the plate."""
+        k, script = len(self.document.objects), wanted.script
+        if wanted.duplicate is None:
+            self.choose(script, mask, part(progress, 0.0, 0.5))
+        if wanted.stay_in_front:
+            self._keep(k)
+            return
+        if wanted.duplicate is not None:
+            self.document = scripted.copied(self.document, k, wanted)
+        else:
+            with self._stopwatch.stage("lift"):
+                self.document = _lift(self.document, k, script, part(progress, 0.5, 0.8))
+            self.document = scripted.with_settings(self.document, k, script)
+        puppet = self.puppets[k] = puppet_of(self.document.objects[k], self.document.photo.camera)
+        step = part(progress, 0.8, 1.0)
+        self.document, self.energies[k] = scripted.posed(
+            self.document, k, puppet, script, step, self._stopwatch
+        )
+        if wanted.duplicate is None:
+            self.document = scripted.placed(self.document, k, script)
+        if script.shadow == "auto" and has_left(self.document.objects[k]):
+            self.casting.add(k)
+
+    def choose(self, script: EditScript, mask: bytes | None, progress: Progress) -> None:
+        """The next object is the one that the script means."""
+        prompt = prompt_of(script)
+        if mask is None and prompt.is_empty:
+            raise ScriptError("no object is chosen: use --click, --box, --subject or --mask")
+        with self._stopwatch.stage("segment"):
+            if mask is not None:
+                found, backend = read_mask(mask, self.document.photo.size), "mask"
             else:
-                inpainter = compose.load(script.inpaint)
-                plate = shadowless_plate(pixels, covered, old, inpainter, step, script.seed)
-                document = edits.set_shadow(document, 0, old.shadow)
-            document = edits.set_plate(document, plate)
-    if script.refine == "harmonise":
-        document = edits.harmonised(document, 0).with_backend("refine", script.refine)
-    return _finished(document, puppet, energies, progress, stopwatch)
+                reading = self._reading(script.segment, part(progress, 0.0, 0.6))
+                answer = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
+                found, backend = answer.mask, answer.backend
+        k = len(self.document.objects)
+        document = edits.set_mask(edits.add_object(self.document), k, found, prompt)
+        self.document = document.with_backend("segment", backend)
 
+    def keep_fronts(self, script: EditScript, progress: Progress) -> None:
+        """What the script's `front` clicks and mask mean stays in front."""
+        wishes: list[tuple[EditScript, bytes | None]] = [
+            (replace(script, **NO_CHOICE | {"click": (xy,)}), None) for xy in script.front
+        ]
+        if script.front_mask is not None:
+            wishes.append((script, Path(script.front_mask).read_bytes()))
+        for number, (wanted, mask) in enumerate(wishes, 1):
+            progress(0.6, "Cutting out what stays in front")
+            k = len(self.document.objects)
+            try:
+                self.choose(wanted, mask, silent)
+                self._keep(k)
+            except ValueError as error:
+                raise ScriptError(f"--front {number}: {error}") from error
+            self.document = edits.rename(self.document, k, f"Front {number}")
 
-def _old_shadow(
-    document: Document, script: EditScript, puppet: Puppet, covered: Mask
-) -> OldShadow | None:
-    """The shadow that an object leaves behind, and takes along; None where it stays there."""
-    item = document.objects[0]
-    place = item.placement
-    stays = place.move == (0, 0) and place.depth == 0 and place.scale == 1
-    if script.shadow == "none" or stays or item.matte is None:
-        return None
-    rest = puppet.posed(None, Placement())
-    bodies = standings(rest, document.photo.camera, document.horizon, item.shadow)
-    return find_old_shadow(document.photo.pixels, item.matte, bodies, covered)
+    def _keep(self, k: int) -> None:
+        """Object `k` stays in front."""
+        mask = self.document.objects[k].selection
+        assert mask is not None, "it was chosen"
+        matte = cut_front(self.document.photo.pixels, mask)
+        self.document = edits.keep_in_front(self.document, k, matte)
+
+    def _reading(self, backend: str, progress: Progress) -> Reading:
+        if backend not in self._readings:
+            pixels = self.document.photo.pixels
+            self._readings[backend] = read_photo(pixels, segment.load(backend), progress)
+        return self._readings[backend]
 
 
 def lift_settings(document: Document, script: EditScript) -> LiftSettings:
@@ -267,119 +345,51 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
     )
 
 
-def _lift(document: Document, script: EditScript, progress: Progress) -> Document:
-    """The chosen object in 3D: lifted, or out of the script's file."""
-    photo, mask = document.photo, document.objects[0].selection
-    assert mask is not None, "select() has chosen it"
+def _lift(document: Document, k: int, script: EditScript, progress: Progress) -> Document:
+    """Object `k`, which is chosen, in 3D: lifted, or out of the script's file."""
+    photo, mask = document.photo, document.objects[k].selection
+    assert mask is not None, "it was chosen"
     if script.splats is None:
         settings = lift_settings(document, script)
         made = lift_mask(
             photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
         )
-        return edits.set_lifted(document, 0, *made, settings)
+        return edits.set_lifted(document, k, *made, settings)
     is_free = script.fov is None and not photo.picture.focal_35mm
     scene = Scene(photo.pixels, photo.camera, mask, is_free)
     source = Source(Path(script.splats), script.gaussians or COUNT, script.flip)
     found = register_file(source, scene, part(progress, 0.0, 0.8), script.seed)
     best = found.registration.best
-    document = edits.set_camera(document, best.camera, 0)
+    document = edits.set_camera(document, best.camera, k)
     rest = part(progress, 0.8, 1.0)
     made = place_import(scene, found.gaussians, best, rest, script.seed)
-    return edits.set_lifted(document, 0, *made)
+    return edits.set_lifted(document, k, *made)
 
 
 def replay(document: Document, progress: Progress = silent) -> Edited:
     """The picture of a session, as it was when the session was saved."""
-    if not document.objects or document.objects[0].lifted is None:
+    lifted = {k: item for k, item in enumerate(document.objects) if item.lifted is not None}
+    if not lifted:
         raise ScriptError("the session holds no lifted object, there is nothing to replay")
     stopwatch = Stopwatch()
-    item = document.objects[0]
-    puppet = puppet_of(item, document.photo.camera)
-    energies = (0.0,)
-    if item.handles:
-        with stopwatch.stage("deform"):
-            energies = puppet.deformer.solve(item.handles, item.has_auto_anchors).energies
-    return _finished(document, puppet, energies, progress, stopwatch)
-
-
-def refuse_missing(script: EditScript) -> None:
-    """Raises ScriptError where the script needs a backend that is not there."""
-    chosen = (
-        ("segmenter", script.segment, segment.BACKENDS),
-        ("lifter", script.lift, lift.BACKENDS),
-        ("inpainter", script.inpaint, compose.BACKENDS),
-    )
-    for kind, name, known in chosen:  # also where the stage will not run
-        if name != "auto" and name not in known:
-            raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
-    if script.refine not in ("auto", *compose.REFINERS):
-        known = ", ".join(compose.REFINERS)
-        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: {known}")
-
-
-def _pose(
-    document: Document,
-    puppet: Puppet,
-    script: EditScript,
-    progress: Progress,
-    stopwatch: Stopwatch,
-) -> tuple[Document, tuple[float, ...]]:
-    """Handles, pins and placement of the script; the energies of the solve."""  # fmt: skip
-    energies: tuple[float, ...] = (0.0,)
-    document = _with_handles(document, puppet, script)
-    item = document.objects[0]
-    if any(not handle.is_pin for handle in item.handles):
-        progress(0.5, "Linking control points")
-        with stopwatch.stage("graph"):
-            deformer = puppet.deformer
-        progress(0.55, "Deforming")
-        with stopwatch.stage("deform"):
-            solution = deformer.solve(item.handles, item.has_auto_anchors)
-        energies = solution.energies
-        document = edits.set_pose(document, 0, solution.pose)
-    move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
-    scale = 1.0 if script.scale is None else script.scale
-    placement = Placement((move[0], move[1]), move[2], turn, scale)
-    return edits.set_placement(document, 0, placement), energies
-
-
-def _with_handles(document: Document, puppet: Puppet, script: EditScript) -> Document:
-    lifted, camera = puppet.lifted, document.photo.camera
-    matte = document.objects[0].matte
-    assert matte is not None
-    texture = object_texture(matte)
-
-    def pick(xy: tuple[float, float], option: str) -> Any:
-        width, height = document.photo.size
-        if not (0 <= xy[0] < width and 0 <= xy[1] < height):
-            raise ScriptError(
-                f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
-            )
-        point = puppet.pick(xy, None, Placement(), texture)
-        if point is None:
-            raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
-        return point
-
-    for xy in script.pin:
-        document = edits.add_handle(document, 0, pick(xy, "--pin").rest, is_pin=True)
-    for handle in script.handle:
-        point = pick(handle.at, "--handle")
-        depth = point.depth + handle.dz * lifted.diameter * lifted.scale
-        if depth <= 0:
-            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
-        target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
-        document = edits.add_handle(document, 0, point.rest, target)
-    return document
+    puppets = {k: puppet_of(item, document.photo.camera) for k, item in lifted.items()}
+    energies: dict[int, tuple[float, ...]] = {}
+    for k, item in lifted.items():
+        if item.handles:
+            with stopwatch.stage("deform"):
+                deformer = puppets[k].deformer
+                energies[k] = deformer.solve(item.handles, item.has_auto_anchors).energies
+    return _finished(document, puppets, energies, progress, stopwatch)
 
 
 def _finished(
     document: Document,
-    puppet: Puppet,
-    energies: tuple[float, ...],
+    puppets: dict[int, Puppet],
+    energies: dict[int, tuple[float, ...]],
     progress: Progress,
     stopwatch: Stopwatch,
 ) -> Edited:
     with stopwatch.stage("render"):
-        result = composite(document, {0: puppet}, part(progress, 0.85, 1.0))
+        result = composite(document, puppets, part(progress, 0.85, 1.0))
     progress(1.0, "Done")
-    return Edited(document, result, _picture(document, result), puppet, energies, stopwatch)
+    return Edited(document, result, _picture(document, result), puppets, energies, stopwatch)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .compose.composite import Composite
-from .document import Document, Placement
+from .document import Document, EditObject, Placement
 from .puppet import Puppet
 
 VERSION = 1
@@ -47,46 +47,23 @@ class Stopwatch:
 
 def build_report(
     document: Document,
-    puppet: Puppet,
-    energies: tuple[float, ...],
+    puppets: dict[int, Puppet],
+    energies: dict[int, tuple[float, ...]],
     result: Composite,
     stopwatch: Stopwatch,
 ) -> dict[str, Any]:
-    """`R.json` of the document's first object.
+    """`R.json` of the document's first lifted object, and a list of all where there are several.
 
-    `reached` is where a handle's surface point is seen before the placement: handles deform
-    first, and their targets are in the picture of that moment.
+    `puppets` of the lifted objects and the `energies` of their solves are by their indices.
     """
     width, height = document.photo.size
-    item = document.objects[0]
-    lifted = item.lifted
-    assert lifted is not None and item.mask is not None, "a report is about a lifted object"
-    camera = document.photo.camera
-    handles = []
-    for handle in item.handles:
-        at = puppet.picture_of(handle.point, None, Placement())
-        to = camera.project(lifted.world_points(handle.target))
-        reached = puppet.picture_of(handle.point, item.pose, Placement())
-        handles.append({
-            "from": _px(at), "to": _px(to), "reached": _px(reached),
-            "error_px": round(float(np.linalg.norm(reached - to)), 4),
-        })  # fmt: skip
+    first = min(puppets)
     used = dict(document.backends)
     shares = result.shares
-    return {
+    report = {
         "version": VERSION,
         "photo": {"width": width, "height": height},
-        "object": {
-            "mask_area_px": int(item.mask.sum()),
-            "gaussians": len(lifted.gaussians),
-            "control_points": len(lifted.control_points),
-            "links": puppet.deformer.graph.link_count,
-            "components": puppet.deformer.graph.component_count,
-        },
-        "handles": handles,
-        "energy": {
-            "start": energies[0], "end": energies[-1], "iterations": max(len(energies) - 1, 0),
-        },
+        **_of_object(document, first, puppets[first], energies.get(first, (0.0,))),
         "pixels": {
             "changed": result.changed,
             "outside_footprint_changed": result.outside_footprint_changed,
@@ -100,6 +77,64 @@ def build_report(
         },
         "seconds": stopwatch.read(),
         "peak_memory_mb": peak_memory_mb(),
+    }  # fmt: skip
+    if len(document.objects) > 1:
+        report["objects"] = [
+            {"number": k + 1, "name": item.name, "role": _role(document.objects, k)}
+            | (
+                _of_object(document, k, puppets[k], energies.get(k, (0.0,)))
+                if k in puppets
+                else {"object": {"mask_area_px": 0 if item.mask is None else int(item.mask.sum())}}
+            )
+            for k, item in enumerate(document.objects)
+        ]
+    return report
+
+
+def _role(objects: tuple[EditObject, ...], k: int) -> str:
+    """What an object is to the edit."""
+    item = objects[k]
+    if item.lifted is None:
+        return "stays in front" if item.stays_in_front else "selected"
+    if not item.is_visible:
+        return "removed"
+    is_copy = any(other.lifted is item.lifted for other in objects[:k])
+    return "copy" if is_copy else "edited" if item.is_moved else "at rest"
+
+
+def _of_object(
+    document: Document, k: int, puppet: Puppet, energies: tuple[float, ...]
+) -> dict[str, Any]:
+    """The figures of a lifted object.
+
+    `reached` is where a handle's surface point is seen before the placement: handles deform
+    first, and their targets are in the picture of that moment.
+    """
+    item = document.objects[k]
+    lifted = item.lifted
+    assert lifted is not None and item.mask is not None, "these are of a lifted object"
+    camera = document.photo.camera
+    handles = []
+    for handle in item.handles:
+        at = puppet.picture_of(handle.point, None, Placement())
+        to = camera.project(lifted.world_points(handle.target))
+        reached = puppet.picture_of(handle.point, item.pose, Placement())
+        handles.append({
+            "from": _px(at), "to": _px(to), "reached": _px(reached),
+            "error_px": round(float(np.linalg.norm(reached - to)), 4),
+        })  # fmt: skip
+    return {
+        "object": {
+            "mask_area_px": int(item.mask.sum()),
+            "gaussians": len(lifted.gaussians),
+            "control_points": len(lifted.control_points),
+            "links": puppet.deformer.graph.link_count,
+            "components": puppet.deformer.graph.component_count,
+        },
+        "handles": handles,
+        "energy": {
+            "start": energies[0], "end": energies[-1], "iterations": max(len(energies) - 1, 0),
+        },
     }  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """The edit script: what is to be done to one photo, in the words of the command line.
 
-The options of `objectmorpher edit` and a JSON file of `--script` are this one dataclass.
+The options of `objectmorpher edit` and a JSON file of `--script` are this one dataclass. A file may
+go on with further objects of the same photo.
 """
 
 from __future__ import annotations
@@ -52,6 +53,9 @@ class EditScript:
     trust: float = 1.0  # in the shape network, of [0, 1]
     no_depth: bool = False  # not as a depth network sees it, where one is installed
     hidden: str | None = None  # file
+    front: tuple[XY, ...] = ()  # px, on things that stay in front of what is edited
+    front_mask: str | None = None  # file: another one
+    remove: bool = False
     pin: tuple[XY, ...] = ()
     handle: tuple[HandleMove, ...] = ()
     move: tuple[float, float, float] | None = None  # px, px, diameters
@@ -74,12 +78,34 @@ class EditScript:
 
 
 @dataclass(frozen=True)
+class FurtherObject:
+    """Another object of the photo. The numbers of objects begin with 1, the script's own."""
+
+    script: EditScript  # its options that are not of the whole photo
+    duplicate: int | None = None  # number of the earlier object that it is a copy of
+    stay_in_front: bool = False  # it is not edited: it covers what is
+    said: frozenset[str] = frozenset()  # the options that stand there
+
+
+@dataclass(frozen=True)
+class Others:
+    """What a script says beside its own object."""
+
+    objects: tuple[FurtherObject, ...] = ()
+    order: tuple[int, ...] = ()  # numbers of objects, back to front
+
+
+ALONE = Others()
+
+
+@dataclass(frozen=True)
 class BatchItem:
     """One edit of a batch: which photo, where to, and what."""
 
     script: EditScript
     photo: str | None = None
     out: str | None = None
+    others: Others = ALONE
 
 
 def parse_scripts(text: str) -> tuple[BatchItem, ...]:
@@ -109,11 +135,54 @@ def script_from(options: Mapping[str, Any]) -> EditScript:
 def _batch_item(item: Any) -> BatchItem:
     if not isinstance(item, dict):
         raise ScriptError("the script is not a JSON object")
-    options = {k: v for k, v in item.items() if k not in ("photo", "out")}
+    options = {k: v for k, v in item.items() if k not in OF_A_FILE}
     for key in ("photo", "out"):
         if key in item and not isinstance(item[key], str):
             raise ScriptError(f"the script's {key!r} is not a file name")
-    return BatchItem(script_from(options), item.get("photo"), item.get("out"))
+    script = script_from(options)
+    return BatchItem(script, item.get("photo"), item.get("out"), _others(item))
+
+
+def _others(item: dict[str, Any]) -> Others:
+    further = item.get("objects", [])
+    if not isinstance(further, list):
+        raise ScriptError("the script's 'objects' are not a list")
+    objects = tuple(_further(number, value) for number, value in enumerate(further, 2))
+    order = item.get("order", [])
+    if not isinstance(order, list):
+        raise ScriptError("the script's 'order' is not a list of objects' numbers")
+    numbers = tuple(_whole(1, len(objects) + 1)("order", number) for number in order)
+    if len(set(numbers)) < len(numbers):
+        raise ScriptError("order: an object stands there twice")
+    return Others(objects, numbers)
+
+
+def _further(number: int, value: Any) -> FurtherObject:
+    try:
+        return _further_object(number, value)
+    except ScriptError as error:
+        raise ScriptError(f"object {number}: {error}") from error
+
+
+def _further_object(number: int, value: Any) -> FurtherObject:
+    if not isinstance(value, dict):
+        raise ScriptError("it is not a JSON object")
+    options = {k: v for k, v in value.items() if k not in ("duplicate", "stay_in_front")}
+    said = {key.replace("-", "_") for key in options}
+    for key in sorted(said & OF_THE_PHOTO):
+        raise ScriptError(f"{key!r} is of the whole photo; it stands beside 'objects'")
+    script = script_from(options)
+    stays = _flag("stay_in_front", value.get("stay_in_front", False))
+    of = value.get("duplicate")
+    if of is not None:
+        of = _whole(1, number - 1)("duplicate", of)
+    allowed = OF_A_COPY if of is not None else CHOOSING if stays else said
+    if of is not None and stays:
+        raise ScriptError("a copy cannot stay in front: it is in no photo")
+    for key in sorted(said - allowed):
+        what = "a copy" if of is not None else "what stays in front"
+        raise ScriptError(f"{key!r} is nothing that {what} can be told")
+    return FurtherObject(script, of, stays, frozenset(said))
 
 
 def _number(key: str, value: Any) -> float:
@@ -200,7 +269,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
     "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
-    "gaussians": _whole(100, 2_000_000),
+    "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles,
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
@@ -209,3 +278,8 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "shadow": _one_of("auto", "none"), "fov": _number,
     "seed": _whole(0, 2**31 - 1),
 }  # fmt: skip
+
+OF_A_FILE = ("photo", "out", "objects", "order")  # keys of a script that are no options
+OF_THE_PHOTO = {"fov", "inpaint", "front", "front_mask", "seed"}
+CHOOSING = {"click", "not_click", "box", "subject", "mask", "segment"}
+OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"}

@@ -73,7 +73,8 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
         is_busy = editor.jobs.is_busy(SELECT)
         return (t("Selecting…") if is_busy else t("Click an object in the photo")), None
     if not editor.is_lifted:
-        return t("Lift object"), "lift"
+        is_kept = editor.object is not None and editor.object.stays_in_front
+        return (t("Another object"), "another") if is_kept else (t("Lift object"), "lift")
     is_moved = editor.object is not None and editor.object.is_moved
     if editor.view.tool in (ToolName.SELECT, ToolName.MASK) or (
         editor.view.tool is ToolName.LOOK and not is_moved

@@ -11,6 +11,7 @@ import numpy as np
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document
 
+from ..layers import is_front
 from ..tasks import LIFT, SELECT
 from ..texts import t
 from ..view import ToolName
@@ -125,6 +126,8 @@ class Objects:
         if document is None or len(order) < 2:
             return None
         for k in reversed(order):
+            if document.objects[k].lifted is None:  # it stays in front, and is nobody's to drag
+                continue
             is_there = k == editor.current or document.objects[k].is_visible
             if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
                 return None if k == editor.current or self._is_over_current(k) else k
@@ -139,20 +142,39 @@ class Objects:
             (other.lifted is own.lifted, other.pose is own.pose, other.placement == own.placement)
         )
 
+    def toggle_front(self) -> None:
+        """Keeps the current object in front of what is edited, as it is in the photo, or not."""
+        editor, k = self._editor, self._editor.current
+        document, item = editor.document, editor.object
+        if document is None or item is None or editor.hand.is_busy:
+            return
+        if item.stays_in_front:
+            editor.apply(t("Do not keep in front"), edits.let_go(document, k))
+            return
+        editor.jobs.cancel(LIFT)  # what it would bring is to be edited
+        try:
+            editor.apply(t("Keep in front"), edits.keep_in_front(document, k))
+        except edits.EditError as error:
+            editor.complain(str(error))
+            return
+        editor.say(t("{name} covers what moves behind it", name=item.name))
+
     # Which covers which
 
     def order(self) -> list[int]:
-        """The lifted objects, back to front."""
+        """The lifted objects and what stays in front, back to front."""
         from objectmorpher_core.compose.order import back_to_front
 
         document = self._editor.committed
         if document is None:
             return []
-        lifted = [k for k, o in enumerate(document.objects) if o.lifted]
-        if len(lifted) < 2:
-            return lifted
-        posed = {k: self._editor.derived.posed(document, k) for k in lifted}
-        return back_to_front(document.objects, posed)
+        objects = document.objects
+        fronts = [k for k in range(len(objects)) if is_front(document, k)]
+        there = [k for k, o in enumerate(objects) if o.lifted or k in fronts]
+        if len(there) < 2:
+            return there
+        posed = partial(self._editor.derived.posed, document)
+        return back_to_front(objects, {k: None if k in fronts else posed(k) for k in there})
 
     def listed(self) -> list[int]:
         """All that are selected, as a list shows them: what is in front first."""
@@ -166,7 +188,7 @@ class Objects:
         """Why the current object cannot go so many places to the front, or (negative) back."""
         order = self.order()
         if self._editor.current not in order:
-            return t("Lift an object first")
+            return t("Lift an object first, or keep it in front")
         if len(order) < 2:
             return t("There is no other object")
         place = order.index(self._editor.current)

@@ -27,7 +27,7 @@ MENUS: dict[str, tuple[str, ...]] = {
     ),
     "Object": (
         "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "remove_object", "-",
-        "forward", "backward", "to_front", "to_back", "-", "ground", "-",
+        "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
         "bare", "fill_again", "shadow", "take_shadow",
     ),
     "Tool": ("select", "mask", "pose", "place", "look", "compose"),

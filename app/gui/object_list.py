@@ -51,7 +51,7 @@ def draw_objects(editor: Editor) -> None:
         _draw_object(editor, k)
     if _is_dragged:
         _drag_row(editor, top)
-    if editor.object is not None and editor.is_lifted:
+    if editor.object is not None and (editor.is_lifted or editor.object.stays_in_front):
         imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
         if button(f"{Icon.PLUS}  {t('Another object')}", Kind.QUIET):
             run(editor, "another")
@@ -91,7 +91,7 @@ def _draw_object(editor: Editor, k: int) -> None:
     draw, is_current = imgui.get_window_draw_list(), k == editor.current
     fill_row(start, end, is_current, is_hovered or k == editor.objects.carried)
     middle = text_top(start, height)
-    icon = Icon.CUBE if thing.lifted else Icon.SELECT
+    icon = Icon.LOCK if thing.stays_in_front else Icon.CUBE if thing.lifted else Icon.SELECT
     role = "accent" if is_current else "secondary"
     draw.add_text(ImVec2(start.x + theme.pt(8), middle), theme.u32(role), icon)
     if editor.objects.renaming == k:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from objectmorpher_core.document import Document
 
 from ..editor import Editor
+from ..layers import Layer, is_front
 from ..painter import shown_now
 from ..render.scene import Hatch, Scene, SplatObject
 from ..view import Shown, ToolName
@@ -88,8 +89,13 @@ def _bare_scene(editor: Editor, document: Document) -> Scene:
     """The background alone, and what of it is being repaired."""
     photo, surround, split = document.photo.pixels, theme.rgb("surround"), editor.view.split or 0.0
     mask = editor.derived.lights.hidden(document) if document.plate is None else None
-    painted = editor.composing.painted_layer()
-    layers = () if painted is None else (painted,)
+    fronts = [
+        editor.derived.fronts.layer(item, editor.view)
+        for k, item in enumerate(document.objects)
+        if is_front(document, k)
+    ]
+    found = (*fronts, editor.composing.painted_layer())
+    layers = tuple(layer for layer in found if layer is not None)
     hatch = None if mask is None else MISSING
     return Scene(photo, surround, document.plate, (), layers, (), mask, hatch=hatch, split=split)
 
@@ -101,10 +107,14 @@ def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float
     return panel, theme.rgb("raised") if is_plain else panel
 
 
-def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject, ...]:
+def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject | Layer, ...]:
     camera, photo, derived = document.photo.camera, document.photo, editor.derived
-    found = []
+    found: list[SplatObject | Layer] = []
     for part in derived.layers.parts(document, shown):
+        if is_front(document, part.k):
+            layer = derived.fronts.layer(document.objects[part.k], editor.view)
+            found += [] if layer is None else [layer]
+            continue
         splats = derived.painter.painted(document, part.k, part.look)
         texture = derived.shape(photo, document.objects[part.k]).texture
         is_tint = part.look is Shown.STRAIN

@@ -95,6 +95,7 @@ class Icon:
     UP = "\uf062"
     DOWN = "\uf063"
     COPY = "\uf24d"
+    LOCK = "\uf023"
     FOLDER = "\uf07b"
     FILE = "\uf15b"
     RESET = "\uf2ea"

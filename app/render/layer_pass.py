@@ -35,14 +35,19 @@ class LayerPass:
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
-        self._forget(scene.shades + scene.layers)
+        between = tuple(item for item in scene.objects if isinstance(item, Layer))
+        self._forget(scene.shades + scene.layers + between)
         for layer in scene.shades + scene.layers:
-            for unit, texture in self._textures(layer).items():
-                texture.use(unit)
-            defines = _defines(scene, layer.invented is not None, layer.is_tint)
-            program, quad = self._programs(*defines)
-            set_uniforms(program, box=layer.box, **_appearance(layer))
-            self._render(program, quad, scene, view)
+            self.draw_layer(layer, scene, view)
+
+    def draw_layer(self, layer: Layer, scene: Scene, view: View) -> None:
+        """One of them, over what is there."""
+        for unit, texture in self._textures(layer).items():
+            texture.use(unit)
+        defines = _defines(scene, layer.invented is not None, layer.is_tint)
+        program, quad = self._programs(*defines)
+        set_uniforms(program, box=layer.box, **_appearance(layer))
+        self._render(program, quad, scene, view)
 
     def draw_picture(
         self, picture: SplatPicture, item: SplatObject, scene: Scene, view: View

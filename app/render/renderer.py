@@ -10,6 +10,7 @@ import numpy as np
 
 from objectmorpher_core.arrays import U8
 
+from ..layers import Layer
 from ..view import View
 from .blend_texture import BlendTexture
 from .kept_canvas import KeptCanvas, Place
@@ -104,6 +105,9 @@ class Renderer:
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
+            if isinstance(item, Layer):
+                self._layer_pass.draw_layer(item, scene, view)
+                continue
             picture = self._render(item, view)
             if picture is not None:
                 self._use(viewport)

@@ -53,7 +53,8 @@ class Scene:
     plate: Plate | None = None  # shown where there is one
     shades: tuple[Layer, ...] = ()  # shadows, below all objects
     layers: tuple[Layer, ...] = ()  # objects that are rendered already, back to front
-    objects: tuple[SplatObject, ...] = ()  # objects to render, back to front
+    # objects to render, back to front, and between them what is rendered already
+    objects: tuple[SplatObject | Layer, ...] = ()
     mask: Selection | None = None  # what `veil` and `hatch` refer to
     touched: Sequence[Box] = ()  # of a mask that is painted in place: what changed, in its order
     veil: float = 0.0  # share of black outside the mask

@@ -63,14 +63,14 @@ class Moved:
     """An object of the edit, and where its Gaussians are now."""
 
     item: EditObject
-    splats: PosedSplats
+    splats: PosedSplats | None  # None: it stays where it is, and was never lifted
     has_hole: bool = True  # nothing stands where it was
     look: Lit = NOTHING  # the light on it, and the shadow that it throws
 
     @property
     def matte(self) -> Matte:
         """Where it was, and what it looked like."""
-        assert self.item.matte is not None, "a lifted object has a matte"
+        assert self.item.matte is not None, "what is drawn has a matte"
         return self.item.matte
 
 
@@ -141,10 +141,9 @@ def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
 
     lighting, things = Lighting(document), []
     for k, splats in stack(document, posed).items():
-        item, puppet = objects[k], own[k]
-        look = NOTHING
-        if item.is_moved:
-            look = lighting.of(item, splats, partial(puppet.posed, None, Placement()))
+        item, look = objects[k], NOTHING
+        if item.is_moved and splats is not None:
+            look = lighting.of(item, splats, partial(own[k].posed, None, Placement()))
         has_hole = leaves_a_hole(objects, k)
         things.append(Moved(item, splats, has_hole, look))
     return tuple(things)
@@ -159,9 +158,12 @@ class _Drawing:
         """`margin`: px of the photo around what is disturbed."""
         self._things, self._plate, self._margin = things, plate, margin
         self._shades = [t.look.shade for t in things if t.look.shade is not None]
-        shown = [k for k, t in enumerate(things) if t.item.is_moved and t.item.is_visible]
-        self._drawables = {k: tiles.prepare(things[k].splats, camera, camera) for k in shown}
-        self._textures = {k: object_texture(things[k].matte) for k in shown}
+        self._drawables = {
+            k: tiles.prepare(thing.splats, camera, camera)
+            for k, thing in enumerate(things)
+            if thing.item.is_moved and thing.item.is_visible and thing.splats is not None
+        }
+        self._textures = {k: object_texture(things[k].matte) for k in self._drawables}
         self.box = self._region(camera)
 
     def _region(self, camera: Camera) -> Box:

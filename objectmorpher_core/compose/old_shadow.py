@@ -6,6 +6,7 @@ stays (promise 2). Only what is too dark to show any is invented.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -86,30 +87,35 @@ def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
 def shadowless_plate(
     pixels: Pixels,
     covered: Mask,
-    old: OldShadow,
+    olds: Sequence[OldShadow],
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
 ) -> Plate:
-    """As `build_plate`, of the photo in full light: the shadow is gone beside the objects, too.
+    """As `build_plate`, of the photo in full light: shadows are gone beside the objects, too.
 
     There it is painted, as by hand: shown wherever something has moved. Where it is so dark that
     the photo shows little of the ground, that is invented.
     """
     height, width = covered.shape
-    shade = old.bounds(width, height)
     lit = pixels.copy()
-    x0, y0, x1, y1 = shade
-    lit[y0:y1, x0:x1], is_changed = without_shadow(pixels, old, shade)
-    lost = crop(old.missing(shade) > LOST, shade, (0, 0, width, height)) & ~covered
+    is_changed, lost = np.zeros_like(covered), np.zeros_like(covered)
+    shades = [old.bounds(width, height) for old in olds]
+    for old, shade in zip(olds, shades, strict=True):
+        part = (slice(shade[1], shade[3]), slice(shade[0], shade[2]))
+        lit[part], is_lighter = without_shadow(lit, old, shade)
+        is_changed[part] |= is_lighter
+        lost[part] |= old.missing(shade) > LOST
+    lost &= ~covered
     filled = covered | lost
     own = build_plate(lit, covered if filled.all() else filled, inpainter, progress, seed)
-    x0, y0 = min(own.left, shade[0]), min(own.top, shade[1])
-    x1, y1 = max(own.box[2], shade[2]), max(own.box[3], shade[3])
+    boxes = np.array([own.box, *shades])
+    x0, y0 = (int(v) for v in boxes[:, :2].min(0))
+    x1, y1 = (int(v) for v in boxes[:, 2:].max(0))
     box = (x0, y0, x1, y1)
     hole = crop(own.hole, own.box, box)
     is_bare = ~covered[y0:y1, x0:x1]
-    lightened = crop(is_changed, shade, box) & is_bare & ~hole
+    lightened = is_changed[y0:y1, x0:x1] & is_bare & ~hole
     result = np.where(lightened[..., None], lit[y0:y1, x0:x1], pixels[y0:y1, x0:x1])
     np.copyto(cut(result, box, own.box), own.pixels, where=own.hole[..., None])
     reach = cv2.distanceTransform((~lost[y0:y1, x0:x1]).astype(np.uint8), cv2.DIST_L2, 5)

@@ -1,8 +1,8 @@
-"""Which lifted objects an edit draws, and in which order: the same in the view and the export."""
+"""Which objects an edit draws, and in which order: the same in the view and the export."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,47 +15,59 @@ from .plate import hole_margin
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
 Posed = Callable[[int], PosedSplats]
+Stack = dict[int, PosedSplats | None]  # None: drawn by its matte, it was never lifted
 
 
-def stack(document: Document, posed: Posed) -> dict[int, PosedSplats]:
+def stack(document: Document, posed: Posed) -> Stack:
     """What is drawn over the plate, back to front, by the objects' indices.
 
-    These are the moved objects, also the hidden ones, whose holes show; and objects at rest where
-    a moved one comes near, which may hide them or be hidden by them. `posed` gives an object's
-    Gaussians where the edit has put them. Of copies that all rest, one is drawn.
+    These are the moved objects, also the hidden ones, whose holes show; and objects at rest, and
+    what stays in front, where a moved one comes near, which may hide them or be hidden by them.
+    `posed` gives an object's Gaussians where the edit has put them. Of copies that all rest, one
+    is drawn.
     """
     objects = document.objects
-    there = {k: posed(k) for k, item in enumerate(objects) if item.is_moved}
-    resting = [k for k, item in enumerate(objects) if _rests(item, item)]
-    if resting and there:
-        reach = [_reach(document, k, splats) for k, splats in there.items()]
+    moved = {k: posed(k) for k, item in enumerate(objects) if item.is_moved}
+    there: Stack = dict(moved)
+    resting = [k for k, o in enumerate(objects) if _rests(o, o) or stands_in_front(o)]
+    if resting and moved:
+        reach = [_reach(document, k, splats) for k, splats in moved.items()]
         for k in resting:
-            matte = objects[k].matte
-            is_second = any(_rests(other, objects[k]) for other in objects[:k])
-            if matte and not is_second and any(_meet(matte.box, bounds) for bounds in reach):
-                there[k] = posed(k)
+            item = objects[k]
+            is_second = any(_rests(other, item) for other in objects[:k])
+            if item.matte and not is_second and any(_meet(item.matte.box, b) for b in reach):
+                there[k] = None if item.stays_in_front else posed(k)
     return {k: there[k] for k in back_to_front(objects, there)}
 
 
-def back_to_front(objects: tuple[EditObject, ...], splats: dict[int, PosedSplats]) -> list[int]:
+def stands_in_front(item: EditObject) -> bool:
+    """Whether it covers what is edited, as it does in the photo."""
+    return item.stays_in_front and item.matte is not None and item.is_visible and not item.is_moved
+
+
+def back_to_front(
+    objects: tuple[EditObject, ...], splats: Mapping[int, PosedSplats | None]
+) -> list[int]:
     """The keys of `splats` by layer, and within a layer by depth, the farthest first.
 
-    Of two at one depth the later is in front: a copy that was moved aside.
+    Of two at one depth the later is in front: a copy that was moved aside. What has no depth, for
+    it was told to stay in front, is the nearest.
     """
     return sorted(splats, key=lambda k: (objects[k].layer, -_depth(splats[k]), k))
 
 
-def _depth(splats: PosedSplats) -> float:
+def _depth(splats: PosedSplats | None) -> float:
     """World units; without its last digits, which differ between equal depths."""
-    return float(np.float32(splats.middle_depth))
+    return -np.inf if splats is None else float(np.float32(splats.middle_depth))
 
 
 def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) -> Document:
-    """The document with layers such that the lifted objects are drawn in `order`, back to front.
+    """The document with layers such that these objects are drawn in `order`, back to front.
 
     Object `k` is the one that was put elsewhere; other layers are raised only where they must be.
     """
-    objects, depths = list(document.objects), {i: _depth(posed(i)) for i in order}
+    objects = list(document.objects)
+    depths = {i: _depth(None if stands_in_front(objects[i]) else posed(i)) for i in order}
 
     def is_nearer(one: int, other: int) -> bool:
         return (-depths[one], one) > (-depths[other], other)

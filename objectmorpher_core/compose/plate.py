@@ -132,10 +132,20 @@ def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None
 
 
 def plate_picture(document: Document) -> Pixels:
-    """(H, W, 3) the photo with its objects painted out."""
-    assert document.plate is not None, "make the plate first"
+    """(H, W, 3) the photo with its objects painted out, but for what stays in front."""
+    plate, photo = document.plate, document.photo.pixels
+    assert plate is not None, "make the plate first"
     width, height = document.photo.size
-    return plate_crop(document.photo.pixels, document.plate, (0, 0, width, height))
+    result = plate_crop(photo, plate, (0, 0, width, height))
+    for item in document.objects:
+        box = overlap(plate.box, item.matte.box) if item.matte is not None else None
+        if box is not None and item.matte is not None and item.stays_in_front:
+            own, is_invented = item.matte, cut(plate.hole, plate.box, box)[..., None]
+            alpha = cut(own.alpha, own.box, box)[..., None]
+            behind = cut(result, (0, 0, width, height), box)
+            mixed = alpha * cut(own.foreground, own.box, box) + (1 - alpha) * unit_pixels(behind)
+            np.copyto(behind, pixels_from_unit(mixed, photo.dtype), where=is_invented)
+    return result
 
 
 def plate_crop(photo: Pixels, plate: Plate, box: Box) -> Pixels:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import edits, pipeline, segment
-from objectmorpher_core.compose.composite import straight_cutout
+from objectmorpher_core.compose.composite import object_texture, straight_cutout
 from objectmorpher_core.document import Placement
 from objectmorpher_core.edits import EditError
 from objectmorpher_core.image import ImageError, Picture, encode_picture, read_picture
@@ -200,7 +200,7 @@ def test_the_picture_of_a_moved_object_moves_with_it():
 def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
     edited = _run(turn=[15, 0, 0])
     picked = edited.puppet.pick(
-        (78.0, 62.0), None, Placement(), pipeline.object_texture(edited.document.objects[0].matte)
+        (78.0, 62.0), None, Placement(), object_texture(edited.document.objects[0].matte)
     )
     placed = edited.puppet.picture_of(picked.rest, None, edited.document.objects[0].placement)
     assert placed[0] < 78 - 2

@@ -24,7 +24,8 @@ FULL = {
     "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5, "stretch-limit": 1.5,
     "split": True, "shadow": "none", "fov": 60, "seed": 7,
     "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
-    "trust": 0.5, "no-depth": True, "hidden": "h.png",
+    "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]], "front-mask": "f.png",
+    "remove": True,
 }  # fmt: skip
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from objectmorpher_core.document import EditObject
+
+from ...commands import run, why_not
 from ...editor import Editor
 from ...texts import t
 from ...view import SelectMode
 from ..models_dialog import draw_offer
 from ..segmented import Choice, segmented
 from ..theme import Icon
-from ..widgets import gap, heading, note
+from ..widgets import checkbox, gap, heading, note, tooltip
 from .edge import draw_command, draw_edge, draw_lift_warning
 
 
@@ -60,8 +63,21 @@ def _draw_facts(editor: Editor) -> None:
         note(" ".join(facts))
     if mask is None and editor.view.selecting.mode is SelectMode.CLICK:
         note(t("Left click adds what belongs to the object, right click removes what does not."))
-    elif mask is not None and not editor.is_lifted:
-        note(t("Right-click what does not belong to the object, then lift it."))
-        draw_command(editor, "import_shape")
+    elif mask is not None and editor.object is not None and not editor.is_lifted:
+        if editor.object.stays_in_front:
+            note(t("It stays where it is, in front of what is edited."))
+        else:
+            note(t("Right-click what does not belong to the object, then lift it."))
+            draw_command(editor, "import_shape")
+        _draw_front(editor, editor.object)
     draw_lift_warning(editor)
     draw_offer(editor)
+
+
+def _draw_front(editor: Editor, item: EditObject) -> None:
+    """Whether it is not edited and stays in front."""
+    if why_not(editor, "keep_in_front") is not None:
+        return
+    if checkbox(t("Keep in front"), item.stays_in_front) != item.stays_in_front:
+        run(editor, "keep_in_front")
+    tooltip(t("It is not edited, and covers what moves behind it"))

@@ -121,7 +121,7 @@ def test_moved_back_it_is_the_photo_byte_for_byte(name, bits):
     old = find_old_shadow(document.photo.pixels, item.matte, bodies)
     if old is not None:  # also where its shadow was taken off the ground
         pixels, covered = document.photo.pixels, plate_cover(document)
-        plate = shadowless_plate(pixels, covered, old, load("telea"))
+        plate = shadowless_plate(pixels, covered, (old,), load("telea"))
         edited = edits.set_plate(edited, plate)
     back = edits.set_placement(edited, 0, Placement())
     assert np.array_equal(composite(back, {0: puppet}).pixels, document.photo.pixels)

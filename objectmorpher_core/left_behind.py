@@ -1,0 +1,65 @@
+"""What a script's objects leave behind: the plate of all, and their shadows in the photo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from . import compose, edits
+from .compose.lighting import standings
+from .compose.old_shadow import OldShadow, shadowless_plate
+from .compose.plate import build_plate, plate_cover
+from .compose.shadow_fit import find_old_shadow
+from .document import Document, EditObject, Matte, Placement
+from .progress import Progress
+from .puppet import Puppet
+from .script import EditScript
+
+
+def with_plate(
+    document: Document,
+    script: EditScript,
+    casting: Mapping[int, Puppet],
+    progress: Progress,
+) -> Document:
+    """The document with what is behind all its objects; those of the numbers in `casting`
+    take their own shadow along.
+
+    An object that has left its place takes its shadow off the ground, where that is sure. It, and
+    every copy of it that is elsewhere, throws one like it.
+    """
+    covered, pixels = plate_cover(document), document.photo.pixels
+    gone: list[OldShadow] = []
+    for matte in _distinct(document, casting):
+        alike = [k for k in casting if document.objects[k].matte is matte]
+        rest = casting[alike[0]].posed(None, Placement())
+        shadow = document.objects[alike[0]].shadow
+        bodies = standings(rest, document.photo.camera, document.horizon, shadow)
+        old = find_old_shadow(pixels, matte, bodies, covered)
+        if old is None:
+            continue
+        for k in alike:
+            if document.objects[k].is_visible:
+                document = edits.set_shadow(document, k, old.shadow)
+        if not any(o.matte is matte and not has_left(o) for o in document.objects):
+            gone.append(old)
+    inpainter = compose.load(script.inpaint)
+    if gone:
+        plate = shadowless_plate(pixels, covered, gone, inpainter, progress, script.seed)
+    else:
+        plate = build_plate(pixels, covered, inpainter, progress, script.seed)
+    return edits.set_plate(document, plate)
+
+
+def has_left(item: EditObject) -> bool:
+    """Whether it is not where its shadow in the photo is: turned and bent it still stands there."""
+    place = item.placement
+    return not item.is_visible or place.move != (0, 0) or place.depth != 0 or place.scale != 1
+
+
+def _distinct(document: Document, casting: Iterable[int]) -> list[Matte]:
+    """Their mattes, each once: copies share theirs."""
+    found: dict[int, Matte] = {}
+    for k in sorted(casting):
+        if (matte := document.objects[k].matte) is not None:
+            found.setdefault(id(matte), matte)
+    return list(found.values())

@@ -1,0 +1,190 @@
+"""What a script says about an object that is lifted: handles, pose, place, light, copies, order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from . import compose, edits, lift, segment
+from .compose.composite import object_texture
+from .compose.order import reordered
+from .document import DeformSettings, Document, Placement
+from .joining import Shadow
+from .progress import Progress
+from .puppet import Puppet, puppet_of
+from .report import Stopwatch
+from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
+
+
+def refuse_missing(script: EditScript, others: Others = ALONE) -> None:
+    """Raises ScriptError where the script needs a backend that is not there."""
+    for number, own in enumerate((script, *(o.script for o in others.objects)), 1):
+        with told_of(number, others):
+            _refuse_missing(own)
+
+
+def _refuse_missing(script: EditScript) -> None:
+    chosen = (
+        ("segmenter", script.segment, segment.BACKENDS),
+        ("lifter", script.lift, lift.BACKENDS),
+        ("inpainter", script.inpaint, compose.BACKENDS),
+    )
+    for kind, name, known in chosen:  # also where the stage will not run
+        if name != "auto" and name not in known:
+            raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
+    if script.refine not in ("auto", *compose.REFINERS):
+        known = ", ".join(compose.REFINERS)
+        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: {known}")
+
+
+@contextmanager
+def told_of(number: int, others: Others) -> Iterator[None]:
+    """An error inside says which object it is about, where there are several."""
+    try:
+        yield
+    except ValueError as error:
+        if not others.objects:
+            raise
+        raise ScriptError(f"object {number}: {error}") from error
+
+
+def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
+    """Copies are told about shadow and light what their originals are, unless they say it."""
+    result: list[FurtherObject] = []
+    for wanted in wishes:
+        if wanted.duplicate is not None:
+            of = result[wanted.duplicate - 1].script
+            kept = {name: getattr(of, name) for name in {"shadow", "refine"} - wanted.said}
+            wanted = replace(wanted, script=replace(wanted.script, **kept))
+        result.append(wanted)
+    return result
+
+
+def with_settings(document: Document, k: int, script: EditScript) -> Document:
+    """Object `k` with the control points and the way of deforming that the script asks for."""
+    if script.nodes is not None:
+        document = edits.resample(document, k, script.nodes)
+    settings = DeformSettings(
+        script.deform,
+        script.links,
+        script.faithful,
+        script.stiffness,
+        script.stretch_limit,
+        script.split,
+    )
+    return edits.set_deform(document, k, settings)
+
+
+def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
+    """Object `k` as a copy of another; what it is not told is as it is there."""
+    assert wanted.duplicate is not None
+    if document.objects[wanted.duplicate - 1].stays_in_front:
+        raise ScriptError(f"object {wanted.duplicate} stays in front and cannot be copied")
+    document = edits.duplicate(document, wanted.duplicate - 1)
+    item = document.objects[k]
+    script, said, place = wanted.script, wanted.said, item.placement
+    if {"handle", "pin"} & said:
+        document = edits.reset_pose(document, k)
+    asked = _placement(script)
+    place = Placement(
+        asked.move if "move" in said else place.move,
+        asked.depth if "move" in said else place.depth,
+        asked.turn if "turn" in said else place.turn,
+        asked.scale if "scale" in said else place.scale,
+    )
+    document = edits.set_placement(document, k, place)
+    document = edits.set_visible(document, k, True)
+    if script.shadow == "none":
+        document = edits.set_shadow(document, k, Shadow())
+    return document
+
+
+def posed(
+    document: Document,
+    k: int,
+    puppet: Puppet,
+    script: EditScript,
+    progress: Progress,
+    stopwatch: Stopwatch,
+) -> tuple[Document, tuple[float, ...]]:
+    """Handles and pins of the script, and the pose they give; the energies of the solve."""
+    energies: tuple[float, ...] = (0.0,)
+    document = _with_handles(document, k, puppet, script)
+    item = document.objects[k]
+    if any(not handle.is_pin for handle in item.handles):
+        progress(0.5, "Linking control points")
+        with stopwatch.stage("graph"):
+            deformer = puppet.deformer
+        progress(0.55, "Deforming")
+        with stopwatch.stage("deform"):
+            solution = deformer.solve(item.handles, item.has_auto_anchors)
+        energies = solution.energies
+        document = edits.set_pose(document, k, solution.pose)
+    return document, energies
+
+
+def placed(document: Document, k: int, script: EditScript) -> Document:
+    """Object `k` where the script wants it, or gone."""
+    document = edits.set_placement(document, k, _placement(script))
+    return edits.set_visible(document, k, False) if script.remove else document
+
+
+def _placement(script: EditScript) -> Placement:
+    move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
+    scale = 1.0 if script.scale is None else script.scale
+    return Placement((move[0], move[1]), move[2], turn, scale)
+
+
+def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:
+    lifted, camera = puppet.lifted, document.photo.camera
+    matte = document.objects[k].matte
+    assert matte is not None
+    texture = object_texture(matte)
+
+    def pick(xy: tuple[float, float], option: str) -> Any:
+        width, height = document.photo.size
+        if not (0 <= xy[0] < width and 0 <= xy[1] < height):
+            raise ScriptError(
+                f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
+            )
+        point = puppet.pick(xy, None, Placement(), texture)
+        if point is None:
+            raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
+        return point
+
+    for xy in script.pin:
+        document = edits.add_handle(document, k, pick(xy, "--pin").rest, is_pin=True)
+    for handle in script.handle:
+        point = pick(handle.at, "--handle")
+        depth = point.depth + handle.dz * lifted.diameter * lifted.scale
+        if depth <= 0:
+            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
+        target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
+        document = edits.add_handle(document, k, point.rest, target)
+    return document
+
+
+def ordered(document: Document, others: Others) -> Document:
+    """The document with layers in the script's `order`; what stays in front is before them all.
+
+    Unless the order names it, too.
+    """
+    order = [number - 1 for number in others.order]
+    if len(order) > 1:
+        camera = document.photo.camera
+
+        def posed_of(k: int) -> Any:
+            item = document.objects[k]
+            return puppet_of(item, camera).posed(item.pose, item.placement)
+
+        document = reordered(document, order[0], order, posed_of)
+    top = max(item.layer for item in document.objects)
+    objects = tuple(
+        replace(item, layer=top) if item.stays_in_front and k not in order else item
+        for k, item in enumerate(document.objects)
+    )
+    return replace(document, objects=objects)

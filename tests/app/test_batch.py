@@ -1,0 +1,131 @@
+"""`objectmorpher batch`: many scripts, whatever becomes of each."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app import cli
+from objectmorpher_core.image import read_picture
+from tests import shapes
+
+MASK = shapes.mask("ellipse")
+PIXELS = shapes.picture(MASK)
+QUICK = {"mask": "mask.png", "gaussians": 300, "inpaint": "telea"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Two photos, a mask, and a folder of scripts."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("scripts", "out", "photos"):
+        Path(name).mkdir()
+    Path("scripts/mask.png").write_bytes(shapes.mask_png(MASK))
+    for name in ("one.png", "two.png"):
+        (tmp_path / "photos" / name).write_bytes(shapes.png(PIXELS))
+    return tmp_path
+
+
+def _script(name: str, *edits: dict) -> None:
+    whole = [QUICK | {"photo": "../photos/one.png"} | edit for edit in edits]
+    text = json.dumps(whole if len(whole) > 1 else whole[0])
+    Path("scripts", name).write_text(text, encoding="utf-8")
+
+
+def _batch(*more: str) -> int:
+    return cli.main(["batch", "scripts", "-o", "out", *more])
+
+
+def _made() -> list[str]:
+    return sorted(path.name for path in Path("out").iterdir())
+
+
+def test_a_failure_does_not_stop_the_others(folder, capsys):
+    _script("a.json", {"move": [9, 4]})
+    _script("b.json", {"photo": "../photos/nowhere.png"})
+    Path("scripts/c.json").write_text("{", encoding="utf-8")
+    _script("d.json", {"turn": [20, 0, 0]}, {"remove": True})
+    assert _batch("--report", "r.json") == cli.FAILED
+    assert _made() == ["a.png", "d-1.png", "d-2.png"]
+    told = capsys.readouterr()
+    lines = told.out.splitlines()
+    assert [line.split()[0] for line in lines[:-1]] == ["done", "failed", "failed", "done", "done"]
+    assert lines[-1] == "3 done, 0 kept, 2 failed"
+    assert "nowhere.png does not exist" in lines[1] and "not JSON" in lines[2]
+    assert told.err.splitlines()[-1].endswith("2 of 5 edits failed")
+    report = json.loads(Path("r.json").read_text())
+    assert (report["done"], report["failed"], len(report["edits"])) == (3, 2, 5)
+    assert report["edits"][0]["report"]["pixels"]["outside_footprint_changed"] == 0
+
+
+def test_it_makes_what_edit_makes(folder):
+    _script("a.json", {"move": [9, 4]})
+    assert _batch() == 0
+    assert cli.main(["edit", "--script", "scripts/a.json", "-o", "own.png"]) == 0
+    assert Path("out/a.png").read_bytes() == Path("own.png").read_bytes()
+
+
+def test_what_was_made_already_is_kept_until_something_changes(folder, capsys):
+    _script("a.json", {"move": [9, 4]})
+    assert _batch() == 0
+    made = Path("out/a.png").stat()
+    assert _batch() == 0
+    assert "1 kept" in capsys.readouterr().out
+    assert Path("out/a.png").stat().st_mtime_ns == made.st_mtime_ns
+    for changed in ("scripts/a.json", "photos/one.png", "scripts/mask.png"):
+        later = Path("out/a.png").stat().st_mtime + 5
+        os.utime(changed, (later, later))
+        assert _batch() == 0
+        assert "1 done" in capsys.readouterr().out.splitlines()[-1], changed
+        os.utime(changed, (1, 1))
+    assert _batch("--overwrite") == 0
+    assert "1 done" in capsys.readouterr().out
+
+
+def test_a_script_without_a_photo_is_for_all_that_are_named(folder):
+    Path("scripts/a.json").write_text(json.dumps(QUICK | {"move": [9, 4]}), encoding="utf-8")
+    assert _batch("--photo", "photos") == 0
+    assert _made() == ["one-a.png", "two-a.png"]
+    one, two = (read_picture(Path("out", name).read_bytes()).pixels for name in _made())
+    assert np.array_equal(one, two) and (one != PIXELS).any()
+
+
+def test_a_script_names_its_own_output(folder):
+    _script("a.json", {"move": [9, 4], "out": "../out/mine.tif"})
+    assert cli.main(["batch", "scripts/a.json"]) == 0
+    assert _made() == ["mine.tif"]
+
+
+WRONG = {
+    "no photo": ({"photo": None}, 'names no "photo"'),
+    "over its photo": ({"out": "../photos/one.png"}, "is an input"),
+    "another kind of file": ({"out": "../out/a.txt"}, "the ending must be"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_is_a_line(folder, capsys, case):
+    change, sentence = WRONG[case]
+    whole = {k: v for k, v in (QUICK | {"photo": "../photos/one.png"} | change).items() if v}
+    Path("scripts/a.json").write_text(json.dumps(whole), encoding="utf-8")
+    before = Path("photos/one.png").read_bytes()
+    assert _batch() == cli.FAILED
+    assert sentence in capsys.readouterr().out
+    assert Path("photos/one.png").read_bytes() == before and _made() == []
+
+
+def test_two_edits_do_not_write_one_file(folder, capsys):
+    _script("a.json", {"move": [9, 4], "out": "../out/x.png"}, {"scale": 2, "out": "../out/x.png"})
+    assert _batch() == cli.FAILED
+    assert "1 done, 0 kept, 1 failed" in capsys.readouterr().out
+
+
+def test_without_a_script_there_is_nothing_to_run(folder, capsys):
+    assert _batch() == cli.FAILED
+    assert "no script" in capsys.readouterr().err
+    assert cli.main(["batch", "scripts", "-o", "nowhere"]) == cli.FAILED
+    assert "is no folder" in capsys.readouterr().err
