@@ -162,8 +162,8 @@ def _cleared(alpha: F32, distance: F32, widths: tuple[float, float], chance: F32
 
     Where hair stands, or a wide blur, something nearby is surely on the mask's other side; haze is
     faint all over. So is a narrow blur's: but where the colours on both sides are far apart no
-    likeness is. `chance` (h, w): alpha that may be one; `distance` (h, w) px is the mask's, `widths` px what
-    its edge may be off, and the band.
+    likeness is. `chance` (h, w) is the alpha that may be one, `distance` (h, w) px the mask's,
+    `widths` px what its edge may be off, and the band.
     """
     astray, band = widths
     away = np.abs(distance)
