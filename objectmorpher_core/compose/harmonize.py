@@ -14,7 +14,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64
+from ..arrays import F32, F64, U8
 from ..document import Document
 from ..pixels import unit_pixels
 from .shadow import GAMMA
@@ -82,6 +82,16 @@ def lit(colour: F32, alpha: F32, gain: Gain) -> F32:
     if gain == NEUTRAL:
         return colour
     return np.minimum(colour * np.array(gain, np.float32), alpha[..., None])
+
+
+def lit_rgba(rgba: U8, gain: Gain) -> U8:
+    """The same of a picture (h, w, 4) u8."""
+    if gain == NEUTRAL:
+        return rgba
+    steps = np.arange(256)[:, None] * np.array([*gain, 1.0]) + 0.5
+    table = steps.clip(0, 255).astype(np.uint8)[:, None]
+    lit = np.asarray(cv2.LUT(rgba, np.ascontiguousarray(table.transpose(1, 0, 2))), np.uint8)
+    return np.minimum(lit, rgba[..., 3:])
 
 
 def _beyond(logarithm: np.ndarray) -> np.ndarray:
