@@ -28,7 +28,7 @@ SHOWN = {("ball", "left", "yaw 35"), ("duck", "above", "pitch 25"), ("figure", "
          ("box", "left", "yaw -35")}  # fmt: skip
 GRAINS = ("x 2.2", "x 0.6", "half a pixel")
 QUALITY = 88
-TILE = 200  # px
+TILE, WIDE = 200, 280  # px
 
 
 def main() -> None:
@@ -52,7 +52,7 @@ def main() -> None:
     _write("photos.jpg", shadow_pairs(), 420)
     grained = grains.measured()
     own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
-    _write("grains.jpg", [[p for c in own for p in c.pictures]])
+    _write("grains.jpg", [[p[:40, :40] for p in c.pictures] for c in own], WIDE)
     measures = Measures(
         turned, places.measured(meshes), grained, grains.found_on_photos(), shaded, filled
     )
