@@ -42,8 +42,8 @@ the solid in levels of 255, plain → Harmonise's *Place* at its usual strength.
 
 What the light is and what the material is, nobody can tell for sure from two mean colours: where
 photographs differ within each place, little is changed, and that much too little where the light
-is truly another. Beside each other in one material it helps most. How much doubt counts was chosen
-on these very cases.
+is truly another. In one material it helps most. Those that are worse stand on wood and grass, whose
+pictures have light and shade of their own. How much doubt counts was chosen on these very cases.
 """
 GRAIN = """## Grain
 

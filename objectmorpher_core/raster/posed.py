@@ -77,10 +77,11 @@ class RestSplats:
         other.blocks = frozen(blocks)
         return other
 
-    @cached_property
     def brightened(self) -> RestSplats:
-        """The same, where it shows its own colours brighter by 1; what it shows of the photo is
-        as it was: the difference says where that is."""
+        """The same in its own colours brighter by 1.
+
+        What it shows of the photo is as it was: the difference between both says where that is.
+        """
         other = copy.copy(self)
         gaussians = self.lifted.gaussians
         other.lifted = replace(
@@ -164,7 +165,7 @@ class PosedSplats:
 
     def brightened(self) -> PosedSplats:
         """The same in its own colours brighter by 1, see `RestSplats.brightened`."""
-        return replace(self, rest=self.rest.brightened)
+        return replace(self, rest=self.rest.brightened())
 
     @property
     def is_layered(self) -> bool:

@@ -14,7 +14,7 @@ from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.grain import Grain, find_grain, sketch_grain
 from objectmorpher_core.compose.noise import BANDS, TILE, Noise, find_noise
-from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.document import DeformSettings, Document, Placement
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.session_file import SessionError, decode_session, encode_session
 from tests import shapes
@@ -126,6 +126,21 @@ def puppet_texture(document: Document):
     return object_texture(matte)
 
 
+def test_what_shows_nothing_of_the_photo_is_given_all_of_its_grain():
+    document, puppet = _scene(0.0)
+    noise = find_noise(document.photo.pixels)
+    assert noise is not None
+    camera, lifted = document.photo.camera, puppet.lifted
+    unseen = np.zeros(len(lifted.gaussians), np.float32)
+    texture = replace(lifted.texture, visibility=unseen)
+    other = Puppet(replace(lifted, splatting="classic", texture=texture), DeformSettings(), camera)
+    splats = other.posed(None, Placement(move=MOVED))
+    exact = find_grain(splats, puppet_texture(document), noise, 0.5, camera)
+    rough = sketch_grain(splats, noise, 0.5, camera)
+    assert exact is not None and rough is not None
+    assert exact.amount.min() > 0.49 and rough.amount.min() == 0.5
+
+
 @pytest.mark.parametrize("place", ["made smaller", "enlarged", "rolled"])
 def test_a_sketch_is_about_as_grainy(place):
     document, puppet = _scene(0.0)
@@ -166,7 +181,7 @@ def test_a_photo_without_noise_has_none():
     pixels, _ = _grainy(0.0)
     assert find_noise(np.full_like(pixels, 120)) is None
     assert find_noise(pixels[:12, :12]) is None
-    smooth = cv2.GaussianBlur(pixels, (0, 0), 8)
+    smooth = np.asarray(cv2.GaussianBlur(pixels, (0, 0), 8), np.uint8)
     assert find_noise(smooth) is None
 
 
@@ -196,7 +211,7 @@ def test_bytes_are_given_the_same_grain_and_alpha_stays():
     alpha[:20] = 0
     colour = (rng.uniform(0, 1, (70, 90, 3)) * alpha[..., None]).astype(np.float32)
     rgba = np.rint(255 * np.dstack([colour, alpha])).astype(np.uint8)
-    unit = rgba / np.float32(255)
+    unit = (rgba / 255).astype(np.float32)
     varied = rng.uniform(0, 1, (5, 7, BANDS)).astype(np.float32)
     for amount in (varied, varied[:1, :1]):
         grain = Grain(noise, amount, -3.0, 4.0, 17.0)
