@@ -74,7 +74,9 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     noisy = np.random.default_rng(0).integers(90, 160, (64, 64, 3)).astype(np.uint8)
     if (noise := find_noise(noisy)) is not None:
         even = np.ones((1, 1, BANDS), np.float32)
-        Grain(noise, even, 0.0, 0.0, 1.0).grained_rgba(clear, 0.0, 0.0, 1.0)
+        grain = Grain(noise, even, 0.0, 0.0, 1.0)
+        grain.grained_rgba(clear, 0.0, 0.0, 1.0)
+        grain.grained(np.zeros((4, 4, 3), np.float32), small, 0, 0)
         splats = puppet.posed(thing.pose, Placement(scale=1.3))
         sketch_grain(splats, noise, 1.0, document.photo.camera)
     affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
