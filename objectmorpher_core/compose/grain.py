@@ -66,9 +66,10 @@ class Grain:
 
         `alpha` (h, w). None is brighter than white, or darker than black.
         """
-        out = np.empty_like(colour)
+        out = np.empty(colour.shape, np.float32)
         table, places = self.noise.deviation, self._places(alpha.shape, left, top, 1.0)
-        inputs: tuple[Any, ...] = colour, np.ascontiguousarray(alpha), table, *places, out
+        pixels = np.ascontiguousarray(colour), np.ascontiguousarray(alpha)
+        inputs: tuple[Any, ...] = *pixels, table, *places, out
         in_threads(lambda a, b: _add(a, b, *inputs), len(out), 2, LEAST_ROWS)
         return out
 
