@@ -118,7 +118,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("backends").add_argument
     add("--lift", metavar="NAME", help="auto or relief")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
-    add("--refine", metavar="NAME", help="none (also auto) or harmonise: light")
+    add("--refine", metavar="NAME", help="none (also auto) or harmonise: light, grain")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add = parser.add_argument_group("the object's shape").add_argument
     add("--gaussians", type=int, metavar="N", help="how many to lift the object to")

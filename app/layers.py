@@ -24,7 +24,7 @@ from .painter import PAINTED
 from .view import Shown, View
 
 if TYPE_CHECKING:
-    from objectmorpher_core.compose.relight import Relit
+    from objectmorpher_core.compose.lighting import Lit
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.reference import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
@@ -103,7 +103,7 @@ class _Work:
     shown: Layer
     since: float  # s, monotonic, when the splats or the view changed last
     is_asked: bool = False
-    relit: tuple[Layer, Relit, Layer] | None = None  # `shown`, the light, and `shown` in it
+    lit: tuple[Layer, Lit, Layer] | None = None  # `shown`, light and grain, and `shown` in them
 
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px
@@ -157,8 +157,9 @@ class Layers:
         if part.is_painted:
             return work.shown
         look = self._derived.lights.of(document, part.k)
-        shown = work.shown if look.relit is None else _relit(work, look.relit)
-        return shown if look.gain == shown.gain else replace(shown, gain=look.gain)
+        if look.relit is not None or look.grain is not None:
+            return _lit(work, look)
+        return work.shown if look.gain == work.shown.gain else replace(work.shown, gain=look.gain)
 
     def parts(self, document: Document, shown: Shown) -> list[Part]:
         """What a view is put together from, back to front."""
@@ -356,16 +357,23 @@ def _sharp_layer(
     return Layer(_floats(covered), rgba, invented, is_draft=True)
 
 
-def _relit(work: _Work, relit: Relit) -> Layer:
-    """What is shown of a part, in a light that varies over it."""
-    shown, kept = work.shown, work.relit
-    if kept is not None and kept[0] is shown and kept[1] is relit:
+def _lit(work: _Work, look: Lit) -> Layer:
+    """What is shown of a part, in a light that varies over it, and with grain."""
+    shown, kept = work.shown, work.lit
+    if kept is not None and kept[0] is shown and kept[1] is look:
         return kept[2]
     left, top, zoom = work.view[:3]
     x0, y0 = shown.box[:2]
-    rgba = relit.lit_rgba(shown.pixels, left + x0 / zoom, top + y0 / zoom, zoom)
-    result = replace(shown, rgba=rgba)
-    work.relit = shown, relit, result
+    place = (left + x0 / zoom, top + y0 / zoom, zoom)
+    from objectmorpher_core.compose.harmonize import NEUTRAL, lit_rgba
+
+    rgba, gain = shown.pixels, look.gain
+    if look.relit is not None:
+        rgba = look.relit.lit_rgba(rgba, *place)
+    if look.grain is not None:  # last: it is as strong as the photo's at the brightness shown
+        rgba, gain = look.grain.grained_rgba(lit_rgba(rgba, gain), *place), NEUTRAL
+    result = replace(shown, rgba=rgba, gain=gain)
+    work.lit = shown, look, result
     return result
 
 

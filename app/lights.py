@@ -1,4 +1,4 @@
-"""Shadows and light of the document's objects, remembered; and where they and repairs are shown.
+"""Shadows, light and grain of the document's objects, remembered; and where repairs are shown.
 
 While something is dragged, a shadow is a coarse one, made in the time that a frame has; once the
 pointer rests, it is the one that is exported.
@@ -73,14 +73,13 @@ class Lights:
         from objectmorpher_core.compose.lighting import NOTHING
 
         item = document.objects[k]
-        has_any = item.shadow.strength or item.harmony or item.relight
+        has_any = item.shadow.strength or item.harmony or item.relight or item.grain
         if not item.is_moved or not item.is_visible or not has_any:
             self._kept.pop(k, None)
             return NOTHING
         splats, now = self._derived.posed(document, k), time.monotonic()
-        sources = (
-            splats, item.shadow, item.harmony, item.relight, document.plate, document.horizon,
-        )  # fmt: skip
+        shares = (item.harmony, item.relight, item.grain)
+        sources = (splats, item.shadow, *shares, document.plate, document.horizon)
         kept = self._kept.get(k)
         if kept is None or not same(kept.sources, sources):
             lit = self._work(document, k, self._is_hurried)()

@@ -309,6 +309,7 @@ class EditObject:
     shadow: Shadow = field(default_factory=Shadow)
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
     relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
+    grain: float = 0.0  # in [0, 1], how much of the photo's grain that it has lost it is given
     shape: LiftSettings = field(default_factory=LiftSettings)
     stays_in_front: bool = False  # covers what is edited, as it does in the photo
 

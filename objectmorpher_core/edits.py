@@ -21,7 +21,14 @@ from .document import (
     Pose,
     Prompt,
 )
-from .joining import LEAST_FEATHER, MOST_FEATHER, USUAL_HARMONY, USUAL_RELIGHT, Shadow
+from .joining import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    USUAL_GRAIN,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+    Shadow,
+)
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 
@@ -366,10 +373,21 @@ def set_relight(document: Document, k: int, relight: float) -> Document:
     return document.with_object(k, replace(document.objects[k], relight=float(relight)))
 
 
+def set_grain(document: Document, k: int, grain: float) -> Document:
+    """How much of the photo's grain object `k` is given where it has lost it, in [0, 1]."""
+    if not 0 <= grain <= 1:
+        raise EditError(f"a grain of {grain:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], grain=float(grain)))
+
+
 def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
-    """Object `k` in the light of its new place and of how it is turned, or in that of the photo."""
-    harmony, relight = (USUAL_HARMONY, USUAL_RELIGHT) if is_harmonised else (0.0, 0.0)
-    return set_relight(set_harmony(document, k, harmony), k, relight)
+    """Object `k` in the light of its new place and of how it is turned, and as grainy as the photo.
+
+    Or as it was in the photo.
+    """
+    usual = (USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN) if is_harmonised else (0.0, 0.0, 0.0)
+    document = set_relight(set_harmony(document, k, usual[0]), k, usual[1])
+    return set_grain(document, k, usual[2])
 
 
 def set_feather(document: Document, feather: float) -> Document:

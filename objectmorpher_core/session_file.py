@@ -251,7 +251,8 @@ def _check_joining(document: Document) -> None:
         raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
     for item in document.objects:
         item.shadow.check()
-        for name, value in {"harmony": item.harmony, "relighting": item.relight}.items():
+        shares = {"harmony": item.harmony, "relighting": item.relight, "grain": item.grain}
+        for name, value in shares.items():
             if not 0 <= value <= 1:
                 raise ValueError(f"an object's {name} is {value:g}, not between 0 and 1")
 

@@ -59,6 +59,8 @@ def _edited() -> Document:
 def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     """A photo that is large, one of 16 bits, and Gaussians that are drawn as they are in a file."""
     from .compose.composite import object_texture
+    from .compose.grain import Grain, sketch_grain
+    from .compose.noise import BANDS, find_noise
     from .compose.relight import Relit
     from .lift.integration import solved
     from .pipeline import lift_mask, make_plate
@@ -67,7 +69,16 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     empty = np.zeros((4, 4))
     solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
     small = np.zeros((4, 4), np.float32)
-    Relit(small, 0.0, 0.0, 1.0).lit_rgba(np.zeros((4, 4, 4), np.uint8), 0.0, 0.0, 1.0)
+    clear = np.zeros((4, 4, 4), np.uint8)
+    Relit(small, 0.0, 0.0, 1.0).lit_rgba(clear, 0.0, 0.0, 1.0)
+    noisy = np.random.default_rng(0).integers(90, 160, (64, 64, 3)).astype(np.uint8)
+    if (noise := find_noise(noisy)) is not None:
+        even = np.ones((1, 1, BANDS), np.float32)
+        grain = Grain(noise, even, 0.0, 0.0, 1.0)
+        grain.grained_rgba(clear, 0.0, 0.0, 1.0)
+        grain.grained(np.zeros((4, 4, 3), np.float32), small, 0, 0)
+        splats = puppet.posed(thing.pose, Placement(scale=1.3))
+        sketch_grain(splats, noise, 1.0, document.photo.camera)
     affine(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32))
     deep = document.photo.pixels.astype(np.uint16) * np.uint16(257)
     assert thing.mask is not None and thing.matte is not None

@@ -14,11 +14,23 @@ uniform vec3 gain;        // of the light at the new place
 uniform sampler2D relit;  // less 1, of the light where the object turned
 uniform vec4 relit_box;   // x0, y0, x1, y1 canvas px
 
+uniform sampler2D amounts;       // of each of the bands of grain
+uniform vec4 amounts_box;        // x0, y0, x1, y1 canvas px
+uniform sampler2DArray grain;    // noise, a layer a band, periodic
+uniform sampler2D deviations;    // of the photo's noise, by brightness
+uniform vec2 corner;             // image px at the canvas's left top
+uniform float zoom;              // canvas px per image px
+uniform float grain_texel;       // image px
+
 in vec2 xy;
 out vec4 color;
 
 #include "hatch.glsl"
 #include "light.glsl"
+
+#ifdef HAS_GRAIN
+#include "grain.glsl"
+#endif
 
 void main() {
     if (xy.x < split || any(lessThan(xy, photo_box.xy)) || any(greaterThan(xy, photo_box.zw))) discard;
@@ -26,6 +38,9 @@ void main() {
     color = lit(texture(layer, at), gain);
 #ifdef HAS_RELIT
     color = lit(color, vec3(1 + texture(relit, (xy - relit_box.xy) / (relit_box.zw - relit_box.xy)).r));
+#endif
+#ifdef HAS_GRAIN
+    color = grained(color, texture(amounts, (xy - amounts_box.xy) / (amounts_box.zw - amounts_box.xy)));
 #endif
 #ifdef HAS_MARKS
 #ifdef DETAIL  // of a picture drawn by the GPU: share that shows the photo, second channel

@@ -265,6 +265,9 @@ class Composing:
     def preview_relight(self, relight: float) -> None:
         self._preview(lambda document, k: edits.set_relight(document, k, relight))
 
+    def preview_grain(self, grain: float) -> None:
+        self._preview(lambda document, k: edits.set_grain(document, k, grain))
+
     def preview_feather(self, feather: float) -> None:
         self._preview(lambda document, _: edits.set_feather(document, feather))
 
@@ -332,7 +335,7 @@ class Composing:
         if editor.committed is None or self._item is None:
             return "none"
         item = editor.committed.objects[editor.current]
-        return "harmonise" if item.harmony or item.relight else "none"
+        return "harmonise" if item.harmony or item.relight or item.grain else "none"
 
     @property
     def _item(self) -> EditObject | None:

@@ -121,6 +121,6 @@ def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObj
         item = SplatObject(splats, texture, camera, is_marked=part.is_marked, is_tint=is_tint)
         if not part.is_painted:
             look = derived.lights.of(document, part.k)
-            item = replace(item, gain=look.gain, relit=look.relit)
+            item = replace(item, gain=look.gain, relit=look.relit, grain=look.grain)
         found.append(item)
     return tuple(found)

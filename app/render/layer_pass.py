@@ -10,6 +10,7 @@ import numpy as np
 from ..layers import Layer
 from ..view import View
 from .blend_texture import BLEND, blend_cells
+from .grain_textures import GrainTextures
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
 
     from .splat_pass import SplatPicture
 
-LAYER, MARKS, RELIT = range(3)  # texture units
-_UNITS = {"layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND}
+LAYER, MARKS, RELIT, AMOUNTS, NOISE, DEVIATIONS = (0, 1, 2, 4, 5, 6)  # texture units
+_UNITS = {
+    "layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND,
+    "amounts": AMOUNTS, "grain": NOISE, "deviations": DEVIATIONS,
+}  # fmt: skip
 TINT = 0.6  # opacity
 
 
@@ -32,6 +36,7 @@ class LayerPass:
         self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
         self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
         self._factors: moderngl.Texture | None = None
+        self._grain = GrainTextures(context)
 
     def draw(self, scene: Scene, view: View) -> None:
         """Into the current viewport, which is the canvas."""
@@ -62,6 +67,9 @@ class LayerPass:
         if item.relit is not None:
             defines.append("HAS_RELIT")
             values["relit_box"] = self._use_factors(item.relit, view)
+        if item.grain is not None:
+            defines.append("HAS_GRAIN")
+            values |= self._grain.use(item.grain, view, (AMOUNTS, NOISE, DEVIATIONS))
         program, quad = self._programs(*defines)
         set_uniforms(program, box=(0, 0, view.width, view.height), **values)
         self._render(program, quad, scene, view)

@@ -14,6 +14,7 @@ from objectmorpher_core.document import Plate
 from ..layers import Layer
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.grain import Grain
     from objectmorpher_core.compose.relight import Relit
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.texture import TextureLevels
@@ -42,6 +43,7 @@ class SplatObject:
     is_tint: bool = False  # lies over everything, translucent
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
     relit: Relit | None = None  # and of each place
+    grain: Grain | None = None  # and added to them
 
 
 @dataclass(frozen=True, eq=False)

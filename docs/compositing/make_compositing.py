@@ -14,18 +14,21 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 sys.path += [str(FOLDER.parent), str(FOLDER.parent / "lifting")]  # what other pages have, too
 
+import grains  # noqa: E402
 import lights  # noqa: E402
+import places  # noqa: E402
 import plates  # noqa: E402
 import shadows  # noqa: E402
 from meshes import fetched  # noqa: E402
-from page import write_page  # noqa: E402
+from page import Measures, write_page  # noqa: E402
 from photos import shadow_pairs  # noqa: E402
 from solids import SOLIDS  # noqa: E402
 
 SHOWN = {("ball", "left", "yaw 35"), ("duck", "above", "pitch 25"), ("figure", "left", "yaw -35"),
          ("box", "left", "yaw -35")}  # fmt: skip
+GRAINS = ("x 2.2", "x 0.6", "half a pixel")
 QUALITY = 88
-TILE = 200  # px
+TILE, WIDE = 200, 280  # px
 
 
 def main() -> None:
@@ -47,7 +50,13 @@ def main() -> None:
     rows = [[p[120:440, 96:416] for p in case.pictures] for case in found]
     _write("shadows.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
     _write("photos.jpg", shadow_pairs(), 420)
-    (FOLDER / "README.md").write_text(write_page(turned, shaded, filled), encoding="utf-8")
+    grained = grains.measured()
+    own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
+    _write("grains.jpg", [[p[:40, :40] for p in c.pictures] for c in own], WIDE)
+    measures = Measures(
+        turned, places.measured(meshes), grained, grains.found_on_photos(), shaded, filled
+    )
+    (FOLDER / "README.md").write_text(write_page(measures), encoding="utf-8")
 
 
 def _bytes(picture: np.ndarray) -> np.ndarray:

@@ -231,6 +231,8 @@ class _Drawing:
         color = lit(picture.color, picture.alpha, look.gain)
         if look.relit is not None:
             color = look.relit.lit(color, picture.alpha, self.box[0], top)
+        if look.grain is not None:
+            color = look.grain.grained(color, picture.alpha, self.box[0], top)
         return replace(picture, color=color)
 
 

@@ -1,4 +1,7 @@
-"""Shadow and light of a moved object, from the document alone: the same for window and export."""
+"""Shadow, light and grain of a moved object, from the document alone.
+
+So they are the same for window and export.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,10 @@ from ..document import Document, EditObject, LiftedObject, Matte
 from ..joining import Shadow
 from ..raster.posed import PosedSplats
 from ..raster.texture import TextureLevels, build_levels
+from .grain import Grain, find_grain, sketch_grain
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .light_estimate import estimate_light
+from .noise import Noise, find_noise
 from .relight import Relit, relight
 from .shadow import COARSE, FINE, Shade, Standing, cast, ground_normal
 from .shadow_fit import Standings
@@ -27,11 +32,12 @@ CAST = 40_000  # Gaussians, of which a shadow is made
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """What is done to an object's colours, and the shadow that it throws."""
+    """What is done to an object's colours, in this order, and the shadow that it throws."""
 
     gain: Gain = NEUTRAL
     shade: Shade | None = None
     relit: Relit | None = None
+    grain: Grain | None = None
 
 
 NOTHING = Lit()
@@ -54,6 +60,11 @@ class Lighting:
         """The background's light, see `harmonize.light_map`."""
         return light_map(self._document)
 
+    @cached_property
+    def noise(self) -> Noise | None:
+        """The photo's grain."""
+        return find_noise(self._document.photo.pixels)
+
     def of(
         self,
         item: EditObject,
@@ -66,11 +77,12 @@ class Lighting:
         `is_sketch`: the shadow is a coarse one, in the time that a frame of a drag has.
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
-        if not item.is_visible or not (has_shadow or has_light or item.relight):
+        has_any = has_shadow or has_light or item.relight or item.grain
+        if not item.is_visible or not has_any:
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
         camera = self._document.photo.camera
-        shade, gain, relit = None, NEUTRAL, None
+        shade, gain, relit, grain = None, NEUTRAL, None, None
         if has_shadow:
             most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
             standing = stand(splats, camera, self._document.horizon, item.shadow, most)
@@ -81,7 +93,13 @@ class Lighting:
                 gain = at_strength(light_gain(self.light, camera.width, before, now), item.harmony)
         if item.relight > 0:
             relit = relight(splats, self._light_of(item), item.relight, camera, is_sketch)
-        return Lit(gain, shade, relit)
+        if item.grain > 0 and self.noise is not None:
+            if is_sketch:
+                grain = sketch_grain(splats, self.noise, item.grain, camera)
+            else:
+                carried = texture or object_texture(item.matte)
+                grain = find_grain(splats, carried, self.noise, item.grain, camera)
+        return Lit(gain, shade, relit, grain)
 
     def _light_of(self, item: EditObject) -> F64:
         """b (3,), see `light_estimate`; estimated once."""

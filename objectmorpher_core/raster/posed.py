@@ -77,6 +77,21 @@ class RestSplats:
         other.blocks = frozen(blocks)
         return other
 
+    def brightened(self) -> RestSplats:
+        """The same in its own colours brighter by 1.
+
+        What it shows of the photo is as it was: the difference between both says where that is.
+        """
+        other = copy.copy(self)
+        gaussians = self.lifted.gaussians
+        other.lifted = replace(
+            self.lifted, gaussians=replace(gaussians, colors=gaussians.colors + np.float32(1))
+        )
+        blocks = self.blocks.copy()
+        blocks[:, COLOUR:] += 1
+        other.blocks = frozen(blocks)
+        return other
+
     @cached_property
     def covariances(self) -> F64:
         """Sigma (N, 3, 3), world."""
@@ -147,6 +162,10 @@ class PosedSplats:
     def painted(self, colors: np.ndarray, has_edge: bool = True) -> PosedSplats:
         """The same in plain `colors` (N, 3), see `RestSplats.painted`."""
         return replace(self, rest=self.rest.painted(colors, has_edge))
+
+    def brightened(self) -> PosedSplats:
+        """The same in its own colours brighter by 1, see `RestSplats.brightened`."""
+        return replace(self, rest=self.rest.brightened())
 
     @property
     def is_layered(self) -> bool:

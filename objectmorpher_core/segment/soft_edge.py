@@ -33,6 +33,7 @@ RIDGE = 1.75  # px: half-width from which on the middle of a limb is certain
 TAIL = 0.02  # alpha that is as good as none
 POLISHED = 12.0  # px of band up to which the larger picture is solved for once more
 HAZE = 0.5  # alpha that may be chance where the mask is clear about a pixel
+PURE = 200.0  # variances that colours are apart: then half as much may
 PLAIN = 0.3  # alpha on the mask's other side that is no chance
 BEYOND = 1.0  # x band: from which on it is the other side
 NEARBY = 2.0  # x band: how far such a pixel vouches for those around it
@@ -121,7 +122,8 @@ def _whole_band(size: _Size, reach: float, before: F32 | None) -> F32:
     rounds = ROUNDS[0] if before is None else ROUNDS[1]
     expected = Expected(alpha, weight.astype(np.float32))
     solved = solve_alpha(size.rgb(WHOLE_PICTURE), unknown, expected, start, rounds)
-    clear = _cleared(solved, distance, astray, band)
+    chance = HAZE / (1 + (clearness / PURE) ** 2)
+    clear = _cleared(solved, distance, (astray, band), chance)
     return _cleaned(np.where(unknown, clear, solved), unknown)
 
 
@@ -155,18 +157,21 @@ def _near(image: F32, size: tuple[int, int]) -> F32:
     return np.asarray(near + 1e-6 * far, np.float32)
 
 
-def _cleared(alpha: F32, distance: F32, astray: float, band: float) -> F32:
+def _cleared(alpha: F32, distance: F32, widths: tuple[float, float], chance: F32) -> F32:
     """`alpha` (h, w) without the haze that chance likenesses leave beside a sharp edge.
 
-    Where hair stands, or a blur, something nearby is surely on the mask's other side; haze is
-    faint all over. `distance` (h, w) px is the mask's, `astray` px what its edge may be off.
+    Where hair stands, or a wide blur, something nearby is surely on the mask's other side; haze is
+    faint all over. So is a narrow blur's: but where the colours on both sides are far apart no
+    likeness is. `chance` (h, w) is the alpha that may be one, `distance` (h, w) px the mask's,
+    `widths` px what its edge may be off, and the band.
     """
+    astray, band = widths
     away = np.abs(distance)
     strayed = np.where(away > BEYOND * band, np.abs(alpha - (distance > 0)), 0).astype(np.float32)
     square = np.ones((2 * round(NEARBY * band) + 1,) * 2, np.uint8)
     strongest = cv2.blur(cv2.dilate(strayed, square), square.shape)
     is_haze = np.clip(2 * (1 - strongest / PLAIN), 0, 1)
-    haze = HAZE * is_haze * np.clip((away - astray) / band, 0, 1)
+    haze = chance * is_haze * np.clip((away - astray) / band, 0, 1)
     return np.clip(np.where(distance < 0, alpha - haze, alpha) / (1 - haze), 0, 1)
 
 

@@ -15,7 +15,7 @@ from app.view import ToolName
 from objectmorpher_core import edits
 from objectmorpher_core.compose.plate import plate_cover, plate_picture
 from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
-from objectmorpher_core.joining import USUAL_HARMONY, USUAL_RELIGHT, Shadow
+from objectmorpher_core.joining import USUAL_GRAIN, USUAL_HARMONY, USUAL_RELIGHT, Shadow
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from tests.shadowed import inside, photo_of, thrown
 from tests.shapes import png
@@ -215,17 +215,20 @@ def test_what_has_not_moved_keeps_its_shadow(editor: Editor, ball: Document) -> 
     assert COMMANDS["take_shadow"].why_not(editor) == "Move the object first"
 
 
-def test_harmonise_offers_both_lights_and_one_step_takes_both(
+def test_harmonise_offers_both_lights_and_grain_and_one_step_takes_all(
     editor: Editor, ball: Document
 ) -> None:
     editor.start(edits.set_placement(ball, 0, Placement(turn=(25.0, 0.0, 0.0))))
     editor.composing.choose_refiner("harmonise")
     assert editor.object is not None
     assert editor.object.harmony == USUAL_HARMONY and editor.object.relight == USUAL_RELIGHT
+    assert editor.object.grain == USUAL_GRAIN
     editor.composing.preview_harmony(0.0)
     editor.commit("Adjust light")
     editor.composing.preview_relight(0.0)
-    assert editor.object.relight == 0
+    editor.commit("Adjust light")
+    editor.composing.preview_grain(0.0)
+    assert editor.object.relight == 0 and editor.object.grain == 0
     assert editor.composing.refiner == "harmonise"  # until the pointer is let go
     editor.commit("Adjust light")
     assert editor.composing.refiner == "none"

@@ -12,6 +12,7 @@ from objectmorpher_core.joining import (
     LEAST_FEATHER,
     MOST_FEATHER,
     MOST_SHADOW,
+    USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
 )
@@ -187,11 +188,13 @@ def _draw_light(editor: Editor) -> None:
     rows = (
         (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
         (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
+        (t("Grain"), 100 * USUAL_GRAIN, item.grain, composing.preview_grain),
     )
     for name, usual, share, preview in rows:
         change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
         _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
     note(t("Light around its new place; light that stays where it was while it turns."))
+    note(t("Grain: the photo's own, where moving the object has smoothed it."))
 
 
 def _draw_edge(editor: Editor) -> None:

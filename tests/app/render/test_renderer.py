@@ -11,7 +11,7 @@ from app.derived import Derived
 from app.render.scene import Scene, SplatObject
 from app.view import View
 from objectmorpher_core import edits
-from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate import plate_cover
 from objectmorpher_core.document import Placement
 from objectmorpher_core.joining import Shadow
@@ -148,3 +148,42 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     turned = composite(edits.set_relight(document, 0, 0.0)).pixels.astype(np.float32) / 255
     assert np.abs(turned - exported).max() > 3 * PIXEL  # that stays while it turns
     assert np.abs(window - exported).mean() <= PIXEL
+
+
+@pytest.mark.parametrize("zoom", [1.0, 0.5])
+@pytest.mark.parametrize("kind", ["tiles", "gl"])
+def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
+    inside = shapes.mask("ellipse")
+    rng = np.random.default_rng(0)
+    grey = np.where(inside, 150, 90)[..., None] + rng.normal(0, 9, (*inside.shape, 3))
+    scene = shapes.lifted_scene(np.rint(grey).clip(0, 255).astype(np.uint8), inside, 800)
+    place = Placement(move=(30.5, -8.0), scale=1.4)
+    plain = edits.set_placement(scene.document(), 0, place)
+    document = edits.set_grain(plain, 0, 1.0)
+    derived, view = Derived(), _view()
+    derived.layers.frame_time = np.inf
+    view.set_zoom(zoom, (80, 60), SIZE)
+    view.left = view.top = 0.0
+    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
+    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
+    item = SplatObject(splats, scene.texture, scene.camera, grain=look.grain)
+    objects = (item,) if kind == "gl" else ()
+    blend = derived.blend(document, view)
+    shown = Scene(
+        document.photo.pixels, (0.0, 0.0, 0.0), document.plate, (), layers, objects, blend=blend
+    )
+    window = _window_picture(renderer, shown, view)
+    parts = int(1 / zoom)
+    exported, smooth = (composite(d).pixels.astype(np.float32) / 255 for d in (document, plain))
+    height, width = (n // parts * parts for n in exported.shape[:2])
+
+    def small(picture):
+        rows = picture[:height, :width].reshape(height // parts, parts, width // parts, parts, 3)
+        return rows.mean((1, 3))
+
+    cutout = straight_cutout(composite(document), np.dtype(np.uint8), document.photo.size)
+    there = small(cutout[..., 3:].repeat(3, 2) == 255) == 1
+    window = window[: height // parts, : width // parts]
+    own, other = (np.abs(window - small(p))[there].mean() for p in (exported, smooth))
+    # It is this grain, at this place; half as large the object is drawn anew, from a halved photo.
+    assert own < (0.1 if zoom == 1 else 0.75) * other

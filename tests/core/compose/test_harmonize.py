@@ -48,3 +48,25 @@ def test_an_object_in_the_dark_is_darker():
     lit = composite(edits.set_harmony(document, 0, 1.0), {0: scene.puppet}).pixels
     assert (plain - lit).max() > 15
     assert (plain - lit).min() >= -1
+
+
+def _patches(seed: int) -> np.ndarray:
+    """(h, w, 3) linear: materials beside each other, in the same light."""
+    colours = np.random.default_rng(seed).uniform(0.1, 0.6, (6, 8, 3))
+    return colours.repeat(10, 0).repeat(10, 1).astype(np.float32)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_other_materials_are_seldom_taken_for_other_light(seed):
+    places = [Silhouette(np.ones((24, 24), np.float32), left, 18.0, 1.0) for left in (6.0, 50.0)]
+    gain = np.array(light_gain(_patches(seed), 80, *places))
+    assert np.abs(np.log(gain)).max() < 0.06
+
+
+def test_light_that_falls_evenly_is_followed_from_place_to_place():
+    ramp = np.linspace(1.0, 0.4, 80, dtype=np.float32)[None, :, None]
+    light = np.full((60, 80, 3), 0.3, np.float32) * ramp
+    places = [Silhouette(np.ones((24, 24), np.float32), left, 18.0, 1.0) for left in (6.0, 50.0)]
+    true = np.log(ramp[0, 62, 0] / ramp[0, 18, 0])
+    found = np.log(np.array(light_gain(light, 80, *places)) ** GAMMA)
+    assert np.abs(found - true).max() < 0.25 * abs(true)
