@@ -373,6 +373,25 @@ class Plate:
         return self.left, self.top, self.left + width, self.top + height
 
 
+@dataclass(frozen=True)
+class Hint:
+    """The background around `to` is to be filled in with what is around `source`."""
+
+    source: tuple[float, float]  # x, y px of the photo
+    to: tuple[float, float]
+    radius: float  # px, of both places
+
+    def __post_init__(self) -> None:
+        if not self.radius > 0:
+            raise ValueError(f"a hint's radius is {self.radius:g} px")
+
+    def moved(self, dx: float, dy: float, scale: tuple[float, float] = (1.0, 1.0)) -> Hint:
+        """The same in px of a picture whose corner is at (-dx, -dy), `scale` across and down."""
+        (a, b), (c, d) = self.source, self.to
+        source = (a + dx) * scale[0], (b + dy) * scale[1]
+        return Hint(source, ((c + dx) * scale[0], (d + dy) * scale[1]), self.radius * min(scale))
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
     """All that is saved and undone."""
@@ -384,6 +403,7 @@ class Document:
     seed: int = 0
     horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
     feather: float = 1.0  # x the usual width over which the edit is blended into the photo
+    hints: tuple[Hint, ...] = ()  # from where the plate is filled
 
     def with_object(self, k: int, changed: EditObject) -> Document:
         """Object `k` replaced; the plate stays only where the mask did."""
