@@ -13,6 +13,7 @@ from .document import (
     Document,
     EditObject,
     Handle,
+    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -286,6 +287,11 @@ def set_plate(document: Document, plate: Plate | None) -> Document:
     """The photo without its objects."""
     changed = replace(document, plate=plate)
     return changed if plate is None else changed.with_backend("inpaint", plate.backend)
+
+
+def set_hints(document: Document, hints: tuple[Hint, ...]) -> Document:
+    """From where the background is to be filled in, from its next filling on."""
+    return replace(document, hints=hints)
 
 
 def set_horizon(document: Document, horizon: float) -> Document:

@@ -26,6 +26,7 @@ from .document import (
     Click,
     DeformSettings,
     Document,
+    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -45,6 +46,7 @@ from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
 from .splat_files import COUNT
 
+USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
 
 
@@ -114,9 +116,10 @@ def make_plate(
     backend: str = "auto",
     progress: Progress = silent,
     seed: int = 0,
+    hints: tuple[Hint, ...] = (),
 ) -> Plate:
     """The photo without what hides it at `covered` (H, W), as a crop."""  # fmt: skip
-    return build_plate(pixels, covered, compose.load(backend), progress, seed)
+    return build_plate(pixels, covered, compose.load(backend), progress, seed, hints)
 
 
 def export(
@@ -155,6 +158,15 @@ def prompt_of(script: EditScript) -> Prompt:
     clicks = [Click(x, y) for x, y in script.click]
     clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
     return Prompt(tuple(clicks), script.box, script.subject)
+
+
+def hints_of(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:
+    """From where the script has the background filled in, of a photo of `size` (w, h) px."""
+    usual = USUAL_HINT * float(np.hypot(*size))
+    return tuple(
+        Hint(fill.source, fill.to, usual if fill.radius is None else fill.radius)
+        for fill in script.fill_from
+    )
 
 
 def select(
@@ -220,15 +232,15 @@ def run_script(
     if document.objects[0].is_moved or needs_plate:
         with stopwatch.stage("inpaint"):
             covered, pixels = plate_cover(document), document.photo.pixels
-            step = part(progress, 0.6, 0.85)
+            step, hints = part(progress, 0.6, 0.85), hints_of(script, document.photo.size)
             old = _old_shadow(document, script, covered)
             if old is None:
-                plate = make_plate(pixels, covered, script.inpaint, step, script.seed)
+                plate = make_plate(pixels, covered, script.inpaint, step, script.seed, hints)
             else:
                 inpainter = compose.load(script.inpaint)
-                plate = shadowless_plate(pixels, covered, old, inpainter, step, script.seed)
+                plate = shadowless_plate(pixels, covered, old, inpainter, step, script.seed, hints)
                 document = edits.set_shadow(document, 0, old.shadow)
-            document = edits.set_plate(document, plate)
+            document = edits.set_plate(edits.set_hints(document, hints), plate)
     if script.refine == "harmonise":
         document = edits.harmonised(document, 0).with_backend("refine", script.refine)
     return _finished(document, puppet, energies, progress, stopwatch)

@@ -62,12 +62,13 @@ class _Level:
 
 def shrunk(values: F32, known: F32, size: tuple[int, int]) -> tuple[F32, F32]:
     """Values (h, w, C) and how much is known of them (h, w), both at another size (w, h) px."""
-    share = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
+    share = np.asarray(cv2.resize(known, size, interpolation=cv2.INTER_AREA), np.float32)
     weighted = [
         cv2.resize(values[..., c] * known, size, interpolation=cv2.INTER_AREA)
         for c in range(values.shape[2])
     ]
-    return np.dstack(weighted) / np.maximum(share, 1e-6)[..., None], share
+    mean = np.dstack(weighted) / np.maximum(share, 1e-6)[..., None]
+    return np.asarray(mean, np.float32), share
 
 
 def complete(rgb: F32, known: F32, guide: Guide, seed: int, progress: Progress) -> Completion:
@@ -182,12 +183,15 @@ class _Filling:
     def search(self, rounds: int) -> None:
         """Looks for better sources."""
         guidance = self._guidance
-        pictures = tuple(map(frozen, (self._rimmed(self.values), self._weight, self._layers)))
-        seen = (guidance.wanted, guidance.offered, self._barred, self._targets)
-        seed = int(self._random.integers(1 << 30))
+        pictures = (
+            frozen(self._rimmed(self.values)), frozen(self._weight), frozen(self._layers)
+        )  # fmt: skip
+        wanted, offered = frozen(guidance.wanted), frozen(guidance.offered)
+        barred, targets = frozen(self._barred, np.float32), frozen(self._targets)
         patch_search.search(
-            pictures, *map(frozen, seen), self.sources, self._costs, rounds, seed
-        )
+            pictures, wanted, offered, barred, targets, self.sources, self._costs, rounds,
+            self._random,
+        )  # fmt: skip
 
     def vote(self) -> None:
         """Makes the hole what its patches' sources are."""
@@ -195,9 +199,9 @@ class _Filling:
         self._let_vote(self._trust * np.exp(-self._costs / (2 * usual)) + LEAST_SHARE)
 
     def _let_vote(self, shares: F32) -> None:
-        seen = (self._layers, self.sources, shares.astype(np.float32), self.hole)
-        values = self.values.copy()
-        patch_search.vote(*map(frozen, seen), values)
+        values, shares = self.values.copy(), frozen(shares, np.float32)
+        layers, sources = frozen(self._layers), frozen(self.sources)
+        patch_search.vote(layers, sources, shares, frozen(self.hole), values)
         self.values = values
 
     def _follow_guidance(self) -> None:

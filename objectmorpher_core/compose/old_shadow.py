@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
-from ..document import Plate
+from ..document import Hint, Plate
 from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
@@ -90,6 +90,7 @@ def shadowless_plate(
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
+    hints: tuple[Hint, ...] = (),
 ) -> Plate:
     """As `build_plate`, of the photo in full light: the shadow is gone beside the objects, too.
 
@@ -103,7 +104,8 @@ def shadowless_plate(
     lit[y0:y1, x0:x1], is_changed = without_shadow(pixels, old, shade)
     lost = crop(old.missing(shade) > LOST, shade, (0, 0, width, height)) & ~covered
     filled = covered | lost
-    own = build_plate(lit, covered if filled.all() else filled, inpainter, progress, seed)
+    filled = covered if filled.all() else filled
+    own = build_plate(lit, filled, inpainter, progress, seed, hints)
     x0, y0 = min(own.left, shade[0]), min(own.top, shade[1])
     x1, y1 = max(own.box[2], shade[2]), max(own.box[3], shade[3])
     box = (x0, y0, x1, y1)

@@ -56,7 +56,7 @@ def _penalty(wanted, offered, barred, source):
 
 
 @numba.njit(cache=True, fastmath=True)
-def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, seed):
+def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, random):
     """PatchMatch rounds over the `targets` (T, 2): neighbours' sources, then random places.
 
     `pictures` are target, weight and layers of `patch_cost`. `sources` (h, w, 3) is each place's
@@ -66,16 +66,13 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, s
     target, weight, layers = pictures
     height, width = costs.shape
     size = target.shape[0] - height + 1
-    np.random.seed(seed)
     weights = np.empty(len(targets), np.float32)
     for n in range(len(targets)):
         row, column = targets[n]
         weights[n] = weight[row : row + size, column : column + size, 0].sum()
         source = (sources[row, column, 0], sources[row, column, 1], sources[row, column, 2])
         costs[row, column] = weights[n] * _penalty(wanted[row, column], offered, barred, source)
-        costs[row, column] += patch_cost(
-            target, weight, layers, (row, column), source, size, NEVER
-        )
+        costs[row, column] += patch_cost(target, weight, layers, (row, column), source, size, NEVER)
     for turn in range(rounds):
         step = 1 if turn % 2 == 0 else -1
         for m in range(len(targets)):
@@ -86,16 +83,16 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, s
             while attempt < 3 or reach >= 1:
                 k, i, j = sources[row, column, 0], sources[row, column, 1], sources[row, column, 2]
                 if attempt == 0:
-                    k = np.random.randint(layers.shape[0])
-                    i, j = np.random.randint(height), np.random.randint(width)
+                    k = int(random.random() * layers.shape[0])
+                    i, j = int(random.random() * height), int(random.random() * width)
                 elif attempt < 3:  # what the place before, in the row and in the column, found
                     v, u = (row - step, column) if attempt == 1 else (row, column - step)
                     if 0 <= v < height and 0 <= u < width and sources[v, u, 0] >= 0:
                         k = sources[v, u, 0]
                         i, j = sources[v, u, 1] + row - v, sources[v, u, 2] + column - u
                 else:
-                    i += np.int64((2 * np.random.random() - 1) * reach)
-                    j += np.int64((2 * np.random.random() - 1) * reach)
+                    i += np.int64((2 * random.random() - 1) * reach)
+                    j += np.int64((2 * random.random() - 1) * reach)
                     reach //= 2
                 attempt += 1
                 if not (0 <= i < height and 0 <= j < width):
@@ -104,9 +101,7 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, s
                 cost = weights[n] * _penalty(wanted[row, column], offered, barred, source)
                 if cost >= best:
                     continue
-                cost += patch_cost(
-                    target, weight, layers, (row, column), source, size, best - cost
-                )
+                cost += patch_cost(target, weight, layers, (row, column), source, size, best - cost)
                 if cost < best:
                     best = cost
                     sources[row, column, 0] = k

@@ -51,9 +51,8 @@ def guidance(guide: Guide, hole: Mask) -> Guidance:
                 numbers[inside & hole, 2] = 1 << k
             else:
                 numbers[inside, 2] += 1 << k
-    unlikely = cv2.resize(guide.unlikely, (width, height), interpolation=cv2.INTER_AREA)
+    resized = cv2.resize(guide.unlikely, (width, height), interpolation=cv2.INTER_AREA)
+    unlikely = np.asarray(resized, np.float32)
     mirrored = offered[:, ::-1].copy()
     mirrored[..., :2] = 0  # no line goes on mirrored
-    return Guidance(
-        wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]])
-    )
+    return Guidance(wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]]))

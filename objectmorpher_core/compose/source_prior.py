@@ -68,7 +68,7 @@ def _strange_tokens(picture: RGB, around: Mask) -> F32 | None:
     patch = max(height, width) / TOKEN_GRID
     size = max(round(width / patch), 1), max(round(height / patch), 1)
     seen = cv2.resize(picture, (size[0] * PATCH, size[1] * PATCH), interpolation=cv2.INTER_AREA)
-    tokens = network.tokens(seen)
+    tokens = network.tokens(np.asarray(seen, np.uint8))
     tokens /= np.linalg.norm(tokens, axis=-1, keepdims=True)
     share = cv2.resize(around.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     near = tokens[share >= min(0.5, float(share.max()))]

@@ -18,6 +18,7 @@ from ..arrays import F32, F64, Mask
 
 BAND = 4.0  # px on either side of a line that belong to it
 LEAST_LENGTH = 9.0  # px of a segment
+LEAST_PICTURE = 24  # px, less has no such lines
 REACH = 5.0  # px between a segment's end and the hole
 MOST_TURN = np.radians(7)  # between two ends of one line
 MOST_SHIFT = 0.06  # x the gap: how far one end lies beside the other's line
@@ -64,9 +65,7 @@ def find_lines(rgb: F32, hole: Mask) -> tuple[Line, ...]:
     return tuple(Line((a.tip, b.tip), (a.tail, b.tail)) for a, b in pairs)
 
 
-def draw_lines(
-    lines: tuple[Line, ...], scale: tuple[float, float], hole: Mask
-) -> tuple[F32, F32]:
+def draw_lines(lines: tuple[Line, ...], scale: tuple[float, float], hole: Mask) -> tuple[F32, F32]:
     """What the hole (h, w) wants, and what is offered outside, both (h, w, 3).
 
     Channels 0 and 1 are a line's number and the signed px beside it; see `patch_search`. `scale`:
@@ -85,13 +84,15 @@ def draw_lines(
 
 def _ends(rgb: F32, hole: Mask) -> list[_End]:
     """The segments that point into the hole."""
+    if min(hole.shape) < LEAST_PICTURE:
+        return []
     grey = cv2.cvtColor(np.clip(rgb, 0, 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
     least = round(LEAST_LENGTH)
     detector = cv2.ximgproc.createFastLineDetector(least, 1.41421356, 30.0, 80.0, 3, False)
     segments = detector.detect(grey)
     if segments is None:
         return []
-    away = cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5)
+    away = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
     ends = []
     for x0, y0, x1, y1 in np.asarray(segments, np.float64).reshape(-1, 4):
         for tip, tail in (((x0, y0), (x1, y1)), ((x1, y1), (x0, y0))):
