@@ -94,12 +94,28 @@ def _ends(rgb: F32, hole: Mask) -> list[_End]:
         return []
     away = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
     ends = []
-    for x0, y0, x1, y1 in np.asarray(segments, np.float64).reshape(-1, 4):
-        for tip, tail in (((x0, y0), (x1, y1)), ((x1, y1), (x0, y0))):
-            end = _end(np.array(tip), np.array(tail), rgb, away)
+    for segment in np.asarray(segments, np.float64).reshape(-1, 2, 2):
+        for tip, tail in _outside(segment, away):
+            end = _end(tip, tail, rgb, away)
             if end is not None:
                 ends.append(end)
     return ends
+
+
+def _outside(segment: F64, away: F32) -> list[tuple[F64, F64]]:
+    """Tip and tail, either way, of the longest part of a segment (2, 2) outside the hole.
+
+    A smooth guess has the edge's beginning, so that a segment may reach into the hole.
+    """
+    count = max(round(float(np.hypot(*(segment[1] - segment[0])))), 1) + 1
+    points = segment[0] + np.linspace(0, 1, count)[:, None] * (segment[1] - segment[0])
+    is_out = np.concatenate([[False], [_at(away, point) > 1 for point in points], [False]])
+    changes = np.flatnonzero(np.diff(is_out.astype(int))).reshape(-1, 2)
+    if not len(changes):
+        return []
+    first, end = changes[np.argmax(changes[:, 1] - changes[:, 0])]
+    start, stop = points[first], points[end - 1]
+    return [(start, stop), (stop, start)]
 
 
 def _end(tip: F64, tail: F64, rgb: F32, away: F32) -> _End | None:
