@@ -18,13 +18,13 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     Document,
     EditObject,
-    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
     Plate,
     Prompt,
 )
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.progress import Progress, part
 
 from .layers import Rendered, Request, render

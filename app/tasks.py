@@ -16,7 +16,6 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import (
     Document,
-    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -24,6 +23,7 @@ from objectmorpher_core.document import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.segment import Found
 
 from . import job_functions

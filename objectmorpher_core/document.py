@@ -15,6 +15,7 @@ import numpy as np
 from .arrays import F32, F64, U8, Mask, Pixels, Selection, frozen
 from .camera import Camera
 from .gaussians import Gaussians
+from .hint import Hint
 from .image import Picture
 from .joining import Shadow
 from .rig import Rig
@@ -77,7 +78,6 @@ class Matte:
     """Soft cut-out of an object inside a crop of the photo; alpha is 0 outside the crop.
 
     The crop may reach past the photo's frame where the object does.
-
     `foreground` is the object's own colour, freed of the background, and continued beyond the
     object so that sampling near the edge never meets the background.
     """
@@ -371,25 +371,6 @@ class Plate:
         """x0, y0, x1, y1 px of the crop in the photo."""
         height, width = self.hole.shape
         return self.left, self.top, self.left + width, self.top + height
-
-
-@dataclass(frozen=True)
-class Hint:
-    """The background around `to` is to be filled in with what is around `source`."""
-
-    source: tuple[float, float]  # x, y px of the photo
-    to: tuple[float, float]
-    radius: float  # px, of both places
-
-    def __post_init__(self) -> None:
-        if not self.radius > 0:
-            raise ValueError(f"a hint's radius is {self.radius:g} px")
-
-    def moved(self, dx: float, dy: float, scale: tuple[float, float] = (1.0, 1.0)) -> Hint:
-        """The same in px of a picture whose corner is at (-dx, -dy), `scale` across and down."""
-        (a, b), (c, d) = self.source, self.to
-        source = (a + dx) * scale[0], (b + dy) * scale[1]
-        return Hint(source, ((c + dx) * scale[0], (d + dy) * scale[1]), self.radius * min(scale))
 
 
 @dataclass(frozen=True, eq=False)

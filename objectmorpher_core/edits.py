@@ -13,7 +13,6 @@ from .document import (
     Document,
     EditObject,
     Handle,
-    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -22,6 +21,7 @@ from .document import (
     Pose,
     Prompt,
 )
+from .hint import Hint
 from .joining import LEAST_FEATHER, MOST_FEATHER, USUAL_HARMONY, USUAL_RELIGHT, Shadow
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one

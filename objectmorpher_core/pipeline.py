@@ -26,7 +26,6 @@ from .document import (
     Click,
     DeformSettings,
     Document,
-    Hint,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -35,6 +34,7 @@ from .document import (
     Plate,
     Prompt,
 )
+from .hint import Hint
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .importing import Scene, Source, place_import, register_file
 from .progress import Progress, part, silent

@@ -12,7 +12,8 @@ import numpy as np
 from objectmorpher_core import compose, edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.brush import Stroke
-from objectmorpher_core.document import Document, EditObject, Hint, Plate
+from objectmorpher_core.document import Document, EditObject, Plate
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.joining import Shadow
 
 from .. import job_functions

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.document import Hint
+from objectmorpher_core.hint import Hint
 
 from ..texts import t
 

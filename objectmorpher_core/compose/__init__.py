@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 from ..arrays import Mask, Pixels
-from ..document import Hint
+from ..hint import Hint
 from ..progress import Progress
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
-from ..document import Hint
+from ..hint import Hint
 from ..progress import Progress, part
 from . import InpaintError
 from .completion import Completion, complete, shrunk, smooth

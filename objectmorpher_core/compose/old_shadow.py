@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
-from ..document import Hint, Plate
+from ..document import Plate
+from ..hint import Hint
 from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent

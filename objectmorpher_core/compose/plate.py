@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
-from ..document import Document, Hint, Matte, Plate
+from ..document import Document, Matte, Plate
+from ..hint import Hint
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
 from . import Inpainter, TakesHints

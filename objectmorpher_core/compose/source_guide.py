@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, Mask
-from ..document import Hint
+from ..hint import Hint
 from .structure_lines import Line, draw_lines
 
 MOST_HINTS = 23  # so many bits does a float32 hold exactly

@@ -13,7 +13,8 @@ from app.tools.compose_tool import ComposeTool
 from app.tools.pointer import Button
 from app.view import Composed, ToolName
 from objectmorpher_core.compose.plate import plate_picture
-from objectmorpher_core.document import Document, Hint
+from objectmorpher_core.document import Document
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.session_file import decode_session, encode_session
 
 

@@ -17,7 +17,6 @@ from objectmorpher_core.document import (
     Document,
     EditObject,
     Handle,
-    Hint,
     LiftedObject,
     Matte,
     Photo,
@@ -28,6 +27,7 @@ from objectmorpher_core.document import (
     Prompt,
 )
 from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.image import Picture, encode_picture, read_picture
 from objectmorpher_core.rig import Rig, Seam
 from objectmorpher_core.session_file import (

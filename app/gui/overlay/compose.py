@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
-from objectmorpher_core.document import Hint
+from objectmorpher_core.hint import Hint
 
 from ...texts import t
 from ...view import Composed

@@ -13,7 +13,7 @@ from objectmorpher_core.compose.patch_search import patch_cost, vote
 from objectmorpher_core.compose.plate import build_plate
 from objectmorpher_core.compose.source_prior import SUBJECT_COST, strange, unlikely
 from objectmorpher_core.compose.structure_lines import draw_lines, find_lines
-from objectmorpher_core.document import Hint
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment.subject import SubjectNet
 
