@@ -94,8 +94,8 @@ def plate_section(filled: dict[str, dict[str, Filled]], taken: list[Taken]) -> s
 
 
 def _times(taken: list[Taken]) -> str:
-    parts = [f"{t.megapixels} MP in {t.seconds:.1f} s and {t.megabytes:.0f} MB more" for t in taken]
-    return f"A thing of a third of the photo's width: {'; '.join(parts)}."
+    parts = [f"{t.megapixels} MP in {t.seconds:.1f} s and {t.megabytes:.0f} MB" for t in taken]
+    return f"A thing of a third of the photo's width, the program's memory: {'; '.join(parts)}."
 
 
 def _plate_summary(filled: dict[str, dict[str, Filled]]) -> str:

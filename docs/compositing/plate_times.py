@@ -23,7 +23,7 @@ class Taken:
 
     megapixels: int
     seconds: float  # of all processors
-    megabytes: float  # at most, beyond what the program and the photo took before
+    megabytes: float  # of the whole process, at most
 
 
 def measured() -> list[Taken]:
@@ -38,9 +38,9 @@ def _taken(megapixels: int) -> Taken:
     side = round((megapixels * 1e6) ** 0.5)
     photo = np.asarray(cv2.resize(small, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
     thing = _thing(photo)
-    before, begun = _peak(), time.process_time()
+    begun = time.process_time()
     make_plate(photo, thing)
-    return Taken(megapixels, time.process_time() - begun, _peak() - before)
+    return Taken(megapixels, time.process_time() - begun, _peak())
 
 
 def _thing(photo: np.ndarray) -> np.ndarray:
