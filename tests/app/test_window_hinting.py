@@ -41,8 +41,17 @@ def test_a_drag_over_the_background_says_from_where(
             Image.fromarray(picture).save(os.environ[SHOT])
         (a, b), (c, d) = start, end
         way = [(a + s * (c - a), b + s * (d - b)) for s in np.linspace(0.4, 0.8, 20)]
-        near = [picture[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4, :3] for x, y in way]
-        gaps = [np.abs(part.astype(int) - ACCENT).sum(-1).min() for part in near]
-        assert np.median(gaps) < 60, "an arrow"
+        on, beside = (
+            [
+                picture[int(y) - 3 : int(y) + 4, int(x + dx) - 3 : int(x + dx) + 4, :3]
+                for x, y in way
+            ]
+            for dx in (0, 40)
+        )
+        gaps = [
+            np.median([np.abs(part.astype(int) - ACCENT).sum(-1).min() for part in parts])
+            for parts in (on, beside)
+        ]
+        assert gaps[0] < 0.6 * gaps[1], "an arrow"
         hands.press("ctrl+z")
         hands.wait(lambda: "edited" not in hands.title(), "going back")
