@@ -118,6 +118,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("backends").add_argument
     add("--lift", metavar="NAME", help="auto or relief")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
+    add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
+        help="the background R px around X2,Y2 is filled in from around X,Y")  # fmt: skip
     add("--refine", metavar="NAME", help="none (also auto) or harmonise: light, grain")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add = parser.add_argument_group("the object's shape").add_argument
@@ -308,6 +310,15 @@ def _handle(text: str) -> dict[str, Any]:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,DZ")
     target = _list(2, 3)(to)
     return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
+
+
+def _fill_from(text: str) -> dict[str, Any]:
+    source, colon, to = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,R")
+    target = _list(2, 3)(to)
+    radius = {"radius": target[2]} if target[2:] else {}
+    return {"source": _list(2, 2)(source), "to": target[:2], **radius}
 
 
 def sentence(error: BaseException) -> str:

@@ -25,6 +25,7 @@ from .derived import Derived
 from .editing.composing import Composing
 from .editing.exporting import Exporting
 from .editing.handle_numbers import HandleNumbers
+from .editing.hinting import Hinting
 from .editing.looking import Looking
 from .editing.masking import Masking
 from .editing.models import Models
@@ -68,6 +69,7 @@ class Editor:
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.exporting, self.models = Exporting(self), Models(self)
         self.composing, self.looking = Composing(self), Looking(self)
+        self.hinting = Hinting(self)
         self.candidates = Candidates(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.derived.lights.ask = self.tasks.light
@@ -173,6 +175,7 @@ class Editor:
         self.objects.carried = None
         self.tasks.forget()
         self.composing.forget()
+        self.hinting.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
         self.hover, self.message = Hover(), None

@@ -24,6 +24,7 @@ from objectmorpher_core.document import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.progress import Progress, part
 
 from .layers import Rendered, Request, render
@@ -45,10 +46,11 @@ WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the fi
 
 @dataclass(frozen=True)
 class Choice:
-    """Which backend does a stage, and its random seed."""
+    """Which backend does a stage, its random seed, and what the user has said about a fill."""
 
     backend: str
     seed: int = 0
+    hints: tuple[Hint, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +226,7 @@ def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -
     """The photo without its objects."""
     from objectmorpher_core.pipeline import make_plate
 
-    return make_plate(pixels, covered, choice.backend, progress=progress, seed=choice.seed)
+    return make_plate(pixels, covered, choice.backend, progress, choice.seed, choice.hints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +248,7 @@ def fill_variants(
     for n in range(count):
         step = part(progress, n / count, (n + 1) / count)
         seed = choice.seed + n
-        plate = make_plate(pixels, covered, choice.backend, progress=step, seed=seed)
+        plate = make_plate(pixels, covered, choice.backend, step, seed, choice.hints)
         found.append(Variant(plate, thumbnail(pixels, plate)))
     return tuple(found)
 
@@ -284,7 +286,9 @@ def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Sha
     if old is None:
         return None
     inpainter, step = compose.load(choice.backend), part(progress, 0.1, 1.0)
-    plate = shadowless_plate(cutout.pixels, cutout.covered, (old,), inpainter, step, choice.seed)
+    plate = shadowless_plate(
+        cutout.pixels, cutout.covered, (old,), inpainter, step, choice.seed, choice.hints
+    )
     return old.shadow, plate
 
 

@@ -111,7 +111,7 @@ class Lights:
         splats = (derived.draft if is_coarse else derived.posed)(document, k)
         posed = puppet.draft if is_coarse else puppet.posed
         rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
-        return lambda: lighting.of(item, splats, lambda: rest, is_sketch)
+        return lambda: lighting.of(item, splats, lambda: rest, shape.texture, is_sketch)
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.lighting import Lighting

@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from objectmorpher_core import edits
+from objectmorpher_core import edits, front_edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import (
     Document,
@@ -24,6 +24,7 @@ from objectmorpher_core.document import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.segment import Found
 
 from . import job_functions
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
 REHEARSE = "rehearse"  # kind of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 FRONT = "front"
+
+
+Wanted = tuple[Mask | Hint | None, ...]  # what a background depends on: masks, then hints
 
 
 class Combine(Enum):
@@ -71,8 +75,8 @@ class Tasks:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.question: Question | None = None  # asked, not answered yet
-        self._plate: tuple[tuple[Mask | None, ...], Plate] | None = None  # of these masks
-        self._no_plate: tuple[Mask | None, ...] | None = None  # asked or failed for these masks
+        self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
+        self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
         self._front: tuple[Mask | None, Matte | None] | None = None
         self._unreadable: Photo | None = None  # reading it has ended the worker
@@ -202,7 +206,7 @@ class Tasks:
             matte = self._front[1]
             if matte is None:  # asked, or failed
                 return False
-            self._amend(lambda now: edits.keep_in_front(now, k, matte))
+            self._amend(lambda now: front_edits.keep_in_front(now, k, matte))
             return True
 
         def accept(matte: Matte) -> None:
@@ -220,28 +224,29 @@ class Tasks:
         document = self._editor.document
         if document is None or document.plate is not None:
             return False
-        masks = tuple(o.mask for o in document.objects)
+        # A fill is of these masks, and of the hints that are in force.
+        wanted = (*(o.mask for o in document.objects), *document.hints)
         if not any(o.lifted for o in document.objects):
             return False
-        if self._plate is not None and same(self._plate[0], masks):
+        if self._plate is not None and same(self._plate[0], wanted):
             self._add_plate(self._plate[1])
             return True
-        if self._no_plate is not None and same(self._no_plate, masks):
+        if self._no_plate is not None and same(self._no_plate, wanted):
             return False
-        self._no_plate = masks
-        self._ask_plate(document, masks)
+        self._no_plate = wanted
+        self._ask_plate(document, wanted)
         return True
 
-    def _ask_plate(self, document: Document, masks: tuple[Mask | None, ...]) -> None:
+    def _ask_plate(self, document: Document, wanted: Wanted) -> None:
         from objectmorpher_core.compose.plate import plate_cover
 
         editor = self._editor
 
         def accept(plate: Plate) -> None:
-            self._plate = (masks, plate)
+            self._plate = (wanted, plate)
 
         def say_so() -> None:
-            if self._no_plate is not None and same(self._no_plate, masks):
+            if self._no_plate is not None and same(self._no_plate, wanted):
                 fill_in = Action(t("Fill in"), self.fill_background)
                 editor.say(t("The background behind the object is not filled in"), fill_in)
 
@@ -252,7 +257,8 @@ class Tasks:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            plate_cover(document), Choice(editor.settings.backends.inpaint, document.seed),
+            plate_cover(document),
+            Choice(editor.settings.backends.inpaint, document.seed, document.hints),
             done=accept, failed=fail, cancelled=say_so, kind=PLATE,
         )  # fmt: skip
 

@@ -92,11 +92,19 @@ class Orbit:
         return Orbit(self.yaw + yaw, float(np.clip(self.pitch + pitch, -STEEPEST, STEEPEST)))
 
 
+class Composed(Enum):
+    """What a drag of the Compose tool does to the background that is shown alone."""
+
+    REPAIR = "Repair"
+    TAKE = "Take from"
+
+
 @dataclass(eq=False)
 class ComposeView:
     """What the Compose tool shows."""
 
     is_bare: bool = False  # the background alone, without the objects
+    drag: Composed = Composed.REPAIR
 
 
 @dataclass(eq=False)

@@ -15,8 +15,10 @@ import numpy as np
 from .arrays import F32, F64, U8, Mask, Pixels, Selection, frozen
 from .camera import Camera
 from .gaussians import Gaussians
+from .hint import Hint
 from .image import Picture
 from .joining import Shadow
+from .pose import Handle, Pose
 from .rig import Rig
 from .rotations import turn_matrix
 
@@ -77,7 +79,6 @@ class Matte:
     """Soft cut-out of an object inside a crop of the photo; alpha is 0 outside the crop.
 
     The crop may reach past the photo's frame where the object does.
-
     `foreground` is the object's own colour, freed of the background, and continued beyond the
     object so that sampling near the edge never meets the background.
     """
@@ -208,36 +209,6 @@ class LiftedObject:
         """World points (..., 3) in the object frame, at rest."""
         shifted = points - self.world_from_object[:3, 3]
         return shifted @ np.linalg.inv(self.world_from_object[:3, :3]).T
-
-
-@dataclass(frozen=True, eq=False)
-class Handle:
-    """A point of the rest surface and where it must be."""
-
-    control_point: int  # nearest control point; two handles never share one
-    point: F64  # (3,) object frame, the surface point that was clicked
-    target: F64  # (3,) object frame; equal to `point` for a pin that was never dragged
-    is_pin: bool = False
-    turn: F64 | None = None  # (3,) rotation vector, radians, any angle; None: as it comes
-    softness: float = 0.0  # 0: met exactly; 1: gives as much as the object itself does
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "point", frozen(self.point, np.float64))
-        object.__setattr__(self, "target", frozen(self.target, np.float64))
-        if self.turn is not None:
-            object.__setattr__(self, "turn", frozen(self.turn, np.float64))
-
-
-@dataclass(frozen=True, eq=False)
-class Pose:
-    """The deformed control points: paper's p'_i and R_i."""
-
-    points: F64  # (M, 3) object frame
-    rotations: F64  # (M, 3, 3)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen(self.points, np.float64))
-        object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
 
 
 UNMOVED = frozen(np.eye(4))
@@ -386,6 +357,7 @@ class Document:
     seed: int = 0
     horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
     feather: float = 1.0  # x the usual width over which the edit is blended into the photo
+    hints: tuple[Hint, ...] = ()  # from where the plate is filled
 
     def with_object(self, k: int, changed: EditObject) -> Document:
         """Object `k` replaced; the plate stays only where the mask did."""

@@ -21,6 +21,7 @@ from .document import (
     Pose,
     Prompt,
 )
+from .hint import Hint
 from .joining import (
     LEAST_FEATHER,
     MOST_FEATHER,
@@ -295,24 +296,9 @@ def set_plate(document: Document, plate: Plate | None) -> Document:
     return changed if plate is None else changed.with_backend("inpaint", plate.backend)
 
 
-def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Document:
-    """Object `k` is not edited: it covers what is, by its `matte`, as it stands in the photo.
-
-    The matte may come later. Raises EditError where nothing is selected, or it was moved.
-    """
-    item = document.objects[k]
-    if item.mask is None:
-        raise EditError("nothing is selected that could stay in front")
-    if item.is_moved:
-        raise EditError("what was moved cannot stay where it is")
-    kept = replace(item, matte=matte or item.matte, stays_in_front=True)
-    return document.with_object(k, kept)
-
-
-def let_go(document: Document, k: int) -> Document:
-    """Object `k` does not stay in front any more."""
-    item = replace(document.objects[k], stays_in_front=False)
-    return document.with_object(k, item if item.lifted else replace(item, matte=None))
+def set_hints(document: Document, hints: tuple[Hint, ...]) -> Document:
+    """From where the background is to be filled in, from its next filling on."""
+    return replace(document, hints=hints)
 
 
 def set_horizon(document: Document, horizon: float) -> Document:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
+
 from . import compose, edits
 from .compose.lighting import standings
 from .compose.old_shadow import OldShadow, shadowless_plate
 from .compose.plate import build_plate, plate_cover
 from .compose.shadow_fit import find_old_shadow
 from .document import Document, EditObject, Matte, Placement
+from .hint import Hint
 from .progress import Progress
 from .puppet import Puppet
 from .script import EditScript
+
+USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
 
 
 def with_plate(
@@ -21,12 +26,14 @@ def with_plate(
     casting: Mapping[int, Puppet],
     progress: Progress,
 ) -> Document:
-    """The document with what is behind all its objects; those of the numbers in `casting`
-    take their own shadow along.
+    """The document with what is behind all its objects, filled in as the script's hints say.
+
+    Those of the numbers in `casting` take their own shadow along.
 
     An object that has left its place takes its shadow off the ground, where that is sure. It, and
     every copy of it that is elsewhere, throws one like it.
     """
+    document = edits.set_hints(document, _hints(script, document.photo.size))
     covered, pixels = plate_cover(document), document.photo.pixels
     gone: list[OldShadow] = []
     for matte in _distinct(document, casting):
@@ -44,9 +51,11 @@ def with_plate(
             gone.append(old)
     inpainter = compose.load(script.inpaint)
     if gone:
-        plate = shadowless_plate(pixels, covered, gone, inpainter, progress, script.seed)
+        plate = shadowless_plate(
+            pixels, covered, gone, inpainter, progress, script.seed, document.hints
+        )
     else:
-        plate = build_plate(pixels, covered, inpainter, progress, script.seed)
+        plate = build_plate(pixels, covered, inpainter, progress, script.seed, document.hints)
     return edits.set_plate(document, plate)
 
 
@@ -54,6 +63,15 @@ def has_left(item: EditObject) -> bool:
     """Whether it is not where its shadow in the photo is: turned and bent it still stands there."""
     place = item.placement
     return not item.is_visible or place.move != (0, 0) or place.depth != 0 or place.scale != 1
+
+
+def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:
+    """From where the script has the background filled in, of a photo of `size` (w, h) px."""
+    usual = USUAL_HINT * float(np.hypot(*size))
+    return tuple(
+        Hint(fill.source, fill.to, usual if fill.radius is None else fill.radius)
+        for fill in script.fill_from
+    )
 
 
 def _distinct(document: Document, casting: Iterable[int]) -> list[Matte]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from . import compose, edits, lift, scripted, segment
+from . import compose, edits, front_edits, lift, scripted, segment
 from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import OPAQUE, Composite, composite
@@ -30,6 +30,7 @@ from .document import (
     Plate,
     Prompt,
 )
+from .hint import Hint
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .importing import Scene, Source, place_import, register_file
 from .left_behind import has_left, with_plate
@@ -136,9 +137,10 @@ def make_plate(
     backend: str = "auto",
     progress: Progress = silent,
     seed: int = 0,
+    hints: tuple[Hint, ...] = (),
 ) -> Plate:
     """The photo without what hides it at `covered` (H, W), as a crop."""  # fmt: skip
-    return build_plate(pixels, covered, compose.load(backend), progress, seed)
+    return build_plate(pixels, covered, compose.load(backend), progress, seed, hints)
 
 
 def export(
@@ -318,7 +320,7 @@ class _Run:
         mask = self.document.objects[k].selection
         assert mask is not None, "it was chosen"
         matte = cut_front(self.document.photo.pixels, mask)
-        self.document = edits.keep_in_front(self.document, k, matte)
+        self.document = front_edits.keep_in_front(self.document, k, matte)
 
     def _reading(self, backend: str, progress: Progress) -> Reading:
         if backend not in self._readings:

@@ -31,6 +31,15 @@ class HandleMove:
 
 
 @dataclass(frozen=True)
+class FillFrom:
+    """The background around `to` is filled in from around `source`."""
+
+    source: XY  # px
+    to: XY  # px
+    radius: float | None = None  # px; None: the usual share of the photo
+
+
+@dataclass(frozen=True)
 class EditScript:
     """One edit. Every field is a long option of the command line (DESIGN section 6)."""
 
@@ -42,6 +51,7 @@ class EditScript:
     segment: str = "auto"
     lift: str = "auto"
     inpaint: str = "auto"
+    fill_from: tuple[FillFrom, ...] = ()
     refine: str = "auto"
     splats: str | None = None  # file
     flip: bool = False  # that file's object stands on its head
@@ -223,6 +233,26 @@ def _handle(key: str, value: Any) -> HandleMove:
     return HandleMove((at[0], at[1]), (to[0], to[1]), _number(key, value.get("dz", 0.0)))
 
 
+def _sources(key: str, value: Any) -> tuple[FillFrom, ...]:
+    if not isinstance(value, list | tuple):
+        raise ScriptError(f"{key}: {value!r} is not a list of sources")
+    return tuple(_source(key, v) for v in value)
+
+
+def _source(key: str, value: Any) -> FillFrom:
+    known = {"source", "to", "radius"}
+    if not isinstance(value, dict) or not {"source", "to"} <= set(value) <= known:
+        raise ScriptError(
+            f'{key}: {value!r} is not {{"source": [x, y], "to": [x, y], "radius": r}}'
+        )
+    source, to = (_numbers(2, 2)(key, value[end]) for end in ("source", "to"))
+    radius = value.get("radius")
+    if radius is not None and _number(key, radius) <= 0:
+        raise ScriptError(f"{key}: a radius of {radius!r} px is none")
+    known_radius = None if radius is None else float(radius)
+    return FillFrom((source[0], source[1]), (to[0], to[1]), known_radius)
+
+
 def _text(key: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
         raise ScriptError(f"{key}: {value!r} is not a name")
@@ -266,6 +296,7 @@ def _between(least: float, most: float) -> Callable[[str, Any], float]:
 PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "click": _points, "not_click": _points, "box": _numbers(4, 4), "subject": _flag,
     "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
+    "fill_from": _sources,
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
     "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,

@@ -8,7 +8,7 @@ from ..editing.composing import SHADOW, VARIANTS
 from ..editor import Editor
 from ..tasks import PLATE
 from ..texts import sentence, t
-from ..view import ToolName
+from ..view import Composed, ToolName
 from .command import Command, no_lift, nothing_lifted
 
 
@@ -21,6 +21,24 @@ def _toggle_bare(editor: Editor) -> None:
 
 def _is_bare(editor: Editor) -> bool:
     return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_bare
+
+
+def _toggle_taking(editor: Editor) -> None:
+    """To the drag that says from where, with the background alone; or back to repairing."""
+    is_taking = _is_taking(editor)
+    if not _is_bare(editor):
+        _toggle_bare(editor)
+    editor.view.compose.drag = Composed.REPAIR if is_taking else Composed.TAKE
+
+
+def _is_taking(editor: Editor) -> bool:
+    return _is_bare(editor) and editor.view.compose.drag is Composed.TAKE
+
+
+def _no_sources(editor: Editor) -> str | None:
+    return nothing_lifted(editor) or (
+        None if editor.hinting.shown else t("Nothing says where the background is taken from")
+    )
 
 
 def _cannot_fill(editor: Editor) -> str | None:
@@ -65,6 +83,12 @@ def _cannot_take(editor: Editor) -> str | None:
 
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
+    "take_from": Command(
+        "Take from here", "Shift+B", _toggle_taking, nothing_lifted, _is_taking
+    ),
+    "forget_sources": Command(
+        "Remove all sources", "", lambda e: e.hinting.remove_all(), _no_sources
+    ),
     "fill_again": Command(
         "Fill in again", "", lambda e: e.composing.fill_again(), _cannot_fill
     ),

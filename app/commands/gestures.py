@@ -37,4 +37,8 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Corner", "Scale"),
         ("Ring", "Turn · Shift: in steps of 15°"),
     ),
+    "Compose": (
+        ("Drag", "Repair the background, or say from where it is taken"),
+        ("Alt-drag, right drag", "Bring the photo back"),
+    ),
 }

@@ -13,6 +13,7 @@ from objectmorpher_core import compose, edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.brush import Stroke
 from objectmorpher_core.document import Document, EditObject, Plate
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.joining import Shadow
 
 from .. import job_functions
@@ -101,15 +102,38 @@ class Composing:
         if document.plate is None:
             editor.tasks.fill_background()
             return
+        self._ask_plate(document.hints, document.plate.seed + 1, t("Fill in again"), _nothing)
+
+    def fill_from(self, hints: tuple[Hint, ...], label: str, end: Callable[[], None]) -> None:
+        """A new background with other hints: a step of its own; then, or if not, `end`."""
+        document = self._editor.document
+        if document is None or document.plate is None:
+            end()
+            return
+        self._ask_plate(hints, document.plate.seed, label, end)
+
+    def _ask_plate(
+        self, hints: tuple[Hint, ...], seed: int, label: str, end: Callable[[], None]
+    ) -> None:
+        editor, document = self._editor, self._editor.document
+        assert document is not None
         masks = _masks(document)
 
+        def take(plate: Plate) -> None:
+            end()
+            self._take_plate(masks, plate, label, hints)
+
         def accept(plate: Plate) -> None:
-            self._ready.append(lambda: self._take_plate(masks, plate, t("Fill in again")))
+            self._ready.append(lambda: take(plate))
+
+        def fail(error: JobError) -> None:
+            end()
+            editor.complain_of(error)
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1),
-            done=accept, failed=editor.complain_of, kind=PLATE,
+            editor.derived.lights.hidden(document), Choice(self.inpainter, seed, hints),
+            done=accept, failed=fail, cancelled=end, kind=PLATE,
         )  # fmt: skip
 
     def try_variants(self) -> None:
@@ -138,16 +162,20 @@ class Composing:
     def choose_variant(self, variant: Variant) -> None:
         document = self._editor.document
         if document is not None and document.plate is not variant.plate:
-            self._take_plate(_masks(document), variant.plate, t("Choose background"))
+            masks, hints = _masks(document), document.hints
+            self._take_plate(masks, variant.plate, t("Choose background"), hints)
 
-    def _take_plate(self, masks: tuple[Mask | None, ...], plate: Plate, label: str) -> None:
+    def _take_plate(
+        self, masks: tuple[Mask | None, ...], plate: Plate, label: str, hints: tuple[Hint, ...]
+    ) -> None:
         editor = self._editor
         document = editor.committed
         if document is not None and same(masks, _masks(document)):
-            editor.apply(label, edits.set_plate(document, plate))
+            editor.apply(label, edits.set_plate(edits.set_hints(document, hints), plate))
 
     def _choice(self, seed: int) -> Choice:
-        return Choice(self.inpainter, seed)
+        document = self._editor.document
+        return Choice(self.inpainter, seed, () if document is None else document.hints)
 
     # Repairing it
 
@@ -349,6 +377,10 @@ class Composing:
             editor.preview = change(editor.committed, editor.current)
         except ValueError as error:
             editor.complain(str(error))
+
+
+def _nothing() -> None:
+    """Nobody waits for the background."""
 
 
 def _masks(document: Document) -> tuple[Mask | None, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..texts import t
+from ..view import Composed
 from .pointer import Button, Pointer, Shape, Stroke, ignore
 
 if TYPE_CHECKING:
@@ -12,16 +13,32 @@ if TYPE_CHECKING:
 
 
 class ComposeTool:
-    """While the background is shown alone: left repairs it, right or Alt restores the photo."""
+    """While the background is shown alone: left repairs it, right or Alt restores the photo.
+
+    Or left drags from where it is to be taken to where it is wanted, right or Alt forgets that.
+    """
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        is_restoring = pointer.alt or pointer.button is Button.RIGHT
+        is_other = pointer.alt or pointer.button is Button.RIGHT
         if not editor.view.compose.is_bare:
             editor.say(t("Show the background alone to paint on it"))
             return ignore()
-        if not editor.composing.start_stroke(is_restoring):
+        if editor.view.compose.drag is Composed.TAKE:
+            if is_other:
+                editor.hinting.remove_at(pointer.xy)
+                return ignore()
+            return self._take(editor) if editor.hinting.start(pointer.xy) else ignore()
+        if not editor.composing.start_stroke(is_other):
             return ignore()
         return self._paint(editor, pointer)
+
+    def _take(self, editor: Editor) -> Stroke:
+        try:
+            while (pointer := (yield)).is_down:
+                editor.hinting.move_to(pointer.xy)
+            editor.hinting.finish()
+        finally:
+            editor.hinting.drop()
 
     def _paint(self, editor: Editor, pointer: Pointer) -> Stroke:
         try:
@@ -39,6 +56,12 @@ class ComposeTool:
     def hint(self, editor: Editor) -> str:
         if not editor.view.compose.is_bare:
             return t("B shows the background alone, to repair it by painting")
+        if editor.view.compose.drag is Composed.TAKE:
+            if editor.hand.is_busy:
+                return t("Let go where it is wanted · Esc takes it back")
+            return t(
+                "Drag from what to take to where it is wanted · Alt-click forgets it · [ ] size"
+            )
         if editor.hand.is_busy:
             return t("Let go to fill in what is painted · Esc takes it back")
         return t("Paint what to fill in again · Alt-paint brings the photo back · [ ] brush size")

@@ -1,6 +1,8 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py
+python docs/compositing/make_compositing.py [plates]
+
+With `plates`, only the last section, about the background, is made anew.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ sys.path += [str(FOLDER.parent), str(FOLDER.parent / "lifting")]  # what other p
 import grains  # noqa: E402
 import lights  # noqa: E402
 import places  # noqa: E402
+import plate_times  # noqa: E402
 import plates  # noqa: E402
 import shadows  # noqa: E402
 from meshes import fetched  # noqa: E402
-from page import Measures, write_page  # noqa: E402
+from page import PLATE, Measures, plate_section, write_page  # noqa: E402
 from photos import shadow_pairs  # noqa: E402
 from solids import SOLIDS  # noqa: E402
 
@@ -32,18 +35,17 @@ TILE, WIDE = 200, 280  # px
 
 
 def main() -> None:
+    if sys.argv[1:] == ["plates"]:
+        page = FOLDER / "README.md"
+        rest = page.read_text(encoding="utf-8").split(PLATE.partition("\n")[0])[0]
+        page.write_text(rest + plate_section(*_plates()), encoding="utf-8")
+        return
     meshes = fetched()
     turned, shaded = [], []
     for number, name in enumerate(SOLIDS):
         turned += lights.measured(name, meshes)
         shaded += shadows.measured(name, number, meshes)
         print(name, flush=True)
-    filled, pictures = {}, []
-    for name in plates.HOLES:
-        photo, cut, filled[name] = plates.measured(name)
-        pictures.append([photo, cut, *(found.picture for found in filled[name].values())])
-        print(name, flush=True)
-    _write("plates.jpg", pictures)
     shown = [case for case in turned if (case.name, case.lamp, case.turn) in SHOWN]
     _write("lights.jpg", [[_bytes(p)[110:400, 110:400] for p in case.pictures] for case in shown])
     found = [case for case in shaded if case.is_found][:8]
@@ -54,9 +56,20 @@ def main() -> None:
     own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
     _write("grains.jpg", [[p[:40, :40] for p in c.pictures] for c in own], WIDE)
     measures = Measures(
-        turned, places.measured(meshes), grained, grains.found_on_photos(), shaded, filled
+        turned, places.measured(meshes), grained, grains.found_on_photos(), shaded, *_plates()
     )
     (FOLDER / "README.md").write_text(write_page(measures), encoding="utf-8")
+
+
+def _plates() -> tuple[dict[str, dict[str, plates.Filled]], list[plate_times.Taken]]:
+    """Holes filled, drawn to plates.jpg; and how long plates take."""
+    filled, pictures = {}, []
+    for name in plates.HOLES:
+        photo, cut, filled[name] = plates.measured(name)
+        pictures.append([photo, cut, *(found.picture for found in filled[name].values())])
+        print(name, flush=True)
+    _write("plates.jpg", pictures)
+    return filled, plate_times.measured()
 
 
 def _bytes(picture: np.ndarray) -> np.ndarray:

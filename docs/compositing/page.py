@@ -8,6 +8,7 @@ import numpy as np
 from grains import ADDED, RINGS, Grained
 from lights import Turned
 from places import WORSE, Moved
+from plate_times import Taken
 from plates import HOLES, WAYS, Filled
 from shadows import Shaded
 
@@ -95,9 +96,18 @@ the photo's resolution, the others are OpenCV's.
 
 ![What was there, the hole, ours, PatchMatch, Telea, Navier-Stokes](plates.jpg)
 
-Ours searches a small picture and takes the detail from the photo: nearly as good as plain
-PatchMatch, in a part of the time, which at 24 MP decides. Neither understands what it copies:
-beside a face it may copy a face (*flag and wall*). Variants, and the brush, are for that.
+{summary}
+
+Ours searches a small picture, from coarse to fine, and takes the detail from the photo. Straight
+edges that enter a hole on two sides go on through it, and the subject of the photo (as U²-Net-p
+sees it; without its weights, colours that do not occur around the hole) is an unlikely source, so
+that hair does not grow over the wall (*flag and wall*). It does not understand what it copies:
+variants, the brush, and *Take from here* (Shift+B, or `--fill-from`) are for that. Its settings
+were chosen on 49 other holes in the same photos and five more; only how much the subject counts
+was seen on *flag and wall*, too. Seconds are those of all processors together.
+
+{times}
+Made by `python docs/compositing/make_compositing.py plates`, as is this section.
 """
 
 
@@ -111,10 +121,11 @@ class Measures:
     found: dict[str, list[float]]  # by photo, see `grains.found_on_photos`
     shaded: list[Shaded]
     filled: dict[str, dict[str, Filled]]
+    taken: list[Taken]
 
 
 def write_page(measures: Measures) -> str:
-    turned, shaded, filled = measures.turned, measures.shaded, measures.filled
+    turned, shaded = measures.turned, measures.shaded
     return "\n".join(
         [
             HEAD,
@@ -124,8 +135,29 @@ def write_page(measures: Measures) -> str:
             ),
             GRAIN.format(table=_grain_table(measures.grained), found=_found_table(measures.found)),
             SHADOW.format(summary=_shadow_summary(shaded), table=_shadow_table(shaded)),
-            PLATE.format(table=_plate_table(filled)),
+            plate_section(measures.filled, measures.taken),
         ]
+    )
+
+
+def plate_section(filled: dict[str, dict[str, Filled]], taken: list[Taken]) -> str:
+    table, summary = _plate_table(filled), _plate_summary(filled)
+    return PLATE.format(table=table, summary=summary, times=_times(taken))
+
+
+def _times(taken: list[Taken]) -> str:
+    parts = [f"{t.megapixels} MP in {t.seconds:.1f} s and {t.megabytes:.0f} MB" for t in taken]
+    return f"A thing of a third of the photo's width, the program's memory: {'; '.join(parts)}."
+
+
+def _plate_summary(filled: dict[str, dict[str, Filled]]) -> str:
+    """In how many holes ours is at least as good as plain PatchMatch."""
+    pairs = [(found["ours"], found["PatchMatch"]) for found in filled.values()]
+    psnr, ssim = (sum(getattr(a, n) >= getattr(b, n) for a, b in pairs) for n in ("psnr", "ssim"))
+    unlike = sum(a.unlike <= b.unlike for a, b in pairs)
+    return (
+        f"Ours is at least as near as plain PatchMatch in {psnr} (PSNR) and {ssim} (SSIM) of "
+        f"{len(pairs)} holes, and at least as alike in {unlike}."
     )
 
 

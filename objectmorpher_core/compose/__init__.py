@@ -6,9 +6,10 @@ An inpainter a file; `load()` imports the chosen one. What lies outside the hole
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ..arrays import Mask, Pixels
+from ..hint import Hint
 from ..progress import Progress
 
 
@@ -31,6 +32,17 @@ class Inpainter(Protocol):
 
         The same arguments give the same bytes. Raises InpaintError where the hole is everything.
         """
+        ...
+
+
+@runtime_checkable
+class TakesHints(Protocol):
+    """An inpainter that heeds what the user says about where to take what from."""
+
+    def inpaint_from(
+        self, rgb: Pixels, hole: Mask, hints: tuple[Hint, ...], progress: Progress, seed: int = 0
+    ) -> Pixels:
+        """As `Inpainter.inpaint`; the hints are in px of `rgb`, some perhaps outside."""
         ...
 
 

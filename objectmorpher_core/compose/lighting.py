@@ -70,6 +70,7 @@ class Lighting:
         item: EditObject,
         splats: PosedSplats,
         rest: Callable[[], PosedSplats],
+        texture: TextureLevels | None = None,
         is_sketch: bool = False,
     ) -> Lit:
         """Of a moved object whose Gaussians are `splats` now and were at `rest`.

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..document import Plate
+from ..hint import Hint
 from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
@@ -91,6 +92,7 @@ def shadowless_plate(
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
+    hints: tuple[Hint, ...] = (),
 ) -> Plate:
     """As `build_plate`, of the photo in full light: shadows are gone beside the objects, too.
 
@@ -108,7 +110,8 @@ def shadowless_plate(
         lost[part] |= old.missing(shade) > LOST
     lost &= ~covered
     filled = covered | lost
-    own = build_plate(lit, covered if filled.all() else filled, inpainter, progress, seed)
+    filled = covered if filled.all() else filled
+    own = build_plate(lit, filled, inpainter, progress, seed, hints)
     boxes = np.array([own.box, *shades])
     x0, y0 = (int(v) for v in boxes[:, :2].min(0))
     x1, y1 = (int(v) for v in boxes[:, 2:].max(0))

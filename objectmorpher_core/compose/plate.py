@@ -15,9 +15,10 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..document import Document, Matte, Plate
+from ..hint import Hint
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
-from . import Inpainter
+from . import Inpainter, TakesHints
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -54,10 +55,11 @@ def build_plate(
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
+    hints: tuple[Hint, ...] = (),
 ) -> Plate:
     """The photo (H, W, 3) without what hides it at `covered` (H, W), which must not be empty.
 
-    `Plate.hole` is where anything is invented.
+    `Plate.hole` is where anything is invented. Hints are for inpainters that take them.
     """
     height, width = covered.shape
     margin = hole_margin(width, height)
@@ -66,9 +68,16 @@ def build_plate(
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
     x0, y0, x1, y1 = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
     context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    if hints:  # from anywhere
+        context = max(width, height)
     top, left = max(y0 - context, 0), max(x0 - context, 0)
     window = (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width)))
-    filled = inpainter.inpaint(pixels[window], hole[window], part(progress, 0.0, 0.9), seed)
+    cut_out, step = (pixels[window], hole[window]), part(progress, 0.0, 0.9)
+    if hints and isinstance(inpainter, TakesHints):
+        moved = tuple(hint.moved(-left, -top) for hint in hints)
+        filled = inpainter.inpaint_from(*cut_out, moved, step, seed)
+    else:
+        filled = inpainter.inpaint(*cut_out, step, seed)
     progress(0.9, "joining it to the photo")
     inner = (slice(y0, y1), slice(x0, x1))
     fill = unit_pixels(filled[y0 - top : y1 - top, x0 - left : x1 - left])

@@ -172,7 +172,8 @@ def _cleared(alpha: F32, distance: F32, widths: tuple[float, float], chance: F32
     strongest = cv2.blur(cv2.dilate(strayed, square), square.shape)
     is_haze = np.clip(2 * (1 - strongest / PLAIN), 0, 1)
     haze = chance * is_haze * np.clip((away - astray) / band, 0, 1)
-    return np.clip(np.where(distance < 0, alpha - haze, alpha) / (1 - haze), 0, 1)
+    cleared = np.where(distance < 0, alpha - haze, alpha) / (1 - haze)
+    return np.asarray(np.clip(cleared, 0, 1), np.float32)
 
 
 def _sharper(size: _Size, before: F32, small: _Size) -> F32:

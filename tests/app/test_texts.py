@@ -29,7 +29,7 @@ SHOWING = {
 }  # fmt: skip
 TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
 TABLE_FILES = ("commands/gestures.py",)  # literals that are all texts
-ENUMS = (view.ToolName, view.Shown, view.Popup, Dialog, What, Motion)
+ENUMS = (view.ToolName, view.Composed, view.Shown, view.Popup, Dialog, What, Motion)
 
 
 def calls(path: Path) -> Iterator[ast.Call]:

@@ -26,6 +26,7 @@ FULL = {
     "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
     "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]], "front-mask": "f.png",
     "remove": True,
+    "fill-from": [{"source": [1, 2], "to": [3, 4], "radius": 5}, {"source": [1, 2], "to": [3, 4]}],
 }  # fmt: skip
 
 
@@ -87,6 +88,8 @@ def test_what_is_no_script_is_refused(text, sentence):
     ("turn", [1, 2]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
     ("scale", float("nan")), ("deform", "jelly"), ("links", None), ("faithful", "yes"),
     ("nodes", 3), ("nodes", 5000), ("nodes", 1.5), ("stiffness", 9),
+    ("fill-from", [[1, 2]]), ("fill-from", [{"source": [1, 2]}]),
+    ("fill-from", [{"source": [1, 2], "to": [3, 4], "radius": 0}]),
     ("shadow", "dark"), ("fov", True), ("seed", -1), ("seed", 1.5), ("seed", 2**40),
 ])  # fmt: skip
 def test_wrong_values_are_refused_with_the_option_and_the_value(key, value):

@@ -27,6 +27,7 @@ from objectmorpher_core.document import (
     Prompt,
 )
 from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.hint import Hint
 from objectmorpher_core.image import Picture, encode_picture, read_picture
 from objectmorpher_core.rig import Rig, Seam
 from objectmorpher_core.session_file import (
@@ -84,6 +85,7 @@ def full_document(photo: Picture, source: bytes) -> Document:
     return Document(
         Photo(photo, Camera.from_fov(width, height, 47.11), source, "a photo.PNG"),
         (edited, only_clicked), plate, (("segment", "dino"), ("inpaint", "patchmatch")), 12345,
+        hints=(Hint((3.0, 0.1 + 0.2), (20.5, 30.0), 7.25),),
     )  # fmt: skip
 
 

@@ -119,9 +119,12 @@ class Canvas:
         at, reach = self.on_canvas(pointer.xy)[0], view.zoom / self.ratio
         half = view.brush.radius * (1 + view.brush.hardness) / 2
         for radius, alpha in ((half, 1.0), (view.brush.radius, 0.45)):
-            r = max(radius * reach, 1.5)
-            self.draw.add_circle(at, r, theme.u32(DARK, 0.7 * alpha), 0, theme.pt(3))
-            self.draw.add_circle(at, r, theme.u32(color, alpha), 0, theme.pt(1.2))
+            self.circle(at, max(radius * reach, 1.5), color, alpha)
+
+    def circle(self, at: ImVec2, radius: float, color: str, alpha: float = 1.0) -> None:
+        """A thin one; `radius` in window units."""
+        self.draw.add_circle(at, radius, theme.u32(DARK, 0.7 * alpha), 0, theme.pt(3))
+        self.draw.add_circle(at, radius, theme.u32(color, alpha), 0, theme.pt(1.2))
 
     def label(self, text: str, x: float, y: float, side: float = 0.0) -> None:
         """White on dark, at a window position; `side`: 0 begins at x, 0.5 centred, 1 ends there."""

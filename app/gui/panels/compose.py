@@ -22,6 +22,7 @@ from ...commands.compose import not_moved
 from ...editor import Editor
 from ...job_functions import Variant
 from ...texts import sentence, t
+from ...view import Composed
 from ..command_button import command_button
 from ..dial import SIDE, dial
 from ..pictures import pictures
@@ -40,7 +41,7 @@ from ..widgets import (
     rule,
     tooltip,
 )
-from .brush import draw_brush_fields
+from .brush import draw_brush_fields, draw_radius
 
 INPAINTERS = {"auto": "Automatic", "patchmatch": "Patches", "telea": "Smooth"}
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
@@ -85,8 +86,21 @@ def _draw_background(editor: Editor) -> None:
     command_button(editor, "variants", width=half)
     _draw_variants(editor)
     if is_bare and editor.document is not None and editor.document.plate is not None:
-        draw_brush_fields(editor)
-        note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
+        _draw_brush(editor)
+
+
+def _draw_brush(editor: Editor) -> None:
+    """What a drag on the background does."""
+    compose_view = editor.view.compose
+    choices = tuple(Choice(way, t(way.value)) for way in Composed)
+    compose_view.drag = segmented("composed", choices, compose_view.drag)
+    if compose_view.drag is Composed.TAKE:
+        draw_radius(editor)
+        command_button(editor, "forget_sources", width=-1)
+        note(t("Drag from what should be there to where it is wanted. Alt-click forgets it."))
+        return
+    draw_brush_fields(editor)
+    note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
 
 
 def _draw_variants(editor: Editor) -> None:

@@ -1,0 +1,159 @@
+"""Filling by example: what goes on, from where it is taken, and by how much patches vote."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from objectmorpher_core.arrays import frozen
+from objectmorpher_core.compose import load
+from objectmorpher_core.compose.completion import smooth
+from objectmorpher_core.compose.patch_search import patch_cost, vote
+from objectmorpher_core.compose.plate import build_plate
+from objectmorpher_core.compose.source_prior import SUBJECT_COST, strange, unlikely
+from objectmorpher_core.compose.structure_lines import draw_lines, find_lines
+from objectmorpher_core.hint import Hint
+from objectmorpher_core.progress import silent
+from objectmorpher_core.segment.subject import SubjectNet
+
+SIZE = 160  # px
+Y, X = np.mgrid[:SIZE, :SIZE]
+HOLE = np.hypot(X - 80, Y - 80) < 26
+
+
+def noisy(levels: np.ndarray, seed: int = 0) -> np.ndarray:
+    """(h, w, 3) u8 of grey levels (h, w) with some grain."""
+    grain = np.random.default_rng(seed).normal(0, 3, (*levels.shape, 3))
+    return np.clip(levels[..., None] + grain, 0, 255).astype(np.uint8)
+
+
+def filled(picture: np.ndarray, hole: np.ndarray = HOLE, hints: tuple[Hint, ...] = ()):
+    emptied = np.where(hole[..., None], np.uint8(0), picture)
+    return load("patchmatch").inpaint_from(emptied, hole, hints, silent, 1)
+
+
+@pytest.mark.parametrize("angle", [0, 25, 70, 90])
+def test_an_edge_that_enters_on_two_sides_goes_on_straight(angle):
+    turn = np.radians(angle)
+    beside = (X - 84) * np.sin(turn) - (Y - 77) * np.cos(turn)
+    picture = noisy(np.where(beside > 0, 170.0, 80.0))
+    found = filled(picture).astype(float).mean(-1)
+    off_edge = HOLE & (np.abs(beside) > 2.5)
+    wrong = (np.abs(found - np.where(beside > 0, 170, 80)) > 45)[off_edge]
+    assert wrong.mean() < 0.02
+
+
+def test_lines_are_found_where_they_are_and_nowhere_else():
+    beside = (X - 84) * 0.5 - (Y - 77) * np.sqrt(0.75)
+    edge = noisy(np.where(beside > 0, 170.0, 80.0)).astype(np.float32)
+    known = (~HOLE).astype(np.float32)
+    lines = find_lines(smooth(edge, known), HOLE)
+    assert len(lines) == 1
+    wanted, offered = draw_lines(lines, (1.0, 1.0), HOLE)
+    assert (wanted[..., 0] > 0)[HOLE & (np.abs(beside) < 2)].mean() > 0.9
+    assert not wanted[~HOLE].any() and not offered[HOLE].any()
+    there = wanted[..., 0] > 0
+    gap = np.abs(np.abs(wanted[there, 1]) - np.abs(beside[there]))
+    assert np.median(gap) < 1.5  # px
+    plain = noisy(np.full((SIZE, SIZE), 90.0)).astype(np.float32)
+    assert not find_lines(smooth(plain, known), HOLE)
+
+
+def test_what_repeats_goes_on():
+    tiles = noisy(60.0 + 120 * ((X // 10 + Y // 10) % 2))
+    error = np.abs(filled(tiles).astype(float) - tiles)[HOLE]
+    assert np.median(error) < 10 and error.mean() < 20
+
+
+def test_a_hint_says_from_where():
+    """Left dark, right bright, the hole in the dark: bright where the user wants it so."""
+    picture = noisy(np.where(X > 120, 200.0, 60.0))
+    hint = Hint((140.0, 80.0), (80.0, 80.0), 12.0)
+    plain, hinted = (filled(picture, hints=h).astype(float).mean(-1) for h in ((), (hint,)))
+    disc = np.hypot(X - 80, Y - 80) < 6  # within the soft seam of the two
+    assert plain[disc].mean() < 80 and hinted[disc].mean() > 160
+    rim = HOLE & (np.hypot(X - 80, Y - 80) > 22)
+    assert hinted[rim].mean() < 90, "elsewhere nothing was said"
+    assert np.array_equal(hinted[~HOLE], picture.astype(float).mean(-1)[~HOLE])
+
+
+def test_a_hint_may_lead_to_the_far_end_of_the_photo():
+    large = noisy(np.where(np.mgrid[:120, :600][1] > 540, 200.0, 60.0))
+    hole = np.zeros((120, 600), bool)
+    hole[45:75, 40:70] = True
+    hint = Hint((570.0, 60.0), (55.0, 60.0), 14.0)
+    plate = build_plate(large, hole, load("patchmatch"), hints=(hint,))
+    assert plate.pixels[60 - plate.top, 55 - plate.left].mean() > 150
+
+
+def test_telea_goes_without_hints():
+    picture = noisy(np.full((SIZE, SIZE), 90.0))
+    hint = Hint((140.0, 80.0), (80.0, 80.0), 12.0)
+    plates = [build_plate(picture, HOLE, load("telea"), hints=h) for h in ((), (hint,))]
+    assert np.array_equal(plates[0].pixels, plates[1].pixels)
+
+
+def test_no_other_object_is_copied():
+    """Everything that a plate covers is a hole: a magenta thing beside does not come again."""
+    picture = noisy(60.0 + 40 * np.sin(X / 9.0))
+    other = np.hypot(X - 125, Y - 80) < 14
+    picture[other] = (255, 0, 255)
+    plate = build_plate(picture, HOLE | other, load("patchmatch"))
+    invented = plate.pixels[plate.hole].astype(int)
+    assert (invented[:, 0] - invented[:, 1]).max() < 60
+
+
+def test_a_colour_that_is_not_around_the_hole_is_unlikely():
+    levels = noisy(60.0 + 100 * (X > 80)).astype(np.float32)
+    red = np.hypot(X - 140, Y - 20) < 12
+    levels[red] = (220, 20, 30)
+    around = (cv2.dilate(HOLE.astype(np.uint8), np.ones((15, 15))) > 0) & ~HOLE
+    share = strange(levels.astype(np.uint8), around)
+    assert share.shape == HOLE.shape and share.min() >= 0
+    inner = np.hypot(X - 140, Y - 20) < 6
+    assert share[inner].min() > 0.5 and share[~red & (X > 82)].mean() < 0.1
+
+
+@pytest.mark.skipif(SubjectNet().missing() is not None, reason="needs U^2-Net-p")
+def test_a_face_beside_the_hole_is_unlikelier_than_the_wall(astronaut):
+    small = cv2.resize(astronaut, (256, 256), interpolation=cv2.INTER_AREA).astype(np.float32)
+    y, x = np.mgrid[:256, :256]
+    hole = np.hypot(x - 185, y - 50) < 18  # in the wall, between her and the shuttle
+    cost = unlikely(small, hole)
+    face, wall = cost[45:70, 100:122].mean(), cost[20:60, 155:165].mean()
+    assert face > wall + 0.3 * SUBJECT_COST
+
+
+def test_votes_are_the_mean_of_what_the_patches_say():
+    random = np.random.default_rng(4)
+    side, radius, channels = 7, 1, 2
+    hole = random.random((side, side)) < 0.4
+    layers = random.random((2, side + 2, side + 2, channels)).astype(np.float32)
+    sources = np.dstack(
+        [random.integers(-1, 2, (side, side)), *random.integers(0, side, (2, side, side))]
+    ).astype(np.int32)
+    shares = random.random((side, side)).astype(np.float32)
+    voted = random.random((side, side, channels)).astype(np.float32)
+    expected = voted.copy()
+    for row, column in np.argwhere(hole):
+        said, weights = [], []
+        for i, j in np.argwhere(sources[..., 0] >= 0):
+            if max(abs(i - row), abs(j - column)) <= radius:
+                k, v, u = sources[i, j]
+                said.append(layers[k, v + row - i + radius, u + column - j + radius])
+                weights.append(shares[i, j])
+        if said:
+            expected[row, column] = np.average(said, 0, weights)
+    vote(frozen(layers), frozen(sources), frozen(shares), frozen(hole), voted)
+    np.testing.assert_allclose(voted, expected, atol=1e-5)
+
+
+def test_a_patch_costs_nothing_where_it_is_from():
+    random = np.random.default_rng(5)
+    layers = frozen(random.random((1, 20, 20, 5)), np.float32)
+    weight = frozen(np.ones_like(layers[0]))
+    assert patch_cost(layers[0], weight, layers, (3, 4), (0, 3, 4), 7, 1e9) == 0
+    gap = layers[0, 3:10, 4:11] - layers[0, 8:15, 9:16]
+    cost = patch_cost(layers[0], weight, layers, (3, 4), (0, 8, 9), 7, 1e9)
+    np.testing.assert_allclose(cost, (gap**2).sum(), rtol=1e-5)
