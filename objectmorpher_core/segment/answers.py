@@ -12,6 +12,7 @@ from ..document import Click, Prompt
 from .edges import BAND, sharpen_band
 from .piece_choice import Choice, Ground, Region, correct
 from .pieces import Pieces
+from .relabel import relabel, touching
 from .selection import SMALLEST, fill_small_holes, keep_touched
 
 OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's edge
@@ -38,7 +39,10 @@ def begin(
     means at the level "object": a part lies in its object, and the object in its group.
     """
     pieces = ground.pieces
-    mask = sharpen_band(image, pieces.paint(choice.pieces), band=_band(pieces))
+    chosen = choice.pieces
+    if prompt.level == "object":
+        chosen = relabel(pieces, chosen, _said(pieces, prompt, True)) & ground.inside(prompt)
+    mask = sharpen_band(image, pieces.paint(chosen), band=_band(pieces))
     mask = _tidy(mask, _reduced(pieces, prompt))
     if whole is not None:
         nested = mask & whole if prompt.level == "part" else mask | whole
@@ -108,13 +112,24 @@ def _wrong(ground: Ground, before: Mask, prompt: Prompt) -> tuple[Mask, tuple[Re
     walls = tuple(
         pieces.at(c.x, c.y) for c in prompt.clicks if c.is_foreground != click.is_foreground
     )
-    choice = correct(ground, click, flippable & ground.inside(prompt), walls)
+    flippable &= ground.inside(prompt)
+    choice = correct(ground, click, flippable, walls)
     had = pieces.mean(before) > 0.5
+    found = had | choice.pieces if click.is_foreground else had & ~choice.pieces
+    said = _said(pieces, prompt, True), _said(pieces, prompt, False)
+    is_like = (relabel(pieces, found, *said) == click.is_foreground) | choice.pieces
+    flipped = touching(pieces, is_like & flippable, choice.pieces)
     others = tuple(
         Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
         for r in _relative(choice.others)
     )
-    return pieces.paint(choice.pieces) & differs, others
+    return pieces.paint(flipped) & differs, others
+
+
+def _said(pieces: Pieces, prompt: Prompt, is_foreground: bool) -> tuple[int, ...]:
+    """The pieces that clicks say are in the object, or are not."""
+    clicks = (c for c in prompt.clicks if c.is_foreground == is_foreground)
+    return tuple(pieces.at(c.x, c.y) for c in clicks)
 
 
 def _tidy(mask: Mask, small: Prompt) -> Mask:

@@ -161,10 +161,17 @@ class Pieces:
 
     def settle(self, is_object: Mask, is_ground: Mask) -> F64:
         """(n,) chance that a walk from a piece meets the object before the ground, both (n,)."""
-        known = 1e6 * (is_object | is_ground) + 1e-9
+        unsure = np.full(self.count, 0.5e-9)
+        return self.walk_home(1e6 * is_object + unsure, 1e6 * (is_ground & ~is_object) + unsure)
+
+    def walk_home(self, to_object: F64, to_ground: F64) -> F64:
+        """(n,) chance that a walk ends in the object; how easily it does, and in the ground (n,).
+
+        Both as the ease with which it passes on to a neighbour: at most about 1.
+        """
         degrees = np.asarray(self._links.sum(1)).ravel()
-        system = (sparse.diags(degrees + known) - self._links).tocsc()
-        return splu(system).solve(known * np.where(is_object, 1.0, np.where(is_ground, 0.0, 0.5)))
+        system = (sparse.diags(degrees + to_object + to_ground) - self._links).tocsc()
+        return splu(system).solve(to_object)
 
     def _open(self) -> Any:
         if self._solver is None:
