@@ -117,7 +117,7 @@ def _wrong(ground: Ground, before: Mask, prompt: Prompt) -> tuple[Mask, tuple[Re
     had = pieces.mean(before) > 0.5
     found = had | choice.pieces if click.is_foreground else had & ~choice.pieces
     said = _said(pieces, prompt, True), _said(pieces, prompt, False)
-    is_like = (relabel(pieces, found, *said) == click.is_foreground) | choice.pieces
+    is_like = (relabel(pieces, found, *said, piece) == click.is_foreground) | choice.pieces
     flipped = touching(pieces, is_like & flippable, choice.pieces)
     others = tuple(
         Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)

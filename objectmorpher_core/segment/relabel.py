@@ -19,6 +19,7 @@ from .pieces import Pieces
 LIKE_COLOR = 5.0  # CIELAB units, standard deviation of how far a colour counts
 LIKE_KIND = 0.3  # of 1 - cosine between tokens, the same as an exponential
 NEAR = 0.6  # x square root of the object's area, standard deviation of how far a place counts
+DOUBT_COLOR = 10.0  # CIELAB units, the same for what a click contradicts
 VOTERS = 500  # of the object, and of the rest: more change nothing visible
 LEAST_ODDS = 0.02  # a vote is never surer than that
 KEEPS = 0.8  # x contrast of the answer before: a vote that blurs it is not heard
@@ -26,7 +27,11 @@ TRUST = 0.02  # of the votes, x a walk's ease between like neighbours
 
 
 def relabel(
-    pieces: Pieces, mask: Mask, wanted: tuple[int, ...], unwanted: tuple[int, ...] = ()
+    pieces: Pieces,
+    mask: Mask,
+    wanted: tuple[int, ...],
+    unwanted: tuple[int, ...] = (),
+    doubted: int | None = None,
 ) -> Mask:
     """(n,) the pieces in `mask` (n,) after the vote; `wanted` and `unwanted` pieces are known.
 
@@ -34,7 +39,7 @@ def relabel(
     """
     if not mask.any() or mask.all():
         return mask
-    chance = votes(pieces, mask)
+    chance = votes(pieces, mask, _heard(pieces, mask, doubted))
     odds = TRUST * np.log(chance / (1 - chance))
     is_object, is_ground = np.maximum(odds, 0) + 1e-9, np.maximum(-odds, 0) + 1e-9
     is_object[list(wanted)] = is_ground[list(unwanted)] = 1e4
@@ -43,8 +48,11 @@ def relabel(
     return found if stands_out else mask
 
 
-def votes(pieces: Pieces, mask: Mask) -> F64:
-    """(n,) how likely a piece is in the object by the labels `mask` (n,) of the others like it."""
+def votes(pieces: Pieces, mask: Mask, heard: F64) -> F64:
+    """(n,) how likely a piece is in the object by the labels `mask` (n,) of the others like it.
+
+    `heard` (n,): how much each vote counts, in [0, 1].
+    """
     size = float(np.sqrt(pieces.area[mask].sum()))
     places = _places(pieces, NEAR * size)
     total = np.full(pieces.count, 1e-6)
@@ -55,11 +63,24 @@ def votes(pieces: Pieces, mask: Mask) -> F64:
         voters = voters[::step]
         gap = np.square(places).sum(1)[:, None] + np.square(places[voters]).sum(1)
         gap -= 2 * places @ places[voters].T
-        weight = np.exp(-np.maximum(gap, 0)) * (step * pieces.area[voters]).astype(np.float32)
+        weight = np.exp(-np.maximum(gap, 0)) * (step * (heard * pieces.area)[voters]).astype(
+            np.float32
+        )
         weight[voters, np.arange(len(voters))] = 0  # none votes for itself
         total += weight.sum(1)
         inside += label * weight.sum(1)
     return np.clip(inside / total, LEAST_ODDS, 1 - LEAST_ODDS)
+
+
+def _heard(pieces: Pieces, mask: Mask, doubted: int | None) -> F64:
+    """(n,) how much each piece's vote counts: what is like one that was told apart says little."""
+    heard = np.ones(pieces.count)
+    if doubted is not None:
+        color = np.square(pieces.colors - pieces.colors[doubted]).sum(1) / DOUBT_COLOR**2
+        kind = np.square(pieces.features - pieces.features[doubted]).sum(1) / LIKE_KIND
+        contrary = mask != mask[doubted]
+        heard[contrary] -= np.exp(-0.5 * (color + kind))[contrary]
+    return heard
 
 
 def _places(pieces: Pieces, near: float) -> F32:
