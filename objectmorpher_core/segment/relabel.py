@@ -55,8 +55,8 @@ def votes(pieces: Pieces, mask: Mask, heard: F64) -> F64:
     """
     size = float(np.sqrt(pieces.area[mask].sum()))
     places = _places(pieces, NEAR * size)
-    total = np.full(pieces.count, 1e-6)
-    inside = np.full(pieces.count, 1e-6) * mask
+    total = 1e-6 * heard + 1e-9  # what no other is like stays what it is, unless it is doubted
+    inside = 1e-6 * heard * mask + 0.5e-9
     for label in (True, False):
         voters = np.flatnonzero(mask == label)
         step = max(1, -(-len(voters) // VOTERS))
