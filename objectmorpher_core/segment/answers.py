@@ -39,10 +39,7 @@ def begin(
     means at the level "object": a part lies in its object, and the object in its group.
     """
     pieces = ground.pieces
-    chosen = choice.pieces
-    if prompt.level == "object":
-        chosen = relabel(pieces, chosen, _said(pieces, prompt, True)) & ground.inside(prompt)
-    mask = sharpen_band(image, pieces.paint(chosen), band=_band(pieces))
+    mask = sharpen_band(image, pieces.paint(choice.pieces), band=_band(pieces))
     mask = _tidy(mask, _reduced(pieces, prompt))
     if whole is not None:
         nested = mask & whole if prompt.level == "part" else mask | whole
@@ -87,6 +84,13 @@ def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> flo
     down = np.count_nonzero(answer.mask[1:] != answer.mask[:-1])
     outline = DIAGONAL * (across + down) / max(int(answer.mask.sum()), 1)
     return float(expected / total / (1 + BLUR * outline))
+
+
+def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:
+    """What a first click means, its pieces decided anew by what is like them."""
+    known = _said(ground.pieces, prompt, True)
+    voted = relabel(ground.pieces, choice.pieces, known) & ground.inside(prompt)
+    return replace(choice, pieces=voted)
 
 
 def _band(pieces: Pieces) -> int:

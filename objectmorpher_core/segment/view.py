@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import F32, RGB, Mask, frozen
 from ..document import Click, Prompt
 from ..progress import Progress, part
-from .answers import Answer, add_click, begin, confidence
+from .answers import Answer, add_click, begin, confidence, vote
 from .edges import enlarge
 from .piece_choice import Choice, Ground, Region, choose
 from .piece_features import crop_tokens
@@ -47,10 +47,10 @@ class Tokens:
 
 
 class View:
-    """A photo (H, W, 3), or a crop of one, and what its last prompts meant."""
+    """A photo (H, W, 3), or a closer look at a crop of one, and what its last prompts meant."""
 
-    def __init__(self, rgb: RGB, embedding: Tokens) -> None:
-        self.rgb, self.embedding = rgb, embedding
+    def __init__(self, rgb: RGB, embedding: Tokens, is_close: bool = False) -> None:
+        self.rgb, self.embedding, self._is_close = rgb, embedding, is_close
         pieces, salience = embedding.pieces, embedding.salience
         if salience is not None:
             size = (pieces.shape[1], pieces.shape[0])
@@ -83,7 +83,10 @@ class View:
     def choice(self, prompt: Prompt) -> Choice:
         """What a prompt means that has one positive click at most."""
         if prompt not in self._choices:
-            _remember(self._choices, prompt, choose(self.ground, prompt), REMEMBERED)
+            choice = choose(self.ground, prompt)
+            if self._is_close and prompt.level == "object":  # few tokens: colours must tell
+                choice = vote(self.ground, prompt, choice)
+            _remember(self._choices, prompt, choice, REMEMBERED)
         return self._choices[prompt]
 
     def adopt(self, mask: Mask, steps: list[Prompt]) -> Answer:
@@ -231,7 +234,7 @@ class PhotoView:
             if salience is not None:
                 salience = _crop_map(salience, photo, box)
             pieces = Pieces(crop, tokens, DETAIL_PIECES)
-            view = View(crop, Tokens(tokens, salience, pieces))
+            view = View(crop, Tokens(tokens, salience, pieces), is_close=True)
             _remember(self._details, (box, is_anew), view, DETAILS)
         return self._details[box, is_anew]
 
