@@ -16,7 +16,7 @@ from .answers import Answer, add_click, begin, confidence, vote
 from .edges import enlarge
 from .piece_choice import Choice, Ground, Region, choose
 from .piece_features import crop_tokens
-from .pieces import Pieces, reduced
+from .pieces import PIECES, Pieces, reduced
 
 REMEMBERED = 8  # answers of a photo
 LOOK_AGAIN = (
@@ -233,8 +233,10 @@ class PhotoView:
                 tokens = crop_tokens(self.embedding.tokens, photo, box)
             if salience is not None:
                 salience = _crop_map(salience, photo, box)
-            pieces = Pieces(crop, tokens, DETAIL_PIECES)
-            view = View(crop, Tokens(tokens, salience, pieces), is_close=True)
+            is_finer = is_anew and not self._is_large
+            pieces = Pieces(crop, tokens, DETAIL_PIECES if is_finer else PIECES)
+            # A large photo's tile has tokens enough.
+            view = View(crop, Tokens(tokens, salience, pieces), is_close=not self._is_large)
             _remember(self._details, (box, is_anew), view, DETAILS)
         return self._details[box, is_anew]
 
