@@ -17,8 +17,8 @@ from .selection import SelectionError
 
 __all__ = ["BACKENDS", "UNSURE", "Found", "Segmenter", "SelectionError", "load"]
 
-# Confidence below which a person is told how to help. Of the answers in docs/selection.md 5 of the
-# 7 with an IoU below 0.75 are below it, and 9 of the 44 better ones.
+# Confidence below which a person is told how to help. Of the answers in docs/selection.md 3 of the
+# 4 with an IoU below 0.75 are below it, and 9 of the 47 better ones.
 UNSURE = 0.75
 
 

@@ -12,6 +12,7 @@ from ..document import Click, Prompt
 from .edges import BAND, sharpen_band
 from .piece_choice import Choice, Ground, Region, correct
 from .pieces import Pieces
+from .relabel import relabel, touching
 from .selection import SMALLEST, fill_small_holes, keep_touched
 
 OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's edge
@@ -85,6 +86,13 @@ def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> flo
     return float(expected / total / (1 + BLUR * outline))
 
 
+def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:
+    """What a first click means, its pieces decided anew by what is like them."""
+    known = _said(ground.pieces, prompt, True)
+    voted = relabel(ground.pieces, choice.pieces, known) & ground.inside(prompt)
+    return replace(choice, pieces=voted)
+
+
 def _band(pieces: Pieces) -> int:
     """px within which the edge is looked for around that of pieces."""
     return int(np.clip(round(OFF_EDGE * pieces.side), 2, BAND))
@@ -108,13 +116,24 @@ def _wrong(ground: Ground, before: Mask, prompt: Prompt) -> tuple[Mask, tuple[Re
     walls = tuple(
         pieces.at(c.x, c.y) for c in prompt.clicks if c.is_foreground != click.is_foreground
     )
-    choice = correct(ground, click, flippable & ground.inside(prompt), walls)
+    flippable &= ground.inside(prompt)
+    choice = correct(ground, click, flippable, walls)
     had = pieces.mean(before) > 0.5
+    found = had | choice.pieces if click.is_foreground else had & ~choice.pieces
+    said = _said(pieces, prompt, True), _said(pieces, prompt, False)
+    is_like = (relabel(pieces, found, *said, piece) == click.is_foreground) | choice.pieces
+    flipped = touching(pieces, is_like & flippable, choice.pieces)
     others = tuple(
         Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
         for r in _relative(choice.others)
     )
-    return pieces.paint(choice.pieces) & differs, others
+    return pieces.paint(flipped) & differs, others
+
+
+def _said(pieces: Pieces, prompt: Prompt, is_foreground: bool) -> tuple[int, ...]:
+    """The pieces that clicks say are in the object, or are not."""
+    clicks = (c for c in prompt.clicks if c.is_foreground == is_foreground)
+    return tuple(pieces.at(c.x, c.y) for c in clicks)
 
 
 def _tidy(mask: Mask, small: Prompt) -> Mask:

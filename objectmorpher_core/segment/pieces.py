@@ -54,16 +54,16 @@ class Growth:
 
 
 class Pieces:
-    """Precomputed for a photo (H, W, 3) and its tokens (h, w, d), if any."""
+    """Precomputed for a photo (H, W, 3) and its tokens (h, w, d), if any: about `count` pieces."""
 
-    def __init__(self, rgb: RGB, tokens: F32 | None) -> None:
+    def __init__(self, rgb: RGB, tokens: F32 | None, count: int = PIECES) -> None:
         self.photo_shape = rgb.shape[:2]
         image = reduced(rgb)
         self.shape = height, width = image.shape[:2]
         lab = np.asarray(
             cv2.cvtColor(image.astype(np.float32) / 255, cv2.COLOR_RGB2LAB), np.float32
         )
-        self.labels = _superpixels(image)  # (h, w) int32
+        self.labels = _superpixels(image, count)  # (h, w) int32
         self.count = int(self.labels.max()) + 1
         self.area = np.bincount(self.labels.ravel(), minlength=self.count).astype(np.float64)
         self.colors = np.stack([self.mean(lab[..., c]) for c in range(3)], 1)  # (n, 3) CIELAB
@@ -161,10 +161,17 @@ class Pieces:
 
     def settle(self, is_object: Mask, is_ground: Mask) -> F64:
         """(n,) chance that a walk from a piece meets the object before the ground, both (n,)."""
-        known = 1e6 * (is_object | is_ground) + 1e-9
+        unsure = np.full(self.count, 0.5e-9)
+        return self.walk_home(1e6 * is_object + unsure, 1e6 * (is_ground & ~is_object) + unsure)
+
+    def walk_home(self, to_object: F64, to_ground: F64) -> F64:
+        """(n,) chance that a walk ends in the object; how easily it does, and in the ground (n,).
+
+        Both as the ease with which it passes on to a neighbour: at most about 1.
+        """
         degrees = np.asarray(self._links.sum(1)).ravel()
-        system = (sparse.diags(degrees + known) - self._links).tocsc()
-        return splu(system).solve(known * np.where(is_object, 1.0, np.where(is_ground, 0.0, 0.5)))
+        system = (sparse.diags(degrees + to_object + to_ground) - self._links).tocsc()
+        return splu(system).solve(to_object)
 
     def _open(self) -> Any:
         if self._solver is None:
@@ -221,10 +228,10 @@ def reduced(rgb: RGB) -> RGB:
     return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _superpixels(image: RGB) -> np.ndarray:
-    """(h, w) int32 labels from 0."""
+def _superpixels(image: RGB, count: int) -> np.ndarray:
+    """(h, w) int32 labels from 0, of about `count` pieces."""
     height, width = image.shape[:2]
-    step = max(SMALLEST_STEP, round((height * width / PIECES) ** 0.5))
+    step = max(SMALLEST_STEP, round((height * width / count) ** 0.5))
     if min(height, width) < 2 * step:  # too small for SLIC: squares
         rows, columns = np.mgrid[:height, :width] // SMALLEST_STEP
         return np.asarray(rows * (columns.max() + 1) + columns, np.int32)

@@ -12,14 +12,18 @@ import numpy as np
 from ..arrays import F32, RGB, Mask, frozen
 from ..document import Click, Prompt
 from ..progress import Progress, part
-from .answers import Answer, add_click, begin, confidence
+from .answers import Answer, add_click, begin, confidence, vote
 from .edges import enlarge
 from .piece_choice import Choice, Ground, Region, choose
 from .piece_features import crop_tokens
-from .pieces import Pieces, reduced
+from .pieces import PIECES, Pieces, reduced
 
 REMEMBERED = 8  # answers of a photo
+LOOK_AGAIN = (
+    0.8  # confidence below which a small whole is recognised anew, larger: it costs a second
+)
 DETAILS = 4  # closer looks that are kept
+DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
 SMALL = 0.03  # x photo's area: such a thing is looked at more closely
 AS_GOOD = 0.7  # x best score: a small region as likely as that is worth a closer look
 MARGIN = 0.5  # x larger side of a thing: what is looked at around it
@@ -43,10 +47,10 @@ class Tokens:
 
 
 class View:
-    """A photo (H, W, 3), or a crop of one, and what its last prompts meant."""
+    """A photo (H, W, 3), or a closer look at a crop of one, and what its last prompts meant."""
 
-    def __init__(self, rgb: RGB, embedding: Tokens) -> None:
-        self.rgb, self.embedding = rgb, embedding
+    def __init__(self, rgb: RGB, embedding: Tokens, is_close: bool = False) -> None:
+        self.rgb, self.embedding, self._is_close = rgb, embedding, is_close
         pieces, salience = embedding.pieces, embedding.salience
         if salience is not None:
             size = (pieces.shape[1], pieces.shape[0])
@@ -79,7 +83,10 @@ class View:
     def choice(self, prompt: Prompt) -> Choice:
         """What a prompt means that has one positive click at most."""
         if prompt not in self._choices:
-            _remember(self._choices, prompt, choose(self.ground, prompt), REMEMBERED)
+            choice = choose(self.ground, prompt)
+            if self._is_close and prompt.level == "object":  # few tokens: colours must tell
+                choice = vote(self.ground, prompt, choice)
+            _remember(self._choices, prompt, choice, REMEMBERED)
         return self._choices[prompt]
 
     def adopt(self, mask: Mask, steps: list[Prompt]) -> Answer:
@@ -113,7 +120,7 @@ class PhotoView:
         self.embedding = embedding
         self._rgb, self._encode = rgb, encode
         self._whole = View(rgb, embedding)
-        self._details: dict[Box, View] = {}
+        self._details: dict[tuple[Box, bool], View] = {}
         self._last: tuple[Prompt, Mask, float] | None = None  # found, and how sure it was
 
     def find(self, prompt: Prompt, progress: Progress) -> tuple[Mask, float]:
@@ -156,10 +163,14 @@ class PhotoView:
     ) -> tuple[Mask, float, int] | None:
         """(H, W) the answer in a box, how sure it is, and to how many steps; None if it is cut."""
         progress(0.1, "looking closer")
-        detail = self._detail(box)
         inside = None if whole is None else whole[box[1] : box[3], box[0] : box[2]]
         moved = [_moved(step, box) for step in steps]
+        detail = self._detail(box, self._is_large)
         first = detail.answer(moved[0], inside, part(progress, 0.3, 0.6))
+        is_unsure = detail.confidence(moved[0], first) < LOOK_AGAIN
+        if is_unsure and steps[0].level == "object" and not self._is_large:
+            detail = self._detail(box, is_anew=True)
+            first = detail.answer(moved[0], inside, part(progress, 0.3, 0.6))
         if _frame_share(first.mask) > CUT:
             return None
         beyond = [any(c.is_foreground and not _is_in(box, c) for c in s.clicks) for s in steps]
@@ -206,20 +217,28 @@ class PhotoView:
             int(min(bottom + margin, tall)),
         )
 
-    def _detail(self, box: Box) -> View:
-        if box not in self._details:
+    @property
+    def _is_large(self) -> bool:
+        return self._rgb.shape[0] * self._rgb.shape[1] > LARGE
+
+    def _detail(self, box: Box, is_anew: bool) -> View:
+        """What a box shows, recognised anew at its size, or by how the whole photo shows it."""
+        if (box, is_anew) not in self._details:
             left, top, right, bottom = box
             crop = np.ascontiguousarray(self._rgb[top:bottom, left:right])
             photo, salience = self._rgb.shape[:2], self.embedding.salience
-            if photo[0] * photo[1] > LARGE:
+            if is_anew:
                 tokens = self._encode(crop)
             else:
                 tokens = crop_tokens(self.embedding.tokens, photo, box)
             if salience is not None:
                 salience = _crop_map(salience, photo, box)
-            view = View(crop, Tokens(tokens, salience, Pieces(crop, tokens)))
-            _remember(self._details, box, view, DETAILS)
-        return self._details[box]
+            is_finer = is_anew and not self._is_large
+            pieces = Pieces(crop, tokens, DETAIL_PIECES if is_finer else PIECES)
+            # A large photo's tile has tokens enough.
+            view = View(crop, Tokens(tokens, salience, pieces), is_close=not self._is_large)
+            _remember(self._details, (box, is_anew), view, DETAILS)
+        return self._details[box, is_anew]
 
 
 def steps_of(prompt: Prompt) -> list[Prompt]:

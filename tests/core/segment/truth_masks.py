@@ -24,7 +24,7 @@ class Truth:
     name: str
     photo: str  # tests.photos
     kind: str  # "whole", or "part" of a whole
-    is_held_out: bool  # no constant of the segmenter was tuned on it
+    is_held_out: bool  # no constant was tuned on it, but those that docs/selection.md names
 
 
 TRUTHS = (
