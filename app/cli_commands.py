@@ -32,6 +32,7 @@ from objectmorpher_core.splat_files import encode as encode_splats
 from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS
 from objectmorpher_core.video_file import encode_video
 
+from .cli_doctor import run_doctor
 from .cli_models import run_models
 from .cli_train import run_train
 from .terminal import PROGRAM, UsageError, progress_bar
@@ -294,6 +295,7 @@ def _line(value: Any) -> str:
 __all__ = [
     "PROGRAM",
     "run_convert",
+    "run_doctor",
     "run_edit",
     "run_info",
     "run_models",

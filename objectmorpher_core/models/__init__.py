@@ -5,9 +5,11 @@ of Python wheels (`fetch.py`), files that the user brings (`added.py`), and mode
 from the Hugging Face Hub or from a folder of the user's (`hub.py`).
 """
 
+from . import shipped
 from .added import KINDS, Added, add, added, remove
-from .fetch import OFFLINE, State, fetch, folder, look, path, verify
+from .fetch import OFFLINE, State, fetch, folder, look, path, remove_weight, verify
 from .hub import (
+    EXTRA,
     HubState,
     check_licence,
     get,
@@ -30,6 +32,7 @@ from .registry import (
 )
 
 __all__ = [
+    "EXTRA",
     "KINDS",
     "OFFLINE",
     "Added",
@@ -54,6 +57,8 @@ __all__ = [
     "place",
     "remove",
     "remove_hub",
+    "remove_weight",
+    "shipped",
     "use_folder",
     "verify",
     "verify_hub",

@@ -88,6 +88,15 @@ def fetch(id: str, progress: Progress = silent) -> Path:
     return found
 
 
+def remove_weight(id: str) -> None:
+    """As if it had never been fetched. Raises ModelError."""
+    at = folder() / weight(id).file
+    try:
+        at.unlink(missing_ok=True)
+    except OSError as error:
+        raise ModelError(f"{at} cannot be removed: {error.strerror or error}") from error
+
+
 def check_online(id: str) -> None:
     """Raises ModelError where nothing may be downloaded."""
     if os.environ.get(OFFLINE, "") not in ("", "0"):

@@ -69,12 +69,10 @@ class Sam:
             return str(error)
         lacks = [] if self._family == "sam-onnx" or _has_torch() else [f"`{EXTRA}`"]
         if not is_here:
-            id = self._id or SMALLEST[self._family]
-            has_source = bool(models.hub_model(id).repository)
-            command = f"get {id}" if has_source else f"add {id} FOLDER"
-            also = "" if has_source else f" (from {models.hub_model(id).home}, or another:"
-            also += "" if has_source else " `objectmorpher models get` lists them)"
-            lacks.append(f"`objectmorpher models {command}`{also}")
+            model = models.hub_model(self._id or SMALLEST[self._family])
+            how = f"get {model.id}`" if model.repository else f"add {model.id} FOLDER`"
+            how += "" if model.repository else f", from {model.home}"
+            lacks.append(f"`objectmorpher models {how}")
         what = self._id or NAMES[self._family]
         return f"{what} is not here: {', then '.join(lacks)}" if lacks else None
 
