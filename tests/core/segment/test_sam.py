@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -422,6 +423,16 @@ def test_what_is_missing_is_one_sentence_with_its_remedy(own_cache, name):
     assert reason is not None and "objectmorpher models" in reason and "\n" not in reason
     with pytest.raises(SelectionError, match="objectmorpher models"):
         segmenter.encode(np.zeros((20, 20, 3), np.uint8), silent)
+
+
+@pytest.mark.parametrize("name", ["torch", "transformers", "safetensors"])
+def test_without_pytorch_one_sentence_says_how_to_get_it(own_cache, monkeypatch, name):
+    needs_torch()
+    models.use_folder("sam2", tiny_sams.write("sam2", own_cache / "sam2"))
+    monkeypatch.setitem(sys.modules, name, None)  # as where it is not installed
+    reason = segment.load("sam2").missing()
+    assert reason == "SAM 2 is not here: `pip install 'objectmorpher[models]'`"
+    assert segment.load("auto").name == "grabcut"
 
 
 def damaged(family: str, folder: Path, change: Callable[[dict], None]) -> None:
