@@ -45,9 +45,10 @@ class SamOnnx:
         self.is_padded = not self._is_efficient
         fixed = [n for n in self._picture.shape if isinstance(n, int) and n > 3]
         self.side = fixed[0] if fixed else SIDE
-        mask = self._inputs.get("mask_input")
-        last = mask.shape[-1] if mask is not None else LOW
-        self.low = last if isinstance(last, int) else LOW
+        masks = {output.name: output for output in self._decoder.get_outputs()}
+        first = next(iter(masks.values()))
+        told = self._inputs.get("mask_input") or masks.get("low_res_masks", first)
+        self.low = told.shape[-1] if isinstance(told.shape[-1], int) else LOW
 
     def encode(self, picture: RGB) -> tuple[F32, ...]:
         """See `SamNetwork.encode`."""

@@ -21,8 +21,8 @@ from .sam_network import Asked, SamNetwork
 from .view import steps_of
 
 REMEMBERED = 16  # answers of a photo
-FINE = 2  # px of a mask for one of the logits, before the photo's edges decide
-WIDEST = 4  # px each side of a small photo's outline within which its edge is found
+WORK_SIDE = 1536  # px of a photo in which the edge is found; a larger one follows by its own edges
+UNSURE = 0.8  # px of logits each side of their outline within which the photo's edge decides
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +89,14 @@ class SamView:
         left, top, right, bottom = self.frame.box
         crop = rgb[top:bottom, left:right]
         height, width = crop.shape[:2]
-        per_logit = max(width, height) / answer.logits.shape[0]  # px
-        if per_logit <= FINE:
-            mask = self.frame.unfold(answer.logits, (width, height)) > 0
-            band = int(np.clip(np.ceil(per_logit), 1, WIDEST))
-            return sharpen_band(crop, mask, band=band) if per_logit > 1 else mask
-        scale = FINE / per_logit
+        scale = min(1.0, WORK_SIDE / max(width, height))
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        return enlarge(crop, self.frame.unfold(answer.logits, size) > 0)
+        mask = self.frame.unfold(answer.logits, size) > 0
+        band = round(UNSURE * max(size) / answer.logits.shape[0])
+        if band > 0:
+            small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA) if scale < 1 else crop
+            mask = sharpen_band(np.asarray(small, np.uint8), mask, band=band)
+        return enlarge(crop, mask)
 
     def logits_of(self, mask: Mask, box: Box) -> F32:
         """(low, low) what a mask (h, w) of another box is in this frame, as logits."""
