@@ -68,6 +68,7 @@ def test_a_family_offers_its_small_size_until_one_is_chosen(choosing: Editor) ->
     hub.choose("sam2", FREE.id)
 
 
+@pytest.mark.slow  # the worker imports PyTorch
 def test_a_model_is_downloaded_and_removed(choosing: Editor, server: Hub) -> None:
     hub = choosing.models.hub
     hub.download(FREE.id)
