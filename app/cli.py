@@ -20,7 +20,18 @@ from .terminal import PROGRAM
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
 FAILURES = (ValueError, OSError, RuntimeError)  # that are one sentence for the user
-COMMANDS = ("edit", "batch", "select", "replay", "info", "convert", "models", "bench", "train")
+COMMANDS = (
+    "edit",
+    "batch",
+    "select",
+    "replay",
+    "info",
+    "convert",
+    "models",
+    "doctor",
+    "bench",
+    "train",
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -65,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_convert(commands.add_parser("convert", help="turn splat and mesh files into each other"))
     _add_bench(commands.add_parser("bench", help="measure, on objects it makes itself"))
     _add_models(commands.add_parser("models", help="list, get and check learned weights"))
+    _add_doctor(commands.add_parser("doctor", help="what runs here, and what would help"))
     _add_train(commands.add_parser("train", help="make the product's own networks anew"))
     return parser
 
@@ -107,7 +119,11 @@ def _add_choosing(parser: argparse.ArgumentParser) -> None:
     add("--box", type=_list(4, 4), metavar="X0,Y0,X1,Y1", help="around it")
     add("--subject", action="store_true", default=None, help="the photo's main subject")
     add("--mask", metavar="M.png", help="a mask picture; it wins over everything else")
-    add("--segment", metavar="NAME", help="backend: auto, dino, grabcut, subject")
+    add(
+        "--segment",
+        metavar="NAME",
+        help="backend: auto, dino, grabcut, subject, sam2, sam, sam3, sam-onnx, or one model's id",
+    )
     add("--seed", type=int, metavar="N", help="default 0; two runs give identical bytes")
 
 
@@ -241,11 +257,23 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Learned weights: fetched ones, and a depth network that you bring."
+    parser.description = "Learned weights: fetched ones, and those that you bring."
     parser.add_argument("action", choices=("list", "get", "path", "verify", "add", "remove"))
-    parser.add_argument("id", nargs="?", help="one weight; default all of them")
-    parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="to add: add depth FILE")
+    parser.add_argument("id", nargs="?", help="one of the list; default all of them")
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE",
+        help="to add: add depth FILE, or add sam2 FOLDER, which is used where it is")  # fmt: skip
+    add = parser.add_argument_group("downloads").add_argument
+    add("--yes", dest="is_agreed", action="store_true", help="its size and licence are all right")
+    add("--accept-licence", metavar="NAME", help="for those with a star in the list")
+    add("--offline", dest="is_offline", action="store_true",
+        help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
     parser.set_defaults(run=_lazily("models"))
+
+
+def _add_doctor(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Tells which backend each stage would use on this machine, and why."
+    parser.add_argument("--json", dest="is_json", action="store_true", help="as one JSON object")
+    parser.set_defaults(run=_lazily("doctor"))
 
 
 def _add_train(parser: argparse.ArgumentParser) -> None:

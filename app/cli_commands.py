@@ -36,6 +36,7 @@ from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS
 from objectmorpher_core.video_file import encode_video
 
 from .cli_batch import run_batch
+from .cli_doctor import run_doctor
 from .cli_models import run_models
 from .cli_train import run_train
 from .terminal import PROGRAM, UsageError, progress_bar
@@ -321,6 +322,7 @@ __all__ = [
     "PROGRAM",
     "run_batch",
     "run_convert",
+    "run_doctor",
     "run_edit",
     "run_info",
     "run_models",

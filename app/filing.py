@@ -34,6 +34,7 @@ class Dialog(Enum):
     MASK_SAVE = "Export mask"
     SHAPE_OPEN = "Use 3D file"
     MODEL_OPEN = "Use depth model"
+    MODEL_FOLDER = "Use the model in a folder"
 
     @property
     def is_opening(self) -> bool:
@@ -122,6 +123,8 @@ class Filing:
             self._editor.shaping.open_file(path)
         elif dialog is Dialog.MODEL_OPEN:
             self._editor.models.add(path)
+        elif dialog is Dialog.MODEL_FOLDER:
+            self._editor.models.hub.use_folder(path)
         elif dialog is Dialog.MASK_SAVE:
             self._editor.masking.write_file(path if path.suffix else path.with_suffix(".png"))
         elif self._editor.exporting.draft is not None:

@@ -34,7 +34,8 @@ def _refuse_missing(script: EditScript) -> None:
         ("inpainter", script.inpaint, compose.BACKENDS),
     )
     for kind, name, known in chosen:  # also where the stage will not run
-        if name != "auto" and name not in known:
+        is_sam = known is segment.BACKENDS and segment.is_known(name)  # or one SAM by its id
+        if name != "auto" and name not in known and not is_sam:
             raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
     if script.refine not in ("auto", *compose.REFINERS):
         known = ", ".join(compose.REFINERS)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
-from objectmorpher_core.models import Added, State, Weight, shipped
+from objectmorpher_core.models import Added, HubState, State, Weight, shipped
 from objectmorpher_core.progress import Progress
 
 from .. import job_functions
 from ..feedback import Action
 from ..jobs import JobError
 from ..texts import t
+from .hub_models import HubModels
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -46,6 +48,7 @@ class Models:
         self._editor = editor
         self.states: tuple[State, ...] = ()  # empty until they were looked at
         self.added: tuple[Added, ...] = ()  # what users bring, likewise
+        self.hub = HubModels(editor)  # those of several files
         self.is_open = False  # the window shows the list
         self._loading = ""
 
@@ -75,21 +78,27 @@ class Models:
 
     def download(self, id: str) -> None:
         """Gets a model; the user has clicked the button that says so."""
+        self.run(id, names_of(id).name, lambda progress: models.fetch(id, progress))
+
+    def run(self, id: str, name: str, fetch: Callable[[Progress], Path]) -> None:
+        """Downloads model `id`, called `name`; the worker uses it once it is there."""
         editor = self._editor
         self._loading = id
         editor.message = None
 
-        def fetch(progress: Progress) -> Path:
-            return models.fetch(id, progress)
-
         def accept(_: Path) -> None:
             self.look()
-            self._use_anew()
-            editor.say(t("{name} is ready", name=names_of(id).name))
+            self.use_anew()
+            editor.say(t("{name} is ready", name=name))
+
+        def complain(error: JobError) -> None:
+            # Whatever it was: networks come back, disks are cleared, indexes are mended.
+            again = Action(t("Retry"), lambda: self.run(id, name, fetch))
+            editor.complain(error.sentence, action=again)
 
         editor.chores.start(
-            t("Downloading {name}", name=names_of(id).name), fetch, kind=DOWNLOAD,
-            done=accept, failed=lambda error: self._complain(error, id), cancelled=self.look,
+            t("Downloading {name}", name=name), fetch, kind=DOWNLOAD,
+            done=accept, failed=complain, cancelled=self.look,
         )  # fmt: skip
 
     def cancel(self) -> None:
@@ -137,14 +146,10 @@ class Models:
             self._editor.complain(str(error))
         self.look()
 
-    def _take(self, found: tuple[tuple[State, ...], tuple[Added, ...]]) -> None:
-        self.states, self.added = found
+    def _take(self, found: Looked) -> None:
+        self.states, self.added, self.hub.states = found
 
-    def _complain(self, error: JobError, id: str) -> None:
-        """Whatever it was: networks come back, disks are cleared, indexes are mended."""
-        self._editor.complain(error.sentence, action=Action(t("Retry"), lambda: self.download(id)))
-
-    def _use_anew(self) -> None:
+    def use_anew(self) -> None:
         """The worker chooses its segmenter again, and reads the photo with it."""
         self._editor.jobs.start(
             "Changing the model", job_functions.forget_segmenter,
@@ -153,8 +158,12 @@ class Models:
         )  # fmt: skip
 
 
-def _looked() -> tuple[tuple[State, ...], tuple[Added, ...]]:
-    return models.verify(), tuple(models.added(kind.id) for kind in models.KINDS)
+Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...]]
+
+
+def _looked() -> Looked:
+    several = tuple(models.look_hub(model.id) for model in models.hub_models())
+    return models.verify(), tuple(models.added(kind.id) for kind in models.KINDS), several
 
 
 def names_of(id: str) -> Names:

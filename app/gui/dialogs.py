@@ -10,6 +10,7 @@ from typing import Any
 from imgui_bundle import imgui
 from imgui_bundle import portable_file_dialogs as pfd
 
+from ..editing.hub_models import GIVEN
 from ..editing.models import MODEL_ENDING
 from ..editor import Editor
 from ..filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog, Filing
@@ -32,6 +33,7 @@ FILTERS = {
     Dialog.MASK_SAVE: (".png",),
     Dialog.SHAPE_OPEN: OBJECT_ENDINGS,
     Dialog.MODEL_OPEN: (MODEL_ENDING,),
+    Dialog.MODEL_FOLDER: GIVEN,
 }
 
 

@@ -18,7 +18,7 @@ ROW = 28.0
 VERBS = {
     Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
     Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
-    Dialog.MODEL_OPEN: "Use",
+    Dialog.MODEL_OPEN: "Use", Dialog.MODEL_FOLDER: "Use",
 }  # fmt: skip
 
 

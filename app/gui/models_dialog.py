@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.models import Added, State
 
@@ -10,12 +10,14 @@ from ..editing.models import DOWNLOAD, names_of
 from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
-from .modal import modal
+from .hub_rows import draw_hub_rows
+from .modal import PADDING, modal
 from .theme import Icon, theme
 from .widgets import Kind, bold_text, button, gap, half_width, note, rule, tooltip
 
 WIDTH = 560.0  # points
 BUTTON = 120.0
+AROUND = 200.0  # what of the window's height the rows leave to title, button and surroundings
 ABOUT = (
     "Everything works without them. What you download stays on this computer, and no photo ever "
     "leaves it."
@@ -29,17 +31,28 @@ def draw_models(editor: Editor) -> None:
     with modal(t("Models"), WIDTH, t(ABOUT)) as is_shown:
         if not is_shown:
             return
-        for state in editor.models.states:
-            _draw_model(editor, state)
-        for own in editor.models.added:
-            _draw_added(editor, own)
-        if not editor.models.states:
-            note(t("Looking at what is there…"))
+        _draw_rows(editor)
         imgui.dummy(theme.size(0, 4))
         imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20 + BUTTON))
         if button(t("Close"), width=BUTTON) or imgui.is_key_pressed(imgui.Key.escape):
             editor.models.is_open = False
             imgui.close_current_popup()
+
+
+def _draw_rows(editor: Editor) -> None:
+    """All that there is, scrolled where the window is too low for it."""
+    room = imgui.get_main_viewport().size.y - theme.pt(AROUND)
+    across = imgui.get_content_region_avail().x + theme.pt(PADDING)  # the scroll bar is in there
+    imgui.set_next_window_size_constraints(ImVec2(across, 0), ImVec2(across, max(room, 1)))
+    imgui.begin_child("##rows", ImVec2(across, 0), imgui.ChildFlags_.auto_resize_y)
+    for state in editor.models.states:
+        _draw_model(editor, state)
+    for own in editor.models.added:
+        _draw_added(editor, own)
+    draw_hub_rows(editor)
+    if not editor.models.states:
+        note(t("Looking at what is there…"))
+    imgui.end_child()
 
 
 def _draw_model(editor: Editor, state: State) -> None:

@@ -29,6 +29,7 @@ POLL = 0.1  # s between two looks at the download
 SLACK = 16 << 20  # bytes that must stay free on the disk
 STALE = 24 * 3600  # s; an unfinished folder older than this belongs to a process that died
 UNFINISHED = ".unfinished-"
+OFFLINE = "OBJECTMORPHER_OFFLINE"  # environment variable: nothing is downloaded
 
 _verified: dict[tuple[str, int, int], bool] = {}  # (path, bytes, mtime ns) -> hash is right
 
@@ -74,6 +75,7 @@ def fetch(id: str, progress: Progress = silent) -> Path:
     wanted = weight(id)
     found = path(id)
     if found is None:
+        check_online(id)
         try:
             _download(wanted, progress)
         except OSError as error:
@@ -84,6 +86,21 @@ def fetch(id: str, progress: Progress = silent) -> Path:
             raise ModelError(f"{id} vanished from {folder()} right after it was written")
     progress(1.0, f"{id} is ready")
     return found
+
+
+def remove_weight(id: str) -> None:
+    """As if it had never been fetched. Raises ModelError."""
+    at = folder() / weight(id).file
+    try:
+        at.unlink(missing_ok=True)
+    except OSError as error:
+        raise ModelError(f"{at} cannot be removed: {error.strerror or error}") from error
+
+
+def check_online(id: str) -> None:
+    """Raises ModelError where nothing may be downloaded."""
+    if os.environ.get(OFFLINE, "") not in ("", "0"):
+        raise ModelError(f"{id} is not here, and {OFFLINE} says to download nothing")
 
 
 def _state(known: Weight) -> State:

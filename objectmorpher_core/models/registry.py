@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from typing import Any, Literal
+
+LicenceKind = Literal["permissive", "non-commercial", "gated"]
+HUB = "https://huggingface.co"  # where a model's own page is, for people
 
 
 class ModelError(RuntimeError):
@@ -28,11 +33,69 @@ class Weight:
     purpose: str
 
 
+@dataclass(frozen=True)
+class HubModel:
+    """A model of several files, from a repository of the Hugging Face Hub or the user's folder."""
+
+    id: str
+    family: str  # what its networks are: "sam2"; a folder of the user's may stand for a family
+    stage: str  # "segment", "lift", "inpaint", "refine" or "depth"
+    size: int  # bytes, nearly: the files themselves are checked by the lock file
+    parameters: int  # millions
+    memory: int  # MB on a GPU at half precision, for one photo, nearly
+    licence: str
+    licence_kind: LicenceKind
+    purpose: str
+    repository: str = ""  # owner/name; empty: only from the user's folder
+    revision: str = ""  # commit; empty: the newest, whose commit the lock file keeps from then on
+    files: tuple[str, ...] = ()  # paths in the repository; * stands for anything
+    sha256: Mapping[str, str] = field(default_factory=dict)  # of the files where it is known
+    page: str = ""  # for people; empty: the repository's
+
+    @property
+    def home(self) -> str:
+        """Its own page."""
+        return self.page or f"{HUB}/{self.repository}"
+
+    @property
+    def is_free(self) -> bool:
+        """Whether no licence has to be accepted by its name."""
+        return self.licence_kind == "permissive"
+
+
+@cache
+def _registry() -> dict[str, Any]:
+    text = files("objectmorpher_core.models").joinpath("registry.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
 @cache
 def weights() -> tuple[Weight, ...]:
     """All known weights, in the registry's order."""
-    text = files("objectmorpher_core.models").joinpath("registry.toml").read_text(encoding="utf-8")
-    return tuple(Weight(**entry) for entry in tomllib.loads(text)["weight"])
+    return tuple(Weight(**entry) for entry in _registry()["weight"])
+
+
+@cache
+def hub_models() -> tuple[HubModel, ...]:
+    """All known models of several files, in the registry's order: of a family the best first."""
+    return tuple(
+        HubModel(**{**entry, "files": tuple(entry.get("files", ()))})
+        for entry in _registry()["model"]
+    )
+
+
+def families() -> tuple[str, ...]:
+    """Of the models of several files, in the registry's order."""
+    return tuple(dict.fromkeys(model.family for model in hub_models()))
+
+
+def hub_model(id: str) -> HubModel:
+    """The model called `id`; raises ModelError with the known names."""
+    for known in hub_models():
+        if known.id == id:
+            return known
+    names = ", ".join(known.id for known in hub_models())
+    raise ModelError(f"there is no model called {id!r}; known are {names}")
 
 
 def weight(id: str) -> Weight:
@@ -40,5 +103,5 @@ def weight(id: str) -> Weight:
     for known in weights():
         if known.id == id:
             return known
-    names = ", ".join(known.id for known in weights())
+    names = ", ".join(known.id for known in (*weights(), *hub_models()))
     raise ModelError(f"there is no model called {id!r}; known are {names}")

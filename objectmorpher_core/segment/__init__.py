@@ -15,7 +15,7 @@ from ..document import Prompt
 from ..progress import Progress
 from .selection import SelectionError
 
-__all__ = ["BACKENDS", "UNSURE", "Found", "Segmenter", "SelectionError", "load"]
+__all__ = ["BACKENDS", "UNSURE", "Found", "Segmenter", "SelectionError", "is_known", "load"]
 
 # Confidence below which a person is told how to help. Of the answers in docs/selection.md 3 of the
 # 4 with an IoU below 0.75 are below it, and 9 of the 47 better ones.
@@ -65,14 +65,39 @@ BACKENDS = {
     "dino": "objectmorpher_core.segment.dino_walk:DinoWalk",
     "subject": "objectmorpher_core.segment.subject:Subject",
     "grabcut": "objectmorpher_core.segment.grabcut:GrabCut",
+    "sam2": "objectmorpher_core.segment.sam:sam2",
+    "sam": "objectmorpher_core.segment.sam:sam",
+    "sam3": "objectmorpher_core.segment.sam:sam3",
+    "sam-onnx": "objectmorpher_core.segment.sam:sam_onnx",
 }
 
 
+def is_known(name: str) -> bool:
+    """Whether `load` takes that name."""
+    from ..models import hub_models
+
+    ids = (model.id for model in hub_models() if model.stage == "segment")
+    return name in ("auto", *BACKENDS, *ids)
+
+
 def load(name: str = "auto") -> Segmenter:
-    """The backend called `name`; "auto" is the best one for clicks that can run here."""
+    """The backend called `name`; "auto" is the best one for clicks that can run here.
+
+    `name` may be a SAM's own id, as "sam2.1-tiny"; "sam2" is the best of SAM 2.1 that is here.
+    """
     if name == "auto":
+        from .sam import best
+
+        found = best()
+        if found is not None:
+            return found
         dino = load("dino")
         return dino if dino.missing() is None else load("grabcut")
+    if name not in BACKENDS and is_known(name):
+        from ..models import hub_model
+        from .sam import Sam
+
+        return Sam(hub_model(name).family, name)
     if name not in BACKENDS:
         raise SelectionError(f"there is no segmenter {name!r}; known are {', '.join(BACKENDS)}")
     module, _, kind = BACKENDS[name].partition(":")

@@ -1,0 +1,259 @@
+"""Models of several files: what is there, getting them from the Hub, or using a user's folder.
+
+A model appears in the cache folder only whole and verified: its files are downloaded beside its
+place, and the folder is renamed. What a broken download has left is gone on with by the next.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from ..progress import Progress, silent
+from . import hub_download, lock
+from .fetch import POLL, SLACK, check_online, folder, sha256_of
+from .lock import FileFacts, Locked
+from .registry import HubModel, ModelError, families, hub_model, hub_models
+from .weight_folder import check_folder
+
+EXTRA = "pip install 'objectmorpher[models]'"
+PARTIAL = ".partial-"
+
+
+@dataclass(frozen=True)
+class HubState:
+    """What is there of a model."""
+
+    model: HubModel
+    path: Path  # the folder where it is, or would be
+    state: Literal["ok", "missing", "damaged"]
+    revision: str = ""  # commit
+    is_own: bool = False  # in a folder of the user's
+    reason: str = ""  # why it is damaged
+
+
+def look_hub(id: str) -> HubState:
+    """What is there of model `id`, by its files' names and sizes. Raises ModelError."""
+    return _state(hub_model(id), is_hashed=False)
+
+
+def verify_hub(id: str) -> HubState:
+    """The same, every file hashed. Raises ModelError."""
+    return _state(hub_model(id), is_hashed=True)
+
+
+def place(id: str) -> Path | None:
+    """The folder of model `id`, or None where it is not there whole."""
+    state = look_hub(id)
+    return state.path if state.state == "ok" else None
+
+
+def installed(family: str) -> tuple[HubModel, ...]:
+    """The models of a family that are there, the best first."""
+    return tuple(m for m in hub_models() if m.family == family and place(m.id) is not None)
+
+
+def check_licence(model: HubModel, accepted: str) -> None:
+    """Raises ModelError where the licence has to be accepted by its name, and is not."""
+    if model.is_free or accepted.strip().lower() == model.licence.lower():
+        return
+    why = "is not for every use" if model.licence_kind == "non-commercial" else "has its own terms"
+    raise ModelError(
+        f"{model.id}: the {model.licence} {why}, read it at {model.home}"
+        f" and accept it by its name: --accept-licence '{model.licence}'"
+    )
+
+
+def get(id: str, progress: Progress = silent, accepted: str = "") -> Path:
+    """The folder of model `id`, downloaded unless it is there. `accepted`: a licence's name.
+
+    Raises ModelError: one sentence. `Cancelled` passes through; the next call goes on from there.
+    """
+    model = hub_model(id)
+    state = look_hub(id)
+    if state.state == "ok":
+        progress(1.0, f"{id} is ready")
+        return state.path
+    if not model.repository:
+        told = f"get it from {model.home} and use it by: objectmorpher models add {id} FOLDER"
+        raise ModelError(f"{id} is brought by you: {told}")
+    check_licence(model, accepted)
+    check_online(id)
+    if importlib.util.find_spec("huggingface_hub") is None:
+        raise ModelError(f"{id} cannot be downloaded without huggingface_hub: {EXTRA}")
+    try:
+        _download(model, progress)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ModelError(f"{id} cannot be written to {folder()}: {reason}") from error
+    progress(1.0, f"{id} is ready")
+    return folder() / id
+
+
+def use_folder(id: str, at: Path) -> HubState:
+    """A folder of the user's is the model `id` from now on; for a family, the one of its size.
+
+    Nothing is copied. Raises ModelError: one sentence, and nothing has changed.
+    """
+    family, at = id if id in families() else hub_model(id).family, at.expanduser().absolute()
+    try:
+        names = check_folder(family, at)
+        id = _nearest(family, sum((at / n).stat().st_size for n in names)) if id == family else id
+        facts = {name: FileFacts((at / name).stat().st_size, "") for name in names}
+        lock.write(id, Locked(facts, folder=str(at)))
+    except OSError as error:
+        raise ModelError(f"{at.name} cannot be used: {error.strerror or error}") from error
+    return look_hub(id)
+
+
+def remove_hub(id: str) -> None:
+    """As if it had never been there; a folder of the user's is forgotten, not deleted.
+
+    Which commit it was stays in the lock file. Raises ModelError.
+    """
+    model = hub_model(id)
+    known = lock.locked(id)
+    try:
+        if known is not None and known.folder:
+            lock.write(id, None)
+        for left in (folder() / model.id, folder() / (PARTIAL + model.id)):
+            if left.exists():
+                shutil.rmtree(left)
+    except OSError as error:
+        raise ModelError(f"{id} cannot be removed: {error.strerror or error}") from error
+
+
+def _nearest(family: str, size: int) -> str:
+    """Of the models of a family the one whose size in bytes is most like this."""
+    own = [model for model in hub_models() if model.family == family]
+    return min(own, key=lambda m: max(m.size, size) / max(min(m.size, size), 1)).id
+
+
+def _state(model: HubModel, is_hashed: bool) -> HubState:
+    known = lock.locked(model.id)
+    at = Path(known.folder) if known and known.folder else folder() / model.id
+    if known is None or not (known.folder or at.is_dir()):
+        return HubState(model, at, "missing")
+    reason = _damage(at, known, is_hashed)
+    if not reason and known.folder and is_hashed:
+        try:
+            check_folder(model.family, at)
+        except ModelError as error:
+            reason = str(error)
+    state = "damaged" if reason else "ok"
+    return HubState(model, at, state, known.revision, bool(known.folder), reason)
+
+
+def _damage(at: Path, known: Locked, is_hashed: bool) -> str:
+    """What is wrong with the files, or nothing."""
+    for name, fact in known.files.items():
+        try:
+            size = (at / name).stat().st_size
+            if size != fact.size:
+                return f"{name} has {size} bytes, not {fact.size}"
+            if is_hashed and fact.sha256 and sha256_of(at / name) != fact.sha256:
+                return f"{name} has another hash than the one in {lock.NAME}"
+        except OSError as error:
+            return f"{name} cannot be read: {error.strerror or error}"
+    return ""
+
+
+def _download(model: HubModel, progress: Progress) -> None:
+    """Hub -> partial folder -> hashes -> its place, and the lock file."""
+    where = folder()
+    where.mkdir(parents=True, exist_ok=True)
+    partial, at = where / (PARTIAL + model.id), where / model.id
+    partial.mkdir(exist_ok=True)
+    pinned = lock.locked(model.id)
+    if pinned is not None and pinned.folder:
+        pinned = None
+    revision = model.revision or (pinned.revision if pinned else "")
+    known = {name: fact.sha256 for name, fact in pinned.files.items()} if pinned else {}
+    request = {
+        "repository": model.repository, "revision": revision, "files": list(model.files),
+        "sha256": known | dict(model.sha256), "target": str(partial), "slack": SLACK,
+    }  # fmt: skip
+    answer, revision = _run(model, request, progress)
+    facts = {name: FileFacts(fact["size"], fact["sha256"]) for name, fact in answer.items()}
+    if at.exists():  # a damaged one
+        shutil.rmtree(at)
+    # The pin first: files that are in place are looked at by it.
+    lock.write(model.id, Locked(facts, revision))
+    os.replace(partial, at)
+
+
+def _run(
+    model: HubModel, request: Mapping[str, Any], progress: Progress
+) -> tuple[dict[str, dict[str, Any]], str]:
+    """Runs `hub_download.py`: what it says of the files, and their commit."""
+    script = Path(hub_download.__file__)
+    command = [sys.executable, "-P", str(script), json.dumps(request)]
+    settings = {"HF_HUB_DISABLE_TELEMETRY": "1", "HF_HUB_DISABLE_PROGRESS_BARS": "1"}
+    target = Path(request["target"])
+    said = target.with_name(target.name + ".log")
+    try:
+        with said.open("wb") as output:
+            child = subprocess.Popen(
+                command, stdout=output, stderr=subprocess.DEVNULL, env=os.environ | settings
+            )
+            try:
+                while child.poll() is None:
+                    _tell(model, target, said, progress)
+                    time.sleep(POLL)
+            finally:
+                if child.poll() is None:
+                    child.kill()
+                    child.wait()
+        told = _lines(said)
+    finally:
+        said.unlink(missing_ok=True)
+    if "done" not in told:
+        raise ModelError(_sentence(model, told.get("error", "other"), told.get("detail", "")))
+    return told["done"], told["plan"]["revision"]
+
+
+def _tell(model: HubModel, target: Path, said: Path, progress: Progress) -> None:
+    """How far the download is, from the files that grow."""
+    plan = _lines(said).get("plan")
+    whole = sum(f["size"] for f in plan["files"].values()) if plan else model.size
+    here = hub_download.bytes_in(target)
+    note = f"downloading {model.id}: {here >> 20} of {whole >> 20} MB"
+    progress(min(0.99, here / max(whole, 1)), note)
+
+
+def _lines(said: Path) -> dict[str, Any]:
+    """All that the download has said so far."""
+    told: dict[str, Any] = {}
+    for line in said.read_text(encoding="utf-8", errors="replace").splitlines():
+        try:
+            told |= json.loads(line)
+        except ValueError:
+            continue  # being written, or a library's own words
+    return told
+
+
+def _sentence(model: HubModel, kind: str, detail: str) -> str:
+    """Why it cannot be had, for a user."""
+    reasons = {
+        "gated": f"its licence has to be accepted at {model.home}, and HF_TOKEN to be set",
+        "repository": f"the Hub has no {model.repository}, or shows it only with a token: HF_TOKEN",
+        "revision": f"the Hub has no such version of {model.repository} any more",
+        "entry": f"{model.repository} lacks {detail or 'a file'}",
+        "offline": "the Hub's library is set to work offline",
+        "disk": f"it needs {detail} in {folder()}",
+        "full": f"the disk of {folder()} is full",
+        "checksum": f"{detail} is not the file that it should be: wrong checksum",
+        "truncated": "a file ended before its end: try again",
+        "network": "the Hub does not answer; is there a network?",
+        "odd": f"the Hub's answer is odd: {detail}",
+    }
+    return f"{model.id} cannot be downloaded: {reasons.get(kind, detail or 'nothing was said')}"

@@ -1,0 +1,118 @@
+"""Models of several files in the list: sizes, licences, downloads, folders of the user's."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from conftest import wait_until
+
+from app.editing import hub_models
+from app.editor import Editor
+from app.gui.hub_rows import GAINS, NAMES, SIZES
+from objectmorpher_core import models
+from tests.core.models.local_hub import TOKEN, Hub, serving
+
+FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
+FILES = {
+    "config.json": b'{"model_type": "sam2"}',
+    "model.safetensors": b"\x02\0\0\0\0\0\0\0{}",  # no tensors
+}
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
+    for name in ("HF_TOKEN", "HF_HUB_OFFLINE", models.OFFLINE):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path / "cache" / "models"
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
+    pytest.importorskip("huggingface_hub")
+    with serving() as found:
+        monkeypatch.setenv("HF_ENDPOINT", found.url)
+        found.repositories = {FREE.repository: FILES, GATED.repository: FILES}
+        found.gated.add(GATED.repository)
+        yield found
+
+
+@pytest.fixture
+def choosing(editor: Editor) -> Editor:
+    """An editor that knows what is there: nothing."""
+    editor.models.look()
+    wait_until(editor, lambda: editor.chores.is_idle)
+    return editor
+
+
+def settle(editor: Editor) -> None:
+    wait_until(editor, lambda: editor.chores.is_idle and editor.jobs.is_idle)
+
+
+def test_every_family_and_size_has_a_name_for_people() -> None:
+    assert set(NAMES) == set(GAINS)
+    shown = [model for model in models.hub_models() if model.stage == "segment"]
+    assert {model.family for model in shown} == set(NAMES)
+    assert {model.id for model in shown} <= set(SIZES) | {"sam3"}
+
+
+def test_a_family_offers_its_small_size_until_one_is_chosen(choosing: Editor) -> None:
+    hub = choosing.models.hub
+    assert hub.shown("sam2").model is FREE
+    hub.choose("sam2", "sam2.1-large")
+    assert hub.shown("sam2").model.id == "sam2.1-large"
+    hub.choose("sam2", FREE.id)
+
+
+@pytest.mark.slow  # the worker imports PyTorch
+def test_a_model_is_downloaded_and_removed(choosing: Editor, server: Hub) -> None:
+    hub = choosing.models.hub
+    hub.download(FREE.id)
+    assert choosing.models.downloading == FREE.id
+    settle(choosing)
+    assert choosing.message is not None and choosing.message.text == f"{FREE.id} is ready"
+    assert hub.shown("sam2").state == "ok"
+    hub.remove(FREE.id)
+    settle(choosing)
+    assert hub.shown("sam2").state == "missing"
+
+
+def test_a_licence_is_accepted_before_a_download(
+    choosing: Editor, server: Hub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not hub_models.has_torch():
+        pytest.skip("torch is not installed")
+    hub = choosing.models.hub
+    assert hub.why_not(GATED) == "Accept its licence first"
+    hub.download(GATED.id)
+    settle(choosing)
+    assert choosing.message is not None and "SAM License" in choosing.message.text
+    hub.accept(GATED, True)
+    assert hub.why_not(GATED) is None
+    monkeypatch.setenv("HF_TOKEN", TOKEN)
+    hub.download(GATED.id)
+    settle(choosing)
+    assert hub.shown("sam3").state == "ok"
+    hub.accept(GATED, False)
+
+
+def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
+    choosing: Editor, tmp_path: Path
+) -> None:
+    hub, folder = choosing.models.hub, tmp_path / "mine"
+    folder.mkdir()
+    hub.wanted = FREE.id
+    hub.use_folder(folder / "config.json")
+    assert choosing.message is not None and "holds no" in choosing.message.text
+    for name, data in FILES.items():
+        (folder / name).write_bytes(data)
+    hub.use_folder(folder / "config.json")
+    settle(choosing)
+    assert hub.shown("sam2").is_own and hub.shown("sam2").path == folder
+    hub.remove(FREE.id)
+    settle(choosing)
+    assert json.loads((folder / "config.json").read_bytes()) == {"model_type": "sam2"}

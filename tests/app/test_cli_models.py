@@ -1,0 +1,133 @@
+"""`objectmorpher models` and `doctor` on the command line: consent, licences, one sentence."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app import cli
+from objectmorpher_core import models
+from tests.core.models.local_hub import TOKEN, Hub, serving
+
+FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
+FILES = {
+    "config.json": b'{"model_type": "sam2"}',
+    "model.safetensors": b"\x02\0\0\0\0\0\0\0{}",  # no tensors
+}
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
+    monkeypatch.setenv(models.OFFLINE, "")
+    for name in ("HF_TOKEN", "HF_HUB_OFFLINE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    return tmp_path / "cache" / "models"
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
+    pytest.importorskip("huggingface_hub")
+    with serving() as found:
+        monkeypatch.setenv("HF_ENDPOINT", found.url)
+        found.repositories = {FREE.repository: FILES, GATED.repository: FILES}
+        found.gated.add(GATED.repository)
+        yield found
+
+
+class Terminal(io.StringIO):
+    """What is typed at a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    """Exit code, stdout, stderr."""
+    code = cli.main(["models", *words])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_the_list_tells_size_licence_and_what_is_there(capsys) -> None:
+    code, out, _ = said(capsys, "list")
+    assert code == 0
+    lines = {line.split()[0]: line for line in out.splitlines()}
+    assert "156.0 MB" in lines[FREE.id] and "Apache-2.0 " in lines[FREE.id]
+    assert "SAM License*" in lines[GATED.id] and "not installed" in lines[GATED.id]
+    assert "models add mobile-sam FOLDER" in lines["mobile-sam"]
+
+
+def test_nothing_is_downloaded_without_consent(capsys, monkeypatch, server: Hub) -> None:
+    code, _, err = said(capsys, "get", FREE.id)
+    assert code == 1 and "156.0 MB" in err and "Apache-2.0" in err and "--yes" in err
+    monkeypatch.setattr(sys, "stdin", Terminal("n\n"))
+    code, _, err = said(capsys, "get", FREE.id)
+    assert code == 1 and "[y/N]" in err and "was not downloaded" in err
+    assert server.ranges == []
+    monkeypatch.setattr(sys, "stdin", Terminal("y\n"))
+    code, out, _ = said(capsys, "get", FREE.id)
+    assert code == 0 and FREE.id in out
+
+
+def test_a_model_is_got_verified_told_of_and_removed(capsys, server: Hub, cache: Path) -> None:
+    assert said(capsys, "get", FREE.id, "--yes")[:2] == (0, f"{FREE.id}: {cache / FREE.id}\n")
+    assert said(capsys, "path", FREE.id)[1] == f"{cache / FREE.id}\n"
+    assert said(capsys, "verify", FREE.id)[1] == f"{FREE.id}: ok\n"
+    assert " installed" in next(
+        line for line in said(capsys, "list")[1].splitlines() if line.startswith(FREE.id)
+    )
+    (cache / FREE.id / "config.json").write_bytes(b"{}")
+    code, out, err = said(capsys, "verify", FREE.id)
+    assert code == 1 and "bytes" in out and FREE.id in err
+    assert said(capsys, "remove", FREE.id)[0] == 0
+    assert said(capsys, "path", FREE.id)[0] == 1
+
+
+def test_a_gated_model_wants_its_licence_by_name(capsys, server: Hub, monkeypatch) -> None:
+    code, _, err = said(capsys, "get", GATED.id, "--yes")
+    assert code == 1 and "--accept-licence 'SAM License'" in err
+    monkeypatch.setenv("HF_TOKEN", TOKEN)
+    code, out, _ = said(capsys, "get", GATED.id, "--yes", "--accept-licence", "SAM License")
+    assert code == 0 and GATED.id in out
+
+
+def test_offline_is_one_sentence(capsys, server: Hub) -> None:
+    for id in (FREE.id, "u2netp"):
+        code, _, err = said(capsys, "get", id, "--yes", "--offline")
+        assert code == 1 and models.OFFLINE in err and err.strip().count("\n") <= 1
+
+
+def test_a_folder_is_added_and_forgotten(capsys, tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for name, data in FILES.items():
+        (folder / name).write_bytes(data)
+    code, out, _ = said(capsys, "add", "sam2", str(folder))
+    assert code == 0 and "yours" in out and str(folder) in out
+    assert said(capsys, "path", FREE.id)[1] == f"{folder}\n"
+    assert said(capsys, "remove", FREE.id)[0] == 0 and folder.exists()
+    code, _, err = said(capsys, "add", "dinosaur", str(folder))
+    assert code == 1 and "known are depth, sam2" in err
+    (folder / "model.safetensors").rename(folder / "model.bin")
+    code, _, err = said(capsys, "add", "sam2", str(folder))
+    assert code == 1 and "only pickled weights" in err
+
+
+def test_the_doctor_tells_what_each_stage_uses_and_what_would_help(capsys) -> None:
+    assert cli.main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    for stage in ("select: grabcut", "lift: ", "background: ", "refine: "):
+        assert f"\n{stage}" in out
+    assert "not dino: " in out and "better with: `objectmorpher models get`" in out
+    assert cli.main(["doctor", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [stage["name"] for stage in told["stages"]] == ["select", "lift", "background", "refine"]
+    assert told["machine"]["cores"] >= 1
