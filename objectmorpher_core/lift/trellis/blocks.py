@@ -179,7 +179,7 @@ def place_code(cells: Tensor, channels: int) -> Tensor:
 def _rates(count: int, device: torch.device) -> Tensor:
     """(count,) radians per unit."""
     steps = torch.arange(count, dtype=torch.float32, device=device) / count
-    return 1.0 / PERIOD**steps
+    return torch.exp(-math.log(PERIOD) * steps)
 
 
 def unit_layer_norm(x: Tensor) -> Tensor:

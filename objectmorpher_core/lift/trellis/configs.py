@@ -199,7 +199,7 @@ def sampling(found: Any) -> Sampling:
 
 def pipeline(folder: Path) -> Pipeline:
     """What the model in `folder` consists of. Raises LiftError."""
-    args = read_json(folder / "pipeline.json").get("args")
+    args = read_json(folder / "pipeline.json").get("args", {})
     try:
         norm = args["slat_normalization"]
         mean, std = (tuple(float(v) for v in norm[key]) for key in ("mean", "std"))

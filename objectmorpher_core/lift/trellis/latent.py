@@ -82,13 +82,13 @@ class LatentFlow(Part):
         self.input_layer = nn.Linear(form.in_channels, widths[0] if widths else code)
         self.input_blocks = nn.ModuleList()
         more = form.num_io_res_blocks - 1
-        for width, wider in zip(widths, (*widths[1:], code), strict=True):
+        for width, wider in zip(widths, (*widths, code)[1:], strict=True):
             self.input_blocks.extend(SparseResBlock(width, width, code) for _ in range(more))
             self.input_blocks.append(SparseResBlock(width, wider, code))
         self.blocks = nn.ModuleList(FlowBlock(form) for _ in range(form.num_blocks))
         self.out_blocks = nn.ModuleList()
         twice = 2 if form.use_skip_connection else 1
-        for width, before in zip(widths[::-1], (code, *widths[:0:-1]), strict=True):
+        for width, before in zip(widths[::-1], (code, *widths[::-1])[:-1], strict=True):
             self.out_blocks.append(SparseResBlock(twice * before, width, code))
             self.out_blocks.extend(SparseResBlock(twice * width, width, code) for _ in range(more))
         self.out_layer = nn.Linear(widths[0] if widths else code, form.out_channels)

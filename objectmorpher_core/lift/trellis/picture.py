@@ -70,7 +70,9 @@ class Encoder:
     def __init__(self, folder: Path, device: torch.device, dtype: torch.dtype) -> None:
         """Raises LiftError: one sentence."""
         from transformers import Dinov2WithRegistersModel
+        from transformers.utils import logging
 
+        logging.disable_progress_bar()
         # Through transformers, which knows the names that older files give to the weights.
         try:
             loaded: Any = Dinov2WithRegistersModel.from_pretrained(
@@ -78,7 +80,8 @@ class Encoder:
                 output_loading_info=True,
             )  # fmt: skip
         except Exception as error:  # of many kinds: of json, safetensors, the hub, and its own
-            raise LiftError(f"{folder} does not hold DINOv2 with registers: {error}") from error
+            reason = str(error).strip().partition("\n")[0]
+            raise LiftError(f"{folder} does not hold DINOv2 with registers: {reason}") from error
         net, said = loaded
         if wrong := sorted(map(str, {*said["missing_keys"], *said["mismatched_keys"]})):
             raise LiftError(f"the weights in {folder} are not DINOv2's: {wrong[0]}")
