@@ -60,6 +60,22 @@ class LatentFlowConfig(StructureFlowConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ViewLatentFlowConfig(LatentFlowConfig):
+    """The same, which also gets what the picture shows at each cell's place in it (CUPID)."""
+
+    cond_latent_channels: int
+    visual_input_channels: int = 3
+    visual_feat_resolution: int = 256
+    visual_feat_channels: tuple[int, ...] = (4, 4, 4, 4)
+    visual_conv_kernel_size: int = 3
+
+    @property
+    def all_channels(self) -> int:
+        """Of what goes in."""
+        return self.in_channels + self.cond_latent_channels + sum(self.visual_feat_channels)
+
+
+@dataclass(frozen=True, kw_only=True)
 class StructureDecoderConfig:
     """From the first flow's latents to occupied cells."""
 
@@ -91,6 +107,11 @@ class Activations:
     scaling_bias: float  # standard deviation where the network says 0
     opacity_bias: float
     scaling_activation: str  # softplus or exp
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatentEncoderConfig(WindowedConfig):
+    in_channels: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,9 +159,9 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-def config(kind: type[C], args: dict[str, Any], ignored: frozenset[str] = frozenset()) -> C:
+def config(kind: type[C], args: dict[str, Any]) -> C:
     """`kind` from a part's published arguments. Raises LiftError for what is not understood."""
-    args = {name: value for name, value in args.items() if name not in FOR_TRAINING | ignored}
+    args = {name: value for name, value in args.items() if name not in FOR_TRAINING}
     for name, only in ONLY.items():
         if name in args and args.pop(name) != only:
             raise LiftError(f"a model with another {name} than {only} cannot be run")

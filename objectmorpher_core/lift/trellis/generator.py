@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from torch import Tensor
 from ...gaussians import Gaussians
 from ...progress import Progress, part, silent
 from .. import LiftError
-from .blocks import Part
+from .camera import View
 from .configs import Pipeline, Sampling, part_path, pipeline
 from .device import Plan
 from .parts import load_part
@@ -37,11 +37,26 @@ class Folders:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class Placed:
+    """Where an object is."""
+
+    voxels: Voxels
+    view: View | None = None  # how the picture shows it, of a generator that says so
+
+
+@dataclass(frozen=True, eq=False)
+class Made(Placed):
     """What a generator makes of a picture."""
 
-    gaussians: Gaussians  # in the cube of side 1 around the origin, z up
-    voxels: Voxels
+    gaussians: Gaussians = field(kw_only=True)  # in the cube of side 1 round the origin, z up
+
+
+@dataclass(frozen=True, eq=False)
+class Extras:
+    """Channels (1, N, E) that the second flow gets beside the latents."""
+
+    shown: Tensor
+    hidden: Tensor  # of the step without the picture
 
 
 class Generator:
@@ -70,11 +85,16 @@ class Generator:
             with torch.inference_mode():
                 progress(0.0, "Looking at the object")
                 seen = self._seen(picture)
-                voxels = self._placed(seen, noise, structure, part(progress, 0.05, 0.5))
-                latents = self._filled(seen, voxels, noise, latent, part(progress, 0.5, 0.95))
+                placed = self._placed(
+                    self._structure(seen, noise, structure, part(progress, 0.05, 0.5))
+                )
+                extras = self._extras(picture, seen, placed)
+                rest = part(progress, 0.5, 0.95)
+                latents = self._filled((seen, extras), placed.voxels, noise, latent, rest)
                 progress(0.95, "Making Gaussians")
-                decoder = self.part(DECODER)
-                return Made(decoder.gaussians(decoder(latents, voxels)[0], voxels), voxels)
+                decoder, voxels = self.part(DECODER), placed.voxels
+                gaussians = decoder.gaussians(decoder(latents, voxels)[0], voxels)
+                return Made(voxels, placed.view, gaussians=gaussians)
         finally:
             if not self.plan.keeps:
                 self.release()
@@ -88,17 +108,14 @@ class Generator:
             if where is None:
                 raise LiftError(f"{self.folders.model / 'pipeline.json'} names no {role}")
             path = part_path(self.folders.model, where, self.folders.shared)
-            self._parts[role] = self._loaded(path)
+            log.info("Loading %s", path.name)
+            self._parts[role] = load_part(path, self.plan.device, self.plan.dtype)
         return self._parts[role]
 
     def release(self) -> None:
         """Gives the memory of all parts back."""
         self._parts.clear()
         self.plan.empty_cache()
-
-    def _loaded(self, path: Path) -> Part:
-        log.info("Loading %s", path.name)
-        return load_part(path, self.plan.device, self.plan.dtype)
 
     def _encoder(self) -> Encoder:
         if "encoder" not in self._parts:
@@ -127,26 +144,29 @@ class Generator:
 
         return sample(velocity, start, how, progress, "Finding the shape")
 
-    def _placed(
-        self, seen: Tensor, noise: torch.Generator, how: Sampling, progress: Progress
-    ) -> Voxels:
-        """Where the object is."""
-        latents = self._structure(seen, noise, how, progress)
-        return occupied(self.part(STRUCTURE)(latents)[0, 0])
+    def _placed(self, latents: Tensor) -> Placed:
+        """Where the object is, from the first flow's latents."""
+        return Placed(occupied(self.part(STRUCTURE)(latents)[0, 0]))
+
+    def _extras(self, picture: Picture, seen: Tensor, placed: Placed) -> Extras | None:
+        """What the second flow gets besides."""
+        return None
 
     def _filled(
         self,
-        seen: Tensor,
+        told: tuple[Tensor, Extras | None],
         voxels: Voxels,
         noise: torch.Generator,
         how: Sampling,
         progress: Progress,
     ) -> Tensor:
         """(1, N, C) what it is like there."""
-        flow, nothing = self.part(LATENT), torch.zeros_like(seen)
-        start = torch.randn((len(voxels), flow.form.in_channels), generator=noise)
+        flow, (seen, extras), nothing = self.part(LATENT), told, torch.zeros_like(told[0])
+        start = torch.randn((len(voxels), flow.form.out_channels), generator=noise)
 
         def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
+            if extras is not None:
+                x = torch.cat([x, extras.shown if is_shown else extras.hidden], 2)
             return flow(x, time, seen if is_shown else nothing, voxels)
 
         found = sample(velocity, start[None].to(self.plan.device), how, progress, "Filling it in")

@@ -12,18 +12,21 @@ from ...progress import Progress, part
 from ...splat_files.axes import QUARTER_TURN, turned
 from .. import LiftError, Subject
 from ..imported import lift_imported
-from ..placement import Hints, register
+from ..placement import Hints, Proposal, Registrar, register
 from ..placement_view import Target
 from . import weights
 from .configs import Sampling
 
 if TYPE_CHECKING:
-    from .generator import Generator
+    from .device import Plan
+    from .generator import Folders, Generator
+    from .picture import Picture
 
 log = logging.getLogger(__name__)
 STEPS = 12  # of each flow: what the publishers' own example takes
 GUIDANCE = 7.5, 3.0  # of the flows, from the same place
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
+FITS = 0.85  # score from which a pose that the network says itself is not looked for again
 SPLATTING = "mip"  # as its Gaussians were trained
 
 
@@ -47,8 +50,7 @@ class TrellisLifter:
         picture = Picture.of(subject.matte)
         gaussians, hints = self._made(picture, subject, part(progress, 0.0, 0.8), seed)
         target = Target(subject.pixels, subject.mask, subject.camera)
-        found = register(gaussians, target, hints, part(progress, 0.8, 0.95), seed)
-        best = found.best
+        best = placed(gaussians, target, hints, part(progress, 0.8, 0.95), seed)
         log.info("Registered with an IoU of %.3f, score %.3f", best.iou, best.score)
         progress(0.95, f"Placed: the outlines agree by {best.iou:.0%}")
         rest = part(progress, 0.95, 1.0)
@@ -56,7 +58,7 @@ class TrellisLifter:
         return replace(lifted, backend=self.name)
 
     def _made(
-        self, picture: Any, subject: Subject, progress: Progress, seed: int
+        self, picture: Picture, subject: Subject, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         """The object in our axes, and what is known of its pose."""
         generator = self._generator()
@@ -66,12 +68,30 @@ class TrellisLifter:
 
     def _generator(self) -> Generator:
         from .device import Plan
-        from .generator import Folders, Generator
+        from .generator import Folders
 
         folders = Folders(*(weights.weights_folder(id) for id in self.ids))
         if (known := self._kept.get(self.name)) is None or known.folders != folders:
-            self._kept[self.name] = Generator(folders, Plan.best())
+            self._kept[self.name] = self._new_generator(folders, Plan.best())
         return self._kept[self.name]
+
+    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
+        from .generator import Generator
+
+        return Generator(folders, plan)
+
+
+def placed(
+    gaussians: Gaussians, target: Target, hints: Hints, progress: Progress, seed: int
+) -> Proposal:
+    """Where the object stands in the photo; near the pose that is hinted at if it fits there."""
+    if hints.start is not None:
+        progress(0.0, "Fitting the object")
+        registrar = Registrar(gaussians, target, seed)
+        best = registrar.improved(registrar.rated(hints.start))
+        if best.score >= FITS:
+            return best
+    return register(gaussians, target, hints, progress, seed).best
 
 
 def example_sampling(generator: Generator) -> tuple[Sampling, Sampling]:

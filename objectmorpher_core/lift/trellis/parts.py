@@ -15,15 +15,18 @@ from .. import LiftError
 from .blocks import Part
 from .configs import (
     GaussianDecoderConfig,
+    LatentEncoderConfig,
     LatentFlowConfig,
     StructureDecoderConfig,
     StructureFlowConfig,
+    ViewLatentFlowConfig,
     config,
     read_json,
 )
 from .latent import LatentFlow
 from .structure import StructureDecoder, StructureFlow
-from .windowed import GaussianDecoder
+from .views import ViewLatentFlow
+from .windowed import GaussianDecoder, LatentEncoder
 
 PICKLES = (".pt", ".pth", ".bin", ".ckpt", ".pkl")
 
@@ -34,7 +37,6 @@ class Kind:
 
     config: type[Any]
     part: Callable[[Any], Part]
-    ignored: frozenset[str] = frozenset()  # arguments that say nothing about the network
 
 
 KINDS = {
@@ -42,6 +44,8 @@ KINDS = {
     "SparseStructureDecoder": Kind(StructureDecoderConfig, StructureDecoder),
     "SLatFlowModel": Kind(LatentFlowConfig, LatentFlow),
     "SLatGaussianDecoder": Kind(GaussianDecoderConfig, GaussianDecoder),
+    "SLatEncoder": Kind(LatentEncoderConfig, LatentEncoder),
+    "VisualLatentConditioningSLatFlowModel": Kind(ViewLatentFlowConfig, ViewLatentFlow),
 }
 
 
@@ -51,7 +55,7 @@ def build(description: dict[str, Any]) -> Part:
     kind = KINDS.get(str(name).removeprefix("Elastic"))
     if kind is None or not isinstance(args, dict):
         raise LiftError(f"a part called {name!r} is not known; known are {', '.join(KINDS)}")
-    return kind.part(config(kind.config, args, kind.ignored))
+    return kind.part(config(kind.config, args))
 
 
 def load_part(path: Path, device: torch.device, dtype: torch.dtype) -> Part:

@@ -12,7 +12,7 @@ from torch.nn import functional
 from ...gaussians import Gaussians
 from .attention import attend_in_windows
 from .blocks import Block, Part, place_code, unit_layer_norm
-from .configs import Activations, GaussianDecoderConfig, WindowedConfig
+from .configs import Activations, GaussianDecoderConfig, LatentEncoderConfig, WindowedConfig
 from .voxels import Voxels
 
 SH_C0 = 0.28209479177387814  # the constant spherical harmonic
@@ -41,6 +41,17 @@ class Windowed(Part):
             windows = voxels.windows(size, size // 2 * (i % 2))
             h = block(h, lambda q, k, v, w=windows: attend_in_windows(q, k, v, w))
         return self.out_layer(unit_layer_norm(h.to(x.dtype)))
+
+
+class LatentEncoder(Windowed):
+    """Features of cells, such as a picture's tokens, to latents."""
+
+    def __init__(self, form: LatentEncoderConfig) -> None:
+        super().__init__(form, form.in_channels, 2 * form.latent_channels)
+
+    def mean(self, x: Tensor, voxels: Voxels) -> Tensor:
+        """(B, N, C): the middle of the distribution, whose width is the other half."""
+        return self(x, voxels).chunk(2, dim=2)[0]
 
 
 class GaussianDecoder(Windowed):
