@@ -114,7 +114,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
     _add_choosing(parser)
     add = parser.add_argument_group("backends").add_argument
-    add("--lift", metavar="NAME", help="auto or relief")
+    add("--lift", metavar="NAME", help="auto, relief, trellis or cupid")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
     add("--refine", metavar="NAME", help="none (also auto) or harmonise: light")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")

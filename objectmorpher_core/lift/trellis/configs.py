@@ -27,6 +27,10 @@ class Transformer:
     mlp_ratio: float = 4.0
     qk_rms_norm: bool = False
 
+    def __post_init__(self) -> None:
+        if self.heads < 1 or self.model_channels % self.heads:
+            raise LiftError(f"{self.model_channels} channels cannot be dealt to {self.heads} heads")
+
     @property
     def heads(self) -> int:
         return self.num_heads or self.model_channels // self.num_head_channels
@@ -84,6 +88,10 @@ class StructureDecoderConfig:
     num_res_blocks: int
     channels: tuple[int, ...]
     num_res_blocks_middle: int = 2
+
+    def __post_init__(self) -> None:
+        if not self.channels:
+            raise LiftError("the model's description gives a decoder no channels")
 
 
 @dataclass(frozen=True, kw_only=True)

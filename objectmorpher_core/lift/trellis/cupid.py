@@ -10,13 +10,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ...arrays import F64
+from ...camera import Camera
 from ...gaussians import Gaussians
 from ...progress import Progress
 from ...splat_files.axes import QUARTER_TURN, turned
 from .. import Subject
 from ..placement import Hints
 from . import weights
-from .camera import pose_in, view
+from .camera import View, pose_in, view
 from .device import Plan
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied
 from .lifter import UP, TrellisLifter, within_memory
@@ -79,12 +81,19 @@ class CupidLifter(TrellisLifter):
         generator = self._generator()
         made = within_memory(generator, lambda: generator.make(picture, progress, seed))
         assert made.view is not None
-        seen_at = picture.photo_xy(made.view.uv)
-        start = pose_in(subject.camera, made.view.points @ QUARTER_TURN.T, seen_at)
+        start = pose_seen(made.view, picture, subject.camera)
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)
 
 
-def centres(voxels: Voxels) -> np.ndarray:
+def pose_seen(seen: View, picture: Picture, camera: Camera) -> F64 | None:
+    """(4, 4) world from object, in our axes, where the photo's camera sees it so.
+
+    The photo's focal length is kept, whatever the network's view has. None where there is none.
+    """
+    return pose_in(camera, seen.points @ QUARTER_TURN.T, picture.photo_xy(seen.uv))
+
+
+def centres(voxels: Voxels) -> F64:
     """(N, 3) f64 of cells, in the cube of side 1 around the origin."""
     return (voxels.cells.double().cpu().numpy() + 0.5) / voxels.resolution - 0.5
 

@@ -92,9 +92,9 @@ class Generator:
                 rest = part(progress, 0.5, 0.95)
                 latents = self._filled((seen, extras), placed.voxels, noise, latent, rest)
                 progress(0.95, "Making Gaussians")
-                decoder, voxels = self.part(DECODER), placed.voxels
-                gaussians = decoder.gaussians(decoder(latents, voxels)[0], voxels)
-                return Made(voxels, placed.view, gaussians=gaussians)
+                return Made(
+                    placed.voxels, placed.view, gaussians=self._gaussians(latents, placed.voxels)
+                )
         finally:
             if not self.plan.keeps:
                 self.release()
@@ -171,6 +171,16 @@ class Generator:
 
         found = sample(velocity, start[None].to(self.plan.device), how, progress, "Filling it in")
         return self.denormed(found)
+
+    def _gaussians(self, latents: Tensor, voxels: Voxels) -> Gaussians:
+        decoder = self.part(DECODER)
+        raw = decoder(latents, voxels)[0]
+        try:
+            return decoder.gaussians(raw, voxels)
+        except ValueError as error:  # weights that are not numbers, or overflowed
+            raise LiftError(
+                f"what the network made of the picture is of no use: {error}"
+            ) from error
 
     def denormed(self, latents: Tensor) -> Tensor:
         """Latents (..., C) in the decoder's units."""

@@ -15,7 +15,8 @@ from objectmorpher_core import lift
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.placement import Hints, Registrar
-from objectmorpher_core.lift.trellis.cupid import CupidGenerator, CupidLifter, centres
+from objectmorpher_core.lift.trellis.cupid import CupidGenerator, CupidLifter, centres, pose_seen
+from objectmorpher_core.lift.trellis.camera import view
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
 from objectmorpher_core.lift.trellis.picture import Picture
@@ -24,6 +25,7 @@ from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.progress import Cancelled, silent
 from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.splat_files.axes import QUARTER_TURN
 from tests import photos
 from tests.core.lift import registered
 from tests.core.lift.trellis import tiny_trellis
@@ -129,7 +131,21 @@ def test_it_cancels(generator, picture):
         generator.make(picture, progress)
 
 
-def test_a_pose_that_fits_is_kept_and_another_is_looked_for():
+def test_where_cells_are_seen_is_where_the_object_stands():
+    """From the network's axes and its picture's square to ours and the photo's pixels."""
+    _, scene = registered.known_bracket()
+    picture = Picture.of(build_matte(scene.pixels, scene.mask, 12))
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (400, 3))  # z up
+    ours = points @ QUARTER_TURN.T
+    turn, shift = scene.world_from_object[:3, :3], scene.world_from_object[:3, 3]
+    xy = scene.camera.project(ours @ turn.T + shift)
+    seen = view(points, (xy - [picture.left, picture.top]) / picture.side)
+    found = pose_seen(seen, picture, scene.camera)
+    assert found is not None and np.allclose(found, scene.world_from_object, atol=1e-5)
+    assert seen.intrinsic[0, 0] == pytest.approx(scene.camera.focal / picture.side)
+
+
+def test_a_pose_that_fits_is_kept():
     gaussians, scene = registered.known_bracket()
     registrar = Registrar(gaussians, scene.target)
     near = scene.world_from_object.copy()
@@ -139,6 +155,11 @@ def test_a_pose_that_fits_is_kept_and_another_is_looked_for():
     assert found.score > FITS and told == ["Fitting the object"]
     assert registered.turn_error(found.world_from_object, scene.world_from_object) < 3
     assert found.score >= registrar.rated(near).score
+
+
+@pytest.mark.slow
+def test_instead_of_a_pose_that_does_not_fit_another_is_looked_for():
+    gaussians, scene = registered.known_bracket()
     wrong = scene.world_from_object.copy()
     wrong[:3, :3] = wrong[:3, :3] @ np.diag([1.0, -1, -1])
     found = placed(gaussians, scene.target, Hints(start=wrong), silent, seed=0)

@@ -3,13 +3,17 @@
 # ruff: noqa: E402 (nothing that needs torch can be imported before the skip)
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="TRELLIS needs torch")
 pytest.importorskip("transformers", reason="TRELLIS needs transformers")
+
+from safetensors.torch import load_file, save_file
 
 from objectmorpher_core import lift
 from objectmorpher_core.camera import Camera
@@ -125,6 +129,17 @@ def test_progress_rises_at_every_step_and_cancels_anywhere(generator, picture):
         with pytest.raises(Cancelled):
             generator.make(picture, progress)
         assert not generator._parts
+
+
+def test_numbers_that_are_none_are_one_sentence(folders, picture, tmp_path):
+    copy = Path(shutil.copytree(folders.model, tmp_path / "model"))
+    path = copy / "ckpts" / "slat_flow_model.safetensors"
+    state = load_file(str(path))
+    save_file(
+        {**state, "out_layer.bias": torch.full_like(state["out_layer.bias"], torch.nan)}, path
+    )
+    with pytest.raises(LiftError, match="not finite"):
+        Generator(replace(folders, model=copy), tiny_trellis.CPU).make(picture)
 
 
 def test_too_many_cells_are_cut_to_the_surest(monkeypatch):

@@ -93,6 +93,8 @@ def test_a_pickle_is_never_read(saved):
         ({"num_blocks": 1 << 40}, "num_blocks"),
         ({"num_blocks": -1}, "num_blocks"),
         ({"model_channels": "many"}, "model_channels"),
+        ({"num_heads": 5}, "heads"),
+        ({"num_heads": None}, "heads"),
         ({"pe_mode": "rope"}, "pe_mode"),
         ({"attn_mode": "full"}, "attn_mode"),
         ({"surprise": 1}, "surprise"),
