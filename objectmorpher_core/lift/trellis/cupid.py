@@ -48,7 +48,7 @@ class CupidGenerator(Generator):
         places = self.part(PLACES)(latents[:, own:])[0, 1:3]
         telling = voxels if len(voxels) >= LEAST_CELLS else _likeliest(logits)
         uv = torch.sigmoid(places[:, *telling.cells.T].T)
-        return Placed(voxels, view(centres(telling), uv.double().cpu().numpy()))
+        return Placed(voxels, view(centres(telling), uv.cpu().double().numpy()))
 
     def _extras(self, picture: Picture, seen: Tensor, placed: Placed) -> Extras | None:
         assert placed.view is not None
@@ -95,7 +95,7 @@ def pose_seen(seen: View, picture: Picture, camera: Camera) -> F64 | None:
 
 def centres(voxels: Voxels) -> F64:
     """(N, 3) f64 of cells, in the cube of side 1 around the origin."""
-    return (voxels.cells.double().cpu().numpy() + 0.5) / voxels.resolution - 0.5
+    return (voxels.cells.cpu().double().numpy() + 0.5) / voxels.resolution - 0.5
 
 
 def _likeliest(logits: Tensor) -> Voxels:

@@ -26,6 +26,8 @@ class Halved(NamedTuple):
 
     voxels: Voxels
     parents: Tensor  # (N,) index of the coarse cell that each cell lies in
+    children: Tensor  # (M, 8) index of the cells in each coarse cell; rows are filled up with any
+    is_there: Tensor  # (M, 8) bool: not merely filled up
 
 
 class Windows(NamedTuple):
@@ -72,7 +74,8 @@ class Voxels:
         strides = torch.tensor([side * side, side, 1], device=self.cells.device)
         code, parents = torch.unique(((self.cells // 2) * strides).sum(1), return_inverse=True)
         cells = torch.stack([code // (side * side), code // side % side, code % side], 1)
-        return Halved(Voxels(cells, side), parents)
+        children, is_there = _members(parents, torch.bincount(parents), 8)
+        return Halved(Voxels(cells, side), parents, children, is_there)
 
     @cached_property
     def _windows(self) -> dict[tuple[int, int], tuple[Windows, ...]]:
@@ -88,19 +91,27 @@ class Voxels:
         side, device = (self.resolution + shift) // size + 1, self.cells.device
         strides = torch.tensor([side * side, side, 1], device=device)
         code = ((self.cells + shift) // size * strides).sum(1)
-        order = torch.argsort(code, stable=True)
-        counts = torch.unique_consecutive(code[order], return_counts=True)[1]
-        starts = torch.cumsum(counts, 0) - counts
+        _, window, counts = torch.unique(code, return_inverse=True, return_counts=True)
         groups, least, length = [], 0, SHORTEST
         while least < int(counts.max()):
             chosen = (counts > least) & (counts <= length)
             if bool(chosen.any()):
-                steps = torch.arange(length, device=device)
-                is_there = steps < counts[chosen, None]
-                index = torch.where(is_there, starts[chosen, None] + steps, starts[chosen, None])
-                groups.append(Windows(order[index], is_there))
+                members, is_there = _members(window, counts, length)
+                groups.append(Windows(members[chosen], is_there[chosen]))
             least, length = length, 2 * length
         return tuple(groups)
+
+
+def _members(groups: Tensor, counts: Tensor, length: int) -> tuple[Tensor, Tensor]:
+    """Index (G, length) of what is in each group, filled up with any, and what is not (bool).
+
+    `groups` (N,) the group of each, `counts` (G,) how many each has: where that is more, some.
+    """
+    order = torch.argsort(groups, stable=True)
+    starts = (torch.cumsum(counts, 0) - counts)[:, None]
+    steps = torch.arange(length, device=groups.device)
+    is_there = steps < counts[:, None]
+    return order[torch.where(is_there, starts + steps, starts)], is_there
 
 
 def pooled(values: Tensor, fine: Voxels) -> Tensor:
@@ -109,8 +120,8 @@ def pooled(values: Tensor, fine: Voxels) -> Tensor:
     Not quite the mean: the published network was trained with a zero counted in beside the n
     cells, so the sum is divided by n + 1.
     """
-    coarse, parents = fine.halved
-    sums = values.new_zeros((values.shape[0], len(coarse), values.shape[2]), dtype=torch.float32)
-    sums.index_add_(1, parents, values.float())
-    counts = torch.bincount(parents, minlength=len(coarse)) + 1
+    halved = fine.halved
+    # Gathered, not scattered: a GPU would add in another order each time.
+    cells = values[:, halved.children].float() * halved.is_there[:, :, None]
+    sums, counts = cells.sum(2), halved.is_there.sum(1) + 1
     return (sums / counts[:, None]).to(values.dtype)
