@@ -107,7 +107,13 @@ def test_renderer_knows_no_editor(path):
     assert not reached & {"app.editor", "app.history", "app.gui"}
 
 
-@pytest.mark.parametrize("module", ["objectmorpher_core.pipeline", "app.editor", "app.cli"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "objectmorpher_core.pipeline", "app.editor", "app.cli",
+        "objectmorpher_core.lift.trellis.lifter", "objectmorpher_core.lift.trellis.cupid_lifter",
+    ],
+)  # fmt: skip
 def test_importing_pulls_in_nothing_heavy(module):
     heavy = sorted(HEAVY | WINDOW | GL)
     code = f"import sys, {module}; print(*[m for m in {heavy} if m in sys.modules])"

@@ -48,7 +48,7 @@ class Lifter(Protocol):
 BACKENDS = {  # imported when chosen
     "relief": "objectmorpher_core.lift.relief:ReliefLifter",
     "trellis": "objectmorpher_core.lift.trellis.lifter:TrellisLifter",
-    "cupid": "objectmorpher_core.lift.trellis.cupid:CupidLifter",
+    "cupid": "objectmorpher_core.lift.trellis.cupid_lifter:CupidLifter",
 }
 
 

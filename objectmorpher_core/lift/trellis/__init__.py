@@ -2,5 +2,5 @@
 
 The paper's own lifter (3.1). No sparse-convolution or attention package is needed, so it runs
 where PyTorch does. Names of parameters are those of the published weights, which are MIT:
-https://github.com/microsoft/TRELLIS. Only `lifter`, `weights` and `configs` go without torch.
+https://github.com/microsoft/TRELLIS. The two lifters are imported without torch.
 """

@@ -11,17 +11,9 @@ import torch
 from torch import Tensor
 
 from ...arrays import F64
-from ...camera import Camera
-from ...gaussians import Gaussians
-from ...progress import Progress
-from ...splat_files.axes import QUARTER_TURN, turned
-from .. import Subject
-from ..placement import Hints
-from . import weights
-from .camera import View, pose_in, view
+from .camera import view
 from .device import Plan
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied
-from .lifter import UP, TrellisLifter, within_memory
 from .picture import Picture
 from .views import looked_up
 from .voxels import Voxels
@@ -64,33 +56,6 @@ class CupidGenerator(Generator):
             torch.cat([tokens, flow.colours(rgb, uv)], 2),
             torch.cat([torch.zeros_like(tokens), flow.colours(torch.zeros_like(rgb), uv)], 2),
         )
-
-
-class CupidLifter(TrellisLifter):
-    """Image to 3D that stands where the photo shows it."""
-
-    name = "cupid"
-    ids = (weights.CUPID, weights.ENCODER, weights.TRELLIS)
-
-    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
-        return CupidGenerator(folders, plan)
-
-    def _made(
-        self, picture: Picture, subject: Subject, progress: Progress, seed: int
-    ) -> tuple[Gaussians, Hints]:
-        generator = self._generator()
-        made = within_memory(generator, lambda: generator.make(picture, progress, seed))
-        assert made.view is not None
-        start = pose_seen(made.view, picture, subject.camera)
-        return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)
-
-
-def pose_seen(seen: View, picture: Picture, camera: Camera) -> F64 | None:
-    """(4, 4) world from object, in our axes, where the photo's camera sees it so.
-
-    The photo's focal length is kept, whatever the network's view has. None where there is none.
-    """
-    return pose_in(camera, seen.points @ QUARTER_TURN.T, picture.photo_xy(seen.uv))
 
 
 def centres(voxels: Voxels) -> F64:

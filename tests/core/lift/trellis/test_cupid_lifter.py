@@ -16,7 +16,8 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
-from objectmorpher_core.lift.trellis.cupid import CupidGenerator, CupidLifter, centres, pose_seen
+from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
+from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter, pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
 from objectmorpher_core.lift.trellis.picture import Picture
