@@ -132,7 +132,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
     _add_choosing(parser)
     add = parser.add_argument_group("backends").add_argument
-    add("--lift", metavar="NAME", help="auto or relief")
+    add("--lift", metavar="NAME", help="auto, relief, trellis or cupid")
     add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
     add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
         help="the background R px around X2,Y2 is filled in from around X,Y")  # fmt: skip

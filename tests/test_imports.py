@@ -15,6 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 CORE, APP = ROOT / "objectmorpher_core", ROOT / "app"
 TRAINING = CORE / "training"
+NETWORKS = {CORE / "lift" / "trellis"}  # classes of torch's; what is imported first needs none
 WINDOW = {"imgui_bundle", "imgui", "glfw", "OpenGL"}
 GL = {"moderngl", "glcontext"}
 HEAVY = {"torch", "onnxruntime", "patchmatch", "trimesh", "tifffile"}  # only inside functions
@@ -69,7 +70,7 @@ def test_core_knows_no_window(path):
 @pytest.mark.parametrize("path", sources(CORE), ids=name_of)
 def test_core_starts_light(path):
     others = tops(path, is_at_import=True) - set(sys.stdlib_module_names)
-    if path.parent == TRAINING:  # networks are classes of torch's
+    if path.parent in {TRAINING, *NETWORKS}:  # networks are classes of torch's
         others -= {"torch"}
     assert others <= CORE_AT_IMPORT, "import it inside the function that needs it"
 
@@ -106,7 +107,13 @@ def test_renderer_knows_no_editor(path):
     assert not reached & {"app.editor", "app.history", "app.gui"}
 
 
-@pytest.mark.parametrize("module", ["objectmorpher_core.pipeline", "app.editor", "app.cli"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "objectmorpher_core.pipeline", "app.editor", "app.cli",
+        "objectmorpher_core.lift.trellis.lifter", "objectmorpher_core.lift.trellis.cupid_lifter",
+    ],
+)  # fmt: skip
 def test_importing_pulls_in_nothing_heavy(module):
     heavy = sorted(HEAVY | WINDOW | GL)
     code = f"import sys, {module}; print(*[m for m in {heavy} if m in sys.modules])"

@@ -45,7 +45,11 @@ class Lifter(Protocol):
         ...
 
 
-BACKENDS = {"relief": "objectmorpher_core.lift.relief:ReliefLifter"}  # imported when chosen
+BACKENDS = {  # imported when chosen
+    "relief": "objectmorpher_core.lift.relief:ReliefLifter",
+    "trellis": "objectmorpher_core.lift.trellis.lifter:TrellisLifter",
+    "cupid": "objectmorpher_core.lift.trellis.cupid_lifter:CupidLifter",
+}
 
 
 def load(name: str = "auto") -> Lifter:

@@ -1,0 +1,187 @@
+"""The transformer blocks of all parts. Attributes are named as in the published weights.
+
+A batch has the same cells in each of its items, so cells of a sparse grid are plain tokens
+(B, N, C): one block serves dense and sparse grids.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from .attention import attend
+from .configs import StructureFlowConfig, Transformer
+
+PERIOD = 10_000.0  # longest wave of both codes, over 2 pi
+TIME_CODE = 256  # channels of the code of a time
+EPSILON = 1e-6  # of the layer norms inside blocks
+Attend = Callable[[Tensor, Tensor, Tensor], Tensor]
+
+
+class Part(nn.Module):
+    """A network of its own file. Its torso may be of lower precision than the rest."""
+
+    torso: tuple[str, ...] = ()  # what the names of its modules begin with
+    precision = torch.float32  # of the torso
+
+    def lower_precision(self) -> set[str]:
+        """Keys of the weights that follow `precision`: the torso's, but not its norms'."""
+        return {
+            f"{name}.{key}"
+            for name, module in self.named_modules()
+            if name.startswith(self.torso) and not isinstance(module, Norm | HeadNorm)
+            for key, _ in module.named_parameters(recurse=False)
+        }
+
+
+class Norm(nn.LayerNorm):
+    """Layer norm in single precision, whatever it is given; over the last axis."""
+
+    def forward(self, input: Tensor) -> Tensor:
+        return super().forward(input.float()).to(input.dtype)
+
+
+class HeadNorm(nn.Module):
+    """Vectors of each head (..., H, D) brought to one length, then scaled."""
+
+    def __init__(self, heads: int, width: int) -> None:
+        super().__init__()
+        self.gamma = nn.Parameter(torch.ones(heads, width))
+
+    def forward(self, x: Tensor) -> Tensor:
+        unit = functional.normalize(x.float(), dim=-1)
+        return (unit * self.gamma * math.sqrt(x.shape[-1])).to(x.dtype)
+
+
+class _Heads(nn.Module):
+    """What attention to itself and to a context share."""
+
+    def __init__(self, channels: int, heads: int, has_norm: bool) -> None:
+        super().__init__()
+        self.heads = heads
+        self.to_out = nn.Linear(channels, channels)
+        if has_norm:
+            self.q_rms_norm = HeadNorm(heads, channels // heads)
+            self.k_rms_norm = HeadNorm(heads, channels // heads)
+        self.has_norm = has_norm
+
+    def _answer(self, q: Tensor, k: Tensor, v: Tensor, how: Attend) -> Tensor:
+        if self.has_norm:
+            q, k = self.q_rms_norm(q), self.k_rms_norm(k)
+        return self.to_out(how(q, k, v).flatten(2))
+
+
+class SelfAttention(_Heads):
+    """Tokens (B, N, C) that see one another."""
+
+    def __init__(self, channels: int, heads: int, has_norm: bool) -> None:
+        super().__init__(channels, heads, has_norm)
+        self.to_qkv = nn.Linear(channels, 3 * channels)
+
+    def forward(self, x: Tensor, how: Attend = attend) -> Tensor:
+        q, k, v = self.to_qkv(x).unflatten(2, (3, self.heads, -1)).unbind(2)
+        return self._answer(q, k, v, how)
+
+
+class CrossAttention(_Heads):
+    """Tokens (B, N, C) that see a context (B, M, D)."""
+
+    def __init__(self, channels: int, context: int, heads: int, has_norm: bool) -> None:
+        super().__init__(channels, heads, has_norm)
+        self.to_q = nn.Linear(channels, channels)
+        self.to_kv = nn.Linear(context, 2 * channels)
+
+    def forward(self, x: Tensor, context: Tensor) -> Tensor:
+        q = self.to_q(x).unflatten(2, (self.heads, -1))
+        k, v = self.to_kv(context).unflatten(2, (2, self.heads, -1)).unbind(2)
+        return self._answer(q, k, v, attend)
+
+
+class FeedForward(nn.Module):
+    """Each token by itself."""
+
+    def __init__(self, channels: int, hidden: int) -> None:
+        super().__init__()
+        self.mlp = nn.Sequential(
+            nn.Linear(channels, hidden), nn.GELU("tanh"), nn.Linear(hidden, channels)
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        return self.mlp(x)
+
+
+class Block(nn.Module):
+    """Attention and feed-forward net, each added to what came in."""
+
+    def __init__(self, form: Transformer) -> None:
+        super().__init__()
+        channels = form.model_channels
+        self.norm1 = Norm(channels, EPSILON, elementwise_affine=False)
+        self.norm2 = Norm(channels, EPSILON, elementwise_affine=False)
+        self.attn = SelfAttention(channels, form.heads, form.qk_rms_norm)
+        self.mlp = FeedForward(channels, form.hidden)
+
+    def forward(self, x: Tensor, how: Attend = attend) -> Tensor:
+        x = x + self.attn(self.norm1(x), how)
+        return x + self.mlp(self.norm2(x))
+
+
+class FlowBlock(nn.Module):
+    """The same with a context, each step shifted and scaled as the time says (Peebles & Xie)."""
+
+    def __init__(self, form: StructureFlowConfig) -> None:
+        super().__init__()
+        channels, heads = form.model_channels, form.heads
+        self.norm1 = Norm(channels, EPSILON, elementwise_affine=False)
+        self.norm2 = Norm(channels, EPSILON)
+        self.norm3 = Norm(channels, EPSILON, elementwise_affine=False)
+        self.self_attn = SelfAttention(channels, heads, form.qk_rms_norm)
+        self.cross_attn = CrossAttention(
+            channels, form.cond_channels, heads, form.qk_rms_norm_cross
+        )
+        self.mlp = FeedForward(channels, form.hidden)
+        self.adaLN_modulation = nn.Sequential(nn.SiLU(), nn.Linear(channels, 6 * channels))
+
+    def forward(self, x: Tensor, time: Tensor, context: Tensor) -> Tensor:
+        """(B, N, C) from tokens (B, N, C), time code (B, C) and context (B, M, D)."""
+        parts = self.adaLN_modulation(time)[:, None].chunk(6, dim=2)
+        shift, scale, gate, shift2, scale2, gate2 = parts
+        x = x + gate * self.self_attn(self.norm1(x) * (1 + scale) + shift)
+        x = x + self.cross_attn(self.norm2(x), context)
+        return x + gate2 * self.mlp(self.norm3(x) * (1 + scale2) + shift2)
+
+
+class TimeCode(nn.Module):
+    """A time (B,) in thousandths as (B, C)."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.mlp = nn.Sequential(
+            nn.Linear(TIME_CODE, channels), nn.SiLU(), nn.Linear(channels, channels)
+        )
+
+    def forward(self, time: Tensor) -> Tensor:
+        waves = time.float()[:, None] * _rates(TIME_CODE // 2, time.device)
+        return self.mlp(torch.cat([waves.cos(), waves.sin()], 1))
+
+
+def place_code(cells: Tensor, channels: int) -> Tensor:
+    """(N, channels) waves along each axis, for cells (N, 3); 0 in channels that are left over."""
+    waves = cells.float()[:, :, None] * _rates(channels // 6, cells.device)
+    code = torch.cat([waves.sin(), waves.cos()], 2).flatten(1)
+    return functional.pad(code, (0, channels - code.shape[1]))
+
+
+def _rates(count: int, device: torch.device) -> Tensor:
+    """(count,) radians per unit."""
+    steps = torch.arange(count, dtype=torch.float32, device=device) / count
+    return torch.exp(-math.log(PERIOD) * steps)
+
+
+def unit_layer_norm(x: Tensor) -> Tensor:
+    """Over the last axis, without parameters, with torch's own epsilon: what heads were given."""
+    return functional.layer_norm(x, x.shape[-1:])

@@ -1,0 +1,50 @@
+"""CUPID as a lifter: as TRELLIS, but the network itself says where the object stands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...arrays import F64
+from ...camera import Camera
+from ...gaussians import Gaussians
+from ...progress import Progress
+from ...splat_files.axes import QUARTER_TURN, turned
+from .. import Subject
+from ..placement import Hints
+from . import weights
+from .camera import View, pose_in
+from .lifter import UP, TrellisLifter, within_memory
+from .picture import Picture
+
+if TYPE_CHECKING:
+    from .device import Plan
+    from .generator import Folders, Generator
+
+
+class CupidLifter(TrellisLifter):
+    """Image to 3D that stands where the photo shows it."""
+
+    name = "cupid"
+    ids = (weights.CUPID, weights.ENCODER, weights.TRELLIS)
+
+    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
+        from .cupid import CupidGenerator
+
+        return CupidGenerator(folders, plan)
+
+    def _made(
+        self, picture: Picture, subject: Subject, progress: Progress, seed: int
+    ) -> tuple[Gaussians, Hints]:
+        generator = self._generator()
+        made = within_memory(generator, lambda: generator.make(picture, progress, seed))
+        assert made.view is not None
+        start = pose_seen(made.view, picture, subject.camera)
+        return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)
+
+
+def pose_seen(seen: View, picture: Picture, camera: Camera) -> F64 | None:
+    """(4, 4) world from object, in our axes, where the photo's camera sees it so.
+
+    The photo's focal length is kept, whatever the network's view has. None where there is none.
+    """
+    return pose_in(camera, seen.points @ QUARTER_TURN.T, picture.photo_xy(seen.uv))

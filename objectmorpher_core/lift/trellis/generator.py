@@ -1,0 +1,205 @@
+"""From a picture to Gaussians: both flows and the decoders, one part in memory after another."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ...gaussians import Gaussians
+from ...progress import Progress, part, silent
+from .. import LiftError
+from .camera import View
+from .configs import Pipeline, Sampling, part_path, pipeline
+from .device import Plan
+from .parts import load_part
+from .picture import Encoder, Picture
+from .sampler import sample
+from .voxels import Voxels
+
+log = logging.getLogger(__name__)
+CELLS = 1 << 16  # more are never decoded; the networks were trained with half as many at most
+FLOW, STRUCTURE = "sparse_structure_flow_model", "sparse_structure_decoder"
+LATENT, DECODER = "slat_flow_model", "slat_decoder_gs"
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Where the weights lie."""
+
+    model: Path
+    encoder: Path
+    shared: Path | None = None  # another model's, of which this one uses parts
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Where an object is."""
+
+    voxels: Voxels
+    view: View | None = None  # how the picture shows it, of a generator that says so
+
+
+@dataclass(frozen=True, eq=False)
+class Made(Placed):
+    """What a generator makes of a picture."""
+
+    gaussians: Gaussians = field(kw_only=True)  # in the cube of side 1 round the origin, z up
+
+
+@dataclass(frozen=True, eq=False)
+class Extras:
+    """Channels (1, N, E) that the second flow gets beside the latents."""
+
+    shown: Tensor
+    hidden: Tensor  # of the step without the picture
+
+
+class Generator:
+    """TRELLIS. Reads its description at once, and each part's weights when they are needed."""
+
+    def __init__(self, folders: Folders, plan: Plan) -> None:
+        """Raises LiftError where the folders do not hold what they should."""
+        self.folders, self.plan = folders, plan
+        self.pipeline: Pipeline = pipeline(folders.model)
+        self._parts: dict[str, Any] = {}
+
+    def make(
+        self,
+        picture: Picture,
+        progress: Progress = silent,
+        seed: int = 0,
+        how: tuple[Sampling, Sampling] | None = None,
+    ) -> Made:
+        """The object of a picture. `how` both flows are sampled; None: as published.
+
+        The same seed gives the same object on one device. Raises LiftError; Cancelled passes.
+        """
+        structure, latent = how or (self.pipeline.structure, self.pipeline.latent)
+        noise = torch.Generator().manual_seed(seed)  # of the host: the same on every device
+        try:
+            with torch.inference_mode():
+                progress(0.0, "Looking at the object")
+                seen = self._seen(picture)
+                placed = self._placed(
+                    self._structure(seen, noise, structure, part(progress, 0.05, 0.5))
+                )
+                extras = self._extras(picture, seen, placed)
+                rest = part(progress, 0.5, 0.95)
+                latents = self._filled((seen, extras), placed.voxels, noise, latent, rest)
+                progress(0.95, "Making Gaussians")
+                return Made(
+                    placed.voxels, placed.view, gaussians=self._gaussians(latents, placed.voxels)
+                )
+        finally:
+            if not self.plan.keeps:
+                self.release()
+
+    def part(self, role: str) -> Any:
+        """The network of a role, in memory; without `plan.keeps` it replaces the one before."""
+        if role not in self._parts:
+            if not self.plan.keeps:
+                self.release()
+            where = self.pipeline.parts.get(role)
+            if where is None:
+                raise LiftError(f"{self.folders.model / 'pipeline.json'} names no {role}")
+            path = part_path(self.folders.model, where, self.folders.shared)
+            log.info("Loading %s", path.name)
+            self._parts[role] = load_part(path, self.plan.device, self.plan.dtype)
+        return self._parts[role]
+
+    def release(self) -> None:
+        """Gives the memory of all parts back."""
+        self._parts.clear()
+        self.plan.empty_cache()
+
+    def _encoder(self) -> Encoder:
+        if "encoder" not in self._parts:
+            if not self.plan.keeps:
+                self.release()
+            # In single precision: it runs once, and everything follows from it.
+            device = self.plan.device
+            self._parts["encoder"] = Encoder(self.folders.encoder, device, torch.float32)
+        return self._parts["encoder"]
+
+    def _seen(self, picture: Picture) -> Tensor:
+        """(1, M, D) what the flows are told."""
+        encoder = self._encoder()
+        return encoder.tokens(picture.on_black(encoder.side))
+
+    def _structure(
+        self, seen: Tensor, noise: torch.Generator, how: Sampling, progress: Progress
+    ) -> Tensor:
+        """(1, C, r, r, r) the latents of where the object is."""
+        flow, nothing = self.part(FLOW), torch.zeros_like(seen)
+        shape = (1, flow.form.in_channels, *[flow.form.resolution] * 3)
+        start = torch.randn(shape, generator=noise).to(self.plan.device)
+
+        def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
+            return flow(x, time, seen if is_shown else nothing)
+
+        return sample(velocity, start, how, progress, "Finding the shape")
+
+    def _placed(self, latents: Tensor) -> Placed:
+        """Where the object is, from the first flow's latents."""
+        return Placed(occupied(self.part(STRUCTURE)(latents)[0, 0]))
+
+    def _extras(self, picture: Picture, seen: Tensor, placed: Placed) -> Extras | None:
+        """What the second flow gets besides."""
+        return None
+
+    def _filled(
+        self,
+        told: tuple[Tensor, Extras | None],
+        voxels: Voxels,
+        noise: torch.Generator,
+        how: Sampling,
+        progress: Progress,
+    ) -> Tensor:
+        """(1, N, C) what it is like there."""
+        flow, (seen, extras), nothing = self.part(LATENT), told, torch.zeros_like(told[0])
+        start = torch.randn((len(voxels), flow.form.out_channels), generator=noise)
+
+        def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
+            if extras is not None:
+                x = torch.cat([x, extras.shown if is_shown else extras.hidden], 2)
+            return flow(x, time, seen if is_shown else nothing, voxels)
+
+        found = sample(velocity, start[None].to(self.plan.device), how, progress, "Filling it in")
+        return self.denormed(found)
+
+    def _gaussians(self, latents: Tensor, voxels: Voxels) -> Gaussians:
+        decoder = self.part(DECODER)
+        raw = decoder(latents, voxels)[0]
+        try:
+            return decoder.gaussians(raw, voxels)
+        except ValueError as error:  # weights that are not numbers, or overflowed
+            raise LiftError(
+                f"what the network made of the picture is of no use: {error}"
+            ) from error
+
+    def denormed(self, latents: Tensor) -> Tensor:
+        """Latents (..., C) in the decoder's units."""
+        mean, std = (latents.new_tensor(v) for v in (self.pipeline.mean, self.pipeline.std))
+        if mean.shape != latents.shape[-1:] or std.shape != mean.shape:
+            raise LiftError(f"pipeline.json tells the scale of {len(mean)} channels, not of these")
+        return latents * std + mean
+
+
+def occupied(logits: Tensor) -> Voxels:
+    """The cells of logits (R, R, R) above 0; the surest where they are too many.
+
+    Raises LiftError where there are none.
+    """
+    count = int((logits > 0).sum())
+    if count == 0:
+        raise LiftError("no shape was found in the picture: try another seed or another selection")
+    if count > CELLS:
+        log.warning("%d cells are occupied, the surest %d are used", count, CELLS)
+        least = logits.flatten().topk(CELLS).values[-1]
+        return Voxels.of(logits >= torch.clamp(least, min=1e-30))
+    return Voxels.of(logits > 0)

@@ -1,0 +1,210 @@
+"""From a photo and a mask to a registered object, with a tiny TRELLIS of random weights."""
+
+# ruff: noqa: E402 (nothing that needs torch can be imported before the skip)
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="TRELLIS needs torch")
+pytest.importorskip("transformers", reason="TRELLIS needs transformers")
+
+from safetensors.torch import load_file, save_file
+
+from objectmorpher_core import lift
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.lift import LiftError
+from objectmorpher_core.lift.trellis import generator as generators
+from objectmorpher_core.lift.trellis import weights
+from objectmorpher_core.lift.trellis.generator import Generator
+from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
+from objectmorpher_core.lift.trellis.picture import Picture
+from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.progress import Cancelled, silent
+from objectmorpher_core.segment.matte import build_matte
+from tests import photos
+from tests.core.lift.trellis import tiny_trellis
+
+ARRAYS = ("means", "quats", "scales", "opacities", "colors")
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    return tiny_trellis.write(tmp_path_factory.mktemp("cache") / "models")
+
+
+@pytest.fixture(scope="module")
+def subject():
+    """The cup of the coffee photo, small."""
+    pixels = photos.photo("coffee")[::3, ::3].copy()
+    height, width = pixels.shape[:2]
+    y, x = np.mgrid[:height, :width]
+    mask = ((x - 0.5 * width) / 37) ** 2 + ((y - 0.5 * height) / 30) ** 2 < 1
+    return pixels, Camera.from_fov(width, height), mask
+
+
+@pytest.fixture(scope="module")
+def picture(subject):
+    return Picture.of(build_matte(subject[0], subject[2], 12))
+
+
+@pytest.fixture
+def generator(folders):
+    return Generator(folders, tiny_trellis.CPU)
+
+
+@pytest.fixture
+def installed(folders, monkeypatch):
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(folders.model.parents[1]))
+    monkeypatch.setattr(TrellisLifter, "_kept", {})
+
+
+def same(one, other):
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ARRAYS)
+
+
+def test_the_picture_is_the_object_on_black_and_knows_where_it_was(subject, picture):
+    mask = subject[2]
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    low, high = np.array([columns[0], rows[0]]), np.array([columns[-1], rows[-1]])
+    middle = picture.photo_xy(np.array([0.5, 0.5]))
+    assert np.abs(middle - 0.5 * (low + high)).max() <= 3  # the soft edge
+    assert picture.side == pytest.approx(1.2 * (high - low).max(), abs=6)
+    rgb = picture.on_black(64)
+    assert rgb.shape == (64, 64, 3) and rgb.min() >= 0 and rgb.max() <= 1
+    assert rgb[:3].max() == 0 and rgb[32, 32].max() > 0.1
+
+
+def test_the_same_seed_makes_the_same_object(generator, picture):
+    one, same_again, other = (generator.make(picture, seed=s).gaussians for s in (1, 1, 2))
+    assert same(one, same_again)
+    assert len(one) != len(other) or not same(one, other)
+
+
+def test_what_is_made_lies_in_its_cube(generator, picture):
+    made = generator.make(picture)
+    cell = 1 / tiny_trellis.CELLS
+    assert len(made.gaussians) == 4 * len(made.voxels)
+    assert np.abs(made.gaussians.means).max() <= 0.5 + 0.25 * cell
+    own = (made.voxels.cells.numpy().repeat(4, 0) + 0.5) * cell - 0.5
+    assert np.abs(made.gaussians.means - own).max() <= 0.75 * cell + 1e-6
+    assert (made.gaussians.scales >= 9e-4).all()
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_lower_precision_makes_nearly_the_same(folders, picture, dtype):
+    full, low = (
+        Generator(folders, replace(tiny_trellis.CPU, dtype=d)).make(picture)
+        for d in (torch.float32, dtype)
+    )
+    cells = [set(map(tuple, made.voxels.cells.tolist())) for made in (full, low)]
+    assert len(cells[0] & cells[1]) > 0.9 * len(cells[0] | cells[1])
+
+
+def test_memory_is_given_back_unless_it_is_to_be_kept(folders, generator, picture):
+    generator.make(picture)
+    assert not generator._parts
+    keeping = Generator(folders, replace(tiny_trellis.CPU, keeps=True))
+    assert same(keeping.make(picture).gaussians, generator.make(picture).gaussians)
+    assert len(keeping._parts) == 5
+
+
+def test_progress_rises_at_every_step_and_cancels_anywhere(generator, picture):
+    told = []
+    generator.make(picture, lambda fraction, note: told.append((fraction, note)))
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions) and fractions[0] >= 0 and fractions[-1] <= 1
+    assert sum("step" in note for _, note in told) == 6
+    for stop in range(len(told)):
+        left = iter(range(stop))
+
+        def progress(fraction, note, left=left):
+            if next(left, None) is None:
+                raise Cancelled
+
+        with pytest.raises(Cancelled):
+            generator.make(picture, progress)
+        assert not generator._parts
+
+
+def test_numbers_that_are_none_are_one_sentence(folders, picture, tmp_path):
+    copy = Path(shutil.copytree(folders.model, tmp_path / "model"))
+    path = copy / "ckpts" / "slat_flow_model.safetensors"
+    state = load_file(str(path))
+    save_file(
+        {**state, "out_layer.bias": torch.full_like(state["out_layer.bias"], torch.nan)}, path
+    )
+    with pytest.raises(LiftError, match="not finite"):
+        Generator(replace(folders, model=copy), tiny_trellis.CPU).make(picture)
+
+
+def test_too_many_cells_are_cut_to_the_surest(monkeypatch):
+    torch.manual_seed(0)
+    logits = torch.randn(8, 8, 8)
+    monkeypatch.setattr(generators, "CELLS", 40)
+    voxels = generators.occupied(logits)
+    assert len(voxels) == 40
+    assert logits[*voxels.cells.T].min() >= logits.flatten().topk(41).values[-1]
+    with pytest.raises(LiftError, match="another seed"):
+        generators.occupied(-logits.abs() - 1)
+
+
+def test_out_of_memory_falls_back_to_one_part_at_a_time(folders, picture):
+    generator = Generator(folders, replace(tiny_trellis.CPU, keeps=True))
+
+    def make():
+        if generator.plan.keeps:
+            raise torch.OutOfMemoryError("no")
+        return generator.make(picture)
+
+    assert len(within_memory(generator, make).gaussians)
+
+    def never():
+        raise torch.OutOfMemoryError("no")
+
+    with pytest.raises(LiftError, match="memory is too small"):
+        within_memory(generator, never)
+
+
+def test_a_mask_becomes_a_registered_object_with_the_photo_on_it(installed, subject):
+    pixels, camera, mask = subject
+    told = []
+    _, lifted = lift_mask(
+        pixels, camera, mask, "trellis", progress=lambda f, n: told.append((f, n))
+    )
+    assert lifted.backend == "trellis" and lifted.splatting == "mip"
+    world = lifted.world_points(lifted.body.means)
+    assert (world[:, 2] > 0).all()
+    middle = camera.project(world).mean(0)
+    assert np.abs(middle - [camera.cx, camera.cy]).max() < 30  # px: over the mask
+    assert (lifted.texture.visibility > 0.5).any() and (lifted.texture.visibility < 0.5).any()
+    assert any("agree" in note for _, note in told)
+
+
+def test_nothing_selected_is_one_sentence(installed, subject):
+    pixels, camera, mask = subject
+    matte = build_matte(pixels, mask, 12)
+    empty = lift.Subject(pixels, camera, mask, replace(matte, alpha=np.zeros_like(matte.alpha)))
+    with pytest.raises(LiftError, match="nothing is selected"):
+        TrellisLifter().lift(empty, lift.LiftSettings(), silent)
+
+
+def test_missing_weights_are_one_sentence_that_says_where_to_put_them(tmp_path, monkeypatch):
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path))
+    with pytest.raises(LiftError) as error:
+        lift.load("trellis")
+    assert "microsoft/TRELLIS-image-large" in str(error.value) and str(tmp_path) in str(error.value)
+    tiny_trellis.write_model(weights.weights_folder(weights.TRELLIS))
+    with pytest.raises(LiftError, match="dinov2-with-registers-large"):
+        lift.load("trellis")
+    tiny_trellis.write_encoder(weights.weights_folder(weights.ENCODER))
+    assert lift.load("trellis").name == "trellis"
+
+
+def test_missing_packages_are_one_sentence(monkeypatch):
+    monkeypatch.setattr(weights, "PACKAGES", ("torch", "no_such_package"))
+    assert "no_such_package is not installed: pip install" in (TrellisLifter().missing() or "")
