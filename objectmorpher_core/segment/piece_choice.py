@@ -75,6 +75,7 @@ class Ground:
 
     pieces: Pieces
     salience: F32 | None  # (h, w) subject map at the pieces' size
+    is_of_large: bool = False  # of a large photo, or of a tile of one
 
     def inside(self, prompt: Prompt) -> Mask:
         """(n,) pieces most of which are in the prompt's box, and those of positive clicks."""

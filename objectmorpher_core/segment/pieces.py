@@ -162,7 +162,11 @@ class Pieces:
     def settle(self, is_object: Mask, is_ground: Mask) -> F64:
         """(n,) chance that a walk from a piece meets the object before the ground, both (n,)."""
         unsure = np.full(self.count, 0.5e-9)
-        return self.walk_home(1e6 * is_object + unsure, 1e6 * (is_ground & ~is_object) + unsure)
+        to_object, to_ground = (
+            np.asarray(1e6 * there + unsure, np.float64)
+            for there in (is_object, is_ground & ~is_object)
+        )
+        return self.walk_home(to_object, to_ground)
 
     def walk_home(self, to_object: F64, to_ground: F64) -> F64:
         """(n,) chance that a walk ends in the object; how easily it does, and in the ground (n,).

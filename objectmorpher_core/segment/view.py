@@ -19,9 +19,7 @@ from .piece_features import crop_tokens
 from .pieces import PIECES, Pieces, reduced
 
 REMEMBERED = 8  # answers of a photo
-LOOK_AGAIN = (
-    0.8  # confidence below which a small whole is recognised anew, larger: it costs a second
-)
+LOOK_AGAIN = 0.8  # confidence: a small whole less sure is recognised anew, in a second or so
 DETAILS = 4  # closer looks that are kept
 DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
 SMALL = 0.03  # x photo's area: such a thing is looked at more closely
@@ -49,13 +47,15 @@ class Tokens:
 class View:
     """A photo (H, W, 3), or a closer look at a crop of one, and what its last prompts meant."""
 
-    def __init__(self, rgb: RGB, embedding: Tokens, is_close: bool = False) -> None:
+    def __init__(
+        self, rgb: RGB, embedding: Tokens, is_close: bool = False, is_of_large: bool = False
+    ) -> None:
         self.rgb, self.embedding, self._is_close = rgb, embedding, is_close
         pieces, salience = embedding.pieces, embedding.salience
         if salience is not None:
             size = (pieces.shape[1], pieces.shape[0])
             salience = np.asarray(cv2.resize(salience, size), np.float32)
-        self.ground = Ground(pieces, salience)
+        self.ground = Ground(pieces, salience, is_of_large)
         self._image = reduced(rgb)
         self._known: dict[Prompt, Answer] = {}
         self._choices: dict[Prompt, Choice] = {}
@@ -119,7 +119,7 @@ class PhotoView:
     def __init__(self, rgb: RGB, embedding: Tokens, encode: Encode) -> None:
         self.embedding = embedding
         self._rgb, self._encode = rgb, encode
-        self._whole = View(rgb, embedding)
+        self._whole = View(rgb, embedding, is_of_large=self._is_large)
         self._details: dict[tuple[Box, bool], View] = {}
         self._last: tuple[Prompt, Mask, float] | None = None  # found, and how sure it was
 
@@ -236,7 +236,8 @@ class PhotoView:
             is_finer = is_anew and not self._is_large
             pieces = Pieces(crop, tokens, DETAIL_PIECES if is_finer else PIECES)
             # A large photo's tile has tokens enough.
-            view = View(crop, Tokens(tokens, salience, pieces), is_close=not self._is_large)
+            known = Tokens(tokens, salience, pieces)
+            view = View(crop, known, not self._is_large, self._is_large)
             _remember(self._details, (box, is_anew), view, DETAILS)
         return self._details[box, is_anew]
 
