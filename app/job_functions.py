@@ -32,7 +32,6 @@ from .shape import build_shape, rehearse
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.repair import Patch
-    from objectmorpher_core.compose.shadow_fit import Standings
     from objectmorpher_core.gaussians import Gaussians
     from objectmorpher_core.importing import Import, Scene
     from objectmorpher_core.joining import Shadow
@@ -269,7 +268,7 @@ class Cutout:
     pixels: Pixels
     matte: Matte
     covered: Mask
-    standings: Standings  # at rest
+    ground: float | None  # degrees above it from which one looks, where that is known
 
 
 def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Shadow, Plate] | None:
@@ -282,7 +281,7 @@ def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Sha
     from objectmorpher_core.compose.shadow_fit import find_old_shadow
 
     progress(0.0, "Looking for its shadow")
-    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.standings, cutout.covered)
+    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
     if old is None:
         return None
     inpainter, step = compose.load(choice.backend), part(progress, 0.1, 1.0)

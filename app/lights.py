@@ -23,7 +23,6 @@ from .view import View
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.lighting import Lighting, Lit
-    from objectmorpher_core.compose.shadow_fit import Standings
     from objectmorpher_core.joining import Shadow
     from objectmorpher_core.raster.posed import PosedSplats
 
@@ -144,13 +143,6 @@ class Lights:
                 kept.shade = Layer(box, rgba, is_coarse=True)
             found.append(kept.shade)
         return tuple(found)
-
-    def standings(self, document: Document, k: int) -> Standings:
-        """How object `k` stands at rest, on each ground that there may be."""
-        from objectmorpher_core.compose.lighting import standings
-
-        shadow = document.objects[k].shadow
-        return standings(self._rest(document, k), document.photo.camera, document.horizon, shadow)
 
     def ground(self, document: Document, k: int, shadow: Shadow) -> float:
         """From how many degrees above the ground one looks at object `k` on it."""

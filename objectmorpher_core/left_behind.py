@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-
 import numpy as np
 
 from . import compose, edits
-from .compose.lighting import standings
 from .compose.old_shadow import OldShadow, shadowless_plate
 from .compose.plate import build_plate, plate_cover
 from .compose.shadow_fit import find_old_shadow
-from .document import Document, EditObject, Matte, Placement
+from .document import Document, EditObject, Matte
 from .hint import Hint
 from .progress import Progress
-from .puppet import Puppet
 from .script import EditScript
 
 USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
@@ -23,7 +19,7 @@ USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
 def with_plate(
     document: Document,
     script: EditScript,
-    casting: Mapping[int, Puppet],
+    casting: frozenset[int],
     progress: Progress,
 ) -> Document:
     """The document with what is behind all its objects, filled in as the script's hints say.
@@ -38,10 +34,7 @@ def with_plate(
     gone: list[OldShadow] = []
     for matte in _distinct(document, casting):
         alike = [k for k in casting if document.objects[k].matte is matte]
-        rest = casting[alike[0]].posed(None, Placement())
-        shadow = document.objects[alike[0]].shadow
-        bodies = standings(rest, document.photo.camera, document.horizon, shadow)
-        old = find_old_shadow(pixels, matte, bodies, covered)
+        old = find_old_shadow(pixels, matte, covered)
         if old is None:
             continue
         for k in alike:
@@ -74,7 +67,7 @@ def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:
     )
 
 
-def _distinct(document: Document, casting: Iterable[int]) -> list[Matte]:
+def _distinct(document: Document, casting: frozenset[int]) -> list[Matte]:
     """Their mattes, each once: copies share theirs."""
     found: dict[int, Matte] = {}
     for k in sorted(casting):

@@ -239,8 +239,7 @@ def run_script(
     if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
-            casting = {k: run.puppets[k] for k in run.casting}
-            document = with_plate(document, script, casting, step)
+            document = with_plate(document, script, frozenset(run.casting), step)
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")

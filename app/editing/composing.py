@@ -320,19 +320,20 @@ class Composing:
             return
         masks, item = _masks(document), document.objects[k]
         assert item.matte is not None
-        lights = editor.derived.lights
-        cutout = job_functions.Cutout(
-            document.photo.pixels,
-            item.matte,
-            lights.hidden(document),
-            lights.standings(document, k),
-        )
+        lights, told = editor.derived.lights, item.shadow.ground
+        is_known = told is not None or document.horizon is not None
+        ground = lights.ground(document, k, item.shadow) if is_known else None
+        covered = lights.hidden(document)
+        cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
 
         def accept(answer: tuple[Shadow, Plate] | None) -> None:
             if answer is None:
                 editor.say(t("No shadow of it is sure; paint it out of the background (B)"))
                 return
-            self._ready.append(lambda: self._take_shadow(masks, k, *answer))
+            shadow, plate = answer
+            if is_known:
+                shadow = replace(shadow, ground=told)
+            self._ready.append(lambda: self._take_shadow(masks, k, shadow, plate))
 
         editor.jobs.start(
             t("Looking for its shadow"), job_functions.take_shadow, cutout,

@@ -104,7 +104,7 @@ sees it; without its weights, colours that do not occur around the hole) is an u
 that hair does not grow over the wall (*flag and wall*). It does not understand what it copies:
 variants, the brush, and *Take from here* (Shift+B, or `--fill-from`) are for that. Its settings
 were chosen on 49 other holes in the same photos and five more; only how much the subject counts
-was seen on *flag and wall*, too. Seconds are those of all processors together.
+was seen on *flag and wall* and *launch tower*, too. Seconds are those of all processors together.
 
 {times}
 Made by `python docs/compositing/make_compositing.py plates`, as is this section.

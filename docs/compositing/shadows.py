@@ -8,20 +8,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import worlds
-from worlds import CAMERA, GROUNDS, SIDE, SUNS
+from worlds import GROUNDS, SIDE, SUNS
 
-from objectmorpher_core.arrays import F64, Mask, Pixels
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.compose.lighting import standings
-from objectmorpher_core.compose.old_shadow import OldShadow, without_shadow
+from objectmorpher_core.arrays import F64, Pixels
+from objectmorpher_core.compose.old_shadow import without_shadow
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.document import DeformSettings, LiftSettings, Placement
-from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.puppet import Puppet
+from objectmorpher_core.segment.matte import build_matte
 
 DARK = 0.1  # of the light, from which the ground counts as shaded
 AROUND = 9  # px about the solid, that the inpainter fills in any case
-SETTINGS = LiftSettings(uses_depth=False)
+MARGIN = 20  # px of the matte
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +41,9 @@ def measured(name: str, number: int, meshes: Path) -> list[Shaded]:
     for k, sun in enumerate(SUNS):
         ground = GROUNDS[(number + k) % len(GROUNDS)]
         made = worlds.photo(stood, sun, ground)
-        old = found(made.photo, made.mask, CAMERA)
-        is_imagined = found(made.shadowless, made.mask, CAMERA) is not None
+        old = find_old_shadow(made.photo, build_matte(made.photo, made.mask, MARGIN))
+        bare = build_matte(made.shadowless, made.mask, MARGIN)
+        is_imagined = find_old_shadow(made.shadowless, bare) is not None
         lifted = made.photo
         if old is not None:
             lifted, _ = without_shadow(made.photo, old, (0, 0, SIDE, SIDE))
@@ -64,13 +61,6 @@ def measured(name: str, number: int, meshes: Path) -> list[Shaded]:
                    pictures)
         )  # fmt: skip
     return cases
-
-
-def found(photo: Pixels, mask: Mask, camera: Camera) -> OldShadow | None:
-    """The old shadow of what is in `mask` (h, w), as a script finds it; None where none is sure."""
-    matte, lifted = lift_mask(photo, camera, mask, settings=SETTINGS)
-    splats = Puppet(lifted, DeformSettings(), camera).posed(None, Placement())
-    return find_old_shadow(photo, matte, standings(splats, camera))
 
 
 def _error(pixels: Pixels, true: Pixels, where: F64) -> float:

@@ -24,9 +24,10 @@ def _intro(rows: list[Row], machine: str) -> str:
 
 {len(rows)} objects in photos that scikit-image and scikit-learn carry, outlined by hand
 ([how](../tests/core/segment/truth/README.md)). *Held out* are objects on which no constant was
-tuned but three of the vote of like pieces (how near, how sure, how blurred: NEAR, TRUST, KEEPS),
-which were chosen with the means of all in view; their figures were read while it was built, and a
-click on one that gave no answer was mended.
+tuned but those of the vote of like pieces (NEAR, TRUST, KEEPS, LIKE_COLOR, LIKE_KIND) and of the
+closer look (LOOK_AGAIN, DETAIL_PIECES), which were chosen with the means of all in view, so that
+"held out" says less of these; their figures were read while it was built, and a click on one that
+gave no answer was mended.
 
 The simulated user first clicks the inmost point of the object (farthest from its edge; the photo's
 frame is an edge), at the level *object*. Each further click is on the inmost point of the largest

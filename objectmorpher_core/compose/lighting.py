@@ -6,7 +6,7 @@ So they are the same for window and export.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,10 +23,8 @@ from .light_estimate import estimate_light
 from .noise import Noise, find_noise
 from .relight import Relit, relight
 from .shadow import COARSE, FINE, Shade, Standing, cast, ground_normal
-from .shadow_fit import Standings
 from .silhouette import SKETCHED, sketch, sketched
 
-GROUNDS = (30.0, 55.0)  # degrees above it: from these one may look, besides the usual
 CAST = 40_000  # Gaussians, of which a shadow is made
 
 
@@ -128,17 +126,6 @@ def stand(
         return None
     normal = _normal_under(splats, camera, horizon, shadow or Shadow())
     return Standing(splats.means[few], normal, camera)
-
-
-def standings(
-    splats: PosedSplats, camera: Camera, horizon: float | None = None, shadow: Shadow | None = None
-) -> Standings:
-    """The same on each ground that there may be; none where none of it is solid."""
-    shadow = shadow or Shadow()
-    is_told = shadow.ground is not None or horizon is not None
-    grounds = (shadow.ground,) if is_told else (None, *GROUNDS)
-    found = {g: stand(splats, camera, horizon, replace(shadow, ground=g)) for g in grounds}
-    return {ground: body for ground, body in found.items() if body is not None}
 
 
 def ground_seen_from(

@@ -158,12 +158,20 @@ class Standing:
         return np.asarray(self._feet + self._above[:, None] * way, np.float64)
 
     def _smooth(self, values: F32, sigma: float) -> F32:
-        """Three boxes one after the other: nearly a bell on the ground, as quick for any width."""
-        size = (2 * round(sigma) + 1, 2 * round(sigma * self._slope) + 1)
-        for _ in range(3):
-            blurred = cv2.blur(values, size, borderType=cv2.BORDER_CONSTANT)
-            values = np.asarray(blurred, np.float32)
-        return values
+        """Blurred alike in all directions on the ground."""
+        return smooth(values, sigma, sigma * self._slope)
+
+
+def smooth(values: F32, across: float, down: float | None = None) -> F32:
+    """Three boxes one after the other: nearly a bell, and as quick for any width.
+
+    `across`, `down`: standard deviations, px; both the same where one is given.
+    """
+    size = (2 * round(across) + 1, 2 * round(across if down is None else down) + 1)
+    for _ in range(3):
+        blurred = cv2.blur(values, size, borderType=cv2.BORDER_CONSTANT)
+        values = np.asarray(blurred, np.float32)
+    return values
 
 
 def _spread(points: F64, values: F64, grid: Grid, camera: Camera) -> tuple[F32, F32]:

@@ -1,6 +1,6 @@
 """The shadow that an object throws in the photo: where it is, and numbers of one that is alike.
 
-Shadows of the object's own body (`shadow`) are tried in all directions and lengths, each
+Shadows of the object's own silhouette (`shadow`) are tried in all directions and lengths, each
 together with a smooth ground, against the logarithm of the brightness around the object. What
 explains it best, by a robust regression (Huber's loss, iteratively reweighted; Holland and Welsch
 1977), is the shadow, if it is dark enough, if the ground is even enough to tell, and if it takes
@@ -10,7 +10,7 @@ shadow that looks like it, for where the object goes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,9 +21,10 @@ from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
 from .old_shadow import BLACK, OldShadow
-from .shadow import DARKEST, GAMMA, Standing
-from .silhouette import Grid
+from .shadow import DARKEST, GAMMA
+from .shadow_shear import Sheet, contact_of, stand, thrown
 
+USUAL_GROUND = 30.0  # degrees: a silhouette alone is told no ground
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
@@ -61,20 +62,19 @@ MOST_GROWN = 2.5  # x its area before
 LEAST_LEFT = 0.2  # of the ground, that is lit
 DEEPEST = 2.5  # natural logarithm of light that is ever given back
 
-Standings = Mapping[float | None, Standing]  # by what a shadow says of the ground
-
 
 def find_old_shadow(
-    pixels: Pixels, matte: Matte, standings: Standings, others: Mask | None = None
+    pixels: Pixels, matte: Matte, others: Mask | None = None, seen_from: float | None = None
 ) -> OldShadow | None:
     """The shadow of what was cut out of the photo `pixels` (H, W, 3); None where none is sure.
 
-    `standings`: the same thing's body at rest, on each ground that it may stand on. `others`
-    (H, W): what else hides the ground.
+    `others` (H, W): what else hides the ground. `seen_from`: how many degrees above it one looks
+    from; None where nobody knows: then it is USUAL_GROUND, and the shadow found says so.
     """
-    if not standings or not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
+    if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
-    seen = _look(pixels, matte, standings, others)
+    slope = float(np.sin(np.radians(USUAL_GROUND if seen_from is None else seen_from)))
+    seen = _look(pixels, matte, others, slope)
     ground = _ground(seen)
     if ground is None:
         return None
@@ -82,9 +82,8 @@ def find_old_shadow(
     if found is None or not _is_sure(seen, ground, found):
         return None
     depth = _missing(seen, ground, found)
-    return OldShadow(
-        _imitated(found), depth, seen.grid.left, seen.grid.top, seen.grid.pitch, ground.scale
-    )
+    shadow = replace(_imitated(found), ground=USUAL_GROUND if seen_from is None else None)
+    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale)
 
 
 def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
@@ -104,12 +103,13 @@ class _Seen:
     colour: F32  # (h, w, 2) logarithms of ratios
     cover: F32  # (h, w) of the object
     free: Mask  # (h, w) ground, or whatever else is not the object
-    standings: Standings
-    contacts: dict[float | None, F32]  # (h, w) natural logarithm of light that a full one takes
-    grid: Grid
+    standing: Sheet
+    left: float
+    top: float
+    pitch: float
 
 
-def _look(pixels: Pixels, matte: Matte, standings: Standings, others: Mask | None) -> _Seen:
+def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> _Seen:
     height, width = pixels.shape[:2]
     rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
     size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
@@ -146,9 +146,9 @@ def _look(pixels: Pixels, matte: Matte, standings: Standings, others: Mask | Non
     free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
     logarithm = np.log(light + BLACK)
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
-    grid = Grid(float(left), float(top), pitch, cells[0], cells[1])
-    contacts = {ground: _taken(body.contact(grid)) for ground, body in standings.items()}
-    return _Seen(logarithm @ LUMA, colour, cover, free, standings, contacts, grid)
+    return _Seen(
+        logarithm @ LUMA, colour, cover, free, stand(cover, slope), float(left), float(top), pitch
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +160,7 @@ class _Ground:
     basis: F64  # (n, 6)
     everywhere: F64  # (h, w, 6) the same of all cells
     brightness: F64  # (n,)
+    contact: F64  # (n,) natural logarithm of the light that a contact takes
     loss: float
     scale: float  # of what is not explained
 
@@ -167,10 +168,7 @@ class _Ground:
 def _ground(seen: _Seen) -> _Ground | None:
     """None where too little of it is seen."""
     rows, columns = seen.cover.shape
-    covered = np.flatnonzero((seen.cover > 0.5).any(1))
-    if not len(covered):
-        return None
-    base, height = float(covered[-1] + 1), float(np.ptp(covered) + 1)
+    base, height = float(seen.standing.ground.max()), seen.standing.height
     y, x = np.mgrid[:rows, :columns]
     x, y = (x + 0.5 - columns / 2) / CELLS, (y + 0.5 - base) / CELLS
     away = cv2.distanceTransform((seen.cover < 0.5).astype(np.uint8), cv2.DIST_L2, 5) / CELLS
@@ -181,9 +179,10 @@ def _ground(seen: _Seen) -> _Ground | None:
     everywhere = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
     weight = np.exp(-((away.ravel()[index] / NEAR) ** 2)).astype(np.float64)
     basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
+    contact = _taken(contact_of(seen.standing)).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
     _, loss, scale = _regressed(basis, brightness, weight)
-    return _Ground(index, weight, basis, everywhere, brightness, loss, scale)
+    return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
 
 
 def _taken(shadow: F32) -> F32:
@@ -223,12 +222,11 @@ class _Found:
 
 def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     """None where it would be no shadow but a light."""
-    taken = _taken(seen.standings[shadow.ground].far(shadow, seen.grid))
+    taken = _taken(thrown(shadow, seen.standing))
     column = taken.ravel()[ground.index].astype(np.float64)
     if column.max() < DARKER:
         return None
-    contact = seen.contacts[shadow.ground].ravel()[ground.index].astype(np.float64)
-    basis = np.column_stack([ground.basis, -column, -contact])
+    basis = np.column_stack([ground.basis, -column, -ground.contact])
     found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
     if found[7] < 0:
         basis = basis[:, :7]
@@ -243,7 +241,7 @@ def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
 def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
     """The best of all directions and lengths, then of some that lie around it."""
     best: _Found | None = None
-    for shadow in _coarsely(seen.standings):
+    for shadow in _coarsely():
         tried = _tried(seen, ground, shadow)
         if tried is not None and (best is None or tried.gain > best.gain):
             best = tried
@@ -257,11 +255,10 @@ def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
     return best
 
 
-def _coarsely(grounds: Iterable[float | None]) -> Iterator[Shadow]:
-    for ground in grounds:
-        for direction in DIRECTIONS:
-            for length in LENGTHS:
-                yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0, ground=ground)
+def _coarsely() -> Iterator[Shadow]:
+    for direction in DIRECTIONS:
+        for length in LENGTHS:
+            yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0)
 
 
 def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
@@ -316,7 +313,7 @@ def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
 
 def _fitted(seen: _Seen, found: _Found) -> F32:
     """(h, w) natural logarithm of the light that the shadow takes which was found."""
-    contact = seen.contacts[found.shadow.ground]
+    contact = _taken(contact_of(seen.standing))
     return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
 
 

@@ -11,7 +11,7 @@ import pytest
 from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.lighting import object_texture, standings
+from objectmorpher_core.compose.lighting import object_texture
 from objectmorpher_core.compose.old_shadow import shadowless_plate
 from objectmorpher_core.compose.plate import hole_margin, plate_cover
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
@@ -117,8 +117,7 @@ def test_moved_back_it_is_the_photo_byte_for_byte(name, bits):
     assert (composite(edited, {0: puppet}).pixels != document.photo.pixels).any()
     item = edited.objects[0]
     assert item.matte is not None
-    bodies = standings(puppet.posed(None, Placement()), document.photo.camera)
-    old = find_old_shadow(document.photo.pixels, item.matte, bodies)
+    old = find_old_shadow(document.photo.pixels, item.matte)
     if old is not None:  # also where its shadow was taken off the ground
         pixels, covered = document.photo.pixels, plate_cover(document)
         plate = shadowless_plate(pixels, covered, (old,), load("telea"))
