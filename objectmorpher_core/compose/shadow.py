@@ -31,6 +31,8 @@ USUAL_GROUND = 15.0  # degrees, from which a ground is seen whose horizon is not
 FINE, COARSE = 176, 64  # cells, longer side of a shadow, and of a sketch of one
 PER_CELL = 1.5  # Gaussians, so that no holes are left
 SPRAY = 0.3  # %, of the Gaussians that may lie below what stands on the ground, or far above all
+COLUMNS = 64  # across an object, in which its lower edge is looked for
+LEVEL = 0.03  # x width, over which the ground's line is smooth
 BLURS = (0.012, 0.07, 0.2)  # x height, at softness 1: near the ground, half up, at the top
 HARDEST = 0.006  # x height, of the least blur
 FADE = 0.5  # of the strength is lost from the ground to the top
@@ -101,7 +103,9 @@ class Standing:
             raise ValueError("an object without a single solid point throws no shadow")
         above = -(points @ normal)
         foot, top = np.percentile(above, (SPRAY, 100 - SPRAY))
-        self._above, self._height = np.maximum(above - foot, 0.0), max(float(top - foot), 1e-9)
+        self._height = max(float(top - foot), 1e-9)
+        above = np.maximum(above - foot, 0.0)
+        self._above = np.maximum(above - _level(points, above, normal), 0.0)
         self._feet = points + self._above[:, None] * normal
         self._is_low = self._above <= BAND * self._height
         self._right = np.array([1.0, 0.0, 0.0])
@@ -160,6 +164,27 @@ class Standing:
     def _smooth(self, values: F32, sigma: float) -> F32:
         """Blurred alike in all directions on the ground."""
         return smooth(values, sigma, sigma * self._slope)
+
+
+def _level(points: F64, above: F64, normal: F64) -> F64:
+    """(N,) how far above the lowest point the ground is taken to be, beside each point.
+
+    One photo does not show of what lies flat or is round below that its sides are as far down as
+    its front: the lower edge of what one sees stands on the ground, as far as it would rise of
+    something round that lies there.
+    """
+    middle = np.median(points, 0)
+    sine = float(np.clip(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9), 0, 1))
+    most = 0.5 * float(np.ptp(points[:, 0])) * sine * np.sqrt(1 - sine**2)
+    across = points[:, 0] / np.maximum(points[:, 2], 1e-9)
+    low, high = float(across.min()), float(across.max())
+    column = ((across - low) / max(high - low, 1e-9) * (COLUMNS - 1)).astype(np.int64)
+    lower = np.full(COLUMNS, np.inf)
+    np.minimum.at(lower, column, above)
+    there = np.flatnonzero(np.isfinite(lower))
+    held = np.interp(np.arange(COLUMNS), there, np.minimum(lower[there], most))
+    level = cv2.GaussianBlur(held[None], (0, 0), LEVEL * COLUMNS)[0]
+    return np.asarray(level[column], np.float64)
 
 
 def smooth(values: F32, across: float, down: float | None = None) -> F32:
