@@ -107,6 +107,7 @@ were chosen on 49 other holes in the same photos and five more; only how much th
 was seen on *flag and wall* and *launch tower*, too. Seconds are those of all processors together.
 
 {times}
+
 Made by `python docs/compositing/make_compositing.py plates`, as is this section.
 """
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import resource
 import time
 from dataclasses import dataclass
 
@@ -12,6 +11,7 @@ import numpy as np
 from skimage import data
 
 from objectmorpher_core.pipeline import make_plate
+from objectmorpher_core.report import peak_memory_mb
 
 MEGAPIXELS = (1, 24)
 REACH = 0.15  # of the photo's width, radius of the thing that is taken out
@@ -40,7 +40,7 @@ def _taken(megapixels: int) -> Taken:
     thing = _thing(photo)
     begun = time.process_time()
     make_plate(photo, thing)
-    return Taken(megapixels, time.process_time() - begun, _peak())
+    return Taken(megapixels, time.process_time() - begun, peak_memory_mb())
 
 
 def _thing(photo: np.ndarray) -> np.ndarray:
@@ -48,8 +48,3 @@ def _thing(photo: np.ndarray) -> np.ndarray:
     height, width = photo.shape[:2]
     y, x = np.ogrid[:height, :width]
     return np.hypot(x - 0.72 * width, y - 0.25 * height) < REACH * width
-
-
-def _peak() -> float:
-    """MB this process has had at most."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
