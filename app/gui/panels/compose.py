@@ -157,7 +157,7 @@ def _draw_shadow(editor: Editor) -> None:
         changed = replace(shadow, **{name: change.value / unit})
         _take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
     usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
-    number = Number(t("Ground from"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
+    number = Number(t("Ground"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
     change = number_field(number, usual if ground is None else ground)
     tooltip(t("How steeply one looks down on the ground: 0° along it, 90° from above"))
     ground = None if change.value == usual else change.value
