@@ -24,7 +24,6 @@ from .view import View
 if TYPE_CHECKING:
     from objectmorpher_core.compose.lighting import Lighting, Lit
     from objectmorpher_core.joining import Shadow
-    from objectmorpher_core.raster.posed import PosedSplats
 
     from .derived import Derived
 
@@ -110,14 +109,14 @@ class Lights:
         splats = (derived.draft if is_coarse else derived.posed)(document, k)
         posed = puppet.draft if is_coarse else puppet.posed
         rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
-        return lambda: lighting.of(item, splats, lambda: rest, shape.texture, is_sketch)
+        return lambda: lighting.of(
+            item, splats, lambda: rest, document.horizon, shape.texture, is_sketch
+        )
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.lighting import Lighting
 
-        return self._lightings(
-            lambda: Lighting(document), document.photo, document.plate, document.horizon
-        )
+        return self._lightings(lambda: Lighting(document), document.photo, document.plate)
 
     # The picture
 
@@ -148,12 +147,9 @@ class Lights:
         """From how many degrees above the ground one looks at object `k` on it."""
         from objectmorpher_core.compose.lighting import ground_seen_from
 
-        rest, camera = self._rest(document, k), document.photo.camera
-        return ground_seen_from(rest, camera, document.horizon, shadow)
-
-    def _rest(self, document: Document, k: int) -> PosedSplats:
-        puppet = self._derived.shape(document.photo, document.objects[k]).puppet
-        return self._rests(lambda: puppet.posed(None, Placement()), puppet, False)
+        lifted = document.objects[k].lifted
+        assert lifted is not None
+        return ground_seen_from(lifted, document.photo.camera, document.horizon, shadow)
 
     def hidden(self, document: Document) -> Mask:
         """(H, W) what the objects hide."""

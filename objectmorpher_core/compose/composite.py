@@ -143,7 +143,8 @@ def _stack(document: Document, puppets: dict[int, Puppet]) -> tuple[Moved, ...]:
     for k, splats in stack(document, posed).items():
         item, look = objects[k], NOTHING
         if item.is_moved and splats is not None:
-            look = lighting.of(item, splats, partial(own[k].posed, None, Placement()))
+            rest = partial(own[k].posed, None, Placement())
+            look = lighting.of(item, splats, rest, document.horizon)
         has_hole = leaves_a_hole(objects, k)
         things.append(Moved(item, splats, has_hole, look))
     return tuple(things)

@@ -68,12 +68,14 @@ class Lighting:
         item: EditObject,
         splats: PosedSplats,
         rest: Callable[[], PosedSplats],
+        horizon: float | None,
         texture: TextureLevels | None = None,
         is_sketch: bool = False,
     ) -> Lit:
         """Of a moved object whose Gaussians are `splats` now and were at `rest`.
 
-        `is_sketch`: the shadow is a coarse one, in the time that a frame of a drag has.
+        `horizon`: the photo's, px, where it is known. `is_sketch`: the shadow is a coarse one, in
+        the time that a frame of a drag has.
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
         has_any = has_shadow or has_light or item.relight or item.grain
@@ -84,7 +86,7 @@ class Lighting:
         shade, gain, relit, grain = None, NEUTRAL, None, None
         if has_shadow:
             most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
-            standing = stand(splats, camera, self._document.horizon, item.shadow, most)
+            standing = stand(splats, camera, horizon, item.shadow, most)
             shade = None if standing is None else cast(item.shadow, standing, cells)
         if has_light:
             before, now = sketch(rest(), camera), sketch(splats, camera)
@@ -124,23 +126,23 @@ def stand(
     few = sketched(splats, most)
     if not len(few):
         return None
-    normal = _normal_under(splats, camera, horizon, shadow or Shadow())
+    normal = _normal_under(splats.rest.lifted, camera, horizon, shadow or Shadow())
     return Standing(splats.means[few], normal, camera)
 
 
 def ground_seen_from(
-    splats: PosedSplats, camera: Camera, horizon: float | None, shadow: Shadow
+    lifted: LiftedObject, camera: Camera, horizon: float | None, shadow: Shadow
 ) -> float:
     """From how many degrees above the ground the camera looks at an object on it."""
-    centre = splats.rest.lifted.centre
-    normal = _normal_under(splats, camera, horizon, shadow)
+    centre = lifted.centre
+    normal = _normal_under(lifted, camera, horizon, shadow)
     sine = float(normal @ centre / np.linalg.norm(centre))
     return float(np.degrees(np.arcsin(np.clip(sine, 0, 1))))
 
 
 def _normal_under(
-    splats: PosedSplats, camera: Camera, horizon: float | None, shadow: Shadow
+    lifted: LiftedObject, camera: Camera, horizon: float | None, shadow: Shadow
 ) -> F64:
     """(3,) of the ground where the object was at rest: it stays where it is."""
-    row = float(camera.project(splats.rest.lifted.centre)[1])
+    row = float(camera.project(lifted.centre)[1])
     return ground_normal(camera, horizon, shadow, row)

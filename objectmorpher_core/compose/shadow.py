@@ -105,15 +105,16 @@ class Standing:
         foot, top = np.percentile(above, (SPRAY, 100 - SPRAY))
         self._height = max(float(top - foot), 1e-9)
         above = np.maximum(above - foot, 0.0)
-        self._above = np.maximum(above - _level(points, above, normal), 0.0)
+        middle = np.median(points, 0)
+        sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
+        self._above = np.maximum(above - _level(points, above, float(np.clip(sine, 0, 1))), 0.0)
         self._feet = points + self._above[:, None] * normal
         self._is_low = self._above <= BAND * self._height
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
-        self._camera, middle = camera, np.median(points, 0)
+        self._camera = camera
         self._size = self._height * camera.focal / max(float(middle[2]), 1e-9)  # photo px
         # Lengths on the ground, towards the viewer, look so much shorter.
-        sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
         self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
 
     def grid(self, shadow: Shadow, cells: int = FINE) -> Grid | None:
@@ -141,8 +142,7 @@ class Standing:
             mixed += self._smooth(
                 np.asarray(cover * weight, np.float32), max(HARDEST, blur * shadow.softness) * size
             )
-        hard, soft = LAST_BLURS
-        return self._smooth(mixed, (hard + (soft - hard) * shadow.softness) * size)
+        return self._smooth(mixed, last_blur(shadow) * size)
 
     def contact(self, grid: Grid) -> F32:
         """(h, w) what touches the ground, blurred and a little lower, 1 at its darkest."""
@@ -166,15 +166,13 @@ class Standing:
         return smooth(values, sigma, sigma * self._slope)
 
 
-def _level(points: F64, above: F64, normal: F64) -> F64:
+def _level(points: F64, above: F64, sine: float) -> F64:
     """(N,) how far above the lowest point the ground is taken to be, beside each point.
 
     One photo does not show of what lies flat or is round below that its sides are as far down as
     its front: the lower edge of what one sees stands on the ground, as far as it would rise of
-    something round that lies there.
+    something round that lies there. `sine`: of the angle at which the ground is seen.
     """
-    middle = np.median(points, 0)
-    sine = float(np.clip(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9), 0, 1))
     most = 0.5 * float(np.ptp(points[:, 0])) * sine * np.sqrt(1 - sine**2)
     across = points[:, 0] / np.maximum(points[:, 2], 1e-9)
     low, high = float(across.min()), float(across.max())
@@ -185,6 +183,12 @@ def _level(points: F64, above: F64, normal: F64) -> F64:
     held = np.interp(np.arange(COLUMNS), there, np.minimum(lower[there], most))
     level = cv2.GaussianBlur(held[None], (0, 0), LEVEL * COLUMNS)[0]
     return np.asarray(level[column], np.float64)
+
+
+def last_blur(shadow: Shadow) -> float:
+    """x the object's height, standard deviation of the blur of the whole shadow."""
+    hard, soft = LAST_BLURS
+    return hard + (soft - hard) * shadow.softness
 
 
 def smooth(values: F32, across: float, down: float | None = None) -> F32:

@@ -24,7 +24,7 @@ from .old_shadow import BLACK, OldShadow
 from .shadow import DARKEST, GAMMA
 from .shadow_shear import Sheet, contact_of, stand, thrown
 
-USUAL_GROUND = 30.0  # degrees: a silhouette alone is told no ground
+SHEET_GROUND = 30.0  # degrees: a silhouette alone is told no ground
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
@@ -69,11 +69,11 @@ def find_old_shadow(
     """The shadow of what was cut out of the photo `pixels` (H, W, 3); None where none is sure.
 
     `others` (H, W): what else hides the ground. `seen_from`: how many degrees above it one looks
-    from; None where nobody knows: then it is USUAL_GROUND, and the shadow found says so.
+    from; None where nobody knows: then it is SHEET_GROUND, and the shadow found says so.
     """
     if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
-    slope = float(np.sin(np.radians(USUAL_GROUND if seen_from is None else seen_from)))
+    slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
     seen = _look(pixels, matte, others, slope)
     ground = _ground(seen)
     if ground is None:
@@ -82,7 +82,7 @@ def find_old_shadow(
     if found is None or not _is_sure(seen, ground, found):
         return None
     depth = _missing(seen, ground, found)
-    shadow = replace(_imitated(found), ground=USUAL_GROUND if seen_from is None else None)
+    shadow = replace(_imitated(found), ground=SHEET_GROUND if seen_from is None else None)
     return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale)
 
 

@@ -25,7 +25,7 @@ from .shadow import (
     FADE,
     FAINTEST,
     HARDEST,
-    LAST_BLURS,
+    last_blur,
     smooth,
 )
 
@@ -121,8 +121,7 @@ def _thrown(shadow: Shadow, standing: Sheet) -> tuple[F32, int, int]:
     height = level - (rows + 0.5) / (2 * fine)
     x = np.rint(columns + height * across).astype(np.int64)
     y = np.floor(level + height * down).astype(np.int64)
-    hard, soft = LAST_BLURS
-    sigma = (hard + (soft - hard) * shadow.softness) * standing.height
+    sigma = last_blur(shadow) * standing.height
     rim = int(np.ceil(3 * sigma)) + 4
     left, top = int(x.min()) - rim, int(y.min()) - rim
     size = (int(y.max()) - top + rim + 1, int(x.max()) - left + rim + 1)

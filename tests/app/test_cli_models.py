@@ -12,13 +12,9 @@ import pytest
 
 from app import cli
 from objectmorpher_core import models
-from tests.core.models.local_hub import TOKEN, Hub, serving
+from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, serving
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
-FILES = {
-    "config.json": b'{"model_type": "sam2"}',
-    "model.safetensors": b"\x02\0\0\0\0\0\0\0{}",  # no tensors
-}
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +33,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
     pytest.importorskip("huggingface_hub")
     with serving() as found:
         monkeypatch.setenv("HF_ENDPOINT", found.url)
-        found.repositories = {FREE.repository: FILES, GATED.repository: FILES}
+        found.repositories = {FREE.repository: TINY_SAM2, GATED.repository: TINY_SAM2}
         found.gated.add(GATED.repository)
         yield found
 
@@ -108,7 +104,7 @@ def test_offline_is_one_sentence(capsys, server: Hub) -> None:
 def test_a_folder_is_added_and_forgotten(capsys, tmp_path: Path) -> None:
     folder = tmp_path / "mine"
     folder.mkdir()
-    for name, data in FILES.items():
+    for name, data in TINY_SAM2.items():
         (folder / name).write_bytes(data)
     code, out, _ = said(capsys, "add", "sam2", str(folder))
     assert code == 0 and "yours" in out and str(folder) in out

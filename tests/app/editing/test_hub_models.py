@@ -13,13 +13,9 @@ from app.editing import hub_models
 from app.editor import Editor
 from app.gui.hub_rows import GAINS, NAMES, SIZES
 from objectmorpher_core import models
-from tests.core.models.local_hub import TOKEN, Hub, serving
+from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, serving
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
-FILES = {
-    "config.json": b'{"model_type": "sam2"}',
-    "model.safetensors": b"\x02\0\0\0\0\0\0\0{}",  # no tensors
-}
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +32,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
     pytest.importorskip("huggingface_hub")
     with serving() as found:
         monkeypatch.setenv("HF_ENDPOINT", found.url)
-        found.repositories = {FREE.repository: FILES, GATED.repository: FILES}
+        found.repositories = {FREE.repository: TINY_SAM2, GATED.repository: TINY_SAM2}
         found.gated.add(GATED.repository)
         yield found
 
@@ -108,7 +104,7 @@ def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     hub.wanted = FREE.id
     hub.use_folder(folder / "config.json")
     assert choosing.message is not None and "holds no" in choosing.message.text
-    for name, data in FILES.items():
+    for name, data in TINY_SAM2.items():
         (folder / name).write_bytes(data)
     hub.use_folder(folder / "config.json")
     settle(choosing)

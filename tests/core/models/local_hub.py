@@ -30,6 +30,10 @@ class Hub:
 
 
 TOKEN = "hf_right"
+TINY_SAM2 = {  # files of a repository
+    "config.json": b'{"model_type": "sam2"}',
+    "model.safetensors": b"\x02\0\0\0\0\0\0\0{}",  # no tensors
+}
 
 
 def _handler(hub: Hub) -> type[BaseHTTPRequestHandler]:

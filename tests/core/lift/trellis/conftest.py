@@ -1,10 +1,15 @@
-"""Networks this small are computed by one thread: more only wait for one another."""
+"""A subject, and one thread: networks this small only wait for one another in more."""
 
 from __future__ import annotations
 
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
+
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.segment.matte import build_matte
+from tests import photos
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -18,3 +23,21 @@ def one_thread():
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def subject():
+    """The cup of the coffee photo, small."""
+    pixels = photos.photo("coffee")[::3, ::3].copy()
+    height, width = pixels.shape[:2]
+    y, x = np.mgrid[:height, :width]
+    mask = ((x - 0.5 * width) / 37) ** 2 + ((y - 0.5 * height) / 30) ** 2 < 1
+    return pixels, Camera.from_fov(width, height), mask
+
+
+@pytest.fixture(scope="module")
+def picture(subject):
+    """The same as the generators see it."""
+    from objectmorpher_core.lift.trellis.picture import Picture
+
+    return Picture.of(build_matte(subject[0], subject[2], 12))

@@ -12,7 +12,6 @@ torch = pytest.importorskip("torch", reason="CUPID needs torch")
 pytest.importorskip("transformers", reason="CUPID needs transformers")
 
 from objectmorpher_core import lift
-from objectmorpher_core.camera import Camera
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
@@ -27,7 +26,6 @@ from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.progress import Cancelled, silent
 from objectmorpher_core.segment.matte import build_matte
 from objectmorpher_core.splat_files.axes import QUARTER_TURN
-from tests import photos
 from tests.core.lift import registered
 from tests.core.lift.trellis import tiny_trellis
 
@@ -69,20 +67,6 @@ def folders(tmp_path_factory):
         tiny_trellis.write_encoder(root / "dinov2-with-registers-large"),
         tiny_trellis.write_model(root / "trellis-image-large", SHARED_PARTS),
     )
-
-
-@pytest.fixture(scope="module")
-def subject():
-    pixels = photos.photo("coffee")[::3, ::3].copy()
-    height, width = pixels.shape[:2]
-    y, x = np.mgrid[:height, :width]
-    mask = ((x - 0.5 * width) / 37) ** 2 + ((y - 0.5 * height) / 30) ** 2 < 1
-    return pixels, Camera.from_fov(width, height), mask
-
-
-@pytest.fixture(scope="module")
-def picture(subject):
-    return Picture.of(build_matte(subject[0], subject[2], 12))
 
 
 @pytest.fixture

@@ -16,17 +16,14 @@ pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 from safetensors.torch import load_file, save_file
 
 from objectmorpher_core import lift
-from objectmorpher_core.camera import Camera
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis import generator as generators
 from objectmorpher_core.lift.trellis import weights
 from objectmorpher_core.lift.trellis.generator import Generator
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
-from objectmorpher_core.lift.trellis.picture import Picture
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.progress import Cancelled, silent
 from objectmorpher_core.segment.matte import build_matte
-from tests import photos
 from tests.core.lift.trellis import tiny_trellis
 
 ARRAYS = ("means", "quats", "scales", "opacities", "colors")
@@ -35,21 +32,6 @@ ARRAYS = ("means", "quats", "scales", "opacities", "colors")
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
     return tiny_trellis.write(tmp_path_factory.mktemp("cache") / "models")
-
-
-@pytest.fixture(scope="module")
-def subject():
-    """The cup of the coffee photo, small."""
-    pixels = photos.photo("coffee")[::3, ::3].copy()
-    height, width = pixels.shape[:2]
-    y, x = np.mgrid[:height, :width]
-    mask = ((x - 0.5 * width) / 37) ** 2 + ((y - 0.5 * height) / 30) ** 2 < 1
-    return pixels, Camera.from_fov(width, height), mask
-
-
-@pytest.fixture(scope="module")
-def picture(subject):
-    return Picture.of(build_matte(subject[0], subject[2], 12))
 
 
 @pytest.fixture
