@@ -16,14 +16,15 @@ from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
-from .graph import Graph, Surface, build_graph
-from .grip import stiffened
+from .graph import Graph, build_graph
+from .grip import other_sides, stiffened
 from .hold import Frozen, Grasp, Hold
 from .skinning import Motion, Skin, Skinned, skin
 from .strain import Strain, measure_strain
+from .surface_links import Surface
 
 FAITHFUL_ITERATIONS = 3  # paper 3.2.2
-ITERATIONS = 200  # at most; the solve ends earlier when nothing moves
+ITERATIONS = 400  # at most; the solve ends earlier when nothing moves
 STEP_ITERATIONS = 4  # in the sub-steps of a large move
 LARGE_MOVE = 0.1  # x diameter: a handle's move beyond this is made in sub-steps
 LARGE_TURN = 0.3  # rad: likewise for a turn
@@ -58,7 +59,8 @@ class Deformer:
         self.rig = rig or Rig()
         self.points = lifted.control_points.astype(np.float64)
         self.diameter = lifted.diameter
-        self.graph: Graph = build_graph(self.points, settings, _surface(lifted), self.rig.seams)
+        self._solid = Surface(lifted.body.means, lifted.body.normals)
+        self.graph: Graph = build_graph(self.points, settings, self._solid, self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
         self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
         self._last_anchors: tuple[int, I32] | None = None  # those of a single handle
@@ -215,6 +217,17 @@ class Deformer:
         positions, rotations = self._follow(minimum.positions, minimum.rotations)
         return Solution(Pose(positions, rotations), minimum.energies)
 
+    def iterated(
+        self, handles: tuple[Handle, ...], iterations: int, has_auto_anchors: bool = True
+    ) -> Pose:
+        """The pose after so many plain iterations from rest, settled or not: for comparisons."""
+        handles = self._effective(handles)
+        if not handles:
+            return self.rest()
+        self._constrain(handles, self.anchors(handles, has_auto_anchors))
+        minimum = iterate(self._solver, self.rest().rotations, iterations)
+        return Pose(*self._follow(minimum.positions, minimum.rotations))
+
     def prepare(self, handles: tuple[Handle, ...], has_auto_anchors: bool = True) -> None:
         """Does now what the first solve with these handles would do: their factorisation."""
         if handles := self._effective(handles):
@@ -292,7 +305,8 @@ class Deformer:
         if key != self._constrained:
             points, hands = np.array([h.point for h in handles]).reshape(-1, 3), None
             if len(handles) and not self.settings.is_faithful:
-                hands = stiffened(self.points, self._solver.weights, points, self.diameter)
+                ends = other_sides(points, self._solid, self.graph.mean_spacing, self.diameter)
+                hands = stiffened(self.points, self._solver.weights, points, ends, self.diameter)
             grasp = self._grasp(handles, points)
             self._hold = Hold.of(handles, grasp, self.points, anchors, self._frozen)
             self._solver.constrain(self._hold.constraints, hands)
@@ -362,11 +376,6 @@ def _on_the_way(handle: Handle, share: float, start: F64 | None = None) -> Handl
     start = handle.point if start is None else start
     target = start + share * (handle.target - start)
     return replace(handle, target=target, turn=None if handle.turn is None else share * handle.turn)
-
-
-def _surface(lifted: LiftedObject) -> Surface:
-    """The object's solid Gaussians, object frame."""
-    return Surface(lifted.body.means, lifted.body.normals)
 
 
 def _weighed(weights: csr_array, stiffness: F64 | None) -> csr_array:

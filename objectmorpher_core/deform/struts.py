@@ -43,13 +43,13 @@ def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> 
     i, j, lengths = i[is_through], j[is_through], lengths[is_through]
     limits = np.zeros(len(points))
     asked = np.union1d(i, j)
-    depths = _thickness(points[asked], normals[asked], spacing, radius, surface)
+    depths = thickness(points[asked], normals[asked], spacing, radius, surface)
     limits[asked] = depths + ROOM * spacing
     is_flesh = lengths <= np.minimum(limits[i], limits[j])
     return Edges(i[is_flesh], j[is_flesh], lengths[is_flesh])
 
 
-def _thickness(points: F64, normals: F64, spacing: float, radius: float, surface: Surface) -> F64:
+def thickness(points: F64, normals: F64, spacing: float, radius: float, surface: Surface) -> F64:
     """How thick (M,) the body is under surface points (M, 3), seen against their normals.
 
     The first of some points on the way in at which a surface faces outwards; 0 where there is none
