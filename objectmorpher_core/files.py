@@ -1,12 +1,26 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all: everything that is written goes through here.
+
+A file is written under a temporary name in its own folder, down to the disk, renamed, and the
+folder is brought down to the disk, too. Whatever fails in between, and wherever the power is cut,
+the file is the old one or the new one. (docs/reliability.md tells how that is tested.)
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import sys
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+
+UNFINISHED = ".unfinished"  # ending of what is being written
+STALE = 3600.0  # s; an unfinished file older than this belongs to a process that died
+PIECE = 1 << 24  # bytes that one write takes
+NAMED = 50  # characters of a file's name that the temporary one has, too
+
+Parts = Sequence[bytes | memoryview]
 
 
 class OutputError(OSError):
@@ -23,41 +37,120 @@ def write_all(outputs: Mapping[Path, bytes]) -> None:
     written: list[tuple[Path, Path]] = []  # (temporary, target)
     try:
         for path, data in outputs.items():
-            target = Path(os.path.realpath(path))
-            _check_target(path, target)
             try:
-                written.append((_write_beside(target, data), target))
-            except OSError as error:
+                target = _checked_target(path)
+                _remove_stale(target)
+                written.append((_write_beside(target, [data]), target))
+            except OutputError:
+                raise
+            except (OSError, ValueError) as error:  # ValueError: a name with a zero in it
                 raise OutputError(f"{path} cannot be written: {_reason(error)}") from error
         if written:
             _rename_all(written)
     finally:
         for temporary, _ in written:
-            temporary.unlink(missing_ok=True)
+            _discard(temporary)
 
 
-def _check_target(path: Path, target: Path) -> None:
+def write_new(target: Path, parts: Parts, mode: int | None = None) -> None:
+    """Writes one file from pieces that are not joined; it may have permissions of its own.
+
+    A link in its place is replaced. The folder is not synced: see `sync_folder`. Raises OSError.
+    """
+    temporary = _write_beside(target, parts, mode)
+    try:
+        os.replace(temporary, target)
+    except BaseException:
+        _discard(temporary)
+        raise
+
+
+def place_file(source: Path, target: Path) -> None:
+    """Moves a file that is complete into its place on the same disk, for good. Raises OSError."""
+    with source.open("rb+") as file:
+        os.fsync(file.fileno())
+    os.replace(source, target)
+    sync_folder(target.parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Makes a folder and those above it, so that they survive a power cut. Raises OSError."""
+    missing = []
+    while not folder.is_dir():
+        missing.append(folder)
+        folder = folder.parent
+    for new in reversed(missing):
+        new.mkdir(exist_ok=True)
+        sync_folder(new.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes the names in it survive a power cut, where the system can."""
+    if sys.platform == "win32":
+        return
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _checked_target(path: Path) -> Path:
+    """The file that `path` means, links followed. Raises OutputError, OSError."""
+    target = Path(os.path.realpath(path))
     if target.is_dir():
         raise OutputError(f"{path} is a folder, not a file")
     if not target.parent.is_dir():
         raise OutputError(f"{path} cannot be written: the folder {path.parent} does not exist")
     if target.exists() and not os.access(target, os.W_OK):
         raise OutputError(f"{path} cannot be written: it is write-protected")
+    return target
 
 
-def _write_beside(target: Path, data: bytes) -> Path:
-    """A temporary file in the target's folder that holds `data`, safely on the disk."""
-    descriptor, name = tempfile.mkstemp(prefix=f".{target.name[:50]}.", dir=target.parent)
+def _write_beside(target: Path, parts: Parts, mode: int | None = None) -> Path:
+    """A temporary file in the target's folder that holds the parts, safely on the disk."""
+    descriptor, name = tempfile.mkstemp(UNFINISHED, _prefix(target), target.parent)
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
+        with os.fdopen(descriptor, "wb", buffering=0) as file:
+            for piece in _pieces(parts):
+                rest = piece
+                while rest:  # a disk may take less than it is given
+                    rest = rest[file.write(rest) :]
+            if mode is None:
+                mode = target.stat().st_mode if target.exists() else 0o666 & ~_umask()
+            os.chmod(name, mode & 0o7777)
             os.fsync(file.fileno())
-        os.chmod(name, target.stat().st_mode if target.exists() else 0o666 & ~_umask())
     except BaseException:
-        os.unlink(name)
+        _discard(Path(name))
         raise
     return Path(name)
+
+
+def _pieces(parts: Parts) -> Iterator[memoryview]:
+    """No longer than what one write takes."""
+    for part in map(memoryview, parts):
+        for start in range(0, len(part), PIECE):
+            yield part[start : start + PIECE]
+
+
+def _prefix(target: Path) -> str:
+    return f".{target.name[:NAMED]}."
+
+
+def _remove_stale(target: Path) -> None:
+    """What a process that was killed has left of this file."""
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(target.parent):
+            is_ours = entry.name.startswith(_prefix(target)) and entry.name.endswith(UNFINISHED)
+            if is_ours and time.time() - entry.stat(follow_symlinks=False).st_mtime > STALE:
+                _discard(Path(entry.path))
+
+
+def _discard(path: Path) -> None:
+    """What cannot be removed is hidden, and harms nobody."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 def _rename_all(written: list[tuple[Path, Path]]) -> None:
@@ -73,38 +166,41 @@ def _rename_all(written: list[tuple[Path, Path]]) -> None:
             os.replace(temporary, target)
             renamed.append(target)
     except OSError as error:
-        for done in renamed:
-            os.replace(olds[done], done) if done in olds else done.unlink()
-        raise OutputError(f"{target} cannot be written: {_reason(error)}") from error
+        told = f"{target} cannot be written: {_reason(error)}"
+        for changed, old in _bring_back(renamed, olds):
+            told += f"; {changed} has changed already"
+            told += f", what it was is in {old.name}" if old is not None else ""
+        raise OutputError(told) from error
     finally:
         for old in olds.values():
-            old.unlink(missing_ok=True)
+            _discard(old)
     for folder in {target.parent for _, target in written}:
-        _sync_folder(folder)
+        sync_folder(folder)
+
+
+def _bring_back(renamed: list[Path], olds: dict[Path, Path]) -> Iterator[tuple[Path, Path | None]]:
+    """Undoes renames; tells of those that the disk keeps, whose old files stay then."""
+    for done in renamed:
+        old = olds.get(done)
+        try:
+            if old is not None:
+                os.replace(old, done)
+            else:
+                done.unlink()
+        except OSError:
+            yield done, olds.pop(done, None)
 
 
 def _second_name(target: Path) -> Path:
-    """The existing file under another name in its folder, to bring it back."""
-    descriptor, name = tempfile.mkstemp(prefix=f".{target.name[:50]}.old.", dir=target.parent)
+    """The existing file under another name in its folder, to bring it back. Raises OSError."""
+    descriptor, name = tempfile.mkstemp(".old", _prefix(target), target.parent)
     os.close(descriptor)
     os.unlink(name)
     try:
         os.link(target, name)
     except OSError:  # a file system without hard links: a copy costs time but is as safe
-        Path(name).write_bytes(target.read_bytes())
+        return _write_beside(target, [target.read_bytes()])
     return Path(name)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes the new names survive a power cut, where the system can."""
-    if not hasattr(os, "O_DIRECTORY"):
-        return
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 def _umask() -> int:
@@ -113,5 +209,5 @@ def _umask() -> int:
     return mask
 
 
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()
+def _reason(error: OSError | ValueError) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

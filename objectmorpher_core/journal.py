@@ -14,10 +14,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import tempfile
 import zlib
-from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,17 +23,19 @@ from typing import Any
 import numpy as np
 
 from .document import Document, Photo
-from .files import OutputError, write_all
-from .image import Picture, encode_picture
-from .session_file import build_document
+from .files import UNFINISHED, make_folder, sync_folder, write_all, write_new
+from .image import MAX_PIXELS, Picture, encode_picture
+from .npy import ArrayError, read_npy
+from .session_file import MAX_BYTES, build_document
 from .session_tree import SessionError, Writer
 
 FORMAT = "objectmorpher recovery"
 VERSION = 1
 DOCUMENT = "document.json"
 ARRAY, PACKED, PHOTO = ".npy", ".npy.z", ".photo"  # endings
-UNFINISHED = ".tmp"
+OWN = (ARRAY, PACKED, PHOTO, UNFINISHED)
 LEVEL = 1  # of zlib: masks are deflated, floating-point numbers hardly would be
+MAX_MASK = MAX_PIXELS + 128  # bytes: a mask and its header
 DIGEST = 64  # characters of a SHA-256
 
 
@@ -63,7 +63,7 @@ class Journal:
         collector = _Collector(skipped=(Photo,))
         tree = collector.tree(document, "")
         photo = document.photo
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         kept: dict[int, tuple[object, str]] = {}
         source = self._file(photo.source or photo.picture.pixels, "photo", kept)
         tree["photo"] = {
@@ -79,6 +79,7 @@ class Journal:
             "document": tree,
         }
         text = json.dumps(head, ensure_ascii=False, allow_nan=False)
+        sync_folder(self.folder)  # the arrays' names first: a power cut may turn their order round
         write_all({self.folder / DOCUMENT: text.encode()})
         self._names = kept
         self._remove_others({DOCUMENT} | {name for _, name in kept.values()})
@@ -101,14 +102,15 @@ class Journal:
             if ending == PACKED:
                 packer = zlib.compressobj(LEVEL)
                 parts = [*[packer.compress(piece) for piece in parts], packer.flush()]
-            _write(target, parts)
+            write_new(target, parts)
         return target.name
 
     def _remove_others(self, names: set[str]) -> None:
         """Earlier steps' arrays, and what was cut off."""
-        for path in self.folder.iterdir():
-            if path.name not in names and path.name.endswith((ARRAY, PACKED, PHOTO, UNFINISHED)):
-                path.unlink(missing_ok=True)
+        with suppress(OSError):  # they are in nobody's way, and go with the folder
+            for path in self.folder.iterdir():
+                if path.name not in names and path.name.endswith(OWN):
+                    path.unlink(missing_ok=True)
 
 
 def read_about(folder: Path) -> dict[str, Any]:
@@ -144,12 +146,9 @@ def _head(folder: Path) -> dict[str, Any]:
 def _array(folder: Path, name: object) -> np.ndarray:
     data = _checked(folder, name)
     try:
-        array = np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError, SyntaxError) as error:
-        raise SessionError("what was kept of the edit is damaged: an array is none") from error
-    if not isinstance(array, np.ndarray) or not _is_numbers(array):
-        raise SessionError("what was kept of the edit is damaged: an array holds no numbers")
-    return array
+        return read_npy(data)
+    except ArrayError as error:
+        raise SessionError(f"what was kept of the edit is damaged: a file is {error}") from error
 
 
 def _checked(folder: Path, name: object) -> bytes:
@@ -157,13 +156,27 @@ def _checked(folder: Path, name: object) -> bytes:
     if not isinstance(name, str) or Path(name).name != name:
         raise SessionError("what was kept of the edit is damaged: a file's name is none")
     try:
-        data = (folder / name).read_bytes()
-        data = zlib.decompress(data) if name.endswith(PACKED) else data
-    except (OSError, zlib.error) as error:
+        at = folder / name
+        if at.is_symlink() or not at.is_file() or at.stat().st_size > MAX_BYTES:
+            raise SessionError("what was kept of the edit is incomplete")
+        data = at.read_bytes()
+        data = _unpacked(data) if name.endswith(PACKED) else data
+    except (OSError, ValueError, zlib.error) as error:  # ValueError: a name with a zero in it
+        if isinstance(error, SessionError):
+            raise
         raise SessionError("what was kept of the edit is incomplete") from error
     if hashlib.sha256(data).hexdigest() != name[:DIGEST]:
         raise SessionError("what was kept of the edit is damaged")
     return data
+
+
+def _unpacked(data: bytes) -> bytes:
+    """A packed mask; a bomb is unpacked no further than a mask can be long. Raises zlib.error."""
+    packer = zlib.decompressobj()
+    plain = packer.decompress(data, MAX_MASK)
+    if not packer.eof:
+        raise zlib.error("it ends early, or goes on for too long")
+    return plain
 
 
 def _is_numbers(array: np.ndarray) -> bool:
@@ -186,26 +199,3 @@ def _parts(value: object, path: str) -> tuple[list[bytes | memoryview], str]:
     np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
     plain = array.reshape(-1).view(np.uint8).data
     return [head.getvalue(), plain], PACKED if array.dtype == np.bool_ else ARRAY
-
-
-def _write(target: Path, parts: Sequence[bytes | memoryview]) -> None:
-    """Down to the disk, and under its name only when it is whole."""
-    descriptor, name = tempfile.mkstemp(suffix=UNFINISHED, dir=target.parent)
-    try:
-        with os.fdopen(descriptor, "wb", buffering=0) as file:
-            for piece in _pieces(parts):
-                if file.write(piece) != len(piece):
-                    raise OutputError(f"{target.name} cannot be written: the disk is full")
-            os.fsync(file.fileno())
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _pieces(parts: Sequence[bytes | memoryview]) -> Iterator[memoryview]:
-    """No longer than what one write takes."""
-    step = 1 << 24
-    for part in map(memoryview, parts):
-        for start in range(0, len(part), step):
-            yield part[start : start + step]

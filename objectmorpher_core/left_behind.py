@@ -1,13 +1,14 @@
-"""What a script's objects leave behind: the plate of all, and their shadows in the photo."""
+"""What a script's objects leave behind: the plate of all, their old shadows and reflections."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from . import compose, edits
-from .compose.old_shadow import OldShadow, shadowless_plate
+from .compose.old_reflection import OldReflection
+from .compose.old_shadow import OldShadow, traceless_plate
+from .compose.old_traces import find_old_traces
 from .compose.plate import build_plate, plate_cover
-from .compose.shadow_fit import find_old_shadow
 from .document import Document, EditObject, Matte
 from .hint import Hint
 from .progress import Progress
@@ -27,24 +28,22 @@ def with_plate(
     Those of the numbers in `casting` take their own shadow along.
 
     An object that has left its place takes its shadow off the ground, where that is sure. It, and
-    every copy of it that is elsewhere, throws one like it.
+    every copy of it that is elsewhere, throws one like it. Its reflection goes, and none is drawn.
     """
     document = edits.set_hints(document, _hints(script, document.photo.size))
     covered, pixels = plate_cover(document), document.photo.pixels
-    gone: list[OldShadow] = []
+    gone: list[OldShadow | OldReflection] = []
     for matte in _distinct(document, casting):
         alike = [k for k in casting if document.objects[k].matte is matte]
-        old = find_old_shadow(pixels, matte, covered)
-        if old is None:
-            continue
+        old = find_old_traces(pixels, matte, covered)
         for k in alike:
-            if document.objects[k].is_visible:
-                document = edits.set_shadow(document, k, old.shadow)
+            if old.shadow is not None and document.objects[k].is_visible:
+                document = edits.set_shadow(document, k, old.shadow.shadow)
         if not any(o.matte is matte and not has_left(o) for o in document.objects):
-            gone.append(old)
+            gone += old.found
     inpainter = compose.load(script.inpaint)
     if gone:
-        plate = shadowless_plate(
+        plate = traceless_plate(
             pixels, covered, gone, inpainter, progress, script.seed, document.hints
         )
     else:

@@ -28,8 +28,11 @@ from .document import SELECTED, Document, EditObject, Photo
 from .files import write_all
 from .image import ImageError, encode_picture, read_picture
 from .joining import LEAST_FEATHER, MOST_FEATHER
+from .limits import SESSION_OBJECTS
+from .limits import SESSION_UNPACKED as MAX_BYTES
+from .npy import ArrayError, read_npy
 from .session_tree import Reader, SessionError, Writer
-from .splat_files.ply import encode_ply
+from .shown import named, shown
 
 __all__ = ["SessionError", "decode_session", "encode_session", "save_session"]
 
@@ -37,7 +40,6 @@ VERSION = 1
 FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the zip format's first day: no clock in the bytes
-MAX_BYTES = 4 << 30  # unpacked, all members: more than any real session, less than a zip bomb
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
 PACKED_ENDINGS = (".png", ".npz", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".avif")
 
@@ -49,6 +51,8 @@ def save_session(document: Document, path: Path) -> None:
 
 def encode_session(document: Document) -> bytes:
     """The bytes of the document's session file. Raises SessionError for values beyond numbers."""
+    from .splat_files.ply import encode_ply
+
     members: dict[str, bytes] = {}
     photo = document.photo
     ending = PurePosixPath(photo.name).suffix.lower()
@@ -88,9 +92,9 @@ def decode_session(data: bytes) -> Document:
         raise SessionError("the session's document.json is damaged: sha256 is missing")
     for name, expected in hashes.items():
         if name not in members:
-            raise SessionError(f"the session is incomplete: {name} is missing")
+            raise SessionError(f"the session is incomplete: {named(name)} is missing")
         if hashlib.sha256(members[name]).hexdigest() != expected:
-            raise SessionError(f"the session is damaged: {name} is not what was saved")
+            raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
     trusted = {name: members[name] for name in hashes}
     return build_document(head.get("document"), trusted, _arrays(trusted))
 
@@ -126,9 +130,9 @@ def _head(members: dict[str, bytes]) -> dict[str, Any]:
         raise SessionError("the file is a zip archive but not a session")
     version = head.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise SessionError(f"the session has no valid version ({version})")
+        raise SessionError(f"the session has no valid version ({shown(version)})")
     if version > VERSION:
-        raise SessionError(f"the session was made by a newer version ({version})")
+        raise SessionError(f"the session was made by a newer version ({shown(version)})")
     return head
 
 
@@ -155,14 +159,9 @@ def _arrays(members: dict[str, bytes]) -> dict[str, np.ndarray]:
     arrays = {}
     for name, data in _unzip(members.get(ARRAYS, b""), ARRAYS).items():
         try:
-            array = np.load(io.BytesIO(data), allow_pickle=False)
-        except (ValueError, EOFError, OSError, SyntaxError) as error:
-            raise SessionError(f"the session is damaged: {name} is no array") from error
-        if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
-            raise SessionError(f"the session is damaged: {name} is no array of numbers")
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise SessionError(f"the session is damaged: {name} holds values that are not finite")
-        arrays[name.removesuffix(".npy")] = array
+            arrays[name.removesuffix(".npy")] = read_npy(data)
+        except ArrayError as error:
+            raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
     return arrays
 
 
@@ -193,7 +192,9 @@ def _unzip(data: bytes, what: str) -> dict[str, bytes]:
             names = [info.filename for info in infos]
             for name in names:
                 if name.startswith("/") or "\\" in name or ".." in name.split("/"):
-                    raise SessionError(f"the {what} holds a member with a forbidden name: {name!r}")
+                    raise SessionError(
+                        f"the {what} holds a member with a forbidden name: {shown(name)}"
+                    )
             if len(set(names)) < len(names):
                 raise SessionError(f"the {what} holds two members of the same name")
             if sum(info.file_size for info in infos) > MAX_BYTES:
@@ -209,6 +210,8 @@ def _unzip(data: bytes, what: str) -> dict[str, bytes]:
 
 def _with_copies(document: Document) -> Document:
     """Copies of an object share its mask, by which they are known as copies."""
+    if len(document.objects) > SESSION_OBJECTS:
+        raise ValueError(f"{len(document.objects):,} objects are more than {SESSION_OBJECTS}")
     known: list[np.ndarray] = []
     objects = []
     for item in document.objects:
@@ -242,6 +245,13 @@ def _check(document: Document) -> None:
             raise ValueError("the plate has another bit depth than the photo")
         if plate.painted is not None:
             _same("the plate's repairs", plate.painted.shape, plate.hole.shape)
+    if (refined := document.refined) is not None:
+        _same("refinement", refined.pixels.shape, (*refined.alpha.shape, 3))
+        _inside("refinement", refined.box, (width, height))
+        if refined.pixels.dtype != document.photo.pixels.dtype:
+            raise ValueError("the refinement has another bit depth than the photo")
+        if not 0 <= refined.strength <= 1:
+            raise ValueError(f"a refinement's strength is {refined.strength:g}")
     _check_joining(document)
 
 
@@ -251,7 +261,10 @@ def _check_joining(document: Document) -> None:
         raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
     for item in document.objects:
         item.shadow.check()
-        shares = {"harmony": item.harmony, "relighting": item.relight, "grain": item.grain}
+        shares = {
+            "harmony": item.harmony, "relighting": item.relight,
+            "grain": item.grain, "defocus": item.defocus,
+        }  # fmt: skip
         for name, value in shares.items():
             if not 0 <= value <= 1:
                 raise ValueError(f"an object's {name} is {value:g}, not between 0 and 1")

@@ -81,12 +81,12 @@ class Reader:
         if origin in (Union, types.UnionType):
             return self._union(get_args(hint), tree, where)
         if hint is np.ndarray or origin is np.ndarray:
-            return self._array(tree, where)
+            return self._array((hint,), tree, where)
         if origin is tuple:
             return self._tuple(get_args(hint), tree, where)
         if is_dataclass(hint):
             return self._dataclass(hint, tree, where)
-        if hint is float and type(tree) is int:
+        if hint is float and type(tree) is int and abs(tree) < 1 << 63:
             return float(tree)
         if type(tree) is not hint:
             raise _damaged(where)
@@ -96,6 +96,8 @@ class Reader:
         """`X | None`, or several kinds of array."""
         if tree is None and types.NoneType in hints:
             return None
+        if all(get_origin(h) is np.ndarray for h in hints if h is not types.NoneType):
+            return self._array(hints, tree, where)
         return self.value(next(h for h in hints if h is not types.NoneType), tree, where)
 
     def _tuple(self, hints: tuple, tree: Any, where: str) -> tuple:
@@ -120,13 +122,18 @@ class Reader:
                 raise _damaged(f"{where}.{f.name}")
         return kind(**given)
 
-    def _array(self, tree: Any, where: str) -> np.ndarray:
+    def _array(self, hints: tuple, tree: Any, where: str) -> np.ndarray:
+        """An array of one of the declared kinds: a kernel would be compiled anew for others."""
         match tree:
             case {"array": str(path)} if path in self.arrays:
-                return frozen(self.arrays[path])
+                array = self.arrays[path]
             case {"png": str(member)} if member in self.members:
-                return frozen(self._picture(member))
-        raise _damaged(where)
+                array = self._picture(member)
+            case _:
+                raise _damaged(where)
+        if not any(_is_of(array, hint) for hint in hints):
+            raise SessionError(f"the session is damaged: {where} has numbers of another kind")
+        return frozen(array)
 
     def _picture(self, member: str) -> np.ndarray:
         try:
@@ -134,6 +141,14 @@ class Reader:
         except ImageError as error:
             raise SessionError(f"the session is damaged: {member}: {error}") from error
         return picture.pixels[..., 0] > 127 if picture.is_grey else picture.pixels
+
+
+def _is_of(array: np.ndarray, hint: Any) -> bool:
+    """Whether `hint` is an array of that dtype, or of any."""
+    kinds = [get_args(part) for part in get_args(hint)[1:]]  # np.ndarray[shape, np.dtype[scalar]]
+    return hint is np.ndarray or any(
+        k and (k[0] is Any or np.dtype(k[0]) == array.dtype) for k in kinds
+    )
 
 
 def _damaged(where: str) -> SessionError:

@@ -15,6 +15,7 @@ from itertools import chain
 from pathlib import Path
 
 import cv2
+import numpy as np
 from PIL import Image
 
 from .arrays import RGB
@@ -29,7 +30,42 @@ WEBP_QUALITY = 85
 
 
 class VideoError(ValueError):
-    """The frames cannot become such a file; one sentence."""
+    """The frames cannot become such a file, or be read from one; one sentence."""
+
+
+def frame_rate(path: Path) -> tuple[float, int]:
+    """Frames a second, and how many there are, as the file says. Raises VideoError."""
+    video = _opened(path)
+    rate, count = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+    video.release()
+    if not rate > 0 or count < 1:
+        raise VideoError(f"{path.name} does not say how many frames it has")
+    return rate, count
+
+
+def read_frames(path: Path, numbers: tuple[int, ...]) -> list[RGB]:
+    """The frames (h, w, 3) of these numbers, from 0. Raises VideoError."""
+    video, found = _opened(path), []
+    try:
+        for number in numbers:
+            video.set(cv2.CAP_PROP_POS_FRAMES, number)
+            is_there, frame = video.read()
+            if not is_there:
+                raise VideoError(f"{path.name} has no frame {number}, or it is damaged")
+            found.append(np.asarray(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB), np.uint8))
+    finally:
+        video.release()
+    return found
+
+
+def _opened(path: Path) -> cv2.VideoCapture:
+    if not path.is_file():
+        raise VideoError(f"there is no video {path}")
+    with _silent_stderr():
+        video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not video.isOpened():
+        raise VideoError(f"{path.name} is no video that can be read here")
+    return video
 
 
 def encode_video(frames: Iterable[RGB], rate: float, ending: str) -> bytes:

@@ -62,7 +62,7 @@ def test_another_writer_goes_on_with_the_files_that_are_there(
 
 def test_a_write_that_is_cut_off_leaves_the_step_before(document: Document, tmp_path: Path) -> None:
     Journal(tmp_path).write(document, {})
-    (tmp_path / "x.tmp").write_bytes(b"half an array")
+    (tmp_path / "x.unfinished").write_bytes(b"half an array")
     (tmp_path / f"{'0' * 64}.npy").write_bytes(b"an array of a step that never came")
     assert_equal(read_journal(tmp_path), document)
 

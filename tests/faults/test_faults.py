@@ -1,0 +1,67 @@
+"""Whatever goes wrong while something is written, the old file or the new one is there, whole."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+QUICK = "session,autosave"
+LEAST_RUNS = 30  # of a scenario: else nothing was injected
+
+
+def run(*options: str) -> list[dict[str, Any]]:
+    """What `python -m tests.faults` found, a dict for each scenario."""
+    command = [sys.executable, "-m", "tests.faults", *options]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    if found and "missing" in found[0]:
+        pytest.skip(found[0]["missing"])
+    assert found, done.stderr
+    return found
+
+
+def assert_none_lost(found: list[dict[str, Any]], least: int) -> None:
+    for result in found:
+        assert result["wrong"] == [], result["name"]
+        assert sum(result["runs"].values()) >= least, result["name"]
+
+
+def test_errors_full_disks_and_kills_leave_the_old_file_or_the_new_one() -> None:
+    found = run("--quick", "--scenarios", QUICK)
+    assert len(found) == QUICK.count(",") + 1
+    assert_none_lost(found, LEAST_RUNS)
+
+
+def test_power_cuts_leave_the_old_step_or_the_new_one() -> None:
+    found = run("--power", "--scenarios", "session,autosave,settings")
+    assert len(found) == 3
+    assert_none_lost(found, 15)
+    assert any(result["ends"].get("new") for result in found)
+
+
+@pytest.mark.parametrize("option", ["--quick", "--power"])
+def test_a_writer_that_takes_no_care_is_found_out(option: str) -> None:
+    """A file that is opened and written over: what the product must not do."""
+    (found,) = run(option, "--scenarios", "careless")
+    assert found["wrong"]
+
+
+def test_a_journal_whose_names_are_not_brought_to_the_disk_is_found_out() -> None:
+    (found,) = run("--power", "--scenarios", "careless order")
+    assert found["wrong"]
+
+
+@pytest.mark.slow
+def test_every_fault_at_every_operation_of_all_that_is_written() -> None:
+    assert_none_lost(run(), 40)  # the token: 7 operations, one of them a write
+
+
+@pytest.mark.slow
+def test_power_cuts_of_all_that_is_written() -> None:
+    assert_none_lost(run("--power"), 10)
