@@ -45,8 +45,12 @@ def upright(block: bytes) -> bytes:
     try:
         walker = _Walker(block)
         field = walker.fields().get(ORIENTATION)
-        if field is not None and field[0] == SHORT:
-            struct.pack_into(walker.order + "H", patched, field[1], 1)
+        if field is not None and field[0] in (SHORT, LONG):
+            number = "H" if field[0] == SHORT else "I"
+            struct.pack_into(walker.order + number, patched, field[1], 1)
+    except (struct.error, ValueError):
+        return block
+    try:
         link = walker.next_link()
         thumbnail_ifd = walker.unpack("I", link)
         if thumbnail_ifd:
@@ -56,7 +60,7 @@ def upright(block: bytes) -> bytes:
                 patched[start : start + length] = bytes(length)
             struct.pack_into(walker.order + "I", patched, link, 0)
     except (struct.error, ValueError):
-        return block
+        pass  # it ends with its first directory
     return bytes(patched)
 
 

@@ -7,22 +7,23 @@ byte; only 16-bit pixels that go into JPEG or WebP, which have 8, are rounded.
 from __future__ import annotations
 
 import io
-import struct
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from PIL import Image, ImageCms, UnidentifiedImageError
+from PIL import Image, ImageCms
 
 from . import exif, png, tiff
 from .arrays import RGB, U8, Mask, Pixels, frozen
+from .limits import PICTURE_PIXELS as MAX_PIXELS
 
-MAX_PIXELS = 250_000_000  # a larger picture does not fit an ordinary machine's memory thrice
 FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "BMP", "GIF")  # plain pixels, no programs
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")  # that can be written
+READ_ENDINGS = (*ENDINGS, ".bmp")  # of what counts as a picture in a folder of pictures
 MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
 WEBP_MAX_SIDE = 16383  # px
 JPEG_MAX_SIDE = 65535  # px
+REASON = 200  # characters of what a decoder says
 LOSSLESS = 100  # quality of WebP that keeps every pixel
 
 Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, which fires before ours in some formats
@@ -58,10 +59,10 @@ def read_picture(data: bytes) -> Picture:
         raise ImageError("the image file is empty")
     try:
         image = Image.open(io.BytesIO(data), formats=FORMATS)
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError):
-        image = None  # perhaps a TIFF that only tifffile knows
     except Image.DecompressionBombError:
         raise ImageError(f"the image has more than {MAX_PIXELS // 10**6} megapixels") from None
+    except Exception:  # Pillow raises whatever a broken file makes it stumble over
+        image = None  # perhaps a TIFF that only tifffile knows
     if image is None and data[:4] not in tiff.MARKS:
         raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP)")
     if image is not None and image.width * image.height > MAX_PIXELS:
@@ -73,8 +74,15 @@ def read_picture(data: bytes) -> Picture:
         return _read_16_bit(data, image) or _read_8_bit(image)
     except ImageError:
         raise
-    except (OSError, ValueError, SyntaxError, EOFError, struct.error, MemoryError) as error:
-        raise ImageError(f"the image cannot be read: {error}") from error
+    except MemoryError as error:
+        raise ImageError("the image cannot be read: there is not enough memory for it") from error
+    except Image.DecompressionBombError as error:  # what lies in its blocks, not its size
+        raise ImageError("the image cannot be read: it would unpack to too much") from error
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())[:REASON] or "it is damaged"
+        raise ImageError(f"the image cannot be read: {reason}") from error
+    except Exception as error:  # as above
+        raise ImageError("the image cannot be read: it is damaged or ends early") from error
 
 
 def _read_16_bit(data: bytes, image: Image.Image | None) -> Picture | None:
@@ -192,8 +200,9 @@ def encode_picture(
         return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
     except ImageError:
         raise
-    except (OSError, ValueError, cv2.error) as error:
-        raise ImageError(f"the picture cannot be written as {ending}: {error}") from error
+    except (OSError, ValueError, MemoryError, cv2.error) as error:
+        reason = " ".join(str(error).split())[:REASON] or "there is not enough memory"
+        raise ImageError(f"the picture cannot be written as {ending}: {reason}") from error
 
 
 class _Channels:

@@ -6,13 +6,17 @@ import struct
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from itertools import accumulate
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-from PIL import Image, TiffImagePlugin
+from PIL import Image
 from PIL.TiffTags import LONG, SHORT, UNDEFINED
 
 from .pixels import Samples
+
+if TYPE_CHECKING:
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 MARKS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # classic and BigTIFF
 ASSOCIATED_ALPHA = 1
@@ -99,11 +103,7 @@ def encode(samples: Samples, icc: bytes | None, exif: bytes | None) -> bytes:
         strips = list(pool.map(lambda top: _deflated(samples[top : top + rows]), tops))
     lengths = [len(strip) for strip in strips]
     starts = tuple(accumulate(lengths[:-1], initial=0))  # Pillow adds the directory's own length
-    fields = TiffImagePlugin.ImageFileDirectory_v2(b"II*\0\0\0\0\0")
-    if exif:
-        source = Image.Exif()
-        source.load(exif)
-        _copy_described(source, fields)
+    fields = _described_by(exif)
     values: dict[int, tuple[int, object]] = {
         256: (LONG, width),
         257: (LONG, height),
@@ -139,12 +139,37 @@ def _deflated(strip: np.ndarray) -> bytes:
 
 def described(image: Image.Image) -> bytes | None:
     """EXIF block of what an opened TIFF file says of its picture; None where it says nothing."""
-    fields = TiffImagePlugin.ImageFileDirectory_v2(b"II*\0\0\0\0\0")
-    _copy_described(image.getexif(), fields)
-    return b"II*\0" + struct.pack("<I", 8) + fields.tobytes(8) if len(fields) else None
+    try:
+        fields = _directory()
+        _copy_described(image.getexif(), fields)
+        block = fields.tobytes(8)
+    except Exception:  # Pillow raises whatever a broken directory makes it stumble over
+        return None
+    return b"II*\0" + struct.pack("<I", 8) + block if len(fields) else None
 
 
-def _copy_described(source: Image.Exif, fields: TiffImagePlugin.ImageFileDirectory_v2) -> None:
+def _described_by(exif: bytes | None) -> ImageFileDirectory_v2:
+    """A directory with what an EXIF block says, which is nothing where it cannot be read."""
+    if exif:
+        try:
+            source, fields = Image.Exif(), _directory()
+            source.load(exif)
+            _copy_described(source, fields)
+            fields.tobytes(8)
+            return fields
+        except Exception:  # as above: a photo is not lost for a broken description
+            pass
+    return _directory()
+
+
+def _directory() -> ImageFileDirectory_v2:
+    """An empty one of a small-endian file."""
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2  # 10 ms that only TIFF files need
+
+    return ImageFileDirectory_v2(b"II*\0\0\0\0\0")
+
+
+def _copy_described(source: Image.Exif, fields: ImageFileDirectory_v2) -> None:
     """Copies what EXIF says of the picture into a TIFF directory."""
     for tag in KEPT_TAGS:
         if tag in (0x8769, 0x8825):

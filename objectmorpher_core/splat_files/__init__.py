@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..gaussians import Gaussians
+from ..limits import FILE_BYTES as MAX_BYTES
 from .axes import half_turned
 from .compressed_ply import decode_compressed, encode_compressed, is_compressed, read_compressed
-from .limits import MAX_BYTES, SplatFileError
+from .limits import SplatFileError
 from .ply import decode_ply, encode_ply, is_mere_points, read_ply
 from .ply_table import read_header
 from .point_cloud import read_points

@@ -10,15 +10,15 @@ import struct
 import warnings
 from typing import Any
 
+from ..limits import MESH_DEPTH as MAX_DEPTH
+from ..limits import MESH_JSON as MAX_JSON
+from ..limits import MESH_NODES as MAX_NODES
+from ..limits import MESH_TRIANGLES as MAX_TRIANGLES
+from ..limits import MESH_VERTICES as MAX_VERTICES
+from ..limits import TEXTURE_SIDE as MAX_SIDE
 from .limits import SplatFileError
 from .mesh_folder import MeshFolder
 
-MAX_JSON = 1 << 26  # bytes
-MAX_TRIANGLES = 5_000_000
-MAX_VERTICES = 15_000_000
-MAX_NODES = 100_000
-MAX_DEPTH = 128  # nodes below each other
-MAX_SIDE = 8192  # px of a texture
 ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # by componentType
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 TRIANGLES, STRIP = 4, 5  # modes

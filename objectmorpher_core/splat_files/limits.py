@@ -6,10 +6,8 @@ import numpy as np
 
 from ..arrays import F32
 from ..gaussians import Gaussians
+from ..limits import GAUSSIANS as MAX_GAUSSIANS
 
-MAX_GAUSSIANS = 20_000_000  # 1.1 GB as `Gaussians`; large city scans have some 10 million
-MAX_BYTES = 4 << 30  # of a file
-MAX_UNPACKED = 1 << 30  # of what a packed file unpacks to
 LEAST_SCALE = 1e-12  # trainers leave logarithms of -inf; its square is still a float32
 GREATEST = 1e9  # position or scale: beyond it products of squares leave float32
 

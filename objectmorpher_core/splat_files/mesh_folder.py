@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
 
+from ..limits import MESH_ASSET as MAX_ASSET
 from .limits import SplatFileError
-
-MAX_ASSET = 1 << 28  # bytes of a texture or buffer
 
 
 class MeshFolder:

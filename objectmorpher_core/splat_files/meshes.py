@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import F64, U8
 from ..gaussians import Gaussians
+from ..limits import MESH_BYTES as MAX_MESH
 from .axes import HALF_TURN, QUARTER_TURN, turned
 from .gltf_check import MAX_SIDE, MAX_TRIANGLES, check_gltf
 from .limits import GREATEST, SplatFileError
@@ -35,7 +36,6 @@ AXES = {
     ".stl": QUARTER_TURN,  # z up: what stands on a printer's bed
 }  # fmt: skip
 ENDINGS = tuple(AXES)
-MAX_MESH = 1 << 30  # bytes
 GREY = 0.6  # sRGB of a surface that nobody coloured
 
 
@@ -60,6 +60,8 @@ def load_surface(data: bytes, path: Path) -> Surface:
         _check_ply(data)
     if ending == ".stl":
         _check_stl(data)
+    if ending == ".obj" or (ending == ".stl" and not _is_binary_stl(data)):
+        _check_text(data)
     scene = _scene(data, ending, folder)
     if folder.refused:
         name = folder.refused[0]
@@ -114,10 +116,23 @@ def _check_ply(data: bytes) -> None:
 
 def _check_stl(data: bytes) -> None:
     """A binary file has as many triangles as it says: trimesh would take it for text."""
-    if not data.lstrip()[:5].lower() == b"solid" and len(data) != 84 + 50 * int.from_bytes(
-        data[80:84], "little"
-    ):
+    if not _is_binary_stl(data) and not data.lstrip()[:5].lower() == b"solid":
         raise SplatFileError("the .stl file is damaged or ends early")
+
+
+def _is_binary_stl(data: bytes) -> bool:
+    """By its length: the first word of binary files may be "solid", too."""
+    return len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+
+
+def _check_text(data: bytes) -> None:
+    """trimesh would guess an encoding, and what comes out depends on what else is installed."""
+    try:
+        is_text = "\0" not in data.decode("utf-8")
+    except UnicodeDecodeError:
+        is_text = False
+    if not is_text:
+        raise SplatFileError("the mesh file is damaged: it is no text in UTF-8")
 
 
 def _surface(scene: Any, is_gltf: bool) -> Surface:

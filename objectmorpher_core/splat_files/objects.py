@@ -60,6 +60,8 @@ def core_box(points: np.ndarray, weights: np.ndarray) -> tuple[F64, F64]:
 
 def centred(gaussians: Gaussians) -> Gaussians:
     """Moved and scaled to the object frame: centred, largest extent 1."""
+    if not len(gaussians):
+        raise SplatFileError("the file holds no Gaussians of an object")
     low, high = gaussians.means.min(0), gaussians.means.max(0)
     extent = float((high - low).max())
     if not extent > 0:

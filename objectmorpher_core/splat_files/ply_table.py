@@ -13,10 +13,10 @@ from typing import IO
 
 import numpy as np
 
+from ..limits import PLY_HEADER as MAX_HEADER
+from ..limits import PLY_LINE as MAX_LINE
 from .limits import SplatFileError
 
-MAX_HEADER = 1 << 16  # bytes; the longest real header (degree 3) has 2 KB
-MAX_LINE = 1 << 14  # bytes of a row written as text; 62 numbers need 1.5 KB
 BLOCK = 1 << 16  # rows at a time; a multiple of a compressed file's chunk
 TEXT_BLOCK = 1 << 12
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import U8
-from .limits import MAX_UNPACKED, SplatFileError, check_count
+from ..limits import SPLATS_UNPACKED as MAX_UNPACKED
+from .limits import SplatFileError, check_count
 
 MAGIC = b"NGSP"
 GZIP_MAGIC = b"\x1f\x8b"

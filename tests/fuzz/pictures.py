@@ -1,0 +1,146 @@
+"""Readers of pictures: photos, masks, EXIF blocks, and what is written of them again."""
+
+from __future__ import annotations
+
+import io
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageCms
+
+from objectmorpher_core import exif
+from objectmorpher_core.image import (
+    ENDINGS,
+    ImageError,
+    Picture,
+    encode_picture,
+    read_coverage,
+    read_picture,
+)
+from objectmorpher_core.pipeline import open_photo
+
+from .checks import Reader, check_picture, refusing
+from .damage import EXIF
+
+WIDTH, HEIGHT = 37, 23
+SMALL = 1 << 20  # pixels up to which a picture is written again
+
+
+def noise(*shape: int, deep: bool = False) -> np.ndarray:
+    """Pixels of noise."""
+    random = np.random.default_rng(len(shape))
+    return random.integers(0, 65536 if deep else 256, shape, np.uint16 if deep else np.uint8)
+
+
+def seeds() -> list[bytes]:
+    """Small pictures of all formats, depths and channels that are read."""
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    block = EXIF
+    found = []
+    for deep in (False, True):
+        pixels, alpha = noise(HEIGHT, WIDTH, 3, deep=deep), noise(HEIGHT, WIDTH, deep=deep)
+        picture = Picture(pixels, icc=profile, exif=block)
+        found += [encode_picture(picture, ending) for ending in ENDINGS]
+        found += [encode_picture(Picture(pixels, alpha), e) for e in (".png", ".tif", ".webp")]
+        grey = Picture(np.repeat(alpha[..., None], 3, 2), is_grey=True, exif=block)
+        found += [encode_picture(grey, ending) for ending in (".png", ".tif", ".jpg")]
+    photo = Image.fromarray(noise(HEIGHT, WIDTH, 3))
+    for mode, kind, options in (
+        ("CMYK", "JPEG", {}), ("RGB", "JPEG", {"progressive": True, "exif": b"Exif\0\0" + EXIF}),
+        ("P", "PNG", {"transparency": 3}), ("1", "PNG", {}), ("P", "GIF", {}), ("RGB", "BMP", {}),
+        ("LAB", "TIFF", {}), ("CMYK", "TIFF", {}), ("RGB", "TIFF", {"compression": "tiff_lzw"}),
+        ("RGB", "TIFF", {"compression": "jpeg"}), ("1", "TIFF", {"compression": "group4"}),
+        ("L", "TIFF", {"compression": "packbits"}), ("RGB", "WEBP", {"quality": 60}),
+        ("RGB", "AVIF", {}),
+    ):  # fmt: skip
+        out = io.BytesIO()
+        photo.convert(mode).save(out, kind, **options) if mode != "LAB" else (
+            _lab(photo).save(out, kind)
+        )
+        found.append(out.getvalue())
+    return found + _deep_tiffs()
+
+
+def _lab(photo: Image.Image) -> Image.Image:
+    srgb, lab = ImageCms.createProfile("sRGB"), ImageCms.createProfile("LAB")
+    turned = ImageCms.profileToProfile(photo, srgb, lab, outputMode="LAB")
+    assert turned is not None
+    return turned
+
+
+def _deep_tiffs() -> list[bytes]:
+    """As other programs write them: planes, tiles, big-endian, BigTIFF, associated alpha."""
+    import tifffile
+
+    deep, found = noise(HEIGHT, WIDTH, 4, deep=True), []
+    for pixels, options in (
+        (deep[..., :3], {"photometric": "rgb", "byteorder": ">"}),
+        (deep[..., :3], {"photometric": "rgb", "bigtiff": True, "compression": "zlib"}),
+        (np.moveaxis(deep[..., :3], 2, 0), {"photometric": "rgb", "planarconfig": "separate"}),
+        (deep, {"photometric": "rgb", "extrasamples": ["assocalpha"]}),
+        (deep[..., 0], {"photometric": "miniswhite"}),
+        (np.tile(deep[..., :3], (3, 2, 1)), {"photometric": "rgb", "tile": (32, 32)}),
+    ):
+        out = io.BytesIO()
+        tifffile.imwrite(out, pixels, **options)
+        found.append(out.getvalue())
+    return found
+
+
+def read(data: bytes, folder: Path) -> None:
+    """A photo is opened, and written again in each format."""
+    with refusing(ImageError):
+        document = open_photo(data, "photo.png")
+    picture = document.photo.picture
+    check_picture(picture)
+    assert document.photo.camera.focal > 0
+    if picture.pixels[..., 0].size > SMALL:
+        return
+    kept = None
+    for ending in ENDINGS:
+        try:
+            kept = encode_picture(picture, ending)
+        except ImageError:
+            continue
+        if ending in (".png", ".tif"):
+            back = read_picture(kept)
+            np.testing.assert_array_equal(back.pixels, picture.pixels)
+            assert (back.alpha is None) == (picture.alpha is None)
+    assert kept is not None, "no format takes it"
+
+
+def mask_seeds() -> list[bytes]:
+    return [encode_picture(Picture(noise(HEIGHT, WIDTH, 3)), ending) for ending in (".png", ".tif")]
+
+
+def read_mask(data: bytes, folder: Path) -> None:
+    """A mask of the photo's size."""
+    with refusing(ImageError):
+        found = read_coverage(data, (WIDTH, HEIGHT))
+    assert found.shape == (HEIGHT, WIDTH) and found.dtype == np.uint8
+
+
+def exif_seeds() -> list[bytes]:
+    block = EXIF
+    flipped = b"MM\0*" + block[4:]
+    return [block, flipped, b"II*\0" + bytes(60)]
+
+
+def read_exif(data: bytes, folder: Path) -> None:
+    """An EXIF block says something sensible, or nothing; it goes into every format."""
+    assert 1 <= exif.orientation(data) <= 8
+    focal = exif.focal_35mm(data)
+    assert focal is None or focal > 0
+    assert len(exif.upright(data)) == len(data)
+    picture = Picture(noise(4, 5, 3), exif=data or None, icc=data or None)
+    for ending in ENDINGS:
+        with suppress(ImageError):  # not every format takes every block
+            read_picture(encode_picture(picture, ending))
+
+
+READERS = [
+    Reader("photo", seeds, read, share=4),
+    Reader("mask", mask_seeds, read_mask, share=0.5),
+    Reader("exif", exif_seeds, read_exif),
+]
