@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass
-from importlib import import_module
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 
-from . import compose, lift, models, segment
+from . import backends, compose, lift, models, segment
+from .compose import refine
+from .evaluation.measures import trunk_files
+from .evaluation.metrics import METRICS
+from .lift import depth_look, worker_file
 from .models import device
+from .threads import core_count
 
-PACKAGES = ("numpy", "opencv-contrib-python-headless", "onnxruntime", "torch", "transformers")
+PACKAGES = (
+    "numpy",
+    "opencv-contrib-python-headless",
+    "onnxruntime",
+    "torch",
+    "transformers",
+    "diffusers",
+)
 
 
 @dataclass(frozen=True)
@@ -25,6 +35,13 @@ class Stage:
     why: str
     others: tuple[tuple[str, str], ...]  # backends that cannot run here, and why
     better: str = ""  # what would help; empty: nothing
+    also: tuple[tuple[str, str], ...] = ()  # what can be asked for by its name, and what it is
+    able: tuple[str, ...] = ()  # backends that can run here
+
+    @property
+    def auto(self) -> str:
+        """The backend that "auto" is where somebody asks; empty: there is none."""
+        return self.uses if self.uses in self.able else next(iter(self.able), "")
 
 
 @dataclass(frozen=True)
@@ -51,16 +68,25 @@ def look_at_machine() -> Machine:
     while not where.exists() and where != where.parent:
         where = where.parent
     system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return Machine(
-        system, cores or 1, device.free_memory("cpu"), shutil.disk_usage(where).free,
+        system, core_count(), device.free_memory("cpu"), shutil.disk_usage(where).free,
         _device(), tuple(found),
     )  # fmt: skip
 
 
 def look_at_stages() -> tuple[Stage, ...]:
     """Each stage, in the order of the work."""
-    return _selecting(), _lifting(), _filling(), _harmonising()
+    stages = (
+        (_selecting(), segment.BACKENDS), (_lifting(), lift.BACKENDS),
+        (_filling(), compose.BACKENDS), (_harmonising(), refine.BACKENDS),
+    )  # fmt: skip
+    able = (replace(stage, able=_able(stage, table)) for stage, table in stages)
+    return *able, _evaluating()
+
+
+def _able(stage: Stage, table: Iterable[str]) -> tuple[str, ...]:
+    absent = dict(stage.others)
+    return (*(name for name in table if name not in absent), *(name for name, _ in stage.also))
 
 
 def _device() -> str:
@@ -79,19 +105,8 @@ def _device() -> str:
     return name if free is None else f"{name}, {free / 2**30:.1f} GB free"
 
 
-def _absent(table: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    """Of a stage's backends those that cannot run here, each with its sentence."""
-    found = []
-    for name, where in table.items():
-        module, _, kind = where.partition(":")
-        reason = getattr(import_module(module), kind)().missing()
-        if reason is not None:
-            found.append((name, reason))
-    return tuple(found)
-
-
 def _selecting() -> Stage:
-    absent = _absent(segment.BACKENDS)
+    absent = backends.absent(segment.BACKENDS)
     chosen = segment.load("auto")
     uses, names = chosen.name, [name for name, _ in absent]
     if uses == "grabcut":
@@ -112,29 +127,83 @@ def _selecting() -> Stage:
 
 
 def _lifting() -> Stage:
-    absent = _absent(lift.BACKENDS)
+    absent = backends.absent(lift.BACKENDS)
     lifter = lift.load("auto")
     name = getattr(lifter, "name", next(n for n in lift.BACKENDS if n not in dict(absent)))
     if name != "relief":
         return Stage("lift", name, "it is here", absent)
     has_shape = models.path("dinov2-vits14") is not None and models.shipped.is_shipped()
-    has_depth = models.added("depth").state == "ok"
+    depth = depth_look.installed()
+    has_depth = depth is not None
     parts = ["the silhouette's body"]
     parts += ["our shape network"] if has_shape else []
-    parts += ["your depth network"] if has_depth else []
-    better = "" if has_depth else "a depth network: `objectmorpher models add depth FILE.onnx`"
+    if depth is not None:
+        parts += ["your depth network" if depth.is_onnx else "Depth Anything V2"]
+    named = "`objectmorpher models get depth-anything-v2-small`"
+    better = "" if has_depth else f"a depth network: {named}"
+    if better and not device.has_torch():
+        better += f" after `{models.EXTRA}`, or `objectmorpher models add depth FILE.onnx`"
     if not has_shape:
         better = "`objectmorpher models get dinov2-vits14`, for our shape network"
-    return Stage("lift", name, f"from {' and '.join(parts)}", absent, better)
+    workers = _workers()
+    absent += tuple((n, told) for n, told, is_there in workers if not is_there)
+    also = tuple((n, told) for n, told, is_there in workers if is_there)
+    return Stage("lift", name, f"from {' and '.join(parts)}", absent, better, also)
+
+
+def _workers() -> list[tuple[str, str, bool]]:
+    """The user's own lifters: name, what is told of it, whether it can run."""
+    found = []
+    for name in worker_file.worker_names():
+        try:
+            worker = worker_file.read_worker(name)
+        except lift.LiftError as error:
+            found.append((name, str(error), False))
+            continue
+        missing = worker.missing()
+        told = f"a worker of yours, licence {worker.licence or 'not told'}"
+        found.append((name, missing or told, missing is None))
+    return found
 
 
 def _filling() -> Stage:
-    absent = _absent(compose.BACKENDS)
+    absent = backends.absent(compose.BACKENDS)
     chosen = compose.load("auto").name
-    why = "the first of its stage that can run here"
-    return Stage("background", chosen, why, absent)
+    if chosen != "patchmatch":
+        better = ""
+        if chosen in ("lama", "migan") and device.has_torch() and device.devices()[0] != "cpu":
+            better = "`objectmorpher models get pixelhacker`, for this GPU"
+        return Stage(
+            "background", chosen, "the first of its stage that can run here", absent, better
+        )
+    why = "it copies from the photo, and needs no model"
+    if "pixelhacker" not in dict(absent):
+        why += "; pixelhacker would take minutes without a GPU"
+    better = "to invent what the photo does not show: `objectmorpher models get lama`, or migan"
+    return Stage("background", chosen, why, absent, better)
 
 
 def _harmonising() -> Stage:
-    others = ", ".join(name for name in compose.REFINERS if name != "none")
-    return Stage("refine", "none", f"what is asked for: {others}", ())
+    absent = backends.absent(refine.BACKENDS)
+    others = [name for name in compose.REFINERS if name != "none"]
+    others += [name for name in refine.BACKENDS if name not in dict(absent)]
+    better = (
+        "" if len(absent) < len(refine.BACKENDS) else "`objectmorpher models get flux2-klein-4b`"
+    )
+    if better and not device.has_torch():
+        better = f"`{models.EXTRA}`, then {better}"
+    return Stage("refine", "none", f"what is asked for: {', '.join(others)}", absent, better)
+
+
+def _evaluating() -> Stage:
+    """What `objectmorpher evaluate` can measure; the official networks are the user's to bring."""
+    reasons = {name: trunk_files.why_missing(name) for name in METRICS}
+    uses = ", ".join(name for name, reason in reasons.items() if reason is None)
+    absent = tuple(
+        (", ".join(name for name, of in reasons.items() if of == reason), reason)
+        for reason in dict.fromkeys(reasons.values())
+        if reason is not None
+    )
+    own = [id for id in trunk_files.OWN if models.path(id) is None]
+    better = f"`objectmorpher models get {own[0]}`" if own else ""
+    return Stage("evaluate", uses, "measures whose networks are here", absent, better)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
+from objectmorpher_core.installation import is_frozen
 from objectmorpher_core.models import HubModel, HubState
 
 from ..texts import t
@@ -21,7 +22,7 @@ FIRST = {
     "sam": "sam-vit-base",
     "sam-onnx": "mobile-sam",
 }  # what a family offers before one chooses
-TORCH = ("sam", "sam2", "sam3")  # families that need PyTorch
+NO_TORCH = ("sam-onnx", "lama", "migan")  # families that run without PyTorch
 
 
 class HubModels:
@@ -64,7 +65,11 @@ class HubModels:
 
     def why_not(self, model: HubModel) -> str | None:
         """Why it cannot be downloaded now."""
-        if model.family in TORCH and not has_torch():
+        if model.family not in NO_TORCH and not has_torch():
+            if is_frozen():
+                return t(
+                    "Nothing can be added to this copy; another: {command}", command=models.EXTRA
+                )
             return t("Needs PyTorch: {command}", command=models.EXTRA)
         if not self.accepts(model):
             return t("Accept its licence first")

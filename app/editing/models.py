@@ -16,6 +16,7 @@ from ..feedback import Action
 from ..jobs import JobError
 from ..texts import t
 from .hub_models import HubModels
+from .workers import Workers
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -49,6 +50,7 @@ class Models:
         self.states: tuple[State, ...] = ()  # empty until they were looked at
         self.added: tuple[Added, ...] = ()  # what users bring, likewise
         self.hub = HubModels(editor)  # those of several files
+        self.workers = Workers(editor)  # programs of the user's
         self.is_open = False  # the window shows the list
         self._loading = ""
 
@@ -148,6 +150,8 @@ class Models:
 
     def _take(self, found: Looked) -> None:
         self.states, self.added, self.hub.states = found
+        self.workers.look()
+        self._editor.methods.forget()
 
     def use_anew(self) -> None:
         """The worker chooses its segmenter again, and reads the photo with it."""
@@ -163,7 +167,8 @@ Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...]]
 
 def _looked() -> Looked:
     several = tuple(models.look_hub(model.id) for model in models.hub_models())
-    return models.verify(), tuple(models.added(kind.id) for kind in models.KINDS), several
+    single = tuple(state for state in models.verify() if state.weight.category == "edit")
+    return single, tuple(models.added(kind.id) for kind in models.KINDS), several
 
 
 def names_of(id: str) -> Names:

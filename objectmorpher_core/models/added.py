@@ -7,7 +7,6 @@ called and its hash.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -15,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from ..files import make_folder, place_file
+from ..limits import FILE_BYTES as BYTES
 from .fetch import UNFINISHED, folder, sha256_of
 from .registry import ModelError
 
-BYTES = 4 << 30  # largest file that is taken
 NOTE = ".json"  # ending of the note beside a file
 
 
@@ -70,16 +70,28 @@ def added(id: str) -> Added:
     at = folder() / own.file
     try:
         found = at.stat()
-        said = json.loads(at.with_suffix(NOTE).read_text(encoding="utf-8"))
-        name, sha256 = str(said["name"]), str(said["sha256"])
+        notes = _notes(at.with_suffix(NOTE))
     except FileNotFoundError:
         return Added(own, at, "damaged" if at.exists() else "missing")
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return Added(own, at, "damaged")
-    key = (str(at), found.st_size, found.st_mtime_ns, sha256)
-    if key not in _looked:
-        _looked[key] = sha256_of(at) == sha256
-    return Added(own, at, "ok" if _looked[key] else "damaged", name, found.st_size, sha256)
+    for name, sha256 in notes:
+        key = (str(at), found.st_size, found.st_mtime_ns, sha256)
+        try:
+            if key not in _looked:
+                _looked[key] = sha256_of(at) == sha256
+        except OSError:
+            return Added(own, at, "damaged", name, found.st_size, sha256)
+        if _looked[key]:
+            return Added(own, at, "ok", name, found.st_size, sha256)
+    return Added(own, at, "damaged", notes[0][0], found.st_size, notes[0][1])
+
+
+def _notes(at: Path) -> list[tuple[str, str]]:
+    """Name and hash of the file, and of the one that was there before it."""
+    said = json.loads(at.read_text(encoding="utf-8"))
+    both = [said, *([said["before"]] if "before" in said else [])]
+    return [(str(one["name"]), str(one["sha256"])) for one in both]
 
 
 def add(id: str, source: Path) -> Added:
@@ -88,17 +100,21 @@ def add(id: str, source: Path) -> Added:
     try:
         if source.stat().st_size > BYTES:
             raise ModelError(f"{source.name} is larger than {BYTES >> 30} GB")
-        where = folder()
-        where.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=where, prefix=UNFINISHED) as scratch:
+        where, before = folder(), added(id)
+        make_folder(where)
+        with tempfile.TemporaryDirectory(  # what it cannot clean up is removed later
+            dir=where, prefix=UNFINISHED, ignore_cleanup_errors=True
+        ) as scratch:
             (Path(scratch) / "copy").mkdir()
             copy, note = Path(scratch) / "copy" / source.name, Path(scratch) / "note"
             shutil.copyfile(source, copy)
             CHECKS[id](copy)  # not the source: its weights may lie in a second file beside it
-            said = {"name": source.name, "sha256": sha256_of(copy)}
+            said: dict[str, object] = {"name": source.name, "sha256": sha256_of(copy)}
+            if before.state == "ok":  # which is still there until the copy takes its place
+                said["before"] = {"name": before.name, "sha256": before.sha256}
             note.write_text(json.dumps(said), encoding="utf-8")
-            os.replace(copy, where / own.file)
-            os.replace(note, (where / own.file).with_suffix(NOTE))
+            place_file(note, (where / own.file).with_suffix(NOTE))
+            place_file(copy, where / own.file)
     except OSError as error:
         raise ModelError(f"{source.name} cannot be added: {error.strerror or error}") from error
     return added(id)

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ..arrays import F32, RGB
+from .onnx_session import open_session
 from .registry import ModelError
 
 SIDE = 518  # px, longer side of what the network sees: what Depth Anything was trained with
@@ -27,14 +28,8 @@ class DepthNet:
 
     def __init__(self, path: Path) -> None:
         """Raises ModelError: one sentence, where the file is no such network."""
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.log_severity_level = 3  # a foreign file's warnings are nobody's business
         try:
-            self._session: Any = onnxruntime.InferenceSession(
-                str(path), options, providers=["CPUExecutionProvider"]
-            )
+            self._session: Any = open_session(path, is_foreign=True)
         except Exception as error:  # onnxruntime has a type of its own for everything
             raise ModelError(
                 f"{path.name} is not an ONNX network, all in one file, that can be opened"
@@ -68,11 +63,7 @@ class DepthNet:
         Raises ModelError.
         """
         width, height = self.size_for(rgb.shape[1], rgb.shape[0])
-        shrinks = width < rgb.shape[1]
-        kind = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
-        small = cv2.resize(rgb, (width, height), interpolation=kind)
-        pixels = (small.astype(np.float32) / 255 - MEAN) / DEVIATION
-        pixels = np.ascontiguousarray(pixels.transpose(2, 0, 1)[None], np.float32)
+        pixels = prepared(rgb, (width, height))
         try:
             found = np.asarray(self._session.run(None, {self._name: pixels})[0])
         except Exception as error:
@@ -87,7 +78,20 @@ class DepthNet:
 
     def size_for(self, width: int, height: int) -> tuple[int, int]:
         """Width and height px in which the network sees a picture of these."""
-        scale = SIDE / max(width, height)
-        own = (max(PATCH, round(n * scale / PATCH) * PATCH) for n in (width, height))
-        own_width, own_height = own
+        own_width, own_height = size_in(width, height)
         return self._fixed[1] or own_width, self._fixed[0] or own_height
+
+
+def size_in(width: int, height: int) -> tuple[int, int]:
+    """Width and height px in which a network of any size sees a picture of these."""
+    scale = SIDE / max(width, height)
+    own_width, own_height = (max(PATCH, round(n * scale / PATCH) * PATCH) for n in (width, height))
+    return own_width, own_height
+
+
+def prepared(rgb: RGB, size: tuple[int, int]) -> F32:
+    """(1, 3, h', w') what a network gets of a picture (h, w, 3); `size`: width and height px."""
+    kind = cv2.INTER_AREA if size[0] < rgb.shape[1] else cv2.INTER_CUBIC
+    small = cv2.resize(rgb, size, interpolation=kind)
+    pixels = (small.astype(np.float32) / 255 - MEAN) / DEVIATION
+    return np.ascontiguousarray(pixels.transpose(2, 0, 1)[None], np.float32)

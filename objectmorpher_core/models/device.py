@@ -39,6 +39,7 @@ class Need:
     work: int  # bytes beside the weights, at half precision
     parts: bool = False  # whether it can be moved to the GPU a part at a time
     only_float32: bool = False  # whether half precision is known to harm it
+    half: Number | None = None  # the short number it was published in; None: the device's better
 
     def bytes(self, number: Number, share: float = 1.0) -> int:
         """Weights, `share` of them, and work in memory."""
@@ -55,12 +56,18 @@ class Plan:
     reason: str  # a part of a sentence, for people
 
     @property
+    def keeps(self) -> bool:
+        """Whether all parts stay in memory for the next time."""
+        return self.tier == "whole"
+
+    @property
     def told(self) -> str:
         """In words."""
         how = ", a part at a time" if self.tier == "offload" else ""
         return f"on {NAMES[self.device]} with {self.number}{how} ({self.reason})"
 
 
+P = TypeVar("P", bound=Plan)
 NAMES = {"cuda": "the GPU", "mps": "the GPU (MPS)", "cpu": "the CPU"}
 
 
@@ -108,7 +115,7 @@ def plans(need: Need) -> tuple[Plan, ...]:
     return tuple(p for device in devices() for p in _on(device, need, free_memory(device)))
 
 
-def run(tiers: tuple[Plan, ...], attempt: Callable[[Plan], T]) -> T:
+def run(tiers: tuple[P, ...], attempt: Callable[[P], T]) -> T:
     """What `attempt` makes of the first tier whose memory suffices. Raises ModelError."""
     for k, plan in enumerate(tiers):
         try:
@@ -116,7 +123,7 @@ def run(tiers: tuple[Plan, ...], attempt: Callable[[Plan], T]) -> T:
         except Exception as error:
             if not is_out_of_memory(error):
                 raise
-            _empty_cache(plan.device)
+            empty_cache(plan.device)
             if k + 1 == len(tiers):
                 raise ModelError(f"there is not enough memory {plan.told}") from error
             log.warning("Memory ran out %s; going on %s", plan.told, tiers[k + 1].told)
@@ -139,13 +146,12 @@ def _on(device: Device, need: Need, free: int | None) -> list[Plan]:
     room = f"{free / 2**30:.1f} GB free" if free is not None else "free memory unknown"
     if device == "cpu":
         return [Plan("cpu", "float32", "cpu", room)]
-    numbers: list[Number] = ["float32"] if need.only_float32 else [_half(device)]
+    number: Number = "float32" if need.only_float32 else need.half or _half(device)
     found = []
-    for number in numbers:
-        if free is None or need.bytes(number) <= SPARE * free:
-            found.append(Plan(device, number, "whole", room))
-        if need.parts and (free is None or need.bytes(number, RESIDENT) <= SPARE * free):
-            found.append(Plan(device, number, "offload", room))
+    if free is None or need.bytes(number) <= SPARE * free:
+        found.append(Plan(device, number, "whole", room))
+    if need.parts and (free is None or need.bytes(number, RESIDENT) <= SPARE * free):
+        found.append(Plan(device, number, "offload", room))
     return found
 
 
@@ -156,7 +162,8 @@ def _half(device: Device) -> Number:
     return "bfloat16" if device == "cuda" and torch.cuda.is_bf16_supported() else "float16"
 
 
-def _empty_cache(device: Device) -> None:
+def empty_cache(device: Device) -> None:
+    """Gives what torch holds for later back to the device."""
     import torch
 
     if device == "cuda":

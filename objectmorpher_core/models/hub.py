@@ -18,14 +18,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from .. import installation
+from ..files import sync_folder
 from ..progress import Progress, silent
+from ..shown import shown
 from . import hub_download, lock
 from .fetch import POLL, SLACK, check_online, folder, sha256_of
 from .lock import FileFacts, Locked
 from .registry import HubModel, ModelError, families, hub_model, hub_models
-from .weight_folder import check_folder
+from .tensors_only import convert
+from .weight_folder import (
+    PICKLED,
+    PIXELHACKER,
+    PLAIN,
+    check_file,
+    check_files,
+    check_folder,
+    pickled_pixelhacker,
+)
 
-EXTRA = "pip install 'objectmorpher[models]'"
+EXTRA = installation.extra("models")
 PARTIAL = ".partial-"
 
 
@@ -55,6 +67,12 @@ def place(id: str) -> Path | None:
     """The folder of model `id`, or None where it is not there whole."""
     state = look_hub(id)
     return state.path if state.state == "ok" else None
+
+
+def files(id: str) -> tuple[Path, ...]:
+    """Where the files of model `id` are; none where it is not there whole."""
+    known, at = lock.locked(id), place(id)
+    return tuple(at / name for name in known.files) if known and at else ()
 
 
 def installed(family: str) -> tuple[HubModel, ...]:
@@ -102,16 +120,59 @@ def get(id: str, progress: Progress = silent, accepted: str = "") -> Path:
 def use_folder(id: str, at: Path) -> HubState:
     """A folder of the user's is the model `id` from now on; for a family, the one of its size.
 
-    Nothing is copied. Raises ModelError: one sentence, and nothing has changed.
+    `at` may be the file itself where the model is one. Nothing is copied. Raises ModelError: one
+    sentence, and nothing has changed.
     """
     family, at = id if id in families() else hub_model(id).family, at.expanduser().absolute()
     try:
-        names = check_folder(family, at)
+        if at.is_file():
+            check_file(family, at)
+            at, names = at.parent, (at.name,)
+        else:
+            names = check_folder(family, at)
         id = _nearest(family, sum((at / n).stat().st_size for n in names)) if id == family else id
         facts = {name: FileFacts((at / name).stat().st_size, "") for name in names}
         lock.write(id, Locked(facts, folder=str(at)))
     except OSError as error:
         raise ModelError(f"{at.name} cannot be used: {error.strerror or error}") from error
+    return look_hub(id)
+
+
+def convert_folder(id: str, at: Path, progress: Progress = silent) -> HubState:
+    """Model `id` from a user's folder as it is published, pickles and all: only its numbers.
+
+    They are written into our models folder; nothing in the user's changes. Raises ModelError.
+    """
+    model, at = hub_model(id), at.expanduser().absolute()
+    if model.family != PIXELHACKER:
+        raise ModelError(f"{id} is not published as pickles: add it without converting")
+    wanted = pickled_pixelhacker(at)
+    partial, place = folder() / (PARTIAL + id), folder() / id
+    try:
+        needed = sum(source.stat().st_size for source in wanted.values()) + SLACK
+        folder().mkdir(parents=True, exist_ok=True)
+        if needed > (free := shutil.disk_usage(folder()).free):
+            raise ModelError(
+                f"{id} needs {needed >> 20} MB in {folder()}, {free >> 20} MB are free"
+            )
+        shutil.rmtree(partial, ignore_errors=True)
+        progress(0.0, f"taking the numbers out of {at.name}")
+        pickles = {s: partial / name for name, s in wanted.items() if s.suffix in PICKLED}
+        convert(pickles)
+        for name, source in wanted.items():
+            if source not in pickles:
+                (partial / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source, partial / name)
+        facts = {name: _facts(partial / name) for name in wanted}
+        if place.exists():
+            shutil.rmtree(place)
+        lock.write(id, Locked(facts))
+        os.replace(partial, place)
+    except OSError as error:
+        raise ModelError(f"{at.name} cannot be converted: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    progress(1.0, f"{id} is ready")
     return look_hub(id)
 
 
@@ -146,7 +207,7 @@ def _state(model: HubModel, is_hashed: bool) -> HubState:
     reason = _damage(at, known, is_hashed)
     if not reason and known.folder and is_hashed:
         try:
-            check_folder(model.family, at)
+            check_files(model.family, at)
         except ModelError as error:
             reason = str(error)
     state = "damaged" if reason else "ok"
@@ -164,6 +225,8 @@ def _damage(at: Path, known: Locked, is_hashed: bool) -> str:
                 return f"{name} has another hash than the one in {lock.NAME}"
         except OSError as error:
             return f"{name} cannot be read: {error.strerror or error}"
+        except ValueError:
+            return f"{shown(name)} is no file's name"
     return ""
 
 
@@ -180,15 +243,43 @@ def _download(model: HubModel, progress: Progress) -> None:
     known = {name: fact.sha256 for name, fact in pinned.files.items()} if pinned else {}
     request = {
         "repository": model.repository, "revision": revision, "files": list(model.files),
-        "sha256": known | dict(model.sha256), "target": str(partial), "slack": SLACK,
+        "sha256": known | dict(model.sha256), "target": str(partial),
+        "slack": SLACK + (model.size if has_pickles(model) else 0),  # each is written once more
     }  # fmt: skip
     answer, revision = _run(model, request, progress)
     facts = {name: FileFacts(fact["size"], fact["sha256"]) for name, fact in answer.items()}
+    facts = _as_tensors(model, partial, facts, progress)
     if at.exists():  # a damaged one
         shutil.rmtree(at)
     # The pin first: files that are in place are looked at by it.
     lock.write(model.id, Locked(facts, revision))
     os.replace(partial, at)
+    sync_folder(where)
+
+
+def _as_tensors(
+    model: HubModel, partial: Path, facts: Mapping[str, FileFacts], progress: Progress
+) -> dict[str, FileFacts]:
+    """The files' facts once its pickles, which are deleted, have become safetensors."""
+    pickles = [name for name in facts if name.endswith(PICKLED)]
+    if not pickles:
+        return dict(facts)
+    progress(0.99, f"taking the numbers out of {model.id}'s pickles")
+    new = {name: Path(name).with_suffix(PLAIN).as_posix() for name in pickles}
+    convert({partial / name: partial / new[name] for name in pickles})
+    for name in pickles:
+        (partial / name).unlink()
+    rest = {name: fact for name, fact in facts.items() if name not in new}
+    return rest | {name: _facts(partial / name) for name in new.values()}
+
+
+def _facts(at: Path) -> FileFacts:
+    return FileFacts(at.stat().st_size, sha256_of(at))
+
+
+def has_pickles(model: HubModel) -> bool:
+    """Whether it is published as pickles only."""
+    return any(name.endswith(PICKLED) for name in model.files)
 
 
 def _run(
@@ -250,7 +341,7 @@ def _sentence(model: HubModel, kind: str, detail: str) -> str:
         "entry": f"{model.repository} lacks {detail or 'a file'}",
         "offline": "the Hub's library is set to work offline",
         "disk": f"it needs {detail} in {folder()}",
-        "full": f"the disk of {folder()} is full",
+        "full": f"the disk of {folder()} is full, or takes no file that large",
         "checksum": f"{detail} is not the file that it should be: wrong checksum",
         "truncated": "a file ended before its end: try again",
         "network": "the Hub does not answer; is there a network?",

@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Any
 
 PART = ".part"
+# No room; a quota that is used up; a disk or a limit that takes no larger file.
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 BLOCK = 1 << 20  # bytes read at a time
 
 
@@ -97,6 +99,8 @@ def _fetch(place: Path, url: str, expected: dict[str, Any]) -> str:
         growing.unlink()
     with growing.open("ab") as file:
         http_get(url, file, resume_size=file.tell(), headers=build_hf_headers(), expected_size=size)
+        file.flush()
+        os.fsync(file.fileno())  # before it gets its name
     sha256, sha1 = hashlib.sha256(), hashlib.sha1(b"blob %d\0" % size)
     with growing.open("rb") as file:
         while block := file.read(BLOCK):
@@ -142,7 +146,7 @@ def _kind_of(error: Exception) -> tuple[str, str]:
     for known, name in names.items():
         if isinstance(error, known):
             return name, detail[-1] if detail else ""
-    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+    if isinstance(error, OSError) and error.errno in FULL:
         return "full", ""
     if "Consistency check failed" in str(error):
         return "truncated", ""

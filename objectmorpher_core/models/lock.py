@@ -8,15 +8,16 @@ and on every machine that the lock file is copied to.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ..files import make_folder, write_all
 from .fetch import folder
 from .registry import ModelError
 
 NAME = "models.lock"
+TOO_MUCH = (RecursionError, OverflowError)  # depth, and numbers beyond numbers
 
 
 @dataclass(frozen=True)
@@ -49,23 +50,22 @@ def write(id: str, entry: Locked | None) -> None:
         known[id] = entry
     told = {name: asdict(known[name]) for name in sorted(known)}
     where = folder()
-    where.mkdir(parents=True, exist_ok=True)
-    temporary = where / f"{NAME}.{os.getpid()}.tmp"
-    temporary.write_text(json.dumps({"version": 1, "models": told}, indent=1) + "\n", "utf-8")
-    os.replace(temporary, where / NAME)
+    make_folder(where)
+    text = json.dumps({"version": 1, "models": told}, indent=1) + "\n"
+    write_all({where / NAME: text.encode()})
 
 
 def _read() -> dict[str, Locked]:
     at = folder() / NAME
     try:
-        text = at.read_text(encoding="utf-8")
+        data = at.read_bytes()
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise ModelError(f"{at} cannot be read: {error.strerror or error}") from error
     try:
-        return {str(id): _entry(told) for id, told in json.loads(text)["models"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        return {str(id): _entry(told) for id, told in json.loads(data)["models"].items()}
+    except (ValueError, KeyError, TypeError, AttributeError, *TOO_MUCH) as error:
         raise ModelError(f"{at} is damaged: remove it, and get its models again") from error
 
 

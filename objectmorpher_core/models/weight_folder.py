@@ -9,21 +9,48 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from ..limits import WEIGHTS_HEADER as MOST_HEADER
+from ..shown import named, shown
 from .registry import ModelError
 
 CONFIG = "config.json"
+PIPELINE = "pipeline.json"
 PLAIN = ".safetensors"
 GRAPH = ".onnx"
 PICKLED = (".bin", ".pt", ".pth", ".ckpt", ".pkl", ".pickle")
-MOST_HEADER = 100 << 20  # bytes; the format's own limit
 ONNX = "-onnx"  # ending of the families that are ONNX files
+ONE_GRAPH = ("lama", "migan")  # families that are one ONNX file
+PIXELHACKER = "pixelhacker"  # a network, perhaps in a folder of its own, and an autoencoder
+CODEC = "vae"  # its folder
+NETWORK = "diffusion_pytorch_model"  # what diffusers calls its files
+INDEX = "model_index.json"
+ADAPTER = ("-lora", "-lightning")  # endings of the families that are one file beside a model
+# Networks of a pipeline that must be there; diffusers' names.
+DIFFUSERS = {
+    "qwen-image-edit": ("QwenImageEditPlusPipeline", ("transformer", "vae", "text_encoder")),
+    "flux2-klein": ("Flux2KleinPipeline", ("transformer", "vae")),
+}
 
 
 def check_folder(family: str, at: Path) -> tuple[str, ...]:
     """Names of the files that are a model of `family`. Raises ModelError: one sentence."""
     if not at.is_dir():
         raise ModelError(f"{at} is not a folder")
+    if family in DIFFUSERS:
+        return _check_diffusers(family, at)
+    if family in PIPELINES:
+        return _check_pipeline(family, at)
     names = sorted(path.name for path in at.iterdir() if path.is_file())
+    if family == PIXELHACKER:
+        return _pixelhacker(at, names)
+    if family in ONE_GRAPH:
+        graphs = tuple(name for name in names if name.endswith(GRAPH))
+        if len(graphs) != 1:
+            _refuse_pickled(at, names, bool(graphs))
+            raise ModelError(f"{at.name} holds {len(graphs)} {GRAPH} files: give the file itself")
+        return graphs
+    if family.endswith(ADAPTER):
+        return _check_adapter(at, names)
     if family.endswith(ONNX):
         graphs = tuple(name for name in names if name.endswith(GRAPH))
         sides = [[n for n in graphs if side in n.lower()] for side in ("encoder", "decoder")]
@@ -43,6 +70,97 @@ def check_folder(family: str, at: Path) -> tuple[str, ...]:
     return (CONFIG, *weights)
 
 
+def check_file(family: str, at: Path) -> None:
+    """Raises ModelError where one file cannot be a model of `family`."""
+    if family not in ONE_GRAPH:
+        raise ModelError(f"{family} is a folder of files, and {at.name} is a file")
+    if at.suffix != GRAPH:
+        raise ModelError(f"{at.name} is no {GRAPH} file")
+
+
+def check_files(family: str, at: Path) -> None:
+    """As `check_folder`, of a folder that was added; beside one graph others may lie."""
+    if family not in ONE_GRAPH:
+        check_folder(family, at)
+
+
+def pickled_pixelhacker(at: Path) -> dict[str, Path]:
+    """Of a folder as PixelHacker is published: names in a folder of ours, and files to take.
+
+    The fine-tuning that is used is Places2's, of scenes, if it is there. Raises ModelError.
+    """
+    folders = [at / name for name in ("ft_places2", ".", "pretrained")]
+    own = [f for f in folders if _of_name(f, (PICKLED[0], PLAIN))]
+    codec = _of_name(at / CODEC, (PLAIN, PICKLED[0]))
+    if not own or not codec or not (at / CODEC / CONFIG).is_file():
+        raise ModelError(f"{at.name} lacks {NETWORK}{PICKLED[0]}, or {CODEC} with its {CONFIG}")
+    found = {NETWORK + PLAIN: own[0] / _of_name(own[0], (PLAIN, PICKLED[0]))[0]}
+    found[f"{CODEC}/{NETWORK}{PLAIN}"] = at / CODEC / codec[0]
+    found[f"{CODEC}/{CONFIG}"] = at / CODEC / CONFIG
+    if (own[0] / CONFIG).is_file():
+        found[CONFIG] = own[0] / CONFIG
+    return found
+
+
+def _of_name(at: Path, endings: tuple[str, ...]) -> list[str]:
+    return [NETWORK + end for end in endings if (at / (NETWORK + end)).is_file()]
+
+
+def _pixelhacker(at: Path, names: list[str]) -> tuple[str, ...]:
+    """See `check_folder`."""
+    found = [f"{CODEC}/{NETWORK}{PLAIN}", f"{CODEC}/{CONFIG}"]
+    own = [n for n in names if n.endswith(PLAIN)]
+    below = sorted(p for p in at.glob(f"*/*{PLAIN}") if p.parent.name != CODEC)
+    own += [p.relative_to(at).as_posix() for p in below]
+    if not own and (any(at.glob(f"*{PICKLED[0]}")) or any(at.glob(f"*/*{PICKLED[0]}"))):
+        raise ModelError(
+            f"{at.name} holds only pickled weights, which can run any code: to take nothing but"
+            f" their numbers, objectmorpher models add {PIXELHACKER} FOLDER --convert"
+        )
+    if len(own) != 1:
+        raise ModelError(f"{at.name} holds {len(own)} {PLAIN} files beside {CODEC}, not one")
+    for name in found:
+        if not (at / name).is_file():
+            raise ModelError(f"{at.name} lacks {name}")
+    config = Path(own[0]).with_name(CONFIG).as_posix()
+    for name in (own[0], found[0]):
+        check_safetensors(at / name)
+    return (own[0], *found, *([config] if (at / config).is_file() else []))
+
+
+def _check_diffusers(family: str, at: Path) -> tuple[str, ...]:
+    """The files of a pipeline, each network of which is a folder."""
+    kind, networks = DIFFUSERS[family]
+    try:
+        said = json.loads((at / INDEX).read_text(encoding="utf-8"))["_class_name"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ModelError(f"{at.name} holds no {INDEX} that says which pipeline it is") from error
+    if said != kind:
+        raise ModelError(f"{at.name} holds a {named(str(said))}, not a {kind}")
+    for network in networks:
+        inside = sorted(p.name for p in (at / network).glob("*") if p.is_file())
+        weights = [name for name in inside if name.endswith(PLAIN)]
+        _refuse_pickled(at / network, inside, bool(weights))
+        if not weights:
+            raise ModelError(f"{at.name}/{network} holds no {PLAIN} file")
+        for name in weights:
+            check_safetensors(at / network / name)
+    files = [p for p in sorted(at.rglob("*")) if p.is_file() and not p.name.endswith(PICKLED)]
+    return tuple(p.relative_to(at).as_posix() for p in files)
+
+
+def _check_adapter(at: Path, names: list[str]) -> tuple[str, ...]:
+    """The one file of an adapter."""
+    weights = [name for name in names if name.endswith(PLAIN)]
+    _refuse_pickled(at, names, bool(weights))
+    if len(weights) != 1:
+        raise ModelError(
+            f"{at.name} needs one {PLAIN} file with the adapter, it has {len(weights)}"
+        )
+    check_safetensors(at / weights[0])
+    return (weights[0],)
+
+
 def _refuse_pickled(at: Path, names: list[str], is_otherwise_there: bool) -> None:
     pickled = [name for name in names if name.endswith(PICKLED)]
     if pickled and not is_otherwise_there:
@@ -56,10 +174,10 @@ def check_kind(family: str, at: Path) -> None:
     """Raises ModelError where config.json is of another kind of model."""
     try:
         said = json.loads((at / CONFIG).read_text(encoding="utf-8"))["model_type"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise ModelError(f"{at.name}/{CONFIG} does not say which model it is") from error
     if said not in KINDS.get(family, (said,)):
-        raise ModelError(f"{at.name} holds a model of the kind {said!r}, not {family}")
+        raise ModelError(f"{at.name} holds a model of the kind {shown(said)}, not {family}")
 
 
 # What transformers calls them; the video models hold the same networks for still pictures.
@@ -67,7 +185,52 @@ KINDS = {
     "sam": ("sam",),
     "sam2": ("sam2", "sam2_video"),
     "sam3": ("sam3", "sam3_video", "sam3_tracker", "sam3_tracker_video"),
+    "dinov2-with-registers": ("dinov2_with_registers",),
+    "depth-anything": ("depth_anything",),
 }
+_OF_TRELLIS = (
+    "sparse_structure_flow_model", "sparse_structure_decoder", "slat_flow_model", "slat_decoder_gs",
+)  # fmt: skip
+PIPELINES = {  # parts without which they cannot run, of families that come with a pipeline.json
+    "trellis": _OF_TRELLIS,
+    "cupid": (*_OF_TRELLIS, "sparse_structure_uv_decoder"),
+}
+
+
+def _check_pipeline(family: str, at: Path) -> tuple[str, ...]:
+    """As `check_folder`: `pipeline.json` names parts, each a .json and a .safetensors file.
+
+    Parts that are not needed may be absent; a path that starts with owner/name is another model's.
+    """
+    try:
+        text = (at / PIPELINE).read_text(encoding="utf-8")
+        parts = {str(k): str(v) for k, v in json.loads(text)["args"]["models"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ModelError(f"{at.name}/{PIPELINE} does not say which parts it has") from error
+    if absent := [role for role in PIPELINES[family] if role not in parts]:
+        raise ModelError(f"{at.name}/{PIPELINE} is not {family}'s: it names no {absent[0]}")
+    found = [PIPELINE]
+    for role, where in parts.items():
+        if Path(where).is_absolute() or ".." in Path(where).parts:
+            raise ModelError(f"{at.name}/{PIPELINE} points out of its folder: {shown(where)}")
+        files = f"{where}.json", f"{where}{PLAIN}"
+        absent = [name for name in files if not _is_file(at / name)]
+        if not absent:
+            check_safetensors(at / files[1])
+            found += files
+        elif role in PIPELINES[family] and where.count("/") < 2:
+            beside = [f"{where}{end}" for end in PICKLED if _is_file(at / f"{where}{end}")]
+            _refuse_pickled(at, beside, False)
+            raise ModelError(f"{at.name} lacks {named(absent[0])}")
+    return tuple(found)
+
+
+def _is_file(at: Path) -> bool:
+    """Names out of a file may be such that no file system takes them."""
+    try:
+        return at.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def check_safetensors(at: Path) -> None:
@@ -83,7 +246,7 @@ def check_safetensors(at: Path) -> None:
         needed = 8 + length + max(ends, default=0)
     except OSError as error:
         raise ModelError(f"{at.name} cannot be read: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ModelError(f"{at.name} is not a {PLAIN} file, or only its beginning") from error
     if needed != size:
         raise ModelError(f"{at.name} is cut off: {size} of {needed} bytes are there")

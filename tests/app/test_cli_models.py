@@ -12,30 +12,23 @@ import pytest
 
 from app import cli
 from objectmorpher_core import models
-from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, serving
+from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
 
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
-    monkeypatch.setenv(models.OFFLINE, "")
-    for name in ("HF_TOKEN", "HF_HUB_OFFLINE"):
-        monkeypatch.delenv(name, raising=False)
+    folder = own_cache(tmp_path, monkeypatch)
+    monkeypatch.setenv(models.OFFLINE, "")  # what `--offline` sets is undone
     monkeypatch.setattr(sys, "stdin", io.StringIO())
-    return tmp_path / "cache" / "models"
+    return folder
 
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
-    pytest.importorskip("huggingface_hub")
-    with serving() as found:
-        monkeypatch.setenv("HF_ENDPOINT", found.url)
-        found.repositories = {FREE.repository: TINY_SAM2, GATED.repository: TINY_SAM2}
-        found.gated.add(GATED.repository)
-        yield found
+    with offering(monkeypatch, TINY_SAM2, FREE, GATED) as hub:
+        yield hub
 
 
 class Terminal(io.StringIO):
@@ -125,5 +118,10 @@ def test_the_doctor_tells_what_each_stage_uses_and_what_would_help(capsys) -> No
     assert "not dino: " in out and "better with: `objectmorpher models get`" in out
     assert cli.main(["doctor", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert [stage["name"] for stage in told["stages"]] == ["select", "lift", "background", "refine"]
+    names = ["select", "lift", "background", "refine", "evaluate"]
+    assert [stage["name"] for stage in told["stages"]] == names
+    assert told["stages"][-1]["uses"] == "psnr, ssim"
+    others = dict(told["stages"][-1]["others"])
+    assert "models get hed-vgg" in others["hed-vgg-perceptual"]
+    assert "models add fid-inception FILE" in others["fid, kid, kid-paired"]
     assert told["machine"]["cores"] >= 1

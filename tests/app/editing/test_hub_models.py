@@ -11,30 +11,22 @@ from conftest import wait_until
 
 from app.editing import hub_models
 from app.editor import Editor
-from app.gui.hub_rows import GAINS, NAMES, SIZES
+from app.gui.hub_rows import GAINS, NAMES, SIZES, STAGES
 from objectmorpher_core import models
-from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, serving
+from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
 
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
-    for name in ("HF_TOKEN", "HF_HUB_OFFLINE", models.OFFLINE):
-        monkeypatch.delenv(name, raising=False)
-    return tmp_path / "cache" / "models"
+    return own_cache(tmp_path, monkeypatch)
 
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
-    pytest.importorskip("huggingface_hub")
-    with serving() as found:
-        monkeypatch.setenv("HF_ENDPOINT", found.url)
-        found.repositories = {FREE.repository: TINY_SAM2, GATED.repository: TINY_SAM2}
-        found.gated.add(GATED.repository)
-        yield found
+    with offering(monkeypatch, TINY_SAM2, FREE, GATED) as hub:
+        yield hub
 
 
 @pytest.fixture
@@ -50,10 +42,11 @@ def settle(editor: Editor) -> None:
 
 
 def test_every_family_and_size_has_a_name_for_people() -> None:
-    assert set(NAMES) == set(GAINS)
-    shown = [model for model in models.hub_models() if model.stage == "segment"]
-    assert {model.family for model in shown} == set(NAMES)
-    assert {model.id for model in shown} <= set(SIZES) | {"sam3"}
+    assert set(NAMES) == set(GAINS) == set(models.families())
+    for family in NAMES:
+        sizes = [model for model in models.hub_models() if model.family == family]
+        assert len(sizes) == 1 or {model.id for model in sizes} <= set(SIZES)
+        assert {model.stage for model in sizes} <= set(STAGES)
 
 
 def test_a_family_offers_its_small_size_until_one_is_chosen(choosing: Editor) -> None:

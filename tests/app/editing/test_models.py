@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from conftest import wait_until
 
+from app.editing.models import NAMES
 from app.editor import Editor
 from app.settings import Settings
 from objectmorpher_core import models
@@ -22,13 +24,29 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "models"
 
 
+@pytest.fixture(scope="module")
+def own_editor(compiled: None, data_folder: None) -> Iterator[Editor]:
+    """One of this file: a worker that starts here would keep this empty cache for all others."""
+    editor = Editor(Settings())
+    yield editor
+    editor.shut_down()
+
+
 @pytest.fixture
-def choosing(editor: Editor) -> Editor:
+def choosing(own_editor: Editor) -> Editor:
     """An editor that knows what is there: nothing."""
-    editor.settings = Settings()
-    editor.models.look()
-    wait_until(editor, lambda: editor.chores.is_idle)
-    return editor
+    own_editor.settings = Settings()
+    own_editor.message = None
+    own_editor.models.look()
+    wait_until(own_editor, lambda: own_editor.chores.is_idle)
+    return own_editor
+
+
+def test_every_model_that_editing_uses_is_listed_and_has_a_name_for_people(
+    choosing: Editor,
+) -> None:
+    assert set(NAMES) == {weight.id for weight in models.weights() if weight.category == "edit"}
+    assert {state.weight.id for state in choosing.models.states} == set(NAMES)
 
 
 def test_the_best_missing_model_is_offered_until_declined(choosing: Editor) -> None:
@@ -67,9 +85,3 @@ def test_a_cancelled_download_leaves_nothing(choosing: Editor, cache: Path) -> N
     assert choosing.models.downloading is None
     wait_until(choosing, lambda: choosing.chores.is_idle)
     wait_until(choosing, lambda: not cache.exists() or list(cache.iterdir()) == [])
-
-
-def test_every_model_has_a_name_for_people() -> None:
-    from app.editing.models import NAMES
-
-    assert set(NAMES) == {weight.id for weight in models.weights()}

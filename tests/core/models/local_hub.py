@@ -6,10 +6,16 @@ import hashlib
 import json
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from objectmorpher_core import models
+from objectmorpher_core.models import HubModel
 
 COMMIT = "a" * 40
 
@@ -24,7 +30,8 @@ class Hub:
     wrong: set[str] = field(default_factory=set)  # files whose content is not what was announced
     short: set[str] = field(default_factory=set)  # files that end early
     sizes: dict[str, int] = field(default_factory=dict)  # announced instead of the true ones
-    stall: threading.Event | None = None  # GETs give half a file, and wait for it
+    stall: threading.Event | None = None  # GETs give a part of a file, and wait for it
+    stall_at: int = 0  # bytes of that part; 0: half
     ranges: list[tuple[str, int]] = field(default_factory=list)  # of GETs: file, first byte
     url: str = ""
 
@@ -102,7 +109,7 @@ def _handler(hub: Hub) -> type[BaseHTTPRequestHandler]:
             if is_head:
                 return
             if hub.stall is not None and len(data) > 1 << 16:
-                self.wfile.write(data[: len(data) // 2])
+                self.wfile.write(data[: hub.stall_at or len(data) // 2])
                 self.wfile.flush()
                 hub.stall.wait(20)
                 self.close_connection = True
@@ -135,3 +142,25 @@ def serving() -> Iterator[Hub]:
     server.shutdown()
     server.server_close()
     thread.join()
+
+
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """No model, token or wish of the user's is seen; the folder where models will be."""
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
+    for name in ("HF_TOKEN", "HF_HUB_OFFLINE", models.OFFLINE):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path / "cache" / "models"
+
+
+@contextmanager
+def offering(
+    monkeypatch: pytest.MonkeyPatch, files: Mapping[str, bytes], free: HubModel, *gated: HubModel
+) -> Iterator[Hub]:
+    """The server, with these files of each model; huggingface_hub asks it, or the test skips."""
+    pytest.importorskip("huggingface_hub")
+    with serving() as hub:
+        monkeypatch.setenv("HF_ENDPOINT", hub.url)
+        hub.repositories = {model.repository: dict(files) for model in (free, *gated)}
+        hub.gated |= {model.repository for model in gated}
+        yield hub

@@ -4,61 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.models.onnx_graph import _as_varint, _bytes_field
+from objectmorpher_core.models.onnx_graph import as_varint, bytes_field
 
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type, and TensorProto.data_type in field 2
 
 
 def value(name: str, *sizes: int | str) -> bytes:
     """ValueInfoProto of a float tensor; a size that is a word is any."""
-    dims = b"".join(_bytes_field(1, _dim(size)) for size in sizes)
-    return _bytes_field(1, name.encode()) + _bytes_field(
-        2, _bytes_field(1, FLOAT + _bytes_field(2, dims))
+    dims = b"".join(bytes_field(1, _dim(size)) for size in sizes)
+    return bytes_field(1, name.encode()) + bytes_field(
+        2, bytes_field(1, FLOAT + bytes_field(2, dims))
     )
 
 
 def _dim(size: int | str) -> bytes:
-    return b"\x08" + _as_varint(size) if isinstance(size, int) else _bytes_field(2, size.encode())
+    return b"\x08" + as_varint(size) if isinstance(size, int) else bytes_field(2, size.encode())
 
 
 def node(kind: str, sources: list[str], target: str, attributes: bytes = b"") -> bytes:
-    names = b"".join(_bytes_field(1, s.encode()) for s in sources) + _bytes_field(
-        2, target.encode()
-    )
-    return names + _bytes_field(4, kind.encode()) + attributes
+    names = b"".join(bytes_field(1, s.encode()) for s in sources) + bytes_field(2, target.encode())
+    return names + bytes_field(4, kind.encode()) + attributes
 
 
 def floats(name: str, array: np.ndarray, outside: str = "") -> bytes:
     """TensorProto of float32; its numbers are in the file `outside`, if there is one."""
-    dims = b"".join(b"\x08" + _as_varint(n) for n in array.shape)
+    dims = b"".join(b"\x08" + as_varint(n) for n in array.shape)
     if outside:
-        place = _bytes_field(1, b"location") + _bytes_field(2, outside.encode())
-        told = _bytes_field(8, name.encode()) + _bytes_field(13, place) + b"\x70\x01"
+        place = bytes_field(1, b"location") + bytes_field(2, outside.encode())
+        told = bytes_field(8, name.encode()) + bytes_field(13, place) + b"\x70\x01"
         return dims + b"\x10\x01" + told
     raw = np.ascontiguousarray(array, "<f4").tobytes()
-    return dims + b"\x10\x01" + _bytes_field(8, name.encode()) + _bytes_field(9, raw)
+    return dims + b"\x10\x01" + bytes_field(8, name.encode()) + bytes_field(9, raw)
 
 
 def integer(name: str, number: int) -> bytes:
     """AttributeProto of an int."""
-    return _bytes_field(
-        5, _bytes_field(1, name.encode()) + b"\x18" + _as_varint(number) + b"\xa0\x01\x02"
+    return bytes_field(
+        5, bytes_field(1, name.encode()) + b"\x18" + as_varint(number) + b"\xa0\x01\x02"
     )
 
 
 def integers(name: str, numbers: list[int]) -> bytes:
     """AttributeProto of ints."""
-    each = b"".join(b"\x40" + _as_varint(n) for n in numbers)
-    return _bytes_field(5, _bytes_field(1, name.encode()) + each + b"\xa0\x01\x07")
+    each = b"".join(b"\x40" + as_varint(n) for n in numbers)
+    return bytes_field(5, bytes_field(1, name.encode()) + each + b"\xa0\x01\x07")
 
 
 def model(nodes: list[bytes], tensors: list[bytes], ends: tuple[list[bytes], list[bytes]]) -> bytes:
     """ModelProto of nodes, constants, and inputs and outputs; IR 7, opset 12."""
-    graph = b"".join(_bytes_field(1, n) for n in nodes) + _bytes_field(2, b"small")
-    graph += b"".join(_bytes_field(5, t) for t in tensors)
-    graph += b"".join(_bytes_field(11, v) for v in ends[0])
-    graph += b"".join(_bytes_field(12, v) for v in ends[1])
-    return b"\x08\x07" + _bytes_field(7, graph) + _bytes_field(8, b"\x10\x0c")
+    graph = b"".join(bytes_field(1, n) for n in nodes) + bytes_field(2, b"small")
+    graph += b"".join(bytes_field(5, t) for t in tensors)
+    graph += b"".join(bytes_field(11, v) for v in ends[0])
+    graph += b"".join(bytes_field(12, v) for v in ends[1])
+    return b"\x08\x07" + bytes_field(7, graph) + bytes_field(8, b"\x10\x0c")
 
 
 def brightness() -> bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -16,9 +15,10 @@ import pytest
 
 from objectmorpher_core import models
 from objectmorpher_core.models import hub, lock, registry
+from objectmorpher_core.models.hub_download import PART
 from objectmorpher_core.models.weight_folder import check_folder, check_safetensors
 from objectmorpher_core.progress import Cancelled
-from tests.core.models.local_hub import COMMIT, TOKEN, Hub, serving
+from tests.core.models.local_hub import COMMIT, TOKEN, Hub, offering, own_cache
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
 CONFIG = json.dumps({"model_type": "sam2"}).encode()
@@ -33,28 +33,18 @@ def safetensors(numbers: np.ndarray) -> bytes:
 
 
 WEIGHTS = safetensors(NUMBERS)
+FILES = {"config.json": CONFIG, "model.safetensors": WEIGHTS, "other.bin": b"no"}
 
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
-    for name in ("HF_TOKEN", "HF_HUB_OFFLINE", models.OFFLINE):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))  # no token of the user's
-    return tmp_path / "cache" / "models"
+    return own_cache(tmp_path, monkeypatch)
 
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
-    if importlib.util.find_spec("huggingface_hub") is None:
-        pytest.skip("huggingface_hub is not installed")
-    with serving() as found:
-        monkeypatch.setenv("HF_ENDPOINT", found.url)
-        for model in (FREE, GATED):
-            files = {"config.json": CONFIG, "model.safetensors": WEIGHTS, "other.bin": b"no"}
-            found.repositories[model.repository] = files
-        found.gated.add(GATED.repository)
-        yield found
+    with offering(monkeypatch, FILES, FREE, GATED) as hub:
+        yield hub
 
 
 def left_in(cache: Path) -> list[str]:
@@ -104,22 +94,24 @@ def test_another_file_under_the_same_commit_is_refused(server: Hub) -> None:
 
 
 def test_a_cancelled_download_is_gone_on_with(server: Hub, cache: Path) -> None:
-    large = safetensors(np.resize(NUMBERS, 24 << 20))  # the library writes 10 MB at a time
+    """From the very byte at which it was cancelled: the server gives no more until then."""
+    at = 20 << 20  # bytes: the library writes 10 MiB at a time
+    large = safetensors(np.resize(NUMBERS, at + (4 << 20)))
     server.repositories[FREE.repository]["model.safetensors"] = large
-    server.stall = threading.Event()
+    server.stall, server.stall_at = threading.Event(), at
 
-    def cancel_half_way(fraction: float, note: str) -> None:
-        if fraction > 0.3:
+    def cancel_there(fraction: float, note: str) -> None:
+        if sum(path.stat().st_size for path in cache.rglob(f"model.safetensors{PART}")) == at:
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        models.get(FREE.id, cancel_half_way)
+        models.get(FREE.id, cancel_there)
     assert left_in(cache) == []
     server.stall.set()
     server.stall = None
     models.get(FREE.id)
     starts = [start for name, start in server.ranges if name == "model.safetensors"]
-    assert starts[0] == 0 and starts[-1] >= 10 << 20
+    assert starts == [0, at]
     assert models.verify_hub(FREE.id).state == "ok"
 
 

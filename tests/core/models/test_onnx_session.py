@@ -1,0 +1,66 @@
+"""onnxruntime runs our networks and tells nobody: no number of this device, no event, no call."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from tests.core.models.small_networks import brightness
+from tests.faults import network
+from tests.faults.tracer import missing
+
+ROOT = Path(__file__).parents[3]
+FIRST_THAT_TELLS = (1, 29)  # of onnxruntime's versions
+OURS = """
+import sys
+from pathlib import Path
+import numpy as np
+from objectmorpher_core.models.depth_net import DepthNet
+print(DepthNet(Path(sys.argv[1])).inverse_depth(np.zeros((70, 98, 3), np.uint8)).ndim)
+"""
+BARE = """
+import sys
+import numpy as np
+import onnxruntime
+session = onnxruntime.InferenceSession(sys.argv[1], providers=["CPUExecutionProvider"])
+print(session.run(None, {"image": np.zeros((1, 3, 70, 98), np.float32)})[0].ndim)
+"""
+
+
+def run(code: str, home: Path, **more: str) -> tuple[list[str], list[network.Attempt]]:
+    """The files that a program leaves in its fresh home, and its calls to the network.
+
+    Of the environment nothing else is there: on machines of CI onnxruntime is silent by itself.
+    """
+    net = home.parent / "net.onnx"
+    net.write_bytes(brightness())
+    home.mkdir()
+    environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(ROOT)}
+    environment |= {"XDG_CACHE_HOME": str(home / "cache"), **more}
+    command = [sys.executable, "-c", code, str(net)]
+    status, said, tried = network.run(command, home, environment)
+    assert status == 0, said
+    return sorted(str(p.relative_to(home)) for p in home.rglob("*") if p.is_file()), tried
+
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+
+
+@pytest.mark.parametrize("setting", [{}, {"ORT_DISABLE_TELEMETRY": "0"}])
+def test_a_network_is_run_and_nothing_is_left_or_sent(
+    tmp_path: Path, setting: dict[str, str]
+) -> None:
+    assert run(OURS, tmp_path / "home", **setting) == ([], [])
+
+
+@pytest.mark.skipif(
+    tuple(int(n) for n in version("onnxruntime").split(".")[:2]) < FIRST_THAT_TELLS,
+    reason="this onnxruntime keeps no records",
+)
+def test_an_onnxruntime_that_is_opened_elsewhere_is_found_out(tmp_path: Path) -> None:
+    files, _ = run(BARE, tmp_path / "home")
+    assert {Path(name).name for name in files} >= {"deviceid", "onnxruntime.db"}
