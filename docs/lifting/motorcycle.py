@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from skimage import data
 from skimage.metrics import structural_similarity
 
-from objectmorpher_core.arrays import F32, F64, Mask
+from objectmorpher_core.arrays import F32, F64
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.document import (
@@ -23,6 +22,7 @@ from objectmorpher_core.document import (
     Matte,
     Placement,
 )
+from objectmorpher_core.evaluation.truth.stereo import FOCAL, OFFSET, StereoPair, read_pair
 from objectmorpher_core.lift import Subject
 from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.depth_prior import Seen
@@ -37,20 +37,6 @@ from objectmorpher_core.progress import silent
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 
-FOCAL, OFFSET = 994.978, 31.086  # px, of the pair's calibration: disparity + OFFSET = FOCAL B / z
-GROUND = (330, 110)  # px: below that row and left of that column there is only floor
-ABOVE_GROUND = 2.5  # px of disparity
-NEAREST_WALL = 34.0  # px of disparity of what is behind the motorcycle
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    left: np.ndarray  # (h, w, 3) u8
-    right: np.ndarray
-    disparity: F64  # (h, w) px; 0 where it is not known
-    mask: Mask  # (h, w) of the motorcycle in the left one
-    right_mask: Mask
-
 
 @dataclass(frozen=True)
 class Result:
@@ -58,29 +44,6 @@ class Result:
     psnr: float  # dB, inside the motorcycle
     ssim: float
     disparity_error: float  # px, RMS over what the left photo shows
-
-
-def read_pair() -> Pair:
-    """The motorcycle is what rises above the plane of the floor, before the wall."""
-    left, right, disparity = data.stereo_motorcycle()
-    disparity = np.where(np.isfinite(disparity), disparity, 0).astype(np.float64)
-    y, x = np.indices(disparity.shape)
-    floor = (y > GROUND[0]) & (x < GROUND[1]) & (disparity > 0)
-    slope, start = np.polyfit(y[floor], disparity[floor], 1)
-    found = disparity > np.maximum(slope * y + start + ABOVE_GROUND, NEAREST_WALL)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(found.astype(np.uint8))
-    largest = labels == 1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])
-    mask = _closed(largest)
-    rows, columns = np.nonzero(mask & (disparity > 0))
-    there = np.rint(columns - disparity[rows, columns]).astype(int)
-    seen = np.zeros(mask.shape, bool)
-    is_in = there >= 0
-    seen[rows[is_in], there[is_in]] = True
-    return Pair(left, right, disparity, mask, _closed(seen))
-
-
-def _closed(mask: Mask) -> Mask:
-    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3))) > 0
 
 
 def results() -> list[Result]:
@@ -137,7 +100,7 @@ def _filled(disparity: F64) -> F32:
 
 
 def _relief_shot(
-    pair: Pair, matte: Matte, lifted: LiftedObject, camera: Camera
+    pair: StereoPair, matte: Matte, lifted: LiftedObject, camera: Camera
 ) -> tuple[F64, float]:
     """Premultiplied (h, w, 3) as the right camera sees the lift, and its disparities' error, px.
 
@@ -171,7 +134,7 @@ def _card_shot(matte: Matte, disparity: float, shape: tuple[int, int]) -> F64:
     )
 
 
-def _compared(pair: Pair, color: F64) -> tuple[float, float]:
+def _compared(pair: StereoPair, color: F64) -> tuple[float, float]:
     """PSNR in dB and SSIM inside the motorcycle as the right photo shows it."""
     truth = pair.right / 255.0
     psnr = -10 * np.log10(((color - truth)[pair.right_mask] ** 2).mean())

@@ -11,6 +11,8 @@ import numpy as np
 import trimesh
 
 from objectmorpher_core.arrays import F64, I32, U8
+from objectmorpher_core.evaluation.truth.lookup import looked_up
+from objectmorpher_core.evaluation.truth.materials import veins
 from objectmorpher_core.rotations import turn_matrix
 
 LIGHT = np.array([-0.45, -0.7, -0.55]) / np.linalg.norm([0.45, 0.7, 0.55])  # towards it
@@ -48,7 +50,7 @@ class Solid:
         at = (self.uv[face] * corners[:, :, None]).sum(1)
         size = np.array(self.texture.shape[1::-1])
         at = np.clip(np.mod(at, size), 0, size - 1.001)
-        return _bilinear(self.texture, at) / 255
+        return looked_up(self.texture, at) / 255
 
     def normals(self, face: I32, corners: F64) -> F64:
         """(n, 3) outward, unit, at rest."""
@@ -62,26 +64,11 @@ def _unit(points: F64) -> F64:
     return (points - middle) / (points.max(0) - points.min(0)).max()
 
 
-def _bilinear(image: np.ndarray, at: F64) -> F64:
-    x, y = at[:, 0].astype(np.float32), at[:, 1].astype(np.float32)
-    parts = [
-        cv2.remap(image, x[k : k + 30000, None], y[k : k + 30000, None], cv2.INTER_LINEAR)[:, 0]
-        for k in range(0, len(x), 30000)
-    ]
-    return np.concatenate(parts).astype(np.float64)
-
-
 def _marble(points: F64, seed: int) -> F64:
     """A solid texture with detail of many sizes, (n, 3) in [0, 1]."""
     rng = np.random.default_rng(seed)
     base, other = rng.uniform(0.25, 0.9, (2, 3))
-    value = np.zeros(len(points))
-    for octave in range(4):
-        waves = rng.normal(size=(6, 3))
-        waves *= 2 * np.pi * 2.2 * 1.9**octave / np.linalg.norm(waves, axis=1, keepdims=True)
-        phase = rng.uniform(0, 2 * np.pi, 6)
-        value += np.sin(points @ waves.T + phase).sum(1) / 1.6**octave
-    mix = 1 / (1 + np.exp(-1.2 * value))
+    mix = veins(points, rng)
     grain = np.sin(points @ (rng.normal(size=(8, 3)) * 55).T + rng.uniform(0, 6, 8)).sum(1)
     return np.clip(base + (other - base) * mix[:, None] + 0.03 * grain[:, None], 0.02, 0.98)
 

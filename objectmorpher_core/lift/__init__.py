@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Protocol
 
+from .. import backends
 from ..arrays import Mask, Pixels
 from ..camera import Camera
 from ..document import LiftedObject, LiftSettings, Matte
@@ -57,13 +57,15 @@ def load(name: str = "auto") -> Lifter:
 
     Raises LiftError for an unknown name or one whose models are missing.
     """
-    if name == "auto":
-        name = "relief"
-    if name not in BACKENDS:
-        known = ", ".join(BACKENDS)
-        raise LiftError(f"the lifter {name!r} is not installed; installed: {known}")
-    module, attribute = BACKENDS[name].split(":")
-    lifter = getattr(import_module(module), attribute)()
-    if (sentence := lifter.missing()) is not None:
-        raise LiftError(sentence)
-    return lifter
+    return backends.able(_lifter("relief" if name == "auto" else name), LiftError)
+
+
+def _lifter(name: str) -> Lifter:
+    from .worker_file import worker_names
+
+    workers = () if name in BACKENDS else worker_names()
+    if name not in workers:
+        return backends.known(BACKENDS, name, "lifter", LiftError, workers)
+    from .external import load_worker
+
+    return load_worker(name)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from threading import Lock
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +21,8 @@ from .depth_prior import Seen
 
 Look = Callable[[Pixels, Mask], Seen | None]
 """Of a photo (H, W, 3), where a mask (H, W) of it is."""
+DEPTH_ANYTHING = "depth-anything-v2-small"
+PACKAGES = ("torch", "transformers", "safetensors")
 MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
 
 
@@ -25,8 +31,8 @@ def look(pixels: Pixels, mask: Mask) -> Seen | None:
 
     Raises LiftError where the network cannot look at that.
     """
-    there = models.added("depth")
-    if there.state != "ok":
+    there = installed()
+    if there is None:
         return None
     box = box_around(mask)
     x0, y0, x1, y1 = box
@@ -35,6 +41,27 @@ def look(pixels: Pixels, mask: Mask) -> Seen | None:
         return Seen(_memory.look(there, rgb), box)
     except models.ModelError as error:
         raise LiftError(f"{error}; without the depth model it can be lifted") from error
+
+
+@dataclass(frozen=True)
+class There:
+    """A depth network on this machine."""
+
+    id: str  # changes with its files
+    at: Path
+    is_onnx: bool
+
+
+def installed() -> There | None:
+    """The network that is looked with: the user's file, else Depth Anything by PyTorch."""
+    own = models.added("depth")
+    if own.state == "ok":
+        return There(own.sha256, own.path, True)
+    at = models.place(DEPTH_ANYTHING)
+    if at is None or any(find_spec(name) is None for name in PACKAGES):
+        return None
+    facts = (at / "model.safetensors").stat() if (at / "model.safetensors").exists() else at.stat()
+    return There(f"{at}:{facts.st_size}:{facts.st_mtime_ns}", at, False)
 
 
 def box_around(mask: Mask) -> tuple[int, int, int, int]:
@@ -48,6 +75,22 @@ def box_around(mask: Mask) -> tuple[int, int, int, int]:
     )  # fmt: skip
 
 
+class Net(Protocol):
+    """What `DepthNet` and `DepthTorch` do."""
+
+    def inverse_depth(self, rgb: RGB) -> F32:
+        """(h', w') of a picture (h, w, 3)."""
+        ...
+
+
+def _opened(there: There) -> Net:
+    if there.is_onnx:
+        return DepthNet(there.at)
+    from ..models.depth_torch import DepthTorch
+
+    return DepthTorch(there.at)
+
+
 class _Memory:
     """The network that was opened last, and the last look: another thickness looks no second time.
 
@@ -56,18 +99,18 @@ class _Memory:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._net: tuple[str, DepthNet] | None = None  # the file's hash
-        self._last: tuple[str, bytes, F32] | None = None  # hashes of file and picture
+        self._net: tuple[str, Net] | None = None  # the network's id
+        self._last: tuple[str, bytes, F32] | None = None  # network's id, picture's hash
 
-    def look(self, there: models.Added, rgb: RGB) -> F32:
+    def look(self, there: There, rgb: RGB) -> F32:
         digest = hashlib.sha256(rgb.data).digest() + bytes(str(rgb.shape), "ascii")
         with self._lock:
-            if self._last is not None and self._last[:2] == (there.sha256, digest):
+            if self._last is not None and self._last[:2] == (there.id, digest):
                 return self._last[2]
-            if self._net is None or self._net[0] != there.sha256:
-                self._net = there.sha256, DepthNet(there.path)
+            if self._net is None or self._net[0] != there.id:
+                self._net = there.id, _opened(there)
             depth = self._net[1].inverse_depth(rgb)
-            self._last = there.sha256, digest, depth
+            self._last = there.id, digest, depth
             return depth
 
 

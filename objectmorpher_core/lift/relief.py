@@ -19,7 +19,7 @@ from ..camera import Camera
 from ..deform.control_points import COUNT, sample_control_points
 from ..document import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ..gaussians import Gaussians
-from ..progress import Progress
+from ..progress import Progress, silent
 from ..rotations import quats_along
 from ..segment.matte import band_width
 from . import LiftError, Subject, shape_look
@@ -76,20 +76,11 @@ class ReliefLifter:
         if area < LEAST_AREA:
             raise LiftError(f"the object is only {area} pixels, too small to lift")
         progress(0.0, "Inflating the silhouette")
-        hidden = None if settings.hidden is None else settings.hidden & ~mask
-        outline = Silhouette.of(mask if hidden is None else mask | hidden)
+        hidden = _hidden(subject, settings)
         canvas = _canvas(matte, hidden, area, settings.count)
         axis = _axis(canvas, settings)
-        body = self._shape(outline, camera, settings, axis)
-        if settings.trust > 0:
-            progress(0.05, "Looking at its shape")
-            if (seen := self._see(subject.pixels, mask, camera)) is not None:
-                body = fused(body, seen, camera, settings.thickness, settings.trust)
-        if settings.uses_depth:
-            progress(0.1, "Looking how deep it is")
-            body = self._followed(body, subject, settings, hidden)
-        if settings.nearness is not None:
-            body = body.nearer(_nearness(subject, settings.nearness, outline))
+        body = self._body(subject, settings, axis, progress)
+        outline = body.silhouette
         progress(0.3, "Placing Gaussians")
         rng = np.random.default_rng(seed)
         band = max(band_width(camera.width, camera.height), _softness(mask, matte, outline.extent))
@@ -104,6 +95,33 @@ class ReliefLifter:
         # A mirrored back shows the photo itself, as sharp as the front does.
         return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
 
+    def body(self, subject: Subject, settings: LiftSettings) -> Body:
+        """The shape alone, on which `lift` spreads its Gaussians."""
+        area = int(np.count_nonzero(subject.mask))
+        canvas = _canvas(subject.matte, _hidden(subject, settings), area, settings.count)
+        return self._body(subject, settings, _axis(canvas, settings), silent)
+
+    def _body(
+        self,
+        subject: Subject,
+        settings: LiftSettings,
+        axis: MirrorAxis | None,
+        progress: Progress,
+    ) -> Body:
+        mask, camera, hidden = subject.mask, subject.camera, _hidden(subject, settings)
+        outline = Silhouette.of(mask if hidden is None else mask | hidden)
+        body = self._shape(outline, camera, settings, axis)
+        if settings.trust > 0:
+            progress(0.05, "Looking at its shape")
+            if (seen := self._see(subject.pixels, mask, camera)) is not None:
+                body = fused(body, seen, camera, settings.thickness, settings.trust)
+        if settings.uses_depth:
+            progress(0.1, "Looking how deep it is")
+            body = self._followed(body, subject, settings, hidden)
+        if settings.nearness is not None:
+            body = body.nearer(_nearness(subject, settings.nearness, outline))
+        return body
+
     def _followed(
         self, body: Body, subject: Subject, settings: LiftSettings, hidden: Mask | None
     ) -> Body:
@@ -117,6 +135,11 @@ class ReliefLifter:
             limit = np.array(hidden.shape[::-1]) - 1
             cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
+
+
+def _hidden(subject: Subject, settings: LiftSettings) -> Mask | None:
+    """(H, W) where something stands before the object."""
+    return None if settings.hidden is None else settings.hidden & ~subject.mask
 
 
 def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> Canvas:

@@ -17,6 +17,7 @@ from .. import models
 from ..arrays import F32, Mask, Pixels
 from ..camera import Camera
 from ..models import shipped
+from ..models.onnx_session import open_session
 from ..segment import dino_tokens
 from .crop import Crop, planes_of
 
@@ -66,9 +67,7 @@ class ShapeNet:
     """The network in an ONNX file."""
 
     def __init__(self, data: bytes) -> None:
-        import onnxruntime
-
-        self._session: Any = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
+        self._session: Any = open_session(data)
 
     def look(self, planes: F32, tokens: F32, mask: Mask, crop: Crop) -> SeenShape:
         """Of planes (7, s, s) and tokens (g, g, c) of a crop."""

@@ -17,7 +17,7 @@ from .lifter import UP, TrellisLifter, within_memory
 from .picture import Picture
 
 if TYPE_CHECKING:
-    from .device import Plan
+    from ...models.device import Plan
     from .generator import Folders, Generator
 
 
@@ -27,10 +27,22 @@ class CupidLifter(TrellisLifter):
     name = "cupid"
     ids = (weights.CUPID, weights.ENCODER, weights.TRELLIS)
 
-    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
+    def _new_generator(self, folders: Folders, tiers: tuple[Plan, ...]) -> Generator:
         from .cupid import CupidGenerator
 
-        return CupidGenerator(folders, plan)
+        return CupidGenerator(folders, *tiers)
+
+    def stance(self, subject: Subject, progress: Progress, seed: int = 0) -> F64 | None:
+        """(4, 4) world from the network's own frame of the object; None where no camera sees it so.
+
+        The frame is about the same for two pictures of one object. Raises LiftError.
+        """
+        from .picture import Picture
+
+        picture, generator = Picture.of(subject.matte), self._generator()
+        made = within_memory(generator, lambda: generator.make(picture, progress, seed))
+        assert made.view is not None
+        return pose_seen(made.view, picture, subject.camera)
 
     def _made(
         self, picture: Picture, subject: Subject, progress: Progress, seed: int

@@ -11,11 +11,11 @@ import torch
 from torch import Tensor
 
 from ...gaussians import Gaussians
+from ...models.device import Plan, empty_cache
 from ...progress import Progress, part, silent
 from .. import LiftError
 from .camera import View
 from .configs import Pipeline, Sampling, part_path, pipeline
-from .device import Plan
 from .parts import load_part
 from .picture import Encoder, Picture
 from .sampler import sample
@@ -62,9 +62,12 @@ class Extras:
 class Generator:
     """TRELLIS. Reads its description at once, and each part's weights when they are needed."""
 
-    def __init__(self, folders: Folders, plan: Plan) -> None:
-        """Raises LiftError where the folders do not hold what they should."""
-        self.folders, self.plan = folders, plan
+    def __init__(self, folders: Folders, *tiers: Plan) -> None:
+        """`tiers`: the plan, and what is gone on with where memory runs out.
+
+        Raises LiftError where the folders do not hold what they should.
+        """
+        self.folders, self.tiers, self.plan = folders, tiers, tiers[0]
         self.pipeline: Pipeline = pipeline(folders.model)
         self._parts: dict[str, Any] = {}
 
@@ -99,6 +102,15 @@ class Generator:
             if not self.plan.keeps:
                 self.release()
 
+    @property
+    def device(self) -> torch.device:
+        return torch.device(self.plan.device)
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of transformers and convolutions."""
+        return getattr(torch, self.plan.number)
+
     def part(self, role: str) -> Any:
         """The network of a role, in memory; without `plan.keeps` it replaces the one before."""
         if role not in self._parts:
@@ -109,21 +121,20 @@ class Generator:
                 raise LiftError(f"{self.folders.model / 'pipeline.json'} names no {role}")
             path = part_path(self.folders.model, where, self.folders.shared)
             log.info("Loading %s", path.name)
-            self._parts[role] = load_part(path, self.plan.device, self.plan.dtype)
+            self._parts[role] = load_part(path, self.device, self.dtype)
         return self._parts[role]
 
     def release(self) -> None:
         """Gives the memory of all parts back."""
         self._parts.clear()
-        self.plan.empty_cache()
+        empty_cache(self.plan.device)
 
     def _encoder(self) -> Encoder:
         if "encoder" not in self._parts:
             if not self.plan.keeps:
                 self.release()
             # In single precision: it runs once, and everything follows from it.
-            device = self.plan.device
-            self._parts["encoder"] = Encoder(self.folders.encoder, device, torch.float32)
+            self._parts["encoder"] = Encoder(self.folders.encoder, self.device, torch.float32)
         return self._parts["encoder"]
 
     def _seen(self, picture: Picture) -> Tensor:
@@ -137,7 +148,7 @@ class Generator:
         """(1, C, r, r, r) the latents of where the object is."""
         flow, nothing = self.part(FLOW), torch.zeros_like(seen)
         shape = (1, flow.form.in_channels, *[flow.form.resolution] * 3)
-        start = torch.randn(shape, generator=noise).to(self.plan.device)
+        start = torch.randn(shape, generator=noise).to(self.device)
 
         def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
             return flow(x, time, seen if is_shown else nothing)
@@ -169,7 +180,7 @@ class Generator:
                 x = torch.cat([x, extras.shown if is_shown else extras.hidden], 2)
             return flow(x, time, seen if is_shown else nothing, voxels)
 
-        found = sample(velocity, start[None].to(self.plan.device), how, progress, "Filling it in")
+        found = sample(velocity, start[None].to(self.device), how, progress, "Filling it in")
         return self.denormed(found)
 
     def _gaussians(self, latents: Tensor, voxels: Voxels) -> Gaussians:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...document import LiftedObject, LiftSettings
 from ...gaussians import Gaussians
+from ...models import ModelError, device
 from ...progress import Progress, part
 from ...splat_files.axes import QUARTER_TURN, turned
 from .. import LiftError, Subject
@@ -18,8 +20,8 @@ from . import weights
 from .configs import Sampling
 
 if TYPE_CHECKING:
-    from .device import Plan
-    from .generator import Folders, Generator
+    from ...models.device import Plan
+    from .generator import Folders, Generator, Made
     from .picture import Picture
 
 log = logging.getLogger(__name__)
@@ -27,6 +29,8 @@ STEPS = 12  # of each flow: what the publishers' own example takes
 GUIDANCE = 7.5, 3.0  # of the flows, from the same place
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 FITS = 0.85  # score from which a pose that the network says itself is not looked for again
+PARAMETERS = 1_924_000_000  # counted; the encoder twice: it stays in single precision
+WORK = 2 << 30  # bytes at half precision, estimated
 SPLATTING = "mip"  # as its Gaussians were trained
 
 
@@ -67,18 +71,17 @@ class TrellisLifter:
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP)
 
     def _generator(self) -> Generator:
-        from .device import Plan
         from .generator import Folders
 
         folders = Folders(*(weights.weights_folder(id) for id in self.ids))
         if (known := self._kept.get(self.name)) is None or known.folders != folders:
-            self._kept[self.name] = self._new_generator(folders, Plan.best())
+            self._kept[self.name] = self._new_generator(folders, tiers())
         return self._kept[self.name]
 
-    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
+    def _new_generator(self, folders: Folders, tiers: tuple[Plan, ...]) -> Generator:
         from .generator import Generator
 
-        return Generator(folders, plan)
+        return Generator(folders, *tiers)
 
 
 def placed(
@@ -104,21 +107,38 @@ def example_sampling(generator: Generator) -> tuple[Sampling, Sampling]:
     return first, second
 
 
-def within_memory(generator: Generator, make: Any) -> Any:
-    """What `make()` makes; where the device's memory does not suffice, part by part."""
-    import torch
+def need() -> device.Need:
+    """What it asks of memory."""
+    return device.Need(PARAMETERS, WORK, parts=True, half="float16")  # as published
+
+
+def tiers() -> tuple[Plan, ...]:
+    """How it can run here, the best first; a GPU that has room is not followed by an hour's work.
+
+    Raises LiftError.
+    """
+    try:
+        found = device.plans(need())
+    except ModelError as error:
+        raise LiftError(str(error)) from error
+    return tuple(plan for plan in found if plan.device != "cpu") or found
+
+
+def within_memory(generator: Generator, make: Callable[[], Made]) -> Made:
+    """What `make()` makes; where the memory of its plan does not suffice, with the next one.
+
+    It stays with that. Raises LiftError.
+    """
+    left = generator.tiers[generator.tiers.index(generator.plan) :]
+
+    def attempt(plan: Plan) -> Made:
+        if plan != generator.plan:
+            generator.release()
+            generator.plan = plan
+        return make()
 
     try:
-        return make()
-    except torch.OutOfMemoryError:
-        log.warning("The GPU's memory is too small for all parts at once: one after another")
-    generator.release()
-    generator.plan = generator.plan.thrifty()
-    try:
-        return make()
-    except torch.OutOfMemoryError as error:
+        return device.run(left, attempt)
+    except ModelError as error:
         generator.release()
-        raise LiftError(
-            "the GPU's memory is too small for this object: close other programs, or lift it as a"
-            " relief"
-        ) from error
+        raise LiftError(f"{error}: close other programs, or lift it as a relief") from error

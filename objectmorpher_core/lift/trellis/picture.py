@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
 from ...arrays import F32, F64
 from ...document import Matte
+from ...models.registry import ModelError
+from ...models.transformers_net import open_net
 from .. import LiftError
 
 if TYPE_CHECKING:
@@ -70,22 +72,16 @@ class Encoder:
     def __init__(self, folder: Path, device: torch.device, dtype: torch.dtype) -> None:
         """Raises LiftError: one sentence."""
         from transformers import Dinov2WithRegistersModel
-        from transformers.utils import logging
 
-        logging.disable_progress_bar()
         # Through transformers, which knows the names that older files give to the weights.
         try:
-            loaded: Any = Dinov2WithRegistersModel.from_pretrained(
-                folder, local_files_only=True, use_safetensors=True, dtype=dtype,
-                output_loading_info=True,
+            net = open_net(
+                Dinov2WithRegistersModel, folder, "does not hold DINOv2 with registers",
+                "DINOv2's", dtype=dtype,
             )  # fmt: skip
-        except Exception as error:  # of many kinds: of json, safetensors, the hub, and its own
-            reason = str(error).strip().partition("\n")[0]
-            raise LiftError(f"{folder} does not hold DINOv2 with registers: {reason}") from error
-        net, said = loaded
-        if wrong := sorted(map(str, {*said["missing_keys"], *said["mismatched_keys"]})):
-            raise LiftError(f"the weights in {folder} are not DINOv2's: {wrong[0]}")
-        self._net = net.to(device).eval().requires_grad_(False)
+        except ModelError as error:
+            raise LiftError(str(error)) from error
+        self._net = net.to(device)
         self.side = int(net.config.image_size)  # px
 
     def tokens(self, rgb: F32) -> torch.Tensor:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
 from objectmorpher_core.segment.matte import build_matte
 from tests import photos
 
@@ -28,11 +26,7 @@ def one_thread():
 @pytest.fixture(scope="module")
 def subject():
     """The cup of the coffee photo, small."""
-    pixels = photos.photo("coffee")[::3, ::3].copy()
-    height, width = pixels.shape[:2]
-    y, x = np.mgrid[:height, :width]
-    mask = ((x - 0.5 * width) / 37) ** 2 + ((y - 0.5 * height) / 30) ** 2 < 1
-    return pixels, Camera.from_fov(width, height), mask
+    return photos.small_cup(3, 37, 30)
 
 
 @pytest.fixture(scope="module")

@@ -167,5 +167,5 @@ def test_a_missing_part_is_one_sentence(folders, picture, tmp_path):
 
 def test_missing_weights_are_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path))
-    with pytest.raises(LiftError, match="hbb1/Cupid"):
+    with pytest.raises(LiftError, match="models get cupid"):
         lift.load("cupid")

@@ -77,11 +77,11 @@ def test_what_is_made_lies_in_its_cube(generator, picture):
     assert (made.gaussians.scales >= 9e-4).all()
 
 
-@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
-def test_lower_precision_makes_nearly_the_same(folders, picture, dtype):
+@pytest.mark.parametrize("number", ["float16", "bfloat16"])
+def test_lower_precision_makes_nearly_the_same(folders, picture, number):
     full, low = (
-        Generator(folders, replace(tiny_trellis.CPU, dtype=d)).make(picture)
-        for d in (torch.float32, dtype)
+        Generator(folders, replace(tiny_trellis.CPU, number=d)).make(picture)
+        for d in ("float32", number)
     )
     cells = [set(map(tuple, made.voxels.cells.tolist())) for made in (full, low)]
     assert len(cells[0] & cells[1]) > 0.9 * len(cells[0] | cells[1])
@@ -90,7 +90,7 @@ def test_lower_precision_makes_nearly_the_same(folders, picture, dtype):
 def test_memory_is_given_back_unless_it_is_to_be_kept(folders, generator, picture):
     generator.make(picture)
     assert not generator._parts
-    keeping = Generator(folders, replace(tiny_trellis.CPU, keeps=True))
+    keeping = Generator(folders, replace(tiny_trellis.CPU, tier="whole"))
     assert same(keeping.make(picture).gaussians, generator.make(picture).gaussians)
     assert len(keeping._parts) == 5
 
@@ -136,7 +136,7 @@ def test_too_many_cells_are_cut_to_the_surest(monkeypatch):
 
 
 def test_out_of_memory_falls_back_to_one_part_at_a_time(folders, picture):
-    generator = Generator(folders, replace(tiny_trellis.CPU, keeps=True))
+    generator = Generator(folders, replace(tiny_trellis.CPU, tier="whole"), tiny_trellis.CPU)
 
     def make():
         if generator.plan.keeps:
@@ -144,11 +144,12 @@ def test_out_of_memory_falls_back_to_one_part_at_a_time(folders, picture):
         return generator.make(picture)
 
     assert len(within_memory(generator, make).gaussians)
+    assert generator.plan == tiny_trellis.CPU and not generator._parts
 
     def never():
         raise torch.OutOfMemoryError("no")
 
-    with pytest.raises(LiftError, match="memory is too small"):
+    with pytest.raises(LiftError, match=r"not enough memory on the CPU.*as a relief"):
         within_memory(generator, never)
 
 
@@ -175,11 +176,12 @@ def test_nothing_selected_is_one_sentence(installed, subject):
         TrellisLifter().lift(empty, lift.LiftSettings(), silent)
 
 
-def test_missing_weights_are_one_sentence_that_says_where_to_put_them(tmp_path, monkeypatch):
+def test_missing_weights_are_one_sentence_that_says_how_to_get_them(tmp_path, monkeypatch):
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path))
     with pytest.raises(LiftError) as error:
         lift.load("trellis")
-    assert "microsoft/TRELLIS-image-large" in str(error.value) and str(tmp_path) in str(error.value)
+    for told in ("models get trellis-image-large", "models add trellis FOLDER", "MIT", "GB"):
+        assert told in str(error.value)
     tiny_trellis.write_model(weights.weights_folder(weights.TRELLIS))
     with pytest.raises(LiftError, match="dinov2-with-registers-large"):
         lift.load("trellis")

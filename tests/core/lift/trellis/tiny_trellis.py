@@ -9,13 +9,13 @@ from typing import Any
 import torch
 from transformers import Dinov2WithRegistersConfig, Dinov2WithRegistersModel
 
-from objectmorpher_core.lift.trellis.device import Plan
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.parts import build, save_part
+from objectmorpher_core.models.device import Plan
 
 WIDTH = 24  # channels of the picture's tokens
 LATENTS, CELLS = 4, 16  # resolution of both stages
-CPU = Plan(torch.device("cpu"), torch.float32, keeps=False)
+CPU = Plan("cpu", "float32", "cpu", "a test")
 SAMPLER = {
     "name": "FlowEulerGuidanceIntervalSampler",
     "args": {"sigma_min": 1e-5},

@@ -1,0 +1,153 @@
+"""The worker process is killed at random, again and again: the editor goes on, nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from conftest import wait_for_jobs, wait_until
+
+from app.commands import run
+from app.editor import Editor
+from objectmorpher_core import edits
+from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.image import ImageError, read_picture
+from objectmorpher_core.session_file import decode_session
+
+KILLS = int(os.environ.get("OBJECTMORPHER_KILLS", "15"))  # seconds each
+HEARD = 0.02  # s in which the thread that reads the pipe hands over what it has read
+FUNCTIONS = {  # what is asked -> what the worker runs
+    "save": "write_session", "export": "write_export", "background": "inpaint",
+}  # fmt: skip
+
+
+def ask(editor: Editor, folder: Path, what: str) -> None:
+    """One of the jobs that run in the worker; it is what runs there then."""
+    wait_for_jobs(editor)
+    if what == "save":
+        editor.filing.save_as(folder / "ball.omorph")
+    elif what == "export":
+        editor.exporting.export_to(folder / "ball.png")
+    else:
+        run(editor, "fill_again")
+    wait_until(editor, lambda: editor.jobs.current is not None)
+    job = editor.jobs.current
+    assert job is not None and job.function.__name__ == FUNCTIONS[what]
+
+
+def seconds(editor: Editor, folder: Path, what: str) -> float:
+    """What the job takes where nobody kills it."""
+    ask(editor, folder, what)
+    start = time.monotonic()
+    wait_until(editor, lambda: editor.jobs.current is None)
+    took = time.monotonic() - start
+    wait_for_jobs(editor)
+    assert editor.message is None or not editor.message.details, editor.message
+    return took
+
+
+def kill(editor: Editor, after: float) -> bool:
+    """Ends the worker as the system does where memory runs out; whether the job still ran.
+
+    It is stopped first, and all that it has said until then is heard: a job without an answer
+    then is one that the kill meets.
+    """
+    job, worker = editor.jobs.current, editor.jobs._worker
+    assert job is not None and worker is not None and worker.process.pid is not None
+    end = time.monotonic() + after
+    while time.monotonic() < end:
+        editor.poll()
+        time.sleep(0.001)
+    process = worker.process.pid
+    os.kill(process, signal.SIGSTOP)
+    while Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+        time.sleep(0.001)
+    while worker._connection.poll():  # the thread that reads takes it
+        time.sleep(0.001)
+    time.sleep(HEARD)
+    editor.poll()
+    if editor.jobs.current is not job:
+        os.kill(process, signal.SIGCONT)
+        return False
+    os.kill(process, signal.SIGKILL)
+    worker.process.join()
+    return True
+
+
+def assert_whole(folder: Path) -> None:
+    """What was saved and exported is the last or the one before, never a part of it."""
+    session, picture = folder / "ball.omorph", folder / "ball.png"
+    if session.exists():
+        assert len(decode_session(session.read_bytes()).objects) == 1
+    if picture.exists():
+        try:
+            read_picture(picture.read_bytes())
+        except ImageError as error:
+            raise AssertionError("the export is damaged") from error
+
+
+def killed_at_random(editor: Editor, ball: Document, folder: Path, kills: int) -> Counter[str]:
+    """Edits, asks for jobs and kills their process while they run; how often in which job.
+
+    The moments are random within what the job took when nobody killed it.
+    """
+    chance, found, moves = random.Random(5), Counter[str](), 0
+    editor.start(ball)
+    seconds(editor, folder, "save")  # the process has started
+    lasts = {what: seconds(editor, folder, what) for what in FUNCTIONS}
+    while found.total() < kills:
+        what = tuple(FUNCTIONS)[found.total() % len(FUNCTIONS)]
+        moves += 1
+        document = editor.document
+        assert document is not None
+        placement = Placement(move=(float(moves), 0.0))
+        editor.apply("Move object", edits.set_placement(document, 0, placement))
+        ask(editor, folder, what)
+        after = chance.uniform(0.0, lasts[what])
+        is_hit = kill(editor, after)
+        if not is_hit:
+            lasts[what] = after  # it takes less
+        found[what] += is_hit
+        assert moves < 10 * kills + 10, f"{what} is over before it can be killed"
+        wait_for_jobs(editor)
+        committed = editor.committed
+        assert committed is not None and committed.objects[0].placement == placement
+        assert_whole(folder)
+        editor.message = None
+        if is_hit:
+            seconds(editor, folder, "save")  # another process does the next job
+    assert editor.history is not None
+    while editor.history.undo_label is not None:
+        editor.undo()
+    assert editor.committed is ball
+    return found
+
+
+def assert_it_goes_on(editor: Editor, folder: Path) -> None:
+    """A job that nobody kills is done."""
+    editor.filing.save_as(folder / "last.omorph")
+    wait_until(editor, lambda: (folder / "last.omorph").exists() and editor.jobs.is_idle)
+    saved = decode_session((folder / "last.omorph").read_bytes())
+    assert editor.committed is not None
+    assert saved.objects[0].placement == editor.committed.objects[0].placement
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks into /proc")
+def test_killed_in_each_job(editor: Editor, ball: Document, tmp_path: Path) -> None:
+    assert killed_at_random(editor, ball, tmp_path, 3) == dict.fromkeys(FUNCTIONS, 1)
+    assert_it_goes_on(editor, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks into /proc")
+def test_killed_many_times(editor: Editor, ball: Document, tmp_path: Path) -> None:
+    found = killed_at_random(editor, ball, tmp_path, KILLS)
+    assert_it_goes_on(editor, tmp_path)
+    print(dict(found))
+    assert found.total() == KILLS
+    assert min(found[what] for what in FUNCTIONS) >= KILLS // len(FUNCTIONS)

@@ -1,0 +1,3 @@
+"""As `o_voxel`."""
+
+from . import postprocess as postprocess
