@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core import compose, edits
+from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.brush import Stroke
 from objectmorpher_core.document import Document, EditObject, Plate
@@ -82,17 +82,10 @@ class Composing:
         view = self._editor.view
         view.compose.is_bare = not view.compose.is_bare
 
-    def choose_inpainter(self, name: str) -> None:
-        """Who fills in the background from now on: one of `compose.BACKENDS`, or "auto"."""
-        editor = self._editor
-        backends = replace(editor.settings.backends, inpaint=name)
-        editor.settings = replace(editor.settings, backends=backends)
-
     @property
     def inpainter(self) -> str:
-        """The one that was chosen; "auto" where that one is not known."""
-        name = self._editor.settings.backends.inpaint
-        return name if name in compose.BACKENDS else "auto"
+        """The backend that is asked to fill in the background; "auto" is the best that can run."""
+        return self._editor.methods.chosen("inpaint")
 
     def fill_again(self) -> None:
         """A new background with another seed: a step of its own."""
@@ -296,6 +289,9 @@ class Composing:
     def preview_grain(self, grain: float) -> None:
         self._preview(lambda document, k: edits.set_grain(document, k, grain))
 
+    def preview_defocus(self, defocus: float) -> None:
+        self._preview(lambda document, k: edits.set_defocus(document, k, defocus))
+
     def preview_feather(self, feather: float) -> None:
         self._preview(lambda document, _: edits.set_feather(document, feather))
 
@@ -314,7 +310,7 @@ class Composing:
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
 
     def take_shadow(self) -> None:
-        """Imitates the object's shadow in the photo, and takes that one off the background."""
+        """Imitates its shadow in the photo; takes that and its reflection off the background."""
         editor, document, k = self._editor, self._editor.committed, self._editor.current
         if document is None or document.plate is None or not editor.is_lifted:
             return
@@ -326,28 +322,32 @@ class Composing:
         covered = lights.hidden(document)
         cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
 
-        def accept(answer: tuple[Shadow, Plate] | None) -> None:
+        def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
             if answer is None:
-                editor.say(t("No shadow of it is sure; paint it out of the background (B)"))
+                editor.say(t("No shadow or reflection is sure; paint it out of the background (B)"))
                 return
             shadow, plate = answer
-            if is_known:
+            if shadow is not None and is_known:
                 shadow = replace(shadow, ground=told)
             self._ready.append(lambda: self._take_shadow(masks, k, shadow, plate))
 
         editor.jobs.start(
-            t("Looking for its shadow"), job_functions.take_shadow, cutout,
+            t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
             self._choice(document.plate.seed + 1), done=accept, failed=editor.complain_of,
             kind=SHADOW,
         )  # fmt: skip
 
     def _take_shadow(
-        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow, plate: Plate
+        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow | None, plate: Plate
     ) -> None:
         editor, document = self._editor, self._editor.committed
         if document is not None and same(masks, _masks(document)):
-            changed = edits.set_shadow(edits.set_plate(document, plate), k, shadow)
-            editor.apply(t("Shadow as in the photo"), changed)
+            changed = edits.set_plate(document, plate)
+            if shadow is None:
+                editor.apply(t("Remove old reflection"), changed)
+            else:
+                changed = edits.set_shadow(changed, k, shadow)
+                editor.apply(t("Shadow as in the photo"), changed)
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""
@@ -364,7 +364,8 @@ class Composing:
         if editor.committed is None or self._item is None:
             return "none"
         item = editor.committed.objects[editor.current]
-        return "harmonise" if item.harmony or item.relight or item.grain else "none"
+        has_any = item.harmony or item.relight or item.grain or item.defocus
+        return "harmonise" if has_any else "none"
 
     @property
     def _item(self) -> EditObject | None:

@@ -38,8 +38,13 @@ def flatten(photo: U8, back: U8, blend: F32, layers: tuple[Layer, ...], photo_bo
     under, behind, blend = _packed_pixels(photo), _packed_pixels(back), frozen(blend)
     in_threads(lambda a, b: _mix(a, b, under, behind, blend, out), len(out), PARTS)
     for layer in layers:
-        _add(layer, blend, photo_box, out)
+        _add(layer, _full(blend) if layer.is_weighed else blend, photo_box, out)
     return out.view(np.uint8).reshape(*out.shape, 4)
+
+
+def _full(blend: F32) -> F32:
+    """Everywhere the edit: for what has its share of it already."""
+    return frozen(np.ones_like(blend))
 
 
 def rehearse() -> None:

@@ -49,9 +49,11 @@ class LayerPass:
         """One of them, over what is there."""
         for unit, texture in self._textures(layer).items():
             texture.use(unit)
-        defines = _defines(scene, layer.invented is not None, layer.is_tint)
+        is_over = layer.is_tint or layer.is_weighed
+        marks = scene.refined if layer.is_weighed else scene.marks
+        defines = _defines(scene, marks is not None and layer.invented is not None, is_over)
         program, quad = self._programs(*defines)
-        set_uniforms(program, box=layer.box, **_appearance(layer))
+        set_uniforms(program, box=layer.box, **_appearance(layer), **hatch_uniforms(marks, view))
         self._render(program, quad, scene, view)
 
     def draw_picture(
@@ -59,11 +61,11 @@ class LayerPass:
     ) -> None:
         """A picture of the whole canvas that is on the GPU already."""
         picture.color.use(LAYER)
-        is_marked = item.is_marked and picture.detail is not None
+        is_marked = item.is_marked and picture.detail is not None and scene.marks is not None
         if picture.detail is not None:
             picture.detail.use(MARKS)
         defines = ["DETAIL", *_defines(scene, is_marked, item.is_tint)]
-        values = _appearance(item)
+        values = _appearance(item) | hatch_uniforms(scene.marks, view)
         if item.relit is not None:
             defines.append("HAS_RELIT")
             values["relit_box"] = self._use_factors(item.relit, view)
@@ -97,7 +99,6 @@ class LayerPass:
             photo_box=photo_box(scene, view),
             cells=blend_cells(scene),
             split=scene.split * view.width,
-            **hatch_uniforms(scene.marks, view),
         )
         self._context.enable(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
@@ -135,10 +136,10 @@ def _appearance(thing: Layer | SplatObject) -> dict[str, Any]:
     return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
 
 
-def _defines(scene: Scene, is_marked: bool, is_tint: bool) -> list[str]:
+def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:
     """What of the shaders is needed: a tint lies over photo and edit alike."""
     defines = ["HAS_MARKS"] if is_marked else []
-    return defines + (["HAS_BLEND"] if scene.blend is not None and not is_tint else [])
+    return defines + (["HAS_BLEND"] if scene.blend is not None and not is_over else [])
 
 
 def photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:

@@ -13,6 +13,7 @@ from objectmorpher_core.arrays import U8
 from ..layers import Layer
 from ..view import View
 from .blend_texture import BlendTexture
+from .defocus_pass import DefocusPass
 from .kept_canvas import KeptCanvas, Place
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
@@ -43,6 +44,7 @@ class Renderer:
         self._blend = BlendTexture(context)
         self._photo_pass = PhotoPass(context)
         self._layer_pass = LayerPass(context)
+        self._defocus_pass = DefocusPass(context)
         self._splat_pass: SplatPass | None = None
         self._kept, self._still = KeptCanvas(context), StillView()
         self._target = context.screen
@@ -110,6 +112,8 @@ class Renderer:
                 continue
             picture = self._render(item, view)
             if picture is not None:
+                if item.blur > 0 and not item.is_marked:
+                    picture = self._defocus_pass.draw(picture, item.blur * view.zoom)
                 self._use(viewport)
                 self._blend.use(scene)
                 self._layer_pass.draw_picture(picture, item, scene, view)

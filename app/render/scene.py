@@ -29,7 +29,7 @@ class Hatch:
     ink: Colour
     strength: float = 0.9  # share of the ink in a stripe
     brightness: float = 0.75  # share of the picture that is left under it
-    slant: float = 1.0  # 1: rising to the right, -1: falling
+    slant: float = 1.0  # 1: rising to the right, -1: falling, 0: upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,7 @@ class SplatObject:
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
     relit: Relit | None = None  # and of each place
     grain: Grain | None = None  # and added to them
+    blur: float = 0.0  # px of the photo, standard deviation, before all that
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,7 @@ class Scene:
     veil: float = 0.0  # share of black outside the mask
     hatch: Hatch | None = None  # inside the mask
     marks: Hatch | None = None  # on what an object invents, where its layer says so
+    refined: Hatch | None = None  # the same on a refinement
     paper: tuple[Colour, Colour] | None = None  # squares of these instead of the photo
     blend: F32 | None = None  # (h, w) over the canvas: 0 shows the photo over the edit
     split: float = 0.0  # share of the canvas, from the left, that shows the photo as it was

@@ -1,8 +1,8 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py [plates]
+python docs/compositing/make_compositing.py [focus | reflections | plates]
 
-With `plates`, only the last section, about the background, is made anew.
+With `focus`, `reflections` or `plates`, only that section is made anew.
 """
 
 from __future__ import annotations
@@ -16,19 +16,24 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 sys.path += [str(FOLDER.parent), str(FOLDER.parent / "lifting")]  # what other pages have, too
 
+import focus  # noqa: E402
 import grains  # noqa: E402
 import lights  # noqa: E402
 import places  # noqa: E402
 import plate_times  # noqa: E402
 import plates  # noqa: E402
+import reflections  # noqa: E402
 import shadows  # noqa: E402
 from meshes import fetched  # noqa: E402
-from page import PLATE, Measures, plate_section, write_page  # noqa: E402
+from page import FOCUS, PLATE, SHADOW, Measures, focus_section, plate_section, write_page  # noqa: E402
 from photos import shadow_pairs  # noqa: E402
+from reflection_page import REFLECTION, reflection_section  # noqa: E402
 from solids import SOLIDS  # noqa: E402
 
 SHOWN = {("ball", "left", "yaw 35"), ("duck", "above", "pitch 25"), ("figure", "left", "yaw -35"),
          ("box", "left", "yaw -35")}  # fmt: skip
+FOCUS_SHOWN = 3.0  # px
+REFLECTIONS_SHOWN = 0.2  # of the light
 GRAINS = ("x 2.2", "x 0.6", "half a pixel")
 QUALITY = 88
 TILE, WIDE = 200, 280  # px
@@ -39,6 +44,21 @@ def main() -> None:
         page = FOLDER / "README.md"
         rest = page.read_text(encoding="utf-8").split(PLATE.partition("\n")[0])[0]
         page.write_text(rest + plate_section(*_plates()), encoding="utf-8")
+        return
+    if sys.argv[1:] == ["focus"]:
+        page = FOLDER / "README.md"
+        before, _, rest = page.read_text(encoding="utf-8").partition(FOCUS.partition("\n")[0])
+        after = rest[rest.index(SHADOW.partition("\n")[0]) :]
+        page.write_text(before + focus_section(*_focus()) + after, encoding="utf-8")
+        return
+    if sys.argv[1:] == ["reflections"]:
+        page = FOLDER / "README.md"
+        text, title = page.read_text(encoding="utf-8"), REFLECTION.partition("\n")[0]
+        before, _, after = text.partition(PLATE.partition("\n")[0])
+        page.write_text(
+            before.split(title)[0] + _reflections() + PLATE.partition("\n")[0] + after,
+            encoding="utf-8",
+        )
         return
     meshes = fetched()
     turned, shaded = [], []
@@ -56,9 +76,33 @@ def main() -> None:
     own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
     _write("grains.jpg", [[p[:40, :40] for p in c.pictures] for c in own], WIDE)
     measures = Measures(
-        turned, places.measured(meshes), grained, grains.found_on_photos(), shaded, *_plates()
+        turned,
+        places.measured(meshes),
+        grained,
+        grains.found_on_photos(),
+        *_focus(),
+        shaded,
+        _reflections(),
+        *_plates(),
     )
     (FOLDER / "README.md").write_text(write_page(measures), encoding="utf-8")
+
+
+def _focus() -> tuple[list[focus.Focussed], list[focus.Sharp]]:
+    """Things gone nearer and farther, some drawn to focus.jpg; and photographs that are sharp."""
+    cases = focus.measured()
+    shown = [c for c in cases if c.far == FOCUS_SHOWN and c.ratio == max(focus.RATIOS)]
+    _write("focus.jpg", [[p[90:330, 160:420] for p in c.pictures] for c in shown], WIDE)
+    return cases, focus.on_photos()
+
+
+def _reflections() -> str:
+    """Their section; some are drawn to reflections.jpg."""
+    cases = reflections.measured()
+    shown = [case for case in cases if case.is_found and case.strength > REFLECTIONS_SHOWN]
+    rows = [[p[60:490, 40:470] for p in case.pictures] for case in shown[:8]]
+    _write("reflections.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
+    return reflection_section(cases, reflections.imagined())
 
 
 def _plates() -> tuple[dict[str, dict[str, plates.Filled]], list[plate_times.Taken]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from focus import Focussed, Sharp
 from grains import ADDED, RINGS, Grained
 from lights import Turned
 from places import WORSE, Moved
@@ -65,6 +66,24 @@ Gravel has no flat place, and its texture is taken for grain; it is given at mos
 
 ![Noise in the photo, moved by half a pixel, smaller, larger: without grain and with it](grains.jpg)
 """
+FOCUS = """## Focus
+
+A thing on a ground that is in focus where the thing stands goes nearer or farther on it. How
+blurred the ground is there is known: px of the photo, true → found. 0 is what is not sure, and
+stays as sharp as it was.
+
+{summary}
+
+{table}
+
+{sharp}
+
+What is found is rather too little: crowded texture looks sharper than it is, and where the ground
+at the thing's foot looks softer than the thing itself (brick), nothing is taken to be sure.
+
+![The thing gone farther: as sharp as it was, as Focus has it, as it should be](focus.jpg)
+
+"""
 SHADOW = """## The old shadow
 
 The solids stand on grounds with photographed textures, each under three lamps that throw a shadow
@@ -88,9 +107,10 @@ On photographs: the saucer's shadow and the motorcycle's.
 PLATE = """## The background
 
 Holes are cut where the background is known, and filled in. PSNR and SSIM in the hole say how near
-the fill is to what was there, *unlike* how differently DINOv2 sees it (1 - cosine of its tokens):
-a smooth blur is near and unlike, a sharp guess is far and alike. *PatchMatch* is pypatchmatch at
-the photo's resolution, the others are OpenCV's.
+the fill is to what was there, *unlike* how differently DINOv2 sees it (1 - cosine of its tokens),
+*HED* how differently an edge detector's VGG16 does ([HED-VGG perceptual](../evaluation.md), which
+minds texture and outlines more): a smooth blur is near and unlike, a sharp guess is far and alike.
+*PatchMatch* is pypatchmatch at the photo's resolution, the others are OpenCV's.
 
 {table}
 
@@ -120,7 +140,10 @@ class Measures:
     moved: list[Moved]
     grained: list[Grained]
     found: dict[str, list[float]]  # by photo, see `grains.found_on_photos`
+    focussed: list[Focussed]
+    sharp: list[Sharp]
     shaded: list[Shaded]
+    reflections: str  # the section
     filled: dict[str, dict[str, Filled]]
     taken: list[Taken]
 
@@ -135,9 +158,43 @@ def write_page(measures: Measures) -> str:
                 summary=_place_summary(measures.moved), table=_place_table(measures.moved)
             ),
             GRAIN.format(table=_grain_table(measures.grained), found=_found_table(measures.found)),
+            focus_section(measures.focussed, measures.sharp).rstrip("\n") + "\n",
             SHADOW.format(summary=_shadow_summary(shaded), table=_shadow_table(shaded)),
+            measures.reflections.rstrip("\n") + "\n",
             plate_section(measures.filled, measures.taken),
         ]
+    )
+
+
+def focus_section(focussed: list[Focussed], sharp: list[Sharp]) -> str:
+    blurred = [case for case in focussed if case.far > 0]
+    plain, soft = (np.mean([getattr(c, n) for c in blurred]) for n in ("sharp", "soft"))
+    worse = sum(case.soft > WORSE * case.sharp for case in focussed)
+    summary = (
+        f"Where focus changes anything the composite is off by {plain:.1f} levels of 255 without "
+        f"Focus, and by {soft:.1f} with it. Of {len(focussed)} cases {worse} are worse by more "
+        f"than {100 * WORSE - 100:.0f} %; some blur is found in "
+        f"{sum(c.found > 0 for c in blurred)} of the {len(blurred)} that have any, and in "
+        f"{sum(c.found > 0 for c in focussed if c.far == 0)} of the others."
+    )
+    ratios = sorted({case.ratio for case in focussed})
+    lines = ["| | " + " | ".join(f"depth x {r:g}" for r in ratios) + " |"]
+    lines.append("| --- |" + " ---: |" * len(ratios))
+    for ground, far in dict.fromkeys((c.ground, c.far) for c in focussed):
+        own = [c for c in focussed if (c.ground, c.far) == (ground, far)]
+        cells = " | ".join(f"{c.true:.1f} → {c.found:.1f}" for c in own)
+        lines.append(f"| {ground}, {far:g} px | {cells} |")
+    return FOCUS.format(summary=summary, table="\n".join(lines), sharp=_sharp_text(sharp))
+
+
+def _sharp_text(sharp: list[Sharp]) -> str:
+    """What photographs say whose focus is not known."""
+    tried, blurred = sum(s.tried for s in sharp), sum(s.blurred for s in sharp)
+    most = max(sharp, key=lambda s: s.most)
+    return (
+        f"{len(sharp)} objects of photographs, most of them sharp all over, were moved to "
+        f"{tried} places and depths: {blurred} times one was blurred, by at most "
+        f"{most.most:.1f} px ({most.name})."
     )
 
 
@@ -155,10 +212,10 @@ def _plate_summary(filled: dict[str, dict[str, Filled]]) -> str:
     """In how many holes ours is at least as good as plain PatchMatch."""
     pairs = [(found["ours"], found["PatchMatch"]) for found in filled.values()]
     psnr, ssim = (sum(getattr(a, n) >= getattr(b, n) for a, b in pairs) for n in ("psnr", "ssim"))
-    unlike = sum(a.unlike <= b.unlike for a, b in pairs)
+    unlike, hed = (sum(getattr(a, n) <= getattr(b, n) for a, b in pairs) for n in ("unlike", "hed"))
     return (
         f"Ours is at least as near as plain PatchMatch in {psnr} (PSNR) and {ssim} (SSIM) of "
-        f"{len(pairs)} holes, and at least as alike in {unlike}."
+        f"{len(pairs)} holes, and at least as alike in {unlike} (DINOv2) and {hed} (HED)."
     )
 
 
@@ -264,15 +321,16 @@ def _plate_table(filled: dict[str, dict[str, Filled]]) -> str:
     rows = [[name, *(_plate_cell(found[way]) for way in WAYS)] for name, found in filled.items()]
     means = [
         [float(np.mean([getattr(filled[name][way], part) for name in HOLES]))
-         for part in ("psnr", "ssim", "unlike", "seconds")]
+         for part in ("psnr", "ssim", "unlike", "hed", "seconds")]
         for way in WAYS
     ]  # fmt: skip
-    rows.append(["**mean**", *(f"{p:.1f}, {s:.3f}, {u:.3f}; {t:.2f} s" for p, s, u, t in means)])
-    return _table(["PSNR dB, SSIM, unlike", *WAYS], rows)
+    told = (f"{p:.1f}, {s:.3f}, {u:.3f}, {h:.3f}; {t:.2f} s" for p, s, u, h, t in means)
+    rows.append(["**mean**", *told])
+    return _table(["PSNR dB, SSIM, unlike, HED", *WAYS], rows)
 
 
 def _plate_cell(filled: Filled) -> str:
-    return f"{filled.psnr:.1f}, {filled.ssim:.3f}, {filled.unlike:.3f}"
+    return f"{filled.psnr:.1f}, {filled.ssim:.3f}, {filled.unlike:.3f}, {filled.hed:.3f}"
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -12,8 +13,10 @@ import numpy as np
 from skimage import data
 from skimage.metrics import structural_similarity
 
+from objectmorpher_core import models
 from objectmorpher_core.arrays import Mask, Pixels
 from objectmorpher_core.compose import load
+from objectmorpher_core.evaluation.measures.hed_vgg import WEIGHT, HedVgg, read_hed_vgg
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import dino_tokens
 
@@ -76,6 +79,7 @@ class Filled:
     psnr: float  # dB, in the hole
     ssim: float  # in the hole
     unlike: float  # 1 - cosine of DINOv2's tokens, those that the hole touches
+    hed: float  # HED-VGG perceptual, in the hole
     seconds: float  # of all processors
     picture: Pixels  # around the hole
 
@@ -122,5 +126,12 @@ def _scored(
     one, other = (t / np.linalg.norm(t, axis=-1, keepdims=True) for t in tokens)
     share = cv2.resize(hole[around].astype(np.float32), (16, 16), interpolation=cv2.INTER_AREA)
     unlike = 1 - (one * other).sum(-1)[share > 0.2].mean()
+    before, after = (np.ascontiguousarray(p[around]) for p in (photo, filled))
+    (seen,) = _hed_vgg()(before, after, [hole[around].astype(np.float64)])
     psnr = 10 * np.log10(255**2 / max(error, 1e-9))
-    return Filled(psnr, float(alike[hole].mean()), float(unlike), seconds, filled[around])
+    return Filled(psnr, float(alike[hole].mean()), float(unlike), seen, seconds, filled[around])
+
+
+@cache
+def _hed_vgg() -> HedVgg:
+    return read_hed_vgg(models.fetch(WEIGHT))

@@ -19,6 +19,7 @@ from solids import SOLIDS, Solid, load
 
 from objectmorpher_core.arrays import F64, Mask, Pixels
 from objectmorpher_core.camera import Camera
+from objectmorpher_core.evaluation.truth.rasterise import rasterised
 from objectmorpher_core.rotations import turn_matrix
 
 SIDE = 512  # px
@@ -151,7 +152,7 @@ def _shadow(stood: Stand, lamp: Lamp, axes: F64, foot: F64) -> F64:
         height = (stood.rest - foot) @ stood.up
         fallen = stood.rest - way * (height / (way @ stood.up))[:, None] - foot
         at = (fallen @ axes.T / REACH + 0.5) * FINE
-        _, _, face, _ = mesh_view._rasterise(at, np.ones(len(at)), stood.solid.faces, FINE, FINE)
+        _, _, face, _ = rasterised(at, np.ones(len(at)), stood.solid.faces, FINE, FINE)
         total += face >= 0
     return total / LAMPS
 

@@ -5,9 +5,9 @@ An inpainter a file; `load()` imports the chosen one. What lies outside the hole
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Protocol, runtime_checkable
 
+from .. import backends
 from ..arrays import Mask, Pixels
 from ..hint import Hint
 from ..progress import Progress
@@ -46,35 +46,51 @@ class TakesHints(Protocol):
         ...
 
 
+@runtime_checkable
+class LooksFar(Protocol):
+    """An inpainter that can use more of the photo than what is copied from."""
+
+    context: int  # px around a hole
+
+
+@runtime_checkable
+class MayBeSlow(Protocol):
+    """An inpainter that "auto" does not take on every machine."""
+
+    def is_slow(self) -> bool:
+        """Whether a fill takes minutes here; asked only where it can run."""
+        ...
+
+
 REFINERS: tuple[str, ...] = (
     "none",
     "harmonise",
 )  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
+    "pixelhacker": "objectmorpher_core.compose.inpaint_pixelhacker:PixelHackerInpainter",
+    "lama": "objectmorpher_core.compose.inpaint_onnx:lama",
+    "migan": "objectmorpher_core.compose.inpaint_onnx:migan",
     "patchmatch": "objectmorpher_core.compose.inpaint_patchmatch:PatchMatchInpainter",
     "telea": "objectmorpher_core.compose.inpaint_telea:TeleaInpainter",
 }
 
 
-def load(name: str = "auto") -> Inpainter:
-    """The inpainter called `name`; "auto" is the first that can run here.
+def load(name: str = "auto", has_hints: bool = False) -> Inpainter:
+    """The inpainter called `name`; "auto" is the first that can run here, and heeds any hints.
 
     Raises InpaintError for an unknown name, or one that cannot run here.
     """
     if name == "auto":
-        return next(found for found in map(_create, BACKENDS) if found.missing() is None)
-    if name not in BACKENDS:
-        raise InpaintError(f"there is no inpainter {name!r}; known are {', '.join(BACKENDS)}")
-    inpainter = _create(name)
-    if (sentence := inpainter.missing()) is not None:
-        raise InpaintError(sentence)
-    return inpainter
+        created = (backends.create(BACKENDS, each) for each in BACKENDS)
+        return next(found for found in created if _suits(found, has_hints))
+    found = backends.known(BACKENDS, name, "inpainter", InpaintError)
+    return backends.able(found, InpaintError)
 
 
 def missing(name: str) -> str | None:
     """Why the inpainter called `name` cannot run here; None where it can, as "auto" always can."""
-    return None if name == "auto" else _create(name).missing()
+    return None if name == "auto" else backends.create(BACKENDS, name).missing()
 
 
 def is_random(name: str = "auto") -> bool:
@@ -82,6 +98,8 @@ def is_random(name: str = "auto") -> bool:
     return load(name).is_random
 
 
-def _create(name: str) -> Inpainter:
-    module, _, kind = BACKENDS[name].partition(":")
-    return getattr(import_module(module), kind)()
+def _suits(inpainter: Inpainter, has_hints: bool) -> bool:
+    """Whether "auto" may take it."""
+    if inpainter.missing() is not None or (has_hints and not isinstance(inpainter, TakesHints)):
+        return False
+    return not (isinstance(inpainter, MayBeSlow) and inpainter.is_slow())

@@ -3,7 +3,8 @@
 Each level of a pyramid alternates between looking for the nearest patches and letting them vote
 (`patch_search`). Beside colours the patches carry how rough the picture is, measured at full size
 and only then made coarse: without that the coarse levels cannot tell gravel from a grey wall
-(Newson et al. 2014, "Video Inpainting of Complex Scenes").
+(Newson et al. 2014, "Video Inpainting of Complex Scenes"). Beside the finest steps two coarser
+bands are measured, which tell gravel from finer or blurred gravel farther off.
 """
 
 from __future__ import annotations
@@ -25,8 +26,14 @@ COARSEST = 8.0  # px, how deep the hole of the coarsest level is at most
 EXPECTATIONS = (8, 3)  # searches and votes, at the coarsest level and at the finest
 ROUNDS = 2  # of each search
 LAST_ROUNDS = 4
+LOOKS = 4  # searches where nothing coarser was searched before
 ROUGHNESS_WINDOW = 5  # px
-ROUGHNESS_WEIGHT = 1.0  # x a colour channel's
+ROUGHNESS_BANDS = (2.0, 4.0)  # px, the finer standard deviation of each band
+BAND_WINDOW = 3.0  # x the band's, standard deviation of what its roughness is a mean of
+BAND_GAIN = 2.0  # x, of a band's contrast, to count about as much as the finest steps
+# A patch that matches nothing well costs least where it is smooth: by the variance of the texture.
+# Roughness must cost as much, and is less than a third of a texture's deviation in levels.
+ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
 HOLE_WEIGHT = 0.4  # x a known pixel's, of one that is only guessed, when patches are compared
 TRUST = 1.3  # x less a patch's vote counts for each px that it lies deeper in the hole
 USUAL_COST = 75  # percentile of the patches' costs, at which a vote loses
@@ -96,14 +103,48 @@ def complete(rgb: F32, known: F32, guide: Guide, seed: int, progress: Progress) 
     return Completion(found.values[..., :3], found.hole, found.sources)
 
 
+def sources_like(filled: F32, hole: Mask, seed: int, progress: Progress) -> I32:
+    """(h, w, 3) for each pixel of a hole where what is known looks like what it was filled with.
+
+    `filled` (h, w, 3), levels up to 255. Sources are as in `Completion`, -1 where there is none.
+    """
+    everywhere = np.ones(hole.shape, np.float32)
+    values = np.dstack([filled, _roughness(filled, everywhere)])
+    filling = _Filling(
+        _Level(values, 1 - hole.astype(np.float32)),
+        Guide(np.zeros(hole.shape, np.float32)),
+        np.random.default_rng(seed),
+    )
+    filling.values = values
+    for k in range(LOOKS):
+        progress(k / LOOKS, "Copying the details")
+        filling.search(ROUNDS)
+    return filling.sources
+
+
 def _roughness(rgb: F32, known: F32) -> F32:
-    """(h, w, 2) mean steps of brightness to the side and down, around each pixel."""
+    """(h, w, 4) around each pixel: steps of brightness to the side and down, two coarser bands."""
     grey = rgb.mean(-1)
     inner = cv2.erode((known >= 1).astype(np.float32), np.ones((3, 3)), borderValue=1)
     window = (ROUGHNESS_WINDOW, ROUGHNESS_WINDOW)
     count = np.maximum(cv2.blur(inner, window), 1e-6)
     steps = [np.abs(cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1)) for d in ((1, 0), (0, 1))]
-    return np.dstack([cv2.blur(s * inner, window) / count for s in steps])
+    found = [cv2.blur(s * inner, window) / count for s in steps]
+    return np.dstack(found + [_band(grey, known, sigma) for sigma in ROUGHNESS_BANDS])
+
+
+def _band(grey: F32, known: F32, sigma: float) -> F32:
+    """(h, w) mean contrast of `grey` (h, w) in the octave above `sigma` px, of what is known."""
+    contrast = np.abs(_blurred(grey, known, sigma) - _blurred(grey, known, 2 * sigma))
+    share = np.where(known > 0, cv2.GaussianBlur(known, (0, 0), 2 * sigma), np.float32(0))
+    return BAND_GAIN * _blurred(contrast, share, BAND_WINDOW * sigma)
+
+
+def _blurred(values: F32, weights: F32, sigma: float) -> F32:
+    """(h, w) weighted means of what is around."""
+    share = cv2.GaussianBlur(weights, (0, 0), sigma)
+    mean = cv2.GaussianBlur(values * weights, (0, 0), sigma) / np.maximum(share, 1e-6)
+    return np.asarray(mean, np.float32)
 
 
 def _pyramid(finest: _Level) -> list[_Level]:
@@ -148,7 +189,8 @@ class _Filling:
         self._targets = np.argwhere(self._touched).astype(np.int32)
         self._layers = np.stack([self._rimmed(v) for v in (self.values, self.values[:, ::-1])])
         self._barred = np.where(self._usable, self._guidance.unlikely, patch_search.NEVER)
-        weights = np.array([1, 1, 1, ROUGHNESS_WEIGHT, ROUGHNESS_WEIGHT], np.float32)
+        weights = np.full(level.values.shape[2], ROUGHNESS_WEIGHT, np.float32)
+        weights[:3] = 1
         inside = np.pad(np.where(self.hole, np.float32(HOLE_WEIGHT), 1), self._radius)
         self._weight = inside[..., None] * weights
         depth = cv2.distanceTransform(self.hole.astype(np.uint8), cv2.DIST_L2, 5)

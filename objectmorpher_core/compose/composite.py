@@ -36,11 +36,13 @@ from .blend import (
     with_touched,
 )
 from .blend import STILL as STILL
+from .defocus import blurred, reach_of
 from .harmonize import lit
 from .lighting import NOTHING, Lighting, Lit
 from .lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .plate import hole_margin, plate_crop, plate_of_holes
+from .refined import with_refined
 from .shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
@@ -120,9 +122,12 @@ def composite(
         progress((top - y0) / (y1 - y0), "Drawing the object")
         for drawn in drawing.over_plate(photo, top, bottom):
             blend.add(drawn)
-    pixels, footprint = blend.pixels, blend.footprint
+    pixels, footprint, share = blend.pixels, blend.footprint, 0.0
+    if document.refined is not None:
+        pixels, share = with_refined(photo, pixels, document.refined)
     changed, outside = _count_changes(photo, pixels, footprint)
-    shares = Shares(*blend.shares())
+    from_photo, from_lifter, from_inpainter = ((1 - share) * own for own in blend.shares())
+    shares = Shares(from_photo, from_lifter, from_inpainter, share)
     weights = blend.weights
     return Composite(
         pixels, footprint, changed, outside, shares, camera, things, drawing.box, weights
@@ -171,7 +176,10 @@ class _Drawing:
         """Everything the edit can touch."""
         margin = int(np.ceil(self._margin)) + 2
         boxes = [thing.matte.box for thing in self._things if thing.item.is_moved]
-        boxes += [box for shown in self._drawables.values() if (box := shown.box()) is not None]
+        for k, shown in self._drawables.items():
+            if (box := shown.box()) is not None:
+                rim = reach_of(self._things[k].look.blur)
+                boxes.append((box[0] - rim, box[1] - rim, box[2] + rim, box[3] + rim))
         boxes += [whole_box(shade.bounds) for shade in self._shades]
         if self._plate is not None and self._plate.painted is not None:
             boxes.append(self._plate.box)
@@ -226,15 +234,30 @@ class _Drawing:
         """The rows `top`..`bottom` of an object's picture; None where it is hidden, or at rest."""
         if k not in self._drawables:
             return None
-        part = (self.box[0], top, self.box[2], bottom)
-        picture = tiles.draw(self._drawables[k], self._textures[k], part)
         look = self._things[k].look
+        picture = self._focussed(k, top, bottom, look.blur)
         color = lit(picture.color, picture.alpha, look.gain)
         if look.relit is not None:
             color = look.relit.lit(color, picture.alpha, self.box[0], top)
         if look.grain is not None:
             color = look.grain.grained(color, picture.alpha, self.box[0], top)
         return replace(picture, color=color)
+
+    def _focussed(self, k: int, top: int, bottom: int, blur: float) -> Picture3D:
+        """The rows of an object's picture, as much out of focus as it is to be."""
+        x0, y0, x1, y1 = self.box
+        if blur <= 0:
+            return tiles.draw(self._drawables[k], self._textures[k], (x0, top, x1, bottom))
+        # By whole tiles more: what the rasteriser rounds, it rounds tile by tile.
+        rim = -(-reach_of(blur) // TILE) * TILE
+        above, below = max(top - rim, y0), min(bottom + rim, y1)
+        picture = tiles.draw(self._drawables[k], self._textures[k], (x0, above, x1, below))
+        picture = _part(picture, 0, below - above)
+        soft = replace(
+            picture, color=blurred(picture.color, blur), alpha=blurred(picture.alpha, blur),
+            from_photo=blurred(picture.from_photo, blur),
+        )  # fmt: skip
+        return _part(soft, top - above, bottom - above)
 
 
 def _pieces(top: int, bottom: int) -> list[tuple[int, int]]:

@@ -31,6 +31,7 @@ from ..raster.sampling import sample
 from ..raster.singles import HALF, ZERO
 from ..raster.texture import TextureLevels, build_levels
 from ..threads import EXACT, in_threads
+from .defocus import attenuation
 from .noise import BANDS, LEVELS, TILE, Noise, band_masks
 from .silhouette import Grid, cell_places, fine_grid, sketched
 
@@ -170,11 +171,13 @@ def _mix(tile, xs, above, below, share, columns, across, noise):
 
 
 def find_grain(
-    splats: PosedSplats, texture: TextureLevels, noise: Noise, strength: float, camera: Camera
-) -> Grain | None:
+    splats: PosedSplats, texture: TextureLevels, noise: Noise, strength: float, camera: Camera,
+    blur: float = 0.0,
+) -> Grain | None:  # fmt: skip
     """What a moved object lacks of the photo's noise, as the photo's `camera` sees it.
 
-    None where it lacks nothing. `strength` in [0, 1] of it is given.
+    None where it lacks nothing. `strength` in [0, 1] of it is given. `blur`: px of the photo by
+    which the object is put out of focus.
     """
     grid = fine_grid(splats, camera)
     if grid is None:
@@ -185,7 +188,7 @@ def find_grain(
     other = tiles.draw(tiles.prepare(splats.brightened(), own, camera), texture)
     shown = picture.alpha - (other.color - picture.color).mean(2)
     share = np.clip(shown / np.maximum(picture.alpha, FAINT), 0, 1)
-    amount = _missing(share[..., None] ** 2 * _kept(picture, share, grid, noise))
+    amount = _missing(share[..., None] ** 2 * _kept(picture, share, grid, noise) * _sharp(blur))
     amount = _continued(amount, np.minimum(picture.alpha, 1))
     if amount.max() < LEAST:
         return None
@@ -193,13 +196,13 @@ def find_grain(
 
 
 def sketch_grain(
-    splats: PosedSplats, noise: Noise, strength: float, camera: Camera
+    splats: PosedSplats, noise: Noise, strength: float, camera: Camera, blur: float = 0.0
 ) -> Grain | None:
     """The same in a millisecond or two: as if all of it had moved by one affine map."""
     few = sketched(splats)
     few = few[splats.rest.lifted.texture.visibility[few] > SOLID]
     few = few[splats.means[few, 2] > 0]
-    amount = np.ones(BANDS, np.float32)
+    kept = np.zeros(BANDS)
     if len(few) > FEWEST:
         now, was = camera.project(splats.means[few]), splats.rest.lifted.texture.u0[few]
         middle = now.mean(0)
@@ -207,10 +210,19 @@ def sketch_grain(
         fitted = np.linalg.lstsq(table, was - now, rcond=None)[0]  # (3, 2)
         maps = np.tile(np.concatenate([middle, fitted[2], fitted[0], fitted[1]]), (SAMPLES, 1))
         after, before = _powers(maps, noise).sum(1)
-        amount = _missing(after / np.maximum(before, 1e-12))
+        kept = after / np.maximum(before, 1e-12) * _sharp(blur)
+    amount = _missing(kept)
     if amount.max() < LEAST:
         return None
     return Grain(noise, frozen(strength * amount[None, None], np.float32), 0.0, 0.0, 1.0)
+
+
+def _sharp(blur: float) -> np.ndarray:
+    """(BANDS,) what a blur, px, leaves of the power in each band."""
+    along = np.fft.fftfreq(PATCH)
+    frequency = np.hypot(along[:, None], along)
+    left = attenuation(blur, frequency)
+    return np.array([left[mask].mean() for mask in band_masks(frequency)], np.float32)
 
 
 def _missing(kept: np.ndarray) -> F32:

@@ -1,8 +1,9 @@
 """An edit as a pile of layers that any paint program can open, and that gives the export again.
 
 From below: the photo; what is invented behind its objects; shadows; the objects, back to front;
-and the photo once more, wherever the edit does not show. That last layer is what makes the pile
-exact: it covers all that lies under it as far as the composite does (`blend.blend_weights`).
+and the photo once more, wherever the edit does not show. That layer is what makes the pile exact:
+it covers all that lies under it as far as the composite does (`blend.blend_weights`). A refinement
+lies above it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from ..document import Document, EditObject, Matte, Plate
 from ..pixels import crop, pixels_from_unit
 from ..progress import Progress, part, silent
+from ..refined import Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes
@@ -21,6 +23,7 @@ from .plate import overlap, plate_of_holes
 from .shadow import Shade
 
 PHOTO, BACKGROUND, UNTOUCHED = "Photo", "Background", "Photo, untouched"
+REFINEMENT = "Refinement"
 EMPTY = "Background without all objects"
 SHADOW = "Shadow of {name}"
 
@@ -67,7 +70,14 @@ def layers(document: Document, progress: Progress = silent) -> tuple[Composite, 
         progress(0.5 + 0.4 * k / len(shown), "drawing")
         pile += _clipped(thing.item.name, *_drawn(thing, document), size)
     untouched = _untouched(document, result, pile)
-    return result, [Layer(PHOTO, photo), *pile, *untouched]
+    above = [] if document.refined is None or not result.stack else _refined(document.refined)
+    return result, [Layer(PHOTO, photo), *pile, *untouched, *above]
+
+
+def _refined(refined: Refined) -> list[Layer]:
+    """Above all else: it is mixed with the finished composite."""
+    alpha = pixels_from_unit(refined.weights, refined.pixels.dtype)
+    return _trimmed(REFINEMENT, np.dstack([refined.pixels, alpha]), refined.box)
 
 
 def _background(name: str, plate: Plate, is_shown: bool = True) -> Layer:

@@ -1,4 +1,4 @@
-"""Shadow, light and grain of a moved object, from the document alone.
+"""Shadow, light, grain and focus of a moved object, from the document alone.
 
 So they are the same for window and export.
 """
@@ -17,10 +17,12 @@ from ..document import Document, EditObject, LiftedObject, Matte
 from ..joining import Shadow
 from ..raster.posed import PosedSplats
 from ..raster.texture import TextureLevels, build_levels
+from .defocus import Focus, Ground, find_defocus
 from .grain import Grain, find_grain, sketch_grain
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .light_estimate import estimate_light
 from .noise import Noise, find_noise
+from .plate import plate_cover
 from .relight import Relit, relight
 from .shadow import COARSE, FINE, Shade, Standing, cast, ground_normal
 from .silhouette import SKETCHED, sketch, sketched
@@ -36,6 +38,7 @@ class Lit:
     shade: Shade | None = None
     relit: Relit | None = None
     grain: Grain | None = None
+    blur: float = 0.0  # px of the photo, standard deviation; before all the others
 
 
 NOTHING = Lit()
@@ -63,6 +66,11 @@ class Lighting:
         """The photo's grain."""
         return find_noise(self._document.photo.pixels)
 
+    @cached_property
+    def focus(self) -> Focus:
+        """How blurred the photo is."""
+        return Focus(self._document.photo.pixels, plate_cover(self._document))
+
     def of(
         self,
         item: EditObject,
@@ -78,12 +86,14 @@ class Lighting:
         the time that a frame of a drag has.
         """
         has_shadow, has_light = item.shadow.strength > 0, item.harmony > 0
-        has_any = has_shadow or has_light or item.relight or item.grain
+        has_any = has_shadow or has_light or item.relight or item.grain or item.defocus
         if not item.is_visible or not has_any:
             return NOTHING
         assert item.matte is not None, "a lifted object has a matte"
         camera = self._document.photo.camera
-        shade, gain, relit, grain = None, NEUTRAL, None, None
+        shade, gain, relit, grain, blur = None, NEUTRAL, None, None, 0.0
+        if item.defocus > 0:
+            blur = item.defocus * self._defocus(item, splats, rest(), horizon)
         if has_shadow:
             most, cells = (SKETCHED, COARSE) if is_sketch else (CAST, FINE)
             standing = stand(splats, camera, horizon, item.shadow, most)
@@ -96,11 +106,21 @@ class Lighting:
             relit = relight(splats, self._light_of(item), item.relight, camera, is_sketch)
         if item.grain > 0 and self.noise is not None:
             if is_sketch:
-                grain = sketch_grain(splats, self.noise, item.grain, camera)
+                grain = sketch_grain(splats, self.noise, item.grain, camera, blur)
             else:
                 carried = texture or object_texture(item.matte)
-                grain = find_grain(splats, carried, self.noise, item.grain, camera)
-        return Lit(gain, shade, relit, grain)
+                grain = find_grain(splats, carried, self.noise, item.grain, camera, blur)
+        return Lit(gain, shade, relit, grain, blur)
+
+    def _defocus(
+        self, item: EditObject, splats: PosedSplats, rest: PosedSplats, horizon: float | None
+    ) -> float:
+        """Px by which the object is too sharp for where it is now."""
+        assert item.lifted is not None and item.matte is not None
+        camera, shadow = self._document.photo.camera, item.shadow
+        normal = _normal_under(item.lifted, camera, horizon, shadow)
+        ground = Ground(normal, horizon is not None or shadow.ground is not None)
+        return find_defocus(splats, rest, item.matte, ground, self.focus, camera)
 
     def _light_of(self, item: EditObject) -> F64:
         """b (3,), see `light_estimate`; estimated once."""

@@ -19,9 +19,10 @@ from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
 from . import Inpainter
+from .old_reflection import OldReflection, without_reflection
 from .plate import Box, build_plate, cut, hole_margin
 from .shadow import GAMMA
-from .silhouette import sampled
+from .silhouette import cells_bounds, sampled
 
 LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
 SEEN = 1 / 512  # of encoded light: less is no shadow
@@ -49,15 +50,11 @@ class OldShadow:
 
     def bounds(self, width: int, height: int) -> Box:
         """x0, y0, x1, y1 px around it, within a photo of that size."""
-        rows, columns = np.flatnonzero(self.depth.any(1)), np.flatnonzero(self.depth.any(0))
-        if not len(rows):
-            return 0, 0, 0, 0
-        x0, x1 = (self.left + self.pitch * (c + d) for c, d in ((columns[0], -1), (columns[-1], 2)))
-        y0, y1 = (self.top + self.pitch * (r + d) for r, d in ((rows[0], -1), (rows[-1], 2)))
-        return (
-            int(np.clip(np.floor(x0), 0, width)), int(np.clip(np.floor(y0), 0, height)),
-            int(np.clip(np.ceil(x1), 0, width)), int(np.clip(np.ceil(y1), 0, height)),
-        )  # fmt: skip
+        return cells_bounds(self.depth, (self.left, self.top), self.pitch, (width, height))
+
+    def lost(self, box: Box) -> Mask:
+        """(h, w) where it is so dark that the photo shows little of the ground."""
+        return self.missing(box) > LOST
 
 
 def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask]:
@@ -85,10 +82,10 @@ def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
     return np.asarray(np.clip(found, 0, None) * near, np.float32)
 
 
-def shadowless_plate(
+def traceless_plate(
     pixels: Pixels,
     covered: Mask,
-    olds: Sequence[OldShadow],
+    traces: Sequence[OldShadow | OldReflection],
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
@@ -96,18 +93,23 @@ def shadowless_plate(
 ) -> Plate:
     """As `build_plate`, of the photo in full light: shadows are gone beside the objects, too.
 
-    There it is painted, as by hand: shown wherever something has moved. Where it is so dark that
-    the photo shows little of the ground, that is invented.
+    Reflections are taken off, too. There it is painted, as by hand: shown wherever something has
+    moved. Where it is so dark that the photo shows little of the ground, and where that mirrors an
+    object in a way that is not known, it is invented.
     """
     height, width = covered.shape
     lit = pixels.copy()
     is_changed, lost = np.zeros_like(covered), np.zeros_like(covered)
-    shades = [old.bounds(width, height) for old in olds]
-    for old, shade in zip(olds, shades, strict=True):
+    traces = sorted(traces, key=lambda old: isinstance(old, OldShadow))  # what is added goes first
+    shades = [old.bounds(width, height) for old in traces]
+    for old, shade in zip(traces, shades, strict=True):
         part = (slice(shade[1], shade[3]), slice(shade[0], shade[2]))
-        lit[part], is_lighter = without_shadow(lit, old, shade)
-        is_changed[part] |= is_lighter
-        lost[part] |= old.missing(shade) > LOST
+        lost[part] |= old.lost(shade)
+        if isinstance(old, OldShadow):
+            lit[part], is_other = without_shadow(lit, old, shade)
+        else:
+            lit[part], is_other = without_reflection(lit, old, shade)
+        is_changed[part] |= is_other
     lost &= ~covered
     filled = covered | lost
     filled = covered if filled.all() else filled

@@ -87,7 +87,7 @@ def reordered(document: Document, k: int, order: Sequence[int], posed: Posed) ->
         objects[above] = replace(
             objects[above], layer=max(objects[above].layer, least(below, above))
         )
-    return replace(document, objects=tuple(objects))
+    return replace(document, objects=tuple(objects), refined=None)
 
 
 def leaves_a_hole(objects: tuple[EditObject, ...], k: int) -> bool:

@@ -18,13 +18,16 @@ LOW_PASS = 2  # small pixels: what is coarser comes from the search, what is fin
 BLEND_STEEPNESS = 2.0  # x, of the blend between two sources' detail
 
 
-def with_detail(crop: Pixels, hole: Mask, small: F32, sources: I32) -> Pixels:
+def with_detail(
+    crop: Pixels, hole: Mask, small: F32, sources: I32, low_pass: int = LOW_PASS
+) -> Pixels:
     """The crop (H, W, 3), its hole (H, W) filled.
 
     `small` (h, w, 3) is the picture filled at a smaller size, levels up to 255, and `sources`
     (h, w, 3) from where: whether from its mirror image, row and column. None where that is -1.
+    What is coarser than `low_pass` pixels of `small` is taken from there.
     """
-    size = max(1, small.shape[1] // LOW_PASS), max(1, small.shape[0] // LOW_PASS)
+    size = max(1, small.shape[1] // low_pass), max(1, small.shape[0] // low_pass)
     unit = np.float32(np.iinfo(crop.dtype).max / 255)
     filled = crop.copy()
     rough = resized(small, *size) * unit

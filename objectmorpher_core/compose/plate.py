@@ -18,7 +18,7 @@ from ..document import Document, Matte, Plate
 from ..hint import Hint
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, part, silent
-from . import Inpainter, TakesHints
+from . import Inpainter, LooksFar, TakesHints
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -68,6 +68,8 @@ def build_plate(
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
     x0, y0, x1, y1 = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
     context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    if isinstance(inpainter, LooksFar):
+        context = max(context, inpainter.context)
     if hints:  # from anywhere
         context = max(width, height)
     top, left = max(y0 - context, 0), max(x0 - context, 0)

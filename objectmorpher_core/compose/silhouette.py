@@ -150,6 +150,25 @@ def sampled(values: F32, corner: tuple[float, float], pitch: float, box: Box) ->
     return np.asarray(near + across * (far - near), np.float32)
 
 
+def cells_bounds(
+    values: F32, corner: tuple[float, float], pitch: float, size: tuple[int, int]
+) -> Box:
+    """x0, y0, x1, y1 px around what of a grid is not 0, in a photo of that size (w, h); else 0s.
+
+    The grid's `corner` is at photo px.
+    """
+    rows, columns = np.flatnonzero(values.any(1)), np.flatnonzero(values.any(0))
+    if not len(rows):
+        return 0, 0, 0, 0
+    x0, x1 = (corner[0] + pitch * (c + d) for c, d in ((columns[0], -1), (columns[-1], 2)))
+    y0, y1 = (corner[1] + pitch * (r + d) for r, d in ((rows[0], -1), (rows[-1], 2)))
+    width, height = size
+    return (
+        int(np.clip(np.floor(x0), 0, width)), int(np.clip(np.floor(y0), 0, height)),
+        int(np.clip(np.ceil(x1), 0, width)), int(np.clip(np.ceil(y1), 0, height)),
+    )  # fmt: skip
+
+
 def cell_places(
     first: int, last: int, start: float, pitch: float, count: int
 ) -> tuple[np.ndarray, F32]:

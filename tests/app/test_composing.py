@@ -15,8 +15,15 @@ from app.view import ToolName
 from objectmorpher_core import edits
 from objectmorpher_core.compose.plate import plate_cover, plate_picture
 from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
-from objectmorpher_core.joining import USUAL_GRAIN, USUAL_HARMONY, USUAL_RELIGHT, Shadow
+from objectmorpher_core.joining import (
+    USUAL_DEFOCUS,
+    USUAL_GRAIN,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+    Shadow,
+)
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
+from tests.reflected import mirrored, photo_with
 from tests.shadowed import inside, photo_of, thrown
 from tests.shapes import png
 
@@ -132,9 +139,9 @@ def test_variants_can_be_looked_at_and_chosen(bare: Editor, ball: Document) -> N
 
 
 def test_a_way_of_filling_without_chance_offers_no_variants(bare: Editor) -> None:
-    bare.composing.choose_inpainter("telea")
+    bare.methods.choose("inpaint", "telea")
     reason = COMMANDS["variants"].why_not(bare)
-    bare.composing.choose_inpainter("auto")
+    bare.methods.choose("inpaint", "auto")
     assert reason == "This way of filling gives the same every time"
     assert COMMANDS["variants"].why_not(bare) is None
 
@@ -172,8 +179,11 @@ def test_a_dragged_shadow_is_coarse_until_the_pointer_rests(editor: Editor, ball
 
 
 def standing(shadow: np.ndarray | None) -> Document:
+    return lifted_of(photo_of(shadow))
+
+
+def lifted_of(pixels: np.ndarray) -> Document:
     """A thing on the ground, lifted, with a background, moved aside."""
-    pixels = photo_of(shadow)
     document = open_photo(png(pixels), "thing.png")
     document = edits.set_mask(edits.add_object(document), 0, inside(), Prompt())
     made = lift_mask(pixels, document.photo.camera, inside(), "relief", LiftSettings(800, trust=0))
@@ -207,7 +217,24 @@ def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) 
     wait_for_jobs(editor)
     assert editor.document is document
     assert editor.message is not None
-    assert editor.message.text.startswith("No shadow of it is sure")
+    assert editor.message.text.startswith("No shadow or reflection is sure")
+
+
+def test_its_reflection_in_the_photo_goes_and_none_is_drawn(editor: Editor) -> None:
+    document = lifted_of(photo_with(mirrored()))
+    editor.start(document)
+    run(editor, "take_shadow")
+    wait_for_jobs(editor)
+    assert editor.history is not None
+    assert editor.history.undo_label == "Remove old reflection"
+    assert editor.object is not None and editor.object.shadow.strength == 0
+    assert editor.document is not None
+    own = (mirrored()[..., 3] > 0.5) & ~plate_cover(document)
+    bare = photo_with(None).astype(float)
+    left, was = (np.abs(plate_picture(d) - bare)[own].mean() for d in (editor.document, document))
+    assert left < 0.5 * was
+    editor.undo()
+    assert editor.document is document
 
 
 def test_what_has_not_moved_keeps_its_shadow(editor: Editor, ball: Document) -> None:
@@ -222,13 +249,15 @@ def test_harmonise_offers_both_lights_and_grain_and_one_step_takes_all(
     editor.composing.choose_refiner("harmonise")
     assert editor.object is not None
     assert editor.object.harmony == USUAL_HARMONY and editor.object.relight == USUAL_RELIGHT
-    assert editor.object.grain == USUAL_GRAIN
+    assert editor.object.grain == USUAL_GRAIN and editor.object.defocus == USUAL_DEFOCUS
     editor.composing.preview_harmony(0.0)
     editor.commit("Adjust light")
     editor.composing.preview_relight(0.0)
     editor.commit("Adjust light")
     editor.composing.preview_grain(0.0)
-    assert editor.object.relight == 0 and editor.object.grain == 0
+    editor.commit("Adjust light")
+    editor.composing.preview_defocus(0.0)
+    assert editor.object.relight == 0 and editor.object.grain == 0 and editor.object.defocus == 0
     assert editor.composing.refiner == "harmonise"  # until the pointer is let go
     editor.commit("Adjust light")
     assert editor.composing.refiner == "none"

@@ -16,7 +16,7 @@ from objectmorpher_core.compose.plate import plate_cover
 from objectmorpher_core.document import Placement
 from objectmorpher_core.joining import Shadow
 from objectmorpher_core.pipeline import make_plate
-from tests import shapes
+from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
@@ -187,3 +187,38 @@ def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
     own, other = (np.abs(window - small(p))[there].mean() for p in (exported, smooth))
     # It is this grain, at this place; half as large the object is drawn anew, from a halved photo.
     assert own < (0.1 if zoom == 1 else 0.75) * other
+
+
+@pytest.mark.parametrize("zoom", [1.0, 0.5])
+@pytest.mark.parametrize("kind", ["tiles", "gl"])
+def test_the_window_shows_focus_as_it_is_exported(renderer, kind, zoom):
+    document = focussed.farther(focussed.scene(5.0), 1.8)
+    derived, view = Derived(), View()
+    derived.layers.frame_time = np.inf
+    view.resize(SIZE, 1.0, document.photo.size)
+    view.set_zoom(zoom, (80, 60), SIZE)
+    view.left, view.top = (240.0, 120.0) if zoom == 1 else (160.0, 60.0)
+    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
+    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
+    assert look.blur > 1
+    texture = derived.shape(document.photo, document.objects[0]).texture
+    item = SplatObject(splats, texture, document.photo.camera, blur=look.blur)
+    objects = (item,) if kind == "gl" else ()
+    blend = derived.blend(document, view)
+    plate = document.plate
+    shown = Scene(document.photo.pixels, (0, 0, 0), plate, (), layers, objects, blend=blend)
+    window = _window_picture(renderer, shown, view)
+    parts = int(1 / zoom)
+    x, y = int(view.left), int(view.top)
+    seen = np.s_[y : y + parts * window.shape[0], x : x + parts * window.shape[1]]
+    sharp = edits.set_defocus(document, 0, 0.0)
+
+    def small(picture):
+        rows = picture[seen].reshape(window.shape[0], parts, window.shape[1], parts, 3)
+        return rows.mean((1, 3))
+
+    soft, plain = (composite(d).pixels.astype(np.float32) / 255 for d in (document, sharp))
+    there = np.abs(small(soft) - small(plain)).max(2) > 0.05
+    assert there.sum() > 200
+    own, other = (np.abs(window - small(p))[there].mean() for p in (soft, plain))
+    assert own < 0.15 * other

@@ -24,6 +24,8 @@ ROOT = Path(__file__).parents[3]
 # target's rounding; 0.7 / 255 elsewhere, what lies behind an alpha of 0.999.
 REST = 2 / 255
 PIXEL = 3 / 255
+NUDGE = 1e-4  # degrees, by which the specification's own picture may jump in
+TIES = 2  # pixels
 
 ZOOMS = {
     "1x": (0, 0, 160, 120, 1.0),
@@ -62,10 +64,19 @@ def test_placed(splat_pass, placement):
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (20.0, 40.0, 0.0)])
 @pytest.mark.parametrize("zoom", ZOOMS)
 def test_bent(splat_pass, zoom, turn, largeness):
+    """A pixel in which two Gaussians are as deep as each other may show either in front."""
     scene, pose = bent("star", 1200, largeness)
-    splats = scene.puppet.posed(pose, Placement(turn=turn))
     camera = scene.camera.windowed(*ZOOMS[zoom])
-    assert difference(splat_pass, splats, scene.texture, camera, scene.camera) <= PIXEL
+    pitch, yaw, roll = turn
+    views = [
+        (scene.puppet.posed(pose, Placement(turn=(pitch + by, yaw, roll))), scene.texture, camera,
+         scene.camera)
+        for by in (0.0, NUDGE, -NUDGE)
+    ]  # fmt: skip
+    picture = rendered(splat_pass, *views[0])
+    gaps = np.array([np.abs(picture - specified(*view)).max(-1) for view in views])
+    assert (gaps[0] > PIXEL).sum() <= TIES
+    assert gaps.min(0).max() <= PIXEL
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -12,7 +12,7 @@ from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.lighting import object_texture
-from objectmorpher_core.compose.old_shadow import shadowless_plate
+from objectmorpher_core.compose.old_shadow import traceless_plate
 from objectmorpher_core.compose.plate import hole_margin, plate_cover
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
 from objectmorpher_core.document import Document, EditObject, Photo, Placement, Prompt
@@ -120,7 +120,7 @@ def test_moved_back_it_is_the_photo_byte_for_byte(name, bits):
     old = find_old_shadow(document.photo.pixels, item.matte)
     if old is not None:  # also where its shadow was taken off the ground
         pixels, covered = document.photo.pixels, plate_cover(document)
-        plate = shadowless_plate(pixels, covered, (old,), load("telea"))
+        plate = traceless_plate(pixels, covered, (old,), load("telea"))
         edited = edits.set_plate(edited, plate)
     back = edits.set_placement(edited, 0, Placement())
     assert np.array_equal(composite(back, {0: puppet}).pixels, document.photo.pixels)

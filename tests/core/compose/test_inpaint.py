@@ -8,16 +8,22 @@ import pytest
 
 from objectmorpher_core.compose import BACKENDS, InpaintError, load
 from objectmorpher_core.progress import Cancelled, silent
+from tests.core.compose import tiny_inpainters
+
+LEARNED = tiny_inpainters.FAMILIES
 
 
 @pytest.fixture(params=BACKENDS)
-def inpainter(request):
+def inpainter(request, tmp_path, monkeypatch):
+    """Each; those that learned something are tiny networks of random weights."""
+    if request.param in LEARNED:
+        tiny_inpainters.bring(request.param, tmp_path, monkeypatch)
     return load(request.param)
 
 
-@pytest.fixture
-def view(rocket):
-    return rocket[180:400, 200:440]
+def is_trained(inpainter) -> bool:
+    """Whether what it fills a hole with means anything."""
+    return inpainter.name not in LEARNED
 
 
 @pytest.fixture
@@ -56,6 +62,8 @@ def test_contract(inpainter, view, hole, depth):
 
 def test_the_rocket_is_gone(inpainter, view, hole):
     """The rocket is white on a dark sky; the fill is as dark as the sky beside it."""
+    if not is_trained(inpainter):
+        pytest.skip("random weights invent nothing that fits")
     filled = inpainter.inpaint(view, hole, silent).astype(float)
     sky = np.zeros_like(hole)
     sky[20:90, 40:80] = True
@@ -154,6 +162,8 @@ def test_16_bit_gradient_shows_no_bands():
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_black_and_white_stay_black_and_white(inpainter, kind, share):
     """Where OpenCV goes a level beyond white, nothing turns black."""
+    if not is_trained(inpainter):
+        pytest.skip("random weights invent nothing that fits")
     level = kind(share * np.iinfo(kind).max)
     plain = np.full((120, 140, 3), level, kind)
     y, x = np.mgrid[:120, :140]
@@ -164,5 +174,5 @@ def test_black_and_white_stay_black_and_white(inpainter, kind, share):
 
 
 def test_unknown_name():
-    with pytest.raises(InpaintError, match="there is no inpainter 'lama'"):
-        load("lama")
+    with pytest.raises(InpaintError, match="there is no inpainter 'lamb'"):
+        load("lamb")

@@ -12,7 +12,7 @@ from skimage import data
 from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.old_shadow import OldShadow, shadowless_plate, without_shadow
+from objectmorpher_core.compose.old_shadow import OldShadow, traceless_plate, without_shadow
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
 from objectmorpher_core.document import Matte, Placement
 from objectmorpher_core.pipeline import run_script
@@ -120,7 +120,7 @@ def test_the_background_is_without_it(taken):
     shade = thrown(35.0, 0.8)
     dark, lit = photo_of(shade, dark=taken), photo_of(None)
     covered = cv2.dilate(inside().astype(np.uint8), np.ones((5, 5))) > 0
-    plate = shadowless_plate(dark, covered, (_found(dark),), load("telea"))
+    plate = traceless_plate(dark, covered, (_found(dark),), load("telea"))
     x0, y0, x1, y1 = plate.box
     assert plate.painted is not None
     assert not (plate.painted & covered[y0:y1, x0:x1]).any()

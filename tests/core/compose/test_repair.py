@@ -47,7 +47,7 @@ def _document() -> Document:
     return replace(document, plate=replace(document.plate, pixels=noise))
 
 
-@pytest.mark.parametrize("name", compose.BACKENDS)
+@pytest.mark.parametrize("name", [n for n in compose.BACKENDS if compose.missing(n) is None])
 @pytest.mark.parametrize("places", [((80, 60), (95, 66)), ((4, 4), (12, 4)), ((40, 60), (60, 60))])
 def test_a_repair_changes_what_is_painted_and_nothing_else(name, places):
     document, stroke = _document(), _stroke(*places)

@@ -1,0 +1,125 @@
+"""FLUX.2-klein-4B: four steps, and no text encoder, because the instruction is always the same.
+
+What the text encoder says of the instruction is computed once and kept in the models folder. From
+then on the encoder, half of the pipeline, is neither loaded nor needed.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from ... import models
+from ...models import ModelError, device
+from ...models.weight_folder import check_safetensors
+from .diffusion import INSTRUCTION, DiffusionRefiner
+from .memory import PipelineNeed, PipelinePlan
+
+STEPS = 4
+VAE = 84_000_000  # parameters
+TEXT_ENCODER = 4_022_000_000
+KEY = "prompt_embeds"
+
+
+class KleinRefiner(DiffusionRefiner):
+    """See the module."""
+
+    name = "klein"
+    families = ("flux2-klein",)
+    adapters = "klein-refine-lora"
+    pipeline = "Flux2KleinPipeline"
+    parts = ("transformer",)
+    work = 3_000_000_000
+
+    def missing(self) -> str | None:
+        """See `Refiner`."""
+        sentence = super().missing()
+        if sentence is not None:
+            return sentence
+        folder, kept = self.folder(), prompt_file(self.folder())
+        if kept.exists() or (folder / "text_encoder").is_dir():
+            return None
+        return (
+            f"{folder.name} has no text_encoder, and what it says is not kept in {kept.name}:"
+            " get the model again"
+        )
+
+    def need(self) -> PipelineNeed:
+        """See `DiffusionRefiner`."""
+        model = self.model()
+        assert model is not None
+        transformer = model.parameters * 1_000_000 - TEXT_ENCODER - VAE
+        return PipelineNeed((transformer, VAE), self.work)
+
+    def _steps(self) -> int:
+        return STEPS
+
+    def _load(self, folder: Path, options: dict[str, Any], plan: PipelinePlan) -> Any:
+        from diffusers.pipelines.flux2.pipeline_flux2_klein import Flux2KleinPipeline
+
+        if not prompt_file(folder).exists():
+            encode_instruction(folder)
+        return Flux2KleinPipeline.from_pretrained(
+            folder, text_encoder=None, tokenizer=None, **options
+        )
+
+    def _call(self, pipeline: Any, pictures: list[Any], given: dict[str, Any]) -> Any:
+        from safetensors.torch import load_file
+
+        file = prompt_file(self.folder())
+        check_safetensors(file)
+        embedding = load_file(file)[KEY].to(pipeline._execution_device, pipeline.transformer.dtype)
+        return pipeline(image=pictures, prompt_embeds=embedding, guidance_scale=1.0, **given)
+
+
+def prompt_file(folder: Path) -> Path:
+    """Where the instruction's embedding is kept; another instruction or model has another file."""
+    config = folder / "text_encoder" / "config.json"
+    kind = config.read_bytes() if config.exists() else folder.name.encode()
+    told = hashlib.sha256(INSTRUCTION.encode() + kind).hexdigest()[:12]
+    return models.folder() / f"klein-prompt-{told}.safetensors"
+
+
+def encode_instruction(folder: Path) -> Path:
+    """Runs the text encoder of a pipeline's folder once; the file that keeps its answer.
+
+    On the CPU: it takes seconds, and the GPU may be too small for it. Raises ModelError.
+    """
+    import torch
+    from diffusers.pipelines.flux2.pipeline_flux2_klein import Flux2KleinPipeline
+    from safetensors.torch import save
+    from transformers import AutoTokenizer, Qwen3ForCausalLM
+
+    from ...files import write_all
+
+    try:
+        tokenizer = AutoTokenizer.from_pretrained(folder / "tokenizer", local_files_only=True)
+        # bfloat16 on the CPU, too: that is how it was published, and half the memory.
+        encoder = Qwen3ForCausalLM.from_pretrained(
+            folder / "text_encoder", local_files_only=True, use_safetensors=True,
+            dtype=torch.bfloat16,
+        )  # fmt: skip
+        layers = layers_told(int(encoder.config.num_hidden_layers))
+        with torch.inference_mode():
+            embedding = Flux2KleinPipeline._get_qwen3_prompt_embeds(
+                encoder, tokenizer, INSTRUCTION, hidden_states_layers=list(layers)
+            )
+        data = save({KEY: embedding.contiguous()})
+        models.folder().mkdir(parents=True, exist_ok=True)
+        write_all({prompt_file(folder): data})
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{folder.name}'s text encoder cannot be opened: {error}") from error
+    except RuntimeError as error:
+        if device.is_out_of_memory(error):
+            raise ModelError("there is not enough memory for the text encoder") from error
+        raise ModelError(f"{folder.name}'s text encoder does not fit its configuration") from error
+    del encoder
+    gc.collect()
+    return prompt_file(folder)
+
+
+def layers_told(count: int) -> tuple[int, int, int]:
+    """Of `count` layers those that are read: 9, 18, 27 of the published encoder's 36."""
+    return count // 4, count // 2, 3 * count // 4
