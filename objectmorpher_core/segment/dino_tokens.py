@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import models
 from ..arrays import F32, RGB
+from ..models.onnx_session import open_session
 from .subject import DEVIATION, MEAN
 
 WEIGHT = "dinov2-vits14"
@@ -26,19 +27,13 @@ class TokenNet:
 
     def __init__(self, threads: int = 0) -> None:
         """`threads` of one run; 0: one a core. Raises ModelError without the weights."""
-        import onnxruntime
-
         from ..models.onnx_graph import with_interface
 
         path = models.path(WEIGHT)
         if path is None:
             raise models.ModelError(f"the model {WEIGHT} is not here: `objectmorpher models get`")
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
         graph = with_interface(path.read_bytes(), IMAGES, TOKENS, *INNER)
-        self._session: Any = onnxruntime.InferenceSession(
-            graph, options, providers=["CPUExecutionProvider"]
-        )
+        self._session: Any = open_session(graph, threads)
 
     def tokens(self, rgb: RGB) -> F32:
         """(h, w, 384) of a picture of h x w patches."""

@@ -2,7 +2,10 @@
 
 Regions grow around the click; the best has strong contrast across its outline, agrees with the
 subject map, leaves the photo's frame free, and has the click near its middle. A first click on a
-part means the whole; a correction means the part around it that the outline got wrong.
+part means the whole; a correction means the part around it that the outline got wrong. What a
+correction means may show better from the other side: what grows around a click that says the
+contrary may have the clearer outline, and the rest is meant. Or it is as far as a walk from the
+clicks gets that may end at any step, where the answer before is trusted (Grady 2005).
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import F32, F64, Mask
 from ..document import Click, Prompt
 from .pieces import Pieces
+from .relabel import touching
 from .selection import SelectionError, box_mask
 
 CENTRED_WHOLE = 0.3  # exponent: how much a click is in the middle of the whole that it means
@@ -30,6 +34,8 @@ SHARP_WHOLE = 6.0  # exponent: how much more a better region is likely to be mea
 SHARP_PART = 20.0
 SHARP_CORRECTION = 6.0
 OFF_CENTRE = 0.05  # least that counts for being in the middle
+TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
+KNOWN = 1e4  # the same of a click: a walk that comes there ends
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
 LARGER = 0.03  # exponent: how much a larger region is preferred
@@ -114,7 +120,10 @@ def correct(ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...])
 
     It holds none of `walls`, the pieces of clicks that say the contrary.
     """
-    regions = _parts(ground, click, allowed, walls, _Taste(MINOR_CORRECTION, LARGER_CORRECTION))
+    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    regions = _parts(ground, click, allowed, walls, taste)
+    regions += _left_over(ground, click, allowed, walls, taste)
+    regions += _reached(ground, click, allowed, walls, taste)
     regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
     return Choice(regions[0].pieces, tuple(regions))
 
@@ -160,20 +169,62 @@ def _parts(
 ) -> list[Region]:
     """The parts of `allowed` (n,) around a click."""
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    allowed = allowed.copy()
-    allowed[piece] = True
+    allowed = allowed | _only(pieces, piece)
     growth = pieces.grow(piece, allowed, tuple(w for w in walls if w != piece))
-    total = pieces.area[allowed].sum()
+    masks = [pieces.region(growth, k) for k in growth.peaks()]
+    return [_rated(ground, click, allowed, mask, taste) for mask in masks]
+
+
+def _left_over(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """What is left of `allowed` (n,) around a click by each part of it around one of `walls`."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    only = _only(pieces, piece)
+    allowed = allowed | only
     regions = []
-    for k in growth.peaks():
-        mask = pieces.region(growth, k)
-        contrast, left = growth.contrast[k], 1 - growth.area[k] / total
-        if growth.is_closed[k]:
-            contrast, left = ALL_OF_IT, 1.0
-        centred = _centred(pieces, mask, click) ** CENTRED_PART
-        size = (growth.area[k] / total) ** taste.larger * max(left, 1e-3) ** taste.minor
-        regions.append(Region(mask, float(contrast * centred * size)))
+    for wall in walls:
+        if wall == piece or not allowed[wall]:
+            continue
+        growth = pieces.grow(wall, allowed, (piece,))
+        for k in growth.peaks():
+            rest = touching(pieces, allowed & ~pieces.region(growth, k), only)
+            if not rest[[w for w in walls if w != piece]].any():
+                regions.append(_rated(ground, click, allowed, rest, taste))
     return regions
+
+
+def _reached(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """The pieces of `allowed` (n,) from which a walk is likelier to end at the click than to stay.
+
+    What is not allowed is, but for what a box leaves out, already what the click says: it draws.
+    """
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    only = _only(pieces, piece)
+    allowed = allowed | only
+    regions = []
+    for trust in TRUST:
+        wrong, right = np.where(allowed, 1e-9, trust), np.where(allowed, trust, 1e-9)
+        right[[w for w in walls if w != piece]] = KNOWN
+        wrong[piece], right[piece] = KNOWN, 1e-9
+        found = (pieces.walk_home(wrong, right) > 0.5) & allowed
+        regions.append(_rated(ground, click, allowed, touching(pieces, found | only, only), taste))
+    return regions
+
+
+def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Taste) -> Region:
+    """Pieces (n,), and how much a click on a place within `allowed` (n,) means just them."""
+    pieces = ground.pieces
+    cut = (mask[pieces.left] != mask[pieces.right]) & allowed[pieces.left] & allowed[pieces.right]
+    share = pieces.area[mask].sum() / pieces.area[allowed].sum()
+    contrast, left = ALL_OF_IT, 1.0
+    if cut.any():
+        contrast = (pieces.gap * pieces.length)[cut].sum() / pieces.length[cut].sum()
+        left = max(1 - share, 1e-3)
+    centred = _centred(pieces, mask, click) ** CENTRED_PART
+    return Region(mask, float(contrast * centred * share**taste.larger * left**taste.minor))
 
 
 def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:

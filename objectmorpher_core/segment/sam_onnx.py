@@ -16,6 +16,7 @@ import numpy as np
 from .. import models
 from ..arrays import F32, RGB
 from ..models import HubModel, ModelError
+from ..models.onnx_session import open_session
 from ..models.weight_folder import check_folder
 from .sam_network import CORNER, GROUND, NOTHING, OBJECT, OTHER_CORNER, Asked, Masks, normalized
 
@@ -159,14 +160,8 @@ def _labelled(asked: Asked) -> tuple[np.ndarray, np.ndarray]:
 
 def _session(path: Path) -> Any:
     """Raises ModelError where it is no ONNX network."""
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.log_severity_level = 3  # a foreign file's warnings are nobody's business
     try:
-        return onnxruntime.InferenceSession(
-            str(path), options, providers=["CPUExecutionProvider"]
-        )  # fmt: skip
+        return open_session(path, is_foreign=True)
     except Exception as error:  # onnxruntime has a type of its own for everything
         raise ModelError(f"{path.name} is not an ONNX network that can be opened") from error
 

@@ -11,6 +11,7 @@ import numpy as np
 from .. import models
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
+from ..models.onnx_session import open_session
 from ..progress import Progress, part, silent
 from .edges import cut
 from .selection import SelectionError, box_mask, check_prompt
@@ -43,11 +44,12 @@ class SubjectNet:
     def salience(self, rgb: RGB) -> F32:
         """(320, 320) in [0, 1] for a photo (H, W, 3)."""
         if self._session is None:
-            import onnxruntime
-
-            self._session = onnxruntime.InferenceSession(
-                str(models.path(WEIGHT)), providers=["CPUExecutionProvider"]
-            )
+            path = models.path(WEIGHT)
+            if path is None:
+                raise models.ModelError(
+                    f"the model {WEIGHT} is not here: `objectmorpher models get`"
+                )
+            self._session = open_session(path)
         small = cv2.resize(rgb, (INPUT_SIDE, INPUT_SIDE), interpolation=cv2.INTER_AREA)
         scaled = small.astype(np.float32) / max(int(small.max()), 1)  # as it was trained
         pixels = ((scaled - MEAN) / DEVIATION).transpose(2, 0, 1)[None]

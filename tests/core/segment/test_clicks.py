@@ -103,6 +103,11 @@ def test_all_objects_but_the_held_out_ones_are_selected():
     assert np.mean([each[-1].boundary for each in tuned]) > 0.79
 
 
+@pytest.mark.slow
+def test_what_is_missing_of_a_seat_of_two_looks_comes_with_one_click():
+    assert steps("seat")[-1].iou > 0.93
+
+
 @pytest.mark.parametrize("name", FEW)
 def test_a_further_click_helps(name):
     ious = [step.iou for step in steps(name)]
@@ -123,6 +128,14 @@ def test_a_correction_changes_nothing_that_hangs_not_together_with_it():
     assert rows.size > 0
     assert columns.max() < 120
     assert rows.min() > 350
+
+
+def test_a_thing_that_is_held_stays_whole_when_who_holds_it_is_taken_away():
+    first, second = steps("tripod")[:2]
+    assert overlap(first.mask, truth_mask("cameraman")) > 0.7
+    assert not second.prompt.clicks[-1].is_foreground
+    assert not (second.mask & truth_mask("cameraman")).sum() > 0.1 * first.mask.sum()
+    assert second.iou > 0.6
 
 
 def test_the_order_of_later_clicks_is_the_users():
