@@ -1,0 +1,1 @@
+"""How good a result is: the measures of `objectmorpher evaluate` (docs/evaluation.md)."""

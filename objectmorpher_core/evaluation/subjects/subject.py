@@ -1,0 +1,33 @@
+"""One photo with one edit of it, and what methods made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .guidance import Guidance
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a method made of a subject."""
+
+    picture: Path
+    log: Path | None = None  # .jsonl, or our report's .json
+    frames: Path | None = None  # of our window's drags
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One photo and one edit of it."""
+
+    name: str  # may hold slashes
+    image: Path
+    guidance: Guidance
+    results: Mapping[str, Result] = field(default_factory=dict)  # by method
+
+
+def methods_of(subjects: tuple[Subject, ...]) -> tuple[str, ...]:
+    """The names of all methods that have a result."""
+    return tuple(sorted({method for subject in subjects for method in subject.results}))
