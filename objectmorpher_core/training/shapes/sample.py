@@ -168,10 +168,11 @@ def _materials(rng: np.random.Generator, built: Builder) -> list[Material]:
 
 
 def _picture(
-    rng: np.random.Generator, scene: _Scene, eye: _Eye, rays: F64, lamps: F64, out: F64, side: int
-) -> F64:
+    rng: np.random.Generator, scene: _Scene, eye: _Eye, rays: F64, lamps: F64, out: F64, side: int,
+    backdrop: F64 | None = None,
+) -> F64:  # fmt: skip
     """(s, s, 3) linear light."""
-    backdrop = _backdrop(rng, side)
+    backdrop = _backdrop(rng, side) if backdrop is None else backdrop
     picture = backdrop.copy()
     on_ground = out[:, 13] > 0
     shadow = rng.uniform(0.2, 0.9) * (1 - out[:, 11]) + 0.5 * (1 - out[:, 12])

@@ -12,6 +12,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from objectmorpher_core.lift.crop import SIDE  # noqa: E402
+from objectmorpher_core.models.onnx_session import open_session  # noqa: E402
 from objectmorpher_core.training import shape_data, train_shape  # noqa: E402
 from objectmorpher_core.training.shape_data import batch_of, packed  # noqa: E402
 from objectmorpher_core.training.shape_losses import losses  # noqa: E402
@@ -94,7 +95,6 @@ def test_stopped_and_resumed_it_is_where_it_was(arrays, tmp_path):
 
 
 def test_it_runs_without_torch(arrays, tmp_path):
-    onnxruntime = pytest.importorskip("onnxruntime")
     pytest.importorskip("onnx")
     from objectmorpher_core.training.export_shape import export
 
@@ -103,7 +103,7 @@ def test_it_runs_without_torch(arrays, tmp_path):
     export(net, path)
     assert path.stat().st_size < 12e6
     batch = batch_of(arrays)
-    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    session = open_session(path)
     inputs = {"planes": batch.planes[:1].numpy(), "tokens": batch.tokens[:1].numpy()}
     found = session.run(None, inputs)[0]
     with torch.inference_mode():
