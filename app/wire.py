@@ -11,13 +11,21 @@ from __future__ import annotations
 import io
 import pickle
 from collections import OrderedDict
-from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 LARGE = 1 << 20  # bytes
 KEPT = 12  # large values remembered on both sides; least recently used first out
+
+
+class Connection(Protocol):
+    """multiprocessing's; Windows has another class of the same methods."""
+
+    def send(self, obj: Any, /) -> None: ...
+    def recv(self) -> Any: ...
+    def send_bytes(self, buf: Any, /) -> None: ...
+    def recv_bytes(self) -> bytes: ...
 
 
 class _Pickler(pickle.Pickler):

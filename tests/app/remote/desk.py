@@ -1,0 +1,79 @@
+"""A window's jobs and the server that they may go to, in one process."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from app import job_functions
+from app.jobs import Jobs
+from app.remote.alone import Alone
+from app.remote.elsewhere import Elsewhere
+from app.remote.front import Front
+from app.remote.running import Call, Outcome
+from app.remote.server import Address, Server
+from app.remote.table import Served, table
+from objectmorpher_core.arrays import frozen
+from objectmorpher_core.progress import Progress
+
+TOKEN = "a-token-that-is-long-enough"
+
+
+class Counting(Alone):
+    """Serves from this process, and knows what it was asked."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked: list[str] = []
+
+    def run(self, call: Call, served: Served, tell: Progress, stop: Any) -> Outcome:
+        self.asked.append(call.name)
+        return super().run(call, served, tell, stop)
+
+
+class Desk:
+    """A window's jobs, the server that they may go to, and what the status bar says."""
+
+    def __init__(self) -> None:
+        self.runner = Counting()
+        self.front = Front(("127.0.0.1", 0), TOKEN, self.runner, table())
+        self.front.start()
+        self.server: Server | None = Server(Address(*self.front.address), TOKEN)
+        self.said: list[str] = []
+        self.answers: list[Any] = []
+        self.errors: list[Any] = []
+        self.cancels = 0
+        self.jobs = Jobs()
+        self.elsewhere = Elsewhere(lambda: self.server, lambda server, why: self.said.append(why))
+        self.jobs.elsewhere = self.elsewhere
+
+    def _cancelled(self) -> None:
+        self.cancels += 1
+
+    def ask(self, function: Any, *arguments: Any) -> None:
+        self.jobs.start(
+            "Test", function, *arguments, done=self.answers.append, failed=self.errors.append,
+            cancelled=self._cancelled,
+        )  # fmt: skip
+
+    def wait(self) -> None:
+        end = time.monotonic() + 60
+        while not self.jobs.is_idle:
+            assert time.monotonic() < end
+            self.jobs.poll()
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        self.jobs.close()
+        self.front.close()
+
+
+def fill() -> tuple:
+    """What `fill_variants` is asked: a noisy photo (H, W, 3), its hole, 2 backgrounds."""
+    random = np.random.default_rng(1)
+    pixels = frozen(random.integers(90, 140, (90, 120, 3)).astype(np.uint8))
+    hole = np.zeros((90, 120), bool)
+    hole[30:60, 40:80] = True
+    return pixels, frozen(hole), job_functions.Choice("telea"), 2

@@ -1,0 +1,229 @@
+"""A real Ray with two processes per stage: they answer as this one does, and one may be killed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from same_values import same_values
+
+from app import job_functions
+from app.job_functions import Choice, Cut
+from app.remote.client import call, hello
+from app.remote.offers import read_offers
+from app.remote.server import Address, NotServed, ServedError, Server
+from objectmorpher_core import compose
+from objectmorpher_core.arrays import frozen
+from objectmorpher_core.camera import Camera
+from objectmorpher_core.document import Click, LiftSettings, Prompt
+from objectmorpher_core.progress import Cancelled, silent
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed"),
+]
+
+TOKEN = "a-token-that-is-long-enough"
+ROOT = Path(__file__).parents[3]
+OPTIONS = (
+    "--port", "0", "--stages", "lift,inpaint",
+    "--replicas", "2", "--cpus", "0.25", "--store", "100",
+)  # fmt: skip
+SAMPLE = ROOT / "assets" / "samples" / "coffee.jpg"
+
+
+def descendants(root: int) -> set[int]:
+    """Processes that `root` has started, and theirs."""
+    listed = subprocess.run(["ps", "-e", "-o", "pid=,ppid="], capture_output=True, text=True)
+    parents = dict(tuple(map(int, line.split())) for line in listed.stdout.splitlines())
+    found = {root}
+    while more := {pid for pid, parent in parents.items() if parent in found} - found:
+        found |= more
+    return found
+
+
+@dataclass
+class Serving:
+    """`objectmorpher serve`, as it was started."""
+
+    server: Server
+    log: Path
+
+    @property
+    def pids(self) -> list[int]:
+        """The processes in which jobs began, in that order."""
+        return [int(n) for n in re.findall(r" runs on .*, process (\d+)", self.log.read_text())]
+
+
+@pytest.fixture(scope="module")
+def serving() -> Iterator[Serving]:
+    """Lifting and filling, two processes each, and nothing of Ray's left afterwards."""
+    # Short: Ray's sockets lie in it, and their paths may have 107 characters.
+    folder = Path(tempfile.mkdtemp(prefix="om"))
+    environment = os.environ | {"RAY_TMPDIR": str(folder), "OBJECTMORPHER_TOKEN": TOKEN}
+    for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ADDRESS"):
+        environment.pop(name, None)
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "app", "serve", *OPTIONS], cwd=ROOT, env=environment,
+            stdout=subprocess.PIPE, stderr=log, text=True,
+        )  # fmt: skip
+        assert process.stdout is not None
+        line = process.stdout.readline()
+    try:
+        found = re.fullmatch(r"serving on http://127\.0\.0\.1:(\d+)\n", line)
+        assert found, (folder / "log").read_text()
+        address = Address("127.0.0.1", int(found.group(1)))
+        started = descendants(process.pid)
+        yield Serving(Server(address, TOKEN), folder / "log")
+        started |= descendants(process.pid)
+    finally:
+        process.terminate()
+        process.wait(40)
+    end = time.monotonic() + 10
+    while left := {pid for pid in started if is_alive(pid)}:
+        assert time.monotonic() < end, f"Ray has left processes: {left}"
+        time.sleep(0.1)
+    assert process.returncode == 0
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+@pytest.fixture
+def server(serving: Serving) -> Server:
+    return serving.server
+
+
+@pytest.fixture(scope="module")
+def photo() -> np.ndarray:
+    """(300, 450, 3) of a real one."""
+    pixels = cv2.imread(str(SAMPLE))[..., ::-1]
+    return frozen(cv2.resize(pixels, (450, 300), interpolation=cv2.INTER_AREA))
+
+
+@pytest.fixture(scope="module")
+def mask(photo: np.ndarray) -> np.ndarray:
+    """An ellipse (H, W) in the middle of it."""
+    y, x = np.mgrid[0:300, 0:450]
+    return frozen(((x - 225) / 80) ** 2 + ((y - 150) / 60) ** 2 < 1)
+
+
+def test_it_tells_its_stages(server: Server) -> None:
+    assert hello(server)["stages"] == {"lift": 2, "inpaint": 2}
+
+
+def test_a_lift_is_what_it_is_here_to_the_last_bit(
+    server: Server, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    cut = Cut(photo, Camera.from_fov(450, 300), mask)
+    arguments = cut, Choice("auto", 1), LiftSettings(count=2000)
+    steps: list[float] = []
+    answer = call(server, "lift", arguments, lambda fraction, _: steps.append(fraction))
+    assert same_values(answer, job_functions.lift(*arguments, progress=silent))
+    assert len(steps) > 3
+
+
+def test_a_job_whose_process_is_killed_is_done_by_the_other_one_with_the_same_answer(
+    serving: Serving, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    arguments = photo, mask, Choice("auto", 3), 2
+    killed: list[int] = []
+
+    def kill(fraction: float, note: str) -> None:
+        if not killed and fraction >= 0.5:  # one background of two is ready
+            killed.append(serving.pids[-1])
+            assert killed[0] in descendants(os.getpid())
+            os.kill(killed[0], signal.SIGKILL)
+
+    answer = call(serving.server, "fill_variants", arguments, kill)
+    assert killed
+    assert len(serving.pids) >= 2
+    assert serving.pids[-1] not in killed
+    assert same_values(answer, job_functions.fill_variants(*arguments, progress=silent))
+
+
+def test_two_processes_work_at_a_time_and_a_third_job_waits(
+    serving: Serving, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    arguments = photo, mask, Choice("auto", 5), 2
+    answers: list[Any] = []
+
+    def work() -> None:
+        answers.append(call(serving.server, "fill_variants", arguments, silent))
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(120)
+    assert len(answers) == 3
+    assert all(same_values(answer, answers[0]) for answer in answers)
+    assert len(set(serving.pids[-3:])) == 2
+
+
+def test_a_backend_has_processes_of_its_own_which_start_with_its_first_job(
+    serving: Serving, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    offers = read_offers(hello(serving.server)["backends"])
+    assert list(offers) == ["lift", "inpaint"] and "telea" in offers["inpaint"].able
+    assert offers["inpaint"].auto == compose.load().name
+    deployed = r" ([a-z0-9.-]+) is deployed"
+    before = re.findall(deployed, serving.log.read_text())
+    assert before == [f"{stage}-{offers[stage].auto}" for stage in ("lift", "inpaint")]
+    for name in ("auto", "telea", "telea"):
+        answer = call(serving.server, "inpaint", (photo, mask, Choice(name)), silent)
+        assert answer.backend == (name if name != "auto" else offers["inpaint"].auto)
+    of_auto, first, second = serving.pids[-3:]
+    assert of_auto not in (first, second)
+    assert re.findall(deployed, serving.log.read_text()) == [*before, "inpaint-telea"]
+
+
+def test_cancelling_ends_the_job_in_its_process(
+    server: Server, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    arguments = photo, mask, Choice("auto", 5), 12
+
+    def progress(fraction: float, note: str) -> None:
+        if fraction > 0.1:
+            raise Cancelled
+
+    for _ in range(2):  # both processes
+        with pytest.raises(Cancelled):
+            call(server, "fill_variants", arguments, progress)
+    start = time.monotonic()
+    call(server, "inpaint", arguments[:3], silent)
+    assert time.monotonic() - start < 20  # the cancelled ones would go on for minutes
+
+
+def test_a_job_that_fails_there_says_why(
+    server: Server, photo: np.ndarray, mask: np.ndarray
+) -> None:
+    with pytest.raises(ServedError, match="no inpainter"):
+        call(server, "inpaint", (photo, mask, Choice("nobody")), silent)
+
+
+def test_a_stage_that_is_not_served_is_refused(server: Server, photo: np.ndarray) -> None:
+    with pytest.raises(NotServed, match="does not segment"):
+        call(server, "segment", (photo, Prompt((Click(9.0, 9.0),)), Choice("auto")), silent)
