@@ -19,6 +19,7 @@ from .hint import Hint
 from .image import Picture
 from .joining import Shadow
 from .pose import Handle, Pose
+from .refined import Refined
 from .rig import Rig
 from .rotations import turn_matrix
 
@@ -281,6 +282,7 @@ class EditObject:
     harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
     relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
     grain: float = 0.0  # in [0, 1], how much of the photo's grain that it has lost it is given
+    defocus: float = 0.0  # in [0, 1], how far it is as blurred as the photo at its new depth
     shape: LiftSettings = field(default_factory=LiftSettings)
     stays_in_front: bool = False  # covers what is edited, as it does in the photo
 
@@ -346,6 +348,23 @@ class Plate:
         return self.left, self.top, self.left + width, self.top + height
 
 
+# Of an object, what its picture depends on; what else changes leaves a refinement as it is.
+SHOWN = (
+    "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
+    "harmony", "relight", "grain", "defocus", "stays_in_front",
+)  # fmt: skip
+
+
+def is_shown_alike(one: EditObject, other: EditObject) -> bool:
+    """Whether two objects look the same; arrays do only where they are one and the same."""
+
+    def is_same(a: object, b: object) -> bool:
+        is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
+        return a is b or (is_plain and a == b)
+
+    return all(is_same(getattr(one, name), getattr(other, name)) for name in SHOWN)
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
     """All that is saved and undone."""
@@ -358,14 +377,19 @@ class Document:
     horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
     feather: float = 1.0  # x the usual width over which the edit is blended into the photo
     hints: tuple[Hint, ...] = ()  # from where the plate is filled
+    refined: Refined | None = None  # None: not asked for, or what it showed has changed since
 
     def with_object(self, k: int, changed: EditObject) -> Document:
-        """Object `k` replaced; the plate stays only where the mask did."""
+        """Object `k` replaced; the plate stays only where the mask did.
+
+        The refinement stays only where nothing that is seen has changed.
+        """
         if k == len(self.objects):
-            return replace(self, objects=(*self.objects, changed), plate=None)
+            return replace(self, objects=(*self.objects, changed), plate=None, refined=None)
         plate = self.plate if changed.mask is self.objects[k].mask else None
+        refined = self.refined if is_shown_alike(changed, self.objects[k]) else None
         objects = tuple(changed if i == k else o for i, o in enumerate(self.objects))
-        return replace(self, objects=objects, plate=plate)
+        return replace(self, objects=objects, plate=plate, refined=refined)
 
     def with_backend(self, stage: str, name: str) -> Document:
         """Records which backend of a stage made what the document holds."""

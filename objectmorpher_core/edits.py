@@ -25,6 +25,7 @@ from .hint import Hint
 from .joining import (
     LEAST_FEATHER,
     MOST_FEATHER,
+    USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
@@ -49,7 +50,8 @@ def remove_object(document: Document, k: int) -> Document:
     objects = tuple(o for i, o in enumerate(document.objects) if i != k)
     mask = document.objects[k].mask
     is_copy = mask is not None and any(other.mask is mask for other in objects)
-    return replace(document, objects=objects, plate=document.plate if is_copy else None)
+    plate = document.plate if is_copy else None
+    return replace(document, objects=objects, plate=plate, refined=None)
 
 
 def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt) -> Document:
@@ -292,7 +294,7 @@ def set_visible(document: Document, k: int, is_visible: bool) -> Document:
 
 def set_plate(document: Document, plate: Plate | None) -> Document:
     """The photo without its objects."""
-    changed = replace(document, plate=plate)
+    changed = replace(document, plate=plate, refined=None)
     return changed if plate is None else changed.with_backend("inpaint", plate.backend)
 
 
@@ -305,7 +307,7 @@ def set_horizon(document: Document, horizon: float) -> Document:
     """The horizon is in this row of the photo, px; it may be outside."""
     if not np.isfinite(horizon):
         raise EditError(f"a horizon at {horizon:g} px is no row of the photo")
-    return replace(document, horizon=float(horizon))
+    return replace(document, horizon=float(horizon), refined=None)
 
 
 def rename(document: Document, k: int, name: str) -> Document:
@@ -325,7 +327,7 @@ def duplicate(document: Document, k: int) -> Document:
     if item.lifted is None:
         raise EditError("lift the object before making a copy of it")
     copy = replace(item, name=_free_name(item.name, {o.name for o in document.objects}))
-    return replace(document, objects=(*document.objects, copy))
+    return replace(document, objects=(*document.objects, copy), refined=None)
 
 
 def _free_name(name: str, taken: set[str]) -> str:
@@ -366,18 +368,28 @@ def set_grain(document: Document, k: int, grain: float) -> Document:
     return document.with_object(k, replace(document.objects[k], grain=float(grain)))
 
 
+def set_defocus(document: Document, k: int, defocus: float) -> Document:
+    """How far object `k` is as blurred as the photo is at its new depth, in [0, 1]."""
+    if not 0 <= defocus <= 1:
+        raise EditError(f"a defocus of {defocus:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], defocus=float(defocus)))
+
+
 def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
-    """Object `k` in the light of its new place and of how it is turned, and as grainy as the photo.
+    """Object `k` in the light of its new place and of how it is turned, as grainy as the photo,
+    and as blurred as that is there.
 
     Or as it was in the photo.
     """
-    usual = (USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN) if is_harmonised else (0.0, 0.0, 0.0)
-    document = set_relight(set_harmony(document, k, usual[0]), k, usual[1])
-    return set_grain(document, k, usual[2])
+    share = 1.0 if is_harmonised else 0.0
+    document = set_harmony(document, k, share * USUAL_HARMONY)
+    document = set_relight(document, k, share * USUAL_RELIGHT)
+    document = set_grain(document, k, share * USUAL_GRAIN)
+    return set_defocus(document, k, share * USUAL_DEFOCUS)
 
 
 def set_feather(document: Document, feather: float) -> Document:
     """Over how wide an edge the edit is blended into the photo, x the usual."""
     if not LEAST_FEATHER <= feather <= MOST_FEATHER:
         raise EditError(f"a blend of {feather:g} x is not {LEAST_FEATHER:g} to {MOST_FEATHER:g}")
-    return replace(document, feather=float(feather))
+    return replace(document, feather=float(feather), refined=None)

@@ -18,18 +18,7 @@ from .arrays import RGB, Mask, Pixels, Selection
 from .camera import Camera
 from .compose.composite import OPAQUE, Composite, composite
 from .compose.plate import build_plate
-from .document import (
-    AS_SEEN,
-    GAUSSIANS,
-    Click,
-    Document,
-    LiftedObject,
-    LiftSettings,
-    Matte,
-    Photo,
-    Plate,
-    Prompt,
-)
+from .document import AS_SEEN, Document, LiftedObject, LiftSettings, Matte, Photo, Plate, Prompt
 from .hint import Hint
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .importing import Scene, Source, place_import, register_file
@@ -37,17 +26,17 @@ from .left_behind import has_left, with_plate
 from .pixels import crop, unit_pixels
 from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
+from .refining import Refining, with_refinement
 from .report import Stopwatch, build_report
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
+from .scripted import prompt_of
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matte import band_width, build_matte
 from .splat_files import COUNT
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
-NO_CHOICE: dict[str, Any] = {
-    "click": (), "not_click": (), "box": None, "subject": False, "mask": None,
-}  # fmt: skip
+NO_CHOICE: dict[str, Any] = dict(click=(), not_click=(), box=None, subject=False, mask=None)
 
 
 def open_photo(data: bytes, name: str, fov: float | None = None, seed: int = 0) -> Document:
@@ -139,8 +128,8 @@ def make_plate(
     seed: int = 0,
     hints: tuple[Hint, ...] = (),
 ) -> Plate:
-    """The photo without what hides it at `covered` (H, W), as a crop."""  # fmt: skip
-    return build_plate(pixels, covered, compose.load(backend), progress, seed, hints)
+    """The photo without what hides it at `covered` (H, W), as a crop."""
+    return build_plate(pixels, covered, compose.load(backend, bool(hints)), progress, seed, hints)
 
 
 def export(
@@ -149,10 +138,7 @@ def export(
     progress: Progress = silent,
 ) -> Picture:
     """The edited photo, with everything of the file that the edit does not concern."""
-    return _picture(document, composite(document, puppets, progress))
-
-
-def _picture(document: Document, result: Composite) -> Picture:
+    result = composite(document, puppets, progress)
     return replace(document.photo.picture, pixels=result.pixels)
 
 
@@ -184,13 +170,6 @@ class Edited:
         )
 
 
-def prompt_of(script: EditScript) -> Prompt:
-    """What the script says about which object is meant."""
-    clicks = [Click(x, y) for x, y in script.click]
-    clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
-    return Prompt(tuple(clicks), script.box, script.subject)
-
-
 def select(
     document: Document,
     script: EditScript,
@@ -218,22 +197,51 @@ def run_script(
 ) -> Edited:
     """The main job: `data` (a picture file called `name`) edited as `script` says.
 
-    `mask` is the bytes of the script's mask picture. `needs_plate` makes the plate even where
-    nothing moved. `others`: the photo's further objects. Raises the one-sentence errors of the
-    stages, all of them ValueErrors.
+    As `continue_script` does, from the file on. Raises the stages' one-sentence ValueErrors.
     """
-    scripted.refuse_missing(script, others)
     stopwatch = Stopwatch()
     with stopwatch.stage("load"):
-        run = _Run(open_photo(data, name, script.fov, script.seed), stopwatch)
+        document = open_photo(data, name, script.fov, script.seed)
+    return continue_script(document, script, mask, progress, needs_plate, others, stopwatch)
+
+
+def lift_first(
+    document: Document, script: EditScript, mask: bytes | None = None, progress: Progress = silent
+) -> Document:
+    """An opened photo with the script's own object chosen and lifted, ready to be edited."""
+    scripted.refuse_missing(script)
+    run = _Run(document, Stopwatch())
+    run.choose(script, mask, part(progress, 0.0, 0.5))
+    run.lift(0, script, part(progress, 0.5, 1.0))
+    return run.document
+
+
+def continue_script(
+    document: Document,
+    script: EditScript,
+    mask: bytes | None = None,
+    progress: Progress = silent,
+    needs_plate: bool = False,
+    others: Others = ALONE,
+    stopwatch: Stopwatch | None = None,
+) -> Edited:
+    """An opened photo edited as `script` says; its own object may be lifted already.
+
+    `mask`: bytes of the script's mask picture. `needs_plate`: the plate is made even where nothing
+    moved. `others`: the photo's further objects. Raises the stages' one-sentence ValueErrors.
+    """
+    scripted.refuse_missing(script, others)
+    refiner = scripted.refiner_of(script, others)
+    stopwatch = stopwatch or Stopwatch()
+    run = _Run(document, stopwatch)
     wishes = scripted.with_inherited((FurtherObject(script), *others.objects))
     for k, wanted in enumerate(wishes):
         step = part(progress, 0.6 * k / len(wishes), 0.6 * (k + 1) / len(wishes))
         own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
         with scripted.told_of(k + 1, others):
-            if k > 0 and own.mask is not None:
-                mask = Path(own.mask).read_bytes()
-            run.add(replace(wanted, script=own), mask if k == 0 or own.mask else None, step)
+            if k > 0:
+                mask = Path(own.mask).read_bytes() if own.mask else None
+            run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
     document = scripted.ordered(run.document, others)
     if any(item.is_moved for item in document.objects) or needs_plate:
@@ -243,6 +251,10 @@ def run_script(
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")
+    if refiner is not None and any(item.is_moved for item in document.objects):
+        with stopwatch.stage("refine"):
+            how = Refining(refiner, script.seed, script.refine_strength)
+            document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     return _finished(document, run.puppets, run.energies, progress, stopwatch)
 
 
@@ -257,10 +269,10 @@ class _Run:
         self._stopwatch = stopwatch
         self._readings: dict[str, Reading] = {}  # by the segmenter's name
 
-    def add(self, wanted: FurtherObject, mask: bytes | None, progress: Progress) -> None:
-        """The next object, as far as it can be without the plate."""
-        k, script = len(self.document.objects), wanted.script
-        if wanted.duplicate is None:
+    def add(self, k: int, wanted: FurtherObject, mask: bytes | None, progress: Progress) -> None:
+        """Object `k` as far as it can be without the plate; the document may hold it, lifted."""
+        script, is_lifted = wanted.script, k < len(self.document.objects)
+        if wanted.duplicate is None and not is_lifted:
             self.choose(script, mask, part(progress, 0.0, 0.5))
         if wanted.stay_in_front:
             self._keep(k)
@@ -268,8 +280,8 @@ class _Run:
         if wanted.duplicate is not None:
             self.document = scripted.copied(self.document, k, wanted)
         else:
-            with self._stopwatch.stage("lift"):
-                self.document = _lift(self.document, k, script, part(progress, 0.5, 0.8))
+            if not is_lifted:
+                self.lift(k, script, part(progress, 0.5, 0.8))
             self.document = scripted.with_settings(self.document, k, script)
         puppet = self.puppets[k] = puppet_of(self.document.objects[k], self.document.photo.camera)
         step = part(progress, 0.8, 1.0)
@@ -281,6 +293,11 @@ class _Run:
         if script.shadow == "auto" and has_left(self.document.objects[k]):
             self.casting.add(k)
 
+    def lift(self, k: int, script: EditScript, progress: Progress) -> None:
+        """Object `k`, which is chosen, in 3D."""
+        with self._stopwatch.stage("lift"):
+            self.document = _lift(self.document, k, script, progress)
+
     def choose(self, script: EditScript, mask: bytes | None, progress: Progress) -> None:
         """The next object is the one that the script means."""
         prompt = prompt_of(script)
@@ -291,8 +308,8 @@ class _Run:
                 found, backend = read_mask(mask, self.document.photo.size), "mask"
             else:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
-                answer = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
-                found, backend = answer.mask, answer.backend
+                got = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
+                found, backend = got.mask, got.backend
         k = len(self.document.objects)
         document = edits.set_mask(edits.add_object(self.document), k, found, prompt)
         self.document = document.with_backend("segment", backend)
@@ -328,30 +345,12 @@ class _Run:
         return self._readings[backend]
 
 
-def lift_settings(document: Document, script: EditScript) -> LiftSettings:
-    """What the script says about the object's shape. Raises ImageError."""
-    hidden = None
-    if script.hidden is not None:
-        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
-    return LiftSettings(
-        count=script.gaussians or GAUSSIANS,
-        thickness=script.thickness,
-        is_standing=not script.floating,
-        is_symmetric={"auto": None, "yes": True, "no": False}[script.symmetry],
-        back=script.back,
-        hidden=hidden,
-        horizon=document.horizon,
-        uses_depth=not script.no_depth,
-        trust=script.trust,
-    )
-
-
 def _lift(document: Document, k: int, script: EditScript, progress: Progress) -> Document:
     """Object `k`, which is chosen, in 3D: lifted, or out of the script's file."""
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
     if script.splats is None:
-        settings = lift_settings(document, script)
+        settings = scripted.lift_settings(document, script)
         made = lift_mask(
             photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
         )
@@ -393,4 +392,5 @@ def _finished(
     with stopwatch.stage("render"):
         result = composite(document, puppets, part(progress, 0.85, 1.0))
     progress(1.0, "Done")
-    return Edited(document, result, _picture(document, result), puppets, energies, stopwatch)
+    picture = replace(document.photo.picture, pixels=result.pixels)
+    return Edited(document, result, picture, puppets, energies, stopwatch)

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,21 @@ STAGES = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Span:
+    """When a stage ran, s of `time.perf_counter`."""
+
+    stage: str
+    begin: float
+    end: float
+
+
 class Stopwatch:
     """Seconds by stage."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = dict.fromkeys(STAGES, 0.0)
+        self.spans: list[Span] = []
         self._start = time.perf_counter()
 
     @contextmanager
@@ -37,7 +48,9 @@ class Stopwatch:
         try:
             yield
         finally:
-            self.seconds[name] += time.perf_counter() - start
+            end = time.perf_counter()
+            self.seconds[name] += end - start
+            self.spans.append(Span(name, start, end))
 
     def read(self) -> dict[str, float]:
         """Seconds by stage so far, with the total."""
@@ -141,13 +154,13 @@ def _of_object(
 def peak_memory_mb() -> float:
     """Largest resident memory of this process so far, MB; 0 where the system does not tell."""
     with contextlib.suppress(OSError):  # Linux; getrusage would count who started us, too
-        found = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.M)
+        found = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text("ascii"), re.M)
         if found:
             return round(int(found[1]) * 1024 / 1e6, 1)
-    try:
-        import resource
-    except ImportError:  # Windows
+    if sys.platform == "win32":
         return 0.0
+    import resource
+
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6, 1)
 

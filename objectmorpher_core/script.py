@@ -7,14 +7,16 @@ go on with further objects of the same photo.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 from .document import BACKS, LEAST_THICKNESS, MOST_THICKNESS
+from .shown import shown
 
 XY = tuple[float, float]
+MOST_NUMBER = 1e9  # px, degrees, diameters
 
 
 class ScriptError(ValueError):
@@ -53,6 +55,7 @@ class EditScript:
     inpaint: str = "auto"
     fill_from: tuple[FillFrom, ...] = ()
     refine: str = "auto"
+    refine_strength: float = 1.0  # of a learned refinement, in [0, 1]
     splats: str | None = None  # file
     flip: bool = False  # that file's object stands on its head
     gaussians: int | None = None
@@ -124,10 +127,39 @@ def parse_scripts(text: str) -> tuple[BatchItem, ...]:
         data = json.loads(text)
     except json.JSONDecodeError as error:
         raise ScriptError(f"the script is not JSON: {error.msg} in line {error.lineno}") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits; depth
+        raise ScriptError("the script is JSON that nobody can read") from error
     items = data if isinstance(data, list) else [data]
     if not items:
         raise ScriptError("the script is empty")
     return tuple(_batch_item(item) for item in items)
+
+
+def beside(item: BatchItem, folder: Path) -> BatchItem:
+    """File names of a script are relative to the script."""
+
+    def at(name: str | None) -> str | None:
+        return None if name is None else str(folder / name)
+
+    def found(name: str | None) -> str | None:
+        """Beside the script, or, as in older ones, where the command is run."""
+        is_beside = name is None or (folder / name).exists() or not Path(name).exists()
+        return at(name) if is_beside else name
+
+    def own(script: EditScript) -> EditScript:
+        return replace(
+            script, mask=at(script.mask), front_mask=at(script.front_mask),
+            hidden=found(script.hidden), splats=found(script.splats),
+        )  # fmt: skip
+
+    objects = tuple(replace(each, script=own(each.script)) for each in item.others.objects)
+    others = replace(item.others, objects=objects)
+    return BatchItem(own(item.script), at(item.photo), at(item.out), others)
+
+
+def files_of(script: EditScript) -> tuple[str | None, ...]:
+    """What an edit reads beside the photo."""
+    return script.mask, script.front_mask, script.hidden, script.splats
 
 
 def script_from(options: Mapping[str, Any]) -> EditScript:
@@ -137,7 +169,7 @@ def script_from(options: Mapping[str, Any]) -> EditScript:
     for key, value in options.items():
         name = key.replace("-", "_")
         if name not in known:
-            raise ScriptError(f"the script's {key!r} is not an option")
+            raise ScriptError(f"the script's {shown(key)} is not an option")
         said[name] = PARSERS[name](key, value)
     return EditScript(**said)
 
@@ -148,7 +180,7 @@ def _batch_item(item: Any) -> BatchItem:
     options = {k: v for k, v in item.items() if k not in OF_A_FILE}
     for key in ("photo", "out"):
         if key in item and not isinstance(item[key], str):
-            raise ScriptError(f"the script's {key!r} is not a file name")
+            raise ScriptError(f"the script's {shown(key)} is not a file name")
     script = script_from(options)
     return BatchItem(script, item.get("photo"), item.get("out"), _others(item))
 
@@ -180,7 +212,7 @@ def _further_object(number: int, value: Any) -> FurtherObject:
     options = {k: v for k, v in value.items() if k not in ("duplicate", "stay_in_front")}
     said = {key.replace("-", "_") for key in options}
     for key in sorted(said & OF_THE_PHOTO):
-        raise ScriptError(f"{key!r} is of the whole photo; it stands beside 'objects'")
+        raise ScriptError(f"{shown(key)} is of the whole photo; it stands beside 'objects'")
     script = script_from(options)
     stays = _flag("stay_in_front", value.get("stay_in_front", False))
     of = value.get("duplicate")
@@ -191,13 +223,14 @@ def _further_object(number: int, value: Any) -> FurtherObject:
         raise ScriptError("a copy cannot stay in front: it is in no photo")
     for key in sorted(said - allowed):
         what = "a copy" if of is not None else "what stays in front"
-        raise ScriptError(f"{key!r} is nothing that {what} can be told")
+        raise ScriptError(f"{shown(key)} is nothing that {what} can be told")
     return FurtherObject(script, of, stays, frozenset(said))
 
 
 def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ScriptError(f"{key}: {value!r} is not a number")
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not -MOST_NUMBER <= value <= MOST_NUMBER:  # NaN compares false
+        raise ScriptError(f"{key}: {shown(value)} is not a number")
     return float(value)
 
 
@@ -205,7 +238,7 @@ def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
     def parse(key: str, value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or not least <= len(value) <= most:
             count = f"{least}" if least == most else f"{least} or {most}"
-            raise ScriptError(f"{key}: {value!r} is not {count} numbers")
+            raise ScriptError(f"{key}: {shown(value)} is not {count} numbers")
         numbers = tuple(_number(key, v) for v in value)
         return numbers + (0.0,) * (most - len(numbers))
 
@@ -214,13 +247,13 @@ def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
 
 def _points(key: str, value: Any) -> tuple[tuple[float, ...], ...]:
     if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {value!r} is not a list of points")
+        raise ScriptError(f"{key}: {shown(value)} is not a list of points")
     return tuple(_numbers(2, 2)(key, v) for v in value)
 
 
 def _handles(key: str, value: Any) -> tuple[HandleMove, ...]:
     if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {value!r} is not a list of handles")
+        raise ScriptError(f"{key}: {shown(value)} is not a list of handles")
     return tuple(_handle(key, v) for v in value)
 
 
@@ -228,14 +261,14 @@ def _handle(key: str, value: Any) -> HandleMove:
     if isinstance(value, HandleMove):
         return value
     if not isinstance(value, dict) or not {"at", "to"} <= set(value) <= {"at", "to", "dz"}:
-        raise ScriptError(f'{key}: {value!r} is not {{"at": [x, y], "to": [x, y], "dz": d}}')
+        raise ScriptError(f'{key}: {shown(value)} is not {{"at": [x, y], "to": [x, y], "dz": d}}')
     at, to = (_numbers(2, 2)(key, value[end]) for end in ("at", "to"))
     return HandleMove((at[0], at[1]), (to[0], to[1]), _number(key, value.get("dz", 0.0)))
 
 
 def _sources(key: str, value: Any) -> tuple[FillFrom, ...]:
     if not isinstance(value, list | tuple):
-        raise ScriptError(f"{key}: {value!r} is not a list of sources")
+        raise ScriptError(f"{key}: {shown(value)} is not a list of sources")
     return tuple(_source(key, v) for v in value)
 
 
@@ -243,26 +276,26 @@ def _source(key: str, value: Any) -> FillFrom:
     known = {"source", "to", "radius"}
     if not isinstance(value, dict) or not {"source", "to"} <= set(value) <= known:
         raise ScriptError(
-            f'{key}: {value!r} is not {{"source": [x, y], "to": [x, y], "radius": r}}'
+            f'{key}: {shown(value)} is not {{"source": [x, y], "to": [x, y], "radius": r}}'
         )
     source, to = (_numbers(2, 2)(key, value[end]) for end in ("source", "to"))
     radius = value.get("radius")
     if radius is not None and _number(key, radius) <= 0:
-        raise ScriptError(f"{key}: a radius of {radius!r} px is none")
+        raise ScriptError(f"{key}: a radius of {shown(radius)} px is none")
     known_radius = None if radius is None else float(radius)
     return FillFrom((source[0], source[1]), (to[0], to[1]), known_radius)
 
 
 def _text(key: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
-        raise ScriptError(f"{key}: {value!r} is not a name")
+        raise ScriptError(f"{key}: {shown(value)} is not a name")
     return value
 
 
 def _one_of(*allowed: str) -> Callable[[str, Any], str]:
     def parse(key: str, value: Any) -> str:
         if value not in allowed:
-            raise ScriptError(f"{key}: {value!r} is not one of {', '.join(allowed)}")
+            raise ScriptError(f"{key}: {shown(value)} is not one of {', '.join(allowed)}")
         return value
 
     return parse
@@ -270,14 +303,14 @@ def _one_of(*allowed: str) -> Callable[[str, Any], str]:
 
 def _flag(key: str, value: Any) -> bool:
     if not isinstance(value, bool):
-        raise ScriptError(f"{key}: {value!r} is not true or false")
+        raise ScriptError(f"{key}: {shown(value)} is not true or false")
     return value
 
 
 def _whole(least: int, most: int) -> Callable[[str, Any], int]:
     def parse(key: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise ScriptError(f"{key}: {value!r} is not a whole number from {least} to {most}")
+            raise ScriptError(f"{key}: {shown(value)} is not a whole number from {least} to {most}")
         return value
 
     return parse
@@ -287,7 +320,7 @@ def _between(least: float, most: float) -> Callable[[str, Any], float]:
     def parse(key: str, value: Any) -> float:
         number = _number(key, value)
         if not least <= number <= most:
-            raise ScriptError(f"{key}: {value!r} is not a number from {least:g} to {most:g}")
+            raise ScriptError(f"{key}: {shown(value)} is not a number from {least:g} to {most:g}")
         return number
 
     return parse
@@ -296,6 +329,7 @@ def _between(least: float, most: float) -> Callable[[str, Any], float]:
 PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "click": _points, "not_click": _points, "box": _numbers(4, 4), "subject": _flag,
     "mask": _text, "segment": _text, "lift": _text, "inpaint": _text, "refine": _text,
+    "refine_strength": _between(0, 1),
     "fill_from": _sources,
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
@@ -311,6 +345,6 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
 }  # fmt: skip
 
 OF_A_FILE = ("photo", "out", "objects", "order")  # keys of a script that are no options
-OF_THE_PHOTO = {"fov", "inpaint", "front", "front_mask", "seed"}
+OF_THE_PHOTO = {"fov", "inpaint", "refine_strength", "front", "front_mask", "seed"}
 CHOOSING = {"click", "not_click", "box", "subject", "mask", "segment"}
 OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"}

@@ -5,14 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from . import compose, edits, lift, segment
+from .compose import refine
 from .compose.composite import object_texture
 from .compose.order import reordered
-from .document import DeformSettings, Document, Placement
+from .document import (
+    GAUSSIANS,
+    Click,
+    DeformSettings,
+    Document,
+    LiftSettings,
+    Placement,
+    Prompt,
+)
+from .image import read_mask
 from .joining import Shadow
 from .progress import Progress
 from .puppet import Puppet, puppet_of
@@ -37,9 +48,20 @@ def _refuse_missing(script: EditScript) -> None:
         is_sam = known is segment.BACKENDS and segment.is_known(name)  # or one SAM by its id
         if name != "auto" and name not in known and not is_sam:
             raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
-    if script.refine not in ("auto", *compose.REFINERS):
-        known = ", ".join(compose.REFINERS)
-        raise ScriptError(f"the refiner {script.refine!r} is not installed; installed: {known}")
+    known = (*compose.REFINERS, *refine.BACKENDS)
+    if script.refine not in ("auto", *known):
+        raise ScriptError(f"there is no refiner {script.refine!r}; known are {', '.join(known)}")
+    if script.refine in refine.BACKENDS and (reason := refine.missing(script.refine)) is not None:
+        raise ScriptError(f"--refine {script.refine}: {reason}")
+
+
+def refiner_of(script: EditScript, others: Others = ALONE) -> str | None:
+    """The learned refiner that is asked for; it refines the whole edit. Raises ScriptError."""
+    asked = {own.refine for own in (script, *(o.script for o in others.objects))}
+    found = sorted(asked & set(refine.BACKENDS))
+    if len(found) > 1:
+        raise ScriptError(f"an edit is refined by one refiner, not by {' and '.join(found)}")
+    return found[0] if found else None
 
 
 @contextmanager
@@ -63,6 +85,31 @@ def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
             wanted = replace(wanted, script=replace(wanted.script, **kept))
         result.append(wanted)
     return result
+
+
+def prompt_of(script: EditScript) -> Prompt:
+    """What the script says about which object is meant."""
+    clicks = [Click(x, y) for x, y in script.click]
+    clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
+    return Prompt(tuple(clicks), script.box, script.subject)
+
+
+def lift_settings(document: Document, script: EditScript) -> LiftSettings:
+    """What the script says about the object's shape. Raises ImageError."""
+    hidden = None
+    if script.hidden is not None:
+        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
+    return LiftSettings(
+        count=script.gaussians or GAUSSIANS,
+        thickness=script.thickness,
+        is_standing=not script.floating,
+        is_symmetric={"auto": None, "yes": True, "no": False}[script.symmetry],
+        back=script.back,
+        hidden=hidden,
+        horizon=document.horizon,
+        uses_depth=not script.no_depth,
+        trust=script.trust,
+    )
 
 
 def with_settings(document: Document, k: int, script: EditScript) -> Document:

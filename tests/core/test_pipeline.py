@@ -258,7 +258,7 @@ def test_empty_and_full_masks_are_refused(inside, error):
     ({"pin": [[5, 5]]}, "--pin 5,5 misses the object"),
     ({"handle": [{"at": [78, 62], "to": [9, 9], "dz": -50}]}, "behind the camera"),
     ({"splats": "x.pdf"}, "x.pdf has none of the endings"),
-    ({"refine": "dream"}, "'dream' is not installed"),
+    ({"refine": "dream"}, "no refiner 'dream'"),
     ({"inpaint": "magic"}, "'magic'"), ({"lift": "magic"}, "'magic'"),
     ({"move": [0, 0, -80]}, "behind the camera"),
     ({"scale": -2}, "a scale of -2 is not above 0"),

@@ -25,7 +25,7 @@ FULL = {
     "split": True, "shadow": "none", "fov": 60, "seed": 7,
     "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
     "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]], "front-mask": "f.png",
-    "remove": True,
+    "remove": True, "refine-strength": 0.5,
     "fill-from": [{"source": [1, 2], "to": [3, 4], "radius": 5}, {"source": [1, 2], "to": [3, 4]}],
 }  # fmt: skip
 

@@ -1,0 +1,285 @@
+"""The library's stable names: an edit is told step by step, and done by what the program runs.
+
+`import objectmorpher_core as om` gives them as `om.open` and so on; docs/python.md tells how they
+are used and what of them stays. An `Edit` is an `EditScript` and an opened photo, so that it gives
+the bytes that `objectmorpher edit` gives for the same options.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+
+from .animation import Clip
+from .arrays import Mask, Pixels
+from .document import Document
+from .files import write_all
+from .image import encode_mask
+from .outputs import encode_output
+from .pipeline import Edited, continue_script, lift_first, open_photo, select
+from .pipeline import replay as replay_document
+from .progress import Progress, silent
+from .script import (
+    ALONE,
+    CHOOSING,
+    EditScript,
+    Others,
+    ScriptError,
+    beside,
+    parse_scripts,
+    script_from,
+)
+
+__all__ = ["Edit", "Result", "Shape", "open", "read_scripts", "replay"]
+
+File = str | os.PathLike[str]
+IN_MEMORY = "photo"  # name of a photo that is no file
+OF_THE_SHAPE = {
+    "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "trust",
+    "no_depth", "hidden",
+}  # fmt: skip
+
+
+class Shape(TypedDict, total=False):
+    """What can be said about an object's shape: the options of `edit` of these names."""
+
+    lift: str  # backend: auto, relief, trellis, cupid, or a worker
+    gaussians: int
+    thickness: float  # times what the outline says
+    back: str  # auto, mirrored or continued
+    symmetry: str  # auto, yes or no
+    floating: bool
+    trust: float  # in the shape network, 0 to 1
+    no_depth: bool
+    hidden: str  # file
+    splats: str  # file: a splat or mesh file takes the object's place
+    flip: bool
+
+
+def open(photo: File | bytes, fov: float | None = None, seed: int = 0) -> Edit:
+    """An edit of a photo that does nothing yet.
+
+    `photo` is a file or the bytes of one; `fov` is the camera's horizontal field of view in
+    degrees, which is otherwise read from EXIF, else 50. Raises ValueError for what is no picture.
+    """
+    data, name = (photo, IN_MEMORY) if isinstance(photo, bytes) else _read(photo)
+    told = {} if fov is None else {"fov": fov}
+    script = script_from({"seed": seed, **told})
+    return Edit(open_photo(data, name, script.fov, script.seed), script)
+
+
+def read_scripts(script: File, photo: File | None = None) -> tuple[Edit, ...]:
+    """The edits in a file of `objectmorpher edit --script`, which may name several.
+
+    `photo` is that of scripts that name none. File names in it are relative to it, and its "out"
+    is not used: what is saved, and where, is yours to say.
+    """
+    path = Path(script)
+    edits = []
+    try:
+        text = _read(path)[0].decode("utf-8")
+    except UnicodeDecodeError:
+        raise ScriptError(f"{path} is not text, so it is no script") from None
+    for item in parse_scripts(text):
+        placed = beside(item, path.parent)
+        source = placed.photo or photo
+        if source is None:
+            raise ScriptError(f"{path} names no photo")
+        edit = open(source, placed.script.fov, placed.script.seed)
+        mask = None if placed.script.mask is None else _read(placed.script.mask)[0]
+        edits.append(replace(edit, script=placed.script, others=placed.others, own_mask=mask))
+    return tuple(edits)
+
+
+def replay(session: File | bytes, progress: Progress = silent) -> Result:
+    """The edit of a session (.omorph), from the window or the command line, carried out again."""
+    from .session_file import decode_session
+
+    data = session if isinstance(session, bytes) else _read(session)[0]
+    return Result(replay_document(decode_session(data), progress))
+
+
+@dataclass(frozen=True, eq=False)
+class Edit:
+    """A photo and what is to be done to it. Every method gives a new edit; this one stays.
+
+    Points are px of the upright photo, x to the right and y down, from its corner. What makes no
+    sense raises a ValueError of one sentence: at once where it can be told, else by `render`.
+    """
+
+    document: Document  # the opened photo; after `lift` with the object
+    script: EditScript
+    others: Others = ALONE
+    own_mask: bytes | None = None  # picture file
+    needs_plate: bool = False
+
+    # ---- choosing the object -----------------------------------------------------------------
+
+    def click(self, x: float, y: float) -> Edit:
+        """The object is seen at this point. Several clicks add up."""
+        return self.options(click=[*self.script.click, (x, y)])
+
+    def not_click(self, x: float, y: float) -> Edit:
+        """What is seen at this point is not of the object."""
+        return self.options(not_click=[*self.script.not_click, (x, y)])
+
+    def box(self, x0: float, y0: float, x1: float, y1: float) -> Edit:
+        """The object is inside this box."""
+        return self.options(box=(x0, y0, x1, y1))
+
+    def subject(self) -> Edit:
+        """The object is the photo's main subject."""
+        return self.options(subject=True)
+
+    def mask(self, mask: File | np.ndarray) -> Edit:
+        """The object is what a mask picture, or a bool array (H, W), covers."""
+        if not isinstance(mask, np.ndarray):
+            return replace(self._unlifted, own_mask=_read(mask)[0])
+        if mask.dtype != np.bool_ or mask.ndim != 2:
+            raise ValueError(f"a mask is (H, W) of bool, not {mask.shape} of {mask.dtype}")
+        return replace(self._unlifted, own_mask=encode_mask(mask))
+
+    @cached_property
+    def selection(self) -> Mask:
+        """(H, W) bool: the object as it was chosen, found when it is first asked for."""
+        document = self.document
+        if not document.objects:
+            document = select(document, self.script, self.own_mask)
+        mask = document.objects[0].mask
+        assert mask is not None, "it was chosen"
+        return mask
+
+    # ---- its shape, its pose and its place ---------------------------------------------------
+
+    def lift(self, progress: Progress = silent, **shape: Unpack[Shape]) -> Edit:
+        """The edit with its object chosen and lifted to 3D now, so that it is done only once.
+
+        Without it `render` does so, each time. What is told later about which object is meant, or
+        about its shape, undoes it.
+        """
+        edit = self._with(shape)._unlifted
+        edit = self._with(shape)._unlifted
+        lifted = lift_first(edit.document, edit.script, edit.own_mask, progress)
+        return replace(edit, document=lifted)
+
+    def pin(self, x: float, y: float) -> Edit:
+        """The point of the object that is seen there stays where it is."""
+        return self.options(pin=[*self.script.pin, (x, y)])
+
+    def drag(self, at: tuple[float, float], to: tuple[float, float], dz: float = 0.0) -> Edit:
+        """The point of the object seen at `at` is to be seen at `to`, `dz` diameters farther."""
+        moves = [{"at": m.at, "to": m.to, "dz": m.dz} for m in self.script.handle]
+        return self.options(handle=[*moves, {"at": at, "to": to, "dz": dz}])
+
+    def move(self, dx: float, dy: float, dz: float = 0.0) -> Edit:
+        """The whole object moves: px to the right, px down, diameters away from the camera."""
+        return self.options(move=(dx, dy, dz))
+
+    def turn(self, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Edit:
+        """The whole object turns by so many degrees."""
+        return self.options(turn=(yaw, pitch, roll))
+
+    def scale(self, factor: float) -> Edit:
+        """The whole object is so many times as large."""
+        return self.options(scale=factor)
+
+    def remove(self) -> Edit:
+        """The object is gone, and what is behind it is seen."""
+        return self.options(remove=True)
+
+    # ---- putting it back ---------------------------------------------------------------------
+
+    def plate(self, inpaint: str = "auto") -> Edit:
+        """What is behind the object is filled in by this backend, even where nothing moves."""
+        return replace(self.options(inpaint=inpaint), needs_plate=True)
+
+    def harmonise(self) -> Edit:
+        """The object takes on light, grain and focus of where it is now."""
+        return self.options(refine="harmonise")
+
+    def options(self, **options: Any) -> Edit:
+        """Any options of `objectmorpher edit` by their long names, with _ for -.
+
+        Their values are those of a script file; one that was said before is replaced.
+        """
+        return self._with(options)
+
+    def render(self, progress: Progress = silent) -> Result:
+        """Carries the edit out. `progress(fraction, text)` is called on the way."""
+        done = continue_script(
+            self.document, self.script, self.own_mask, progress, self.needs_plate, self.others
+        )
+        return Result(done)
+
+    def _with(self, options: Mapping[str, Any]) -> Edit:
+        said = {name.replace("-", "_") for name in options}
+        script = self.script.merged(script_from(options), said)
+        edit = replace(self, script=script)
+        if {"fov", "seed"} & said:
+            photo = self.document.photo
+            fresh = open_photo(photo.source, photo.name, script.fov, script.seed)
+            return replace(edit, document=fresh)
+        if "mask" in said and script.mask is not None:
+            return edit.mask(script.mask)
+        return edit._unlifted if (CHOOSING | OF_THE_SHAPE) & said else edit
+
+    @property
+    def _unlifted(self) -> Edit:
+        photo, script = self.document.photo, self.script
+        if not self.document.objects:
+            return self
+        return replace(self, document=open_photo(photo.source, photo.name, script.fov, script.seed))
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """An edit that was carried out."""
+
+    edited: Edited
+
+    @property
+    def pixels(self) -> Pixels:
+        """(H, W, 3) the edited photo, upright RGB, u8 or u16 as the photo's."""
+        return self.edited.picture.pixels
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What `--report` writes: seconds, handles, footprint and more, in plain values."""
+        return self.edited.report()
+
+    def encode(
+        self, ending: str = ".png", what: str = "photo", video: str = "morph", seconds: float = 4.0
+    ) -> bytes:
+        """The bytes of a file with that ending; see `save`."""
+        return encode_output(what, self.edited, Path(f"{IN_MEMORY}{ending}"), Clip(video, seconds))
+
+    def save(
+        self, path: File, what: str = "photo", video: str = "morph", seconds: float = 4.0
+    ) -> None:
+        """Writes a file, whole or not at all; an existing one is replaced.
+
+        `what`: photo, mask, plate, object, depth, layers, splats, session or video; of a video
+        `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises ValueError
+        where the file's ending cannot hold it, and OSError where it cannot be written.
+        """
+        target = Path(path)
+        write_all({target: encode_output(what, self.edited, target, Clip(video, seconds))})
+
+
+def _read(file: File) -> tuple[bytes, str]:
+    """The bytes of a file and its name without folder. Raises OSError of one sentence."""
+    path = Path(file)
+    try:
+        return path.read_bytes(), path.name
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path} does not exist") from None
+    except IsADirectoryError:
+        raise IsADirectoryError(f"{path} is a folder, not a file") from None
+    except PermissionError:
+        raise PermissionError(f"{path} cannot be read") from None

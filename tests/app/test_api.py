@@ -1,0 +1,201 @@
+"""`import objectmorpher_core as om`: the bytes of the command line, one sentence for failures."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import objectmorpher_core as om
+from app import __version__, cli
+from objectmorpher_core.image import read_picture
+from tests import shapes
+
+ROOT = Path(__file__).parents[2]
+MASK = shapes.mask("ellipse")
+PIXELS = shapes.picture(MASK)
+QUICK = {"gaussians": 300, "inpaint": "telea"}
+QUICK_SAID = ["--gaussians", "300", "--inpaint", "telea"]
+TOP, BELOW = (78, 45), (78, 80)  # px, on the object
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A working directory with a photo and its mask."""
+    monkeypatch.chdir(tmp_path)
+    Path("photo.png").write_bytes(shapes.png(PIXELS))
+    Path("mask.png").write_bytes(shapes.mask_png(MASK))
+    return tmp_path
+
+
+def _edit() -> om.Edit:
+    return om.open("photo.png").mask("mask.png").options(**QUICK)
+
+
+def _cli(*more: str) -> bytes:
+    said = ["edit", "photo.png", "-o", "cli.png", "--mask", "mask.png", *QUICK_SAID, *more]
+    assert cli.main(said) == 0
+    return Path("cli.png").read_bytes()
+
+
+EDITS = {
+    "turned": (lambda e: e.turn(20, 5, 0), ["--turn", "20,5,0"]),
+    "dragged": (
+        lambda e: e.pin(*BELOW).drag(TOP, (86, 45), 0.1).harmonise(),
+        ["--pin", "78,80", "--handle", "78,45:86,45,0.1", "--refine", "harmonise"],
+    ),
+    "moved": (
+        lambda e: e.move(9, -4).scale(0.9).options(shadow="none", stiffness=2.0),
+        ["--move", "9,-4", "--scale", "0.9", "--shadow", "none", "--stiffness", "2"],
+    ),
+    "gone": (lambda e: e.remove(), ["--remove"]),
+    "thin": (
+        lambda e: e.options(thickness=0.4).turn(30), ["--thickness", "0.4", "--turn", "30,0,0"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_the_command_line_gives_the_same_bytes(folder, name):
+    edited, said = EDITS[name]
+    edited(_edit()).render().save("api.png")
+    assert Path("api.png").read_bytes() == _cli(*said)
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_lifting_first_changes_nothing(folder, name):
+    edited, _ = EDITS[name]
+    assert edited(_edit().lift()).render().encode() == edited(_edit()).render().encode()
+
+
+def test_every_further_output_is_that_of_the_command_line(folder):
+    kinds = {
+        "mask": "mask-of.png", "plate": "plate.png", "object": "object.png", "depth": "depth.png",
+        "layers": "layers.ora", "splats": "splats.ply",
+    }  # fmt: skip
+    said = [w for k, name in kinds.items() for w in (f"--save-{k}", f"cli-{name}")]
+    _cli("--turn", "20,0,0", *said, "--session", "cli.omorph")
+    result = _edit().turn(20).plate("telea").render()
+    for what, name in kinds.items():
+        result.save(name, what)
+        assert Path(name).read_bytes() == Path(f"cli-{name}").read_bytes(), what
+    result.save("api.omorph", "session")
+    assert Path("api.omorph").read_bytes() == Path("cli.omorph").read_bytes()
+    assert om.replay("api.omorph").encode() == result.encode()
+
+
+def test_a_script_file_is_the_command_lines(folder):
+    script = {
+        "photo": "photo.png", "out": "cli.png", "mask": "mask.png", "turn": [10, 0, 0], **QUICK,
+        "objects": [{"duplicate": 1, "move": [30, 0]}],
+    }  # fmt: skip
+    (folder / "scripts").mkdir()
+    Path("edit.json").write_text(json.dumps(script))
+    assert cli.main(["edit", "--script", "edit.json"]) == 0
+    (edit,) = om.read_scripts("edit.json")
+    assert edit.render().encode() == Path("cli.png").read_bytes()
+
+
+def test_an_edit_stays_as_it_was(folder):
+    edit = _edit()
+    before = edit.script, edit.document
+    lifted = edit.lift()
+    lifted.turn(20).pin(*BELOW).render()
+    assert (edit.script, edit.document) == before
+    assert not edit.document.objects and not lifted.script.pin
+    assert np.array_equal(read_picture(edit.render().encode()).pixels, PIXELS)
+
+
+def test_what_is_told_of_the_object_after_lifting_lifts_it_anew(folder):
+    lifted = _edit().lift().turn(30)
+    assert lifted.document.objects
+    thin = lifted.options(thickness=0.3)
+    assert not thin.document.objects
+    assert thin.render().encode() == _edit().options(thickness=0.3).turn(30).render().encode()
+    other = np.roll(MASK, 3, axis=1)
+    assert np.array_equal(lifted.mask(other).selection, other)
+
+
+def test_the_selection_is_what_is_edited(folder):
+    assert np.array_equal(_edit().selection, MASK)
+    assert np.array_equal(_edit().lift().selection, MASK)
+    assert np.array_equal(om.open(shapes.png(PIXELS)).mask(MASK).selection, MASK)
+    clicked = om.open("photo.png").options(segment="grabcut").click(78, 62).selection
+    assert (clicked & MASK).sum() / (clicked | MASK).sum() > 0.8
+
+
+def test_figures_and_pixels_are_plain(folder):
+    result = _edit().turn(20).render()
+    assert json.loads(json.dumps(result.report))["object"]["gaussians"] > 0
+    assert np.array_equal(result.pixels, read_picture(result.encode()).pixels)
+    assert (result.pixels != PIXELS).any()
+
+
+WRONG = {
+    "no file": lambda: om.open("nothing.jpg"),
+    "a folder": lambda: om.open("."),
+    "no picture": lambda: om.open(b"text"),
+    "a field of view": lambda: om.open("photo.png", fov=400),
+    "an option": lambda: _edit().options(nose=1),
+    "a value": lambda: _edit().scale("large"),  # type: ignore[arg-type]
+    "a mask of numbers": lambda: _edit().mask(np.zeros(MASK.shape)),
+    "a mask of another size": lambda: _edit().mask(MASK[:9]).render(),
+    "an empty mask": lambda: _edit().mask(np.zeros_like(MASK)).lift(),
+    "nothing chosen": lambda: om.open("photo.png").render(),
+    "a backend": lambda: _edit().options(lift="magic").lift(),
+    "a point beside it": lambda: _edit().drag((1, 1), (9, 9)).render(),
+    "an ending": lambda: _edit().render().save("out.gif"),
+    "an output": lambda: _edit().render().save("out.png", "everything"),
+    "no background": lambda: _edit().render().save("out.png", "plate"),
+    "no such folder": lambda: _edit().render().save("nowhere/out.png"),
+    "a script": lambda: om.read_scripts("photo.png"),
+    "a session": lambda: om.replay("photo.png"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_failure_is_one_sentence_and_writes_nothing(folder, name):
+    before = sorted(folder.iterdir())
+    with pytest.raises((ValueError, OSError)) as caught:
+        WRONG[name]()
+    told = str(caught.value)
+    assert told and "\n" not in told and "Errno" not in told and "codec" not in told
+    assert len(told) < 200
+    assert sorted(folder.iterdir()) == before
+
+
+def test_importing_it_imports_nothing_else():
+    code = (
+        "import sys; before = set(sys.modules); import objectmorpher_core as om; "
+        "new = {m.split('.')[0] for m in set(sys.modules) - before}; "
+        "print(*sorted(new - set(sys.stdlib_module_names))); dir(om); om.__version__; "
+        "assert 'numpy' not in sys.modules; om.open; assert 'numpy' in sys.modules; "
+        "assert not {'torch', 'onnxruntime', 'trimesh', 'app', 'moderngl'} & set(sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["objectmorpher_core"]
+
+
+def test_the_stable_names_are_there_and_told_of():
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    for name in om.__all__:
+        assert getattr(om, name) is not None
+        assert f"om.{name}" in page
+    for kind in (om.Edit, om.Result):
+        for name in vars(kind):
+            is_told = f"`{name}" in page or f"`{kind.__name__}.{name}" in page
+            assert name.startswith("_") or is_told, f"{kind.__name__}.{name}"
+    with pytest.raises(AttributeError):
+        om.nothing  # noqa: B018
+
+
+def test_there_is_one_version():
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert f'version = "{__version__}"' in project
+    assert om.__version__ == __version__
