@@ -1,0 +1,37 @@
+"""What of the build machine's system went into the program's folder, and under which licence."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+# Under the GPL; Python can do without each.
+GPL = ("libreadline", "readline.", "libgdbm", "_gdbm", "libdb-5")
+DOCUMENTED = Path("/usr/share/doc")
+
+
+def check(folder: Path) -> None:
+    """Raises SystemExit where a library under the GPL is in it."""
+    found = [p.name for p in folder.rglob("*") if p.name.startswith(GPL)]
+    if found:
+        raise SystemExit(f"under the GPL, and may not be shipped: {', '.join(found)}")
+
+
+def write_system_texts(folder: Path, target: Path) -> None:
+    """The copyright files of the Debian packages whose libraries are in it."""
+    if shutil.which("dpkg") is None:
+        return
+    inside = folder / "_internal"
+    for library in sorted(inside.glob("*.so*")):
+        told = subprocess.run(
+            ["dpkg", "-S", f"*/{library.name}"], capture_output=True, text=True, check=False
+        )
+        for line in told.stdout.splitlines():
+            package = line.split(":")[0]
+            text = DOCUMENTED / package / "copyright"
+            if text.is_file():
+                own = target / f"debian-{package}"
+                own.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(text, own / "copyright")
+                break
