@@ -11,6 +11,7 @@ from ..editor import Editor
 from ..export_plan import LENGTHS, LOSSLESS, Format, Motion, What
 from ..filing import Dialog
 from ..texts import t
+from .landmarks import mark
 from .modal import modal
 from .segmented import Choice, segmented
 from .theme import FIELD, PRIMARY, theme
@@ -130,6 +131,7 @@ def _draw_where(editor: Editor) -> bool:
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
     name = exporting.draft.name
     is_entered, typed = imgui.input_text_with_hint("##name", t("name or path"), name, flags)
+    mark(t("Name"))
     if typed != name:
         exporting.set_name(typed)
     _name(t("In"))
@@ -168,7 +170,9 @@ def _draw_foot(exporting: Exporting, is_entered: bool, is_unfolded: bool) -> Non
         label = f"{fitted(exporting.label, room)}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
     # The key that opened it is still down in its first frame.
-    is_enter = not imgui.is_window_appearing() and any(
+    # Where the ring is around a control, it is pressed.
+    is_free = not imgui.is_window_appearing() and not imgui.get_io().nav_visible
+    is_enter = is_free and any(
         imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
     )
     is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)

@@ -86,7 +86,8 @@ class FileChooser:
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
         imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
         foot = theme.pt(56)
-        imgui.begin_child("##files", ImVec2(0, -foot), imgui.ChildFlags_.always_use_window_padding)
+        flags = imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.nav_flattened
+        imgui.begin_child("##files", ImVec2(0, -foot), flags)
         chosen = None
         for entry in self._entries:
             chosen = self._draw_entry(entry) or chosen

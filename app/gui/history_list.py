@@ -8,7 +8,7 @@ from ..editor import Editor
 from ..texts import t
 from .rows import fill_row, text_top
 from .theme import theme
-from .widgets import heading, rule
+from .widgets import drawn_button, heading, rule
 
 ROW = 28.0  # points
 CORNER = 4.0  # radius
@@ -26,7 +26,7 @@ def draw_history(editor: Editor) -> None:
     steps, cursor = history.steps, history.cursor
     height = theme.pt(ROW) * min(len(steps), MOST)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
-    is_visible = imgui.begin_child("##history", ImVec2(0, height))
+    is_visible = imgui.begin_child("##history", ImVec2(0, height), imgui.ChildFlags_.nav_flattened)
     for k, label in enumerate(steps):
         if _draw_step(k, label, cursor):
             editor.travel(k)
@@ -42,7 +42,7 @@ def draw_history(editor: Editor) -> None:
 def _draw_step(k: int, label: str, cursor: int) -> bool:
     """One row; whether it was clicked. Steps that were undone are dimmed."""
     start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
-    is_clicked = imgui.invisible_button(f"##step{k}", ImVec2(width, theme.pt(ROW)))
+    is_clicked = drawn_button(f"##step{k}", ImVec2(width, theme.pt(ROW)))
     draw, end = imgui.get_window_draw_list(), ImVec2(start.x + width, start.y + theme.pt(ROW))
     fill_row(start, end, k == cursor, imgui.is_item_hovered(), CORNER)
     if k == cursor:

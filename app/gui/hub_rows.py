@@ -13,30 +13,64 @@ from ..filing import Dialog
 from ..texts import t
 from .segmented import Choice, segmented
 from .theme import theme
-from .widgets import Kind, bold_text, button, checkbox, gap, note, rule
+from .widgets import Kind, bold_text, button, checkbox, gap, heading, note, rule
 
 BUTTON = 120.0  # points
 NAMES = {
     "sam2": "SAM 2.1", "sam3": "SAM 3", "sam": "SAM", "sam-onnx": "Small SAMs (ONNX)",
+    "pixelhacker": "PixelHacker", "lama": "LaMa", "migan": "MI-GAN",
+    "trellis": "TRELLIS", "cupid": "CUPID", "dinov2-with-registers": "DINOv2 with registers",
+    "depth-anything": "Depth Anything V2", "qwen-image-edit": "Qwen-Image-Edit",
+    "qwen-image-edit-2511-lightning": "Lightning for Qwen-Image-Edit-2511",
+    "qwen-image-edit-2509-lightning": "Lightning for Qwen-Image-Edit-2509",
+    "qwen-refine-lora": "Your LoRA on Qwen-Image-Edit",
+    "flux2-klein": "FLUX.2-klein", "flux2-klein-base": "FLUX.2-klein, base",
+    "klein-refine-lora": "Your LoRA on FLUX.2-klein",
 }  # fmt: skip
 GAINS = {
     "sam2": "Clicks select nearly anything; parts, objects and groups",
     "sam3": "The newest, for a large GPU",
     "sam": "The first of its kind, which the paper uses",
     "sam-onnx": "Smaller and quicker, without PyTorch",
+    "pixelhacker": "Invents what is behind objects, for a GPU: the paper's",
+    "lama": "Invents what is behind large objects, without a GPU",
+    "migan": "Invents what is behind objects, the quickest",
+    "trellis": "The whole object from one picture, for a GPU: the paper's",
+    "cupid": "The same with the photo's camera; also needs TRELLIS",
+    "dinov2-with-registers": "What TRELLIS and CUPID see a picture with",
+    "depth-anything": "A lifted object is as deep as it looks, not as its outline says",
+    "qwen-image-edit": "Makes the edit look photographed, for a very large GPU: the paper's",
+    "qwen-image-edit-2511-lightning": "The same in 4 steps instead of 40",
+    "qwen-image-edit-2509-lightning": "The same in 4 or 8 steps instead of 40",
+    "qwen-refine-lora": "What you have trained it to do",
+    "flux2-klein": "Makes the edit look photographed, in four steps, for a GPU of 12 GB",
+    "flux2-klein-base": "What a LoRA of yours for FLUX.2-klein is trained on",
+    "klein-refine-lora": "What you have trained it to do",
 }
 SIZES = {
     "sam2.1-tiny": "Tiny", "sam2.1-small": "Small", "sam2.1-base-plus": "Base",
     "sam2.1-large": "Large",
     "sam-vit-base": "Base", "sam-vit-large": "Large", "sam-vit-huge": "Huge",
     "mobile-sam": "MobileSAM", "efficient-sam": "EfficientSAM",
+    "qwen-image-edit-2509": "2509", "qwen-image-edit-2511": "2511",
+    "qwen-image-edit-2509-lightning-4": "4 steps", "qwen-image-edit-2509-lightning-8": "8 steps",
+}  # fmt: skip
+STAGES = {
+    "segment": "For selecting", "inpaint": "For the background", "lift": "For lifting",
+    "depth": "For the depth of what is lifted", "refine": "For refining",
 }  # fmt: skip
 
 
 def draw_hub_rows(editor: Editor) -> None:
-    """All families."""
+    """All families, by what they are for."""
+    before = ""
     for family in editor.models.hub.families:
         if family in NAMES:
+            stage = editor.models.hub.shown(family).model.stage
+            if stage != before:
+                gap(12)
+                heading(t(STAGES[stage]))
+            before = stage
             imgui.push_id(family)
             _draw_family(editor, family)
             imgui.pop_id()
@@ -82,6 +116,9 @@ def _draw_facts(editor: Editor, shown: HubState) -> None:
     if shown.state == "ok":
         return
     if not model.repository:
+        if model.family.endswith("-lora"):
+            note(t("Nothing is downloaded: one .safetensors file in a folder of yours."))
+            return
         note(t("Nothing is downloaded: get it from {page}, as two ONNX files.", page=source))
         note(t("Licence {licence}", licence=model.licence))
         return

@@ -18,7 +18,7 @@ from .panels.mask import draw_mask
 from .panels.place import draw_place
 from .panels.pose import draw_pose
 from .panels.select import draw_select
-from .panes import edge, pane
+from .panes import INSPECTOR, edge, pane
 from .theme import PRIMARY, theme
 from .widgets import Kind, button, rule
 
@@ -33,11 +33,12 @@ _scroll = _Scroll()
 
 
 def draw_inspector(editor: Editor, rect: Rect) -> None:
-    with pane("##inspector", rect):
+    with pane(INSPECTOR, rect):
         foot = theme.pt(PRIMARY + 24)
         bar = imgui.get_style().scrollbar_size if _scroll.is_needed else 0.0
         across = imgui.get_content_region_avail().x + bar  # the bar stands in the padding
-        imgui.begin_child("##scroll", ImVec2(across, rect.height - foot - theme.pt(12)))
+        size = ImVec2(across, rect.height - foot - theme.pt(12))
+        imgui.begin_child("##scroll", size, imgui.ChildFlags_.nav_flattened)
         draw_objects(editor)
         rule()
         _PANELS[editor.view.tool](editor)

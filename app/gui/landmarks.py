@@ -16,6 +16,7 @@ from imgui_bundle import ImVec2, imgui
 
 VARIABLE = "OBJECTMORPHER_LANDMARKS"
 POINTER = "Pointer"
+FOCUS = "Focus"  # before the name of what the keyboard has reached
 
 _file = os.environ.get(VARIABLE) or None
 _places: dict[str, tuple[float, float, float, float]] = {}
@@ -28,6 +29,8 @@ def mark(label: str) -> None:
         return
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     _places[clean(label)] = (low.x, low.y, high.x, high.y)
+    if imgui.is_item_focused() and imgui.get_io().nav_visible:
+        _places[f"{FOCUS}: {clean(label)}"] = _places[clean(label)]
 
 
 def mark_on_canvas(label: str, low: ImVec2, high: ImVec2) -> None:

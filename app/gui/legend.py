@@ -14,7 +14,7 @@ from ..render.scene import Hatch
 from ..texts import t
 from ..view import Shown
 from .layout import Rect
-from .scenes import INPAINTED, LIFTED
+from .scenes import INPAINTED, LIFTED, REFINED
 from .theme import theme
 from .widgets import bold_text, small_text
 
@@ -37,13 +37,18 @@ class Legend:
             Shown.OBJECT: (0.0, lambda: None),
             Shown.DEPTH: (BAR + 2 * LINE, self._draw_depth),
             Shown.NORMALS: (3 * LINE, self._draw_normals),
-            Shown.PROVENANCE: (4 * LINE, self._draw_provenance),
+            Shown.PROVENANCE: (self._provenance_rows * LINE, self._draw_provenance),
             Shown.STRAIN: (BAR + 2 * LINE, self._draw_strain),
         }
         self._height, self._draw_rows = rows.get(self._shown, (0.0, lambda: None))
         self._left = rect.x + rect.width - theme.pt(PAD + WIDTH)
         self._top = rect.y + rect.height - theme.pt(PAD + self._panel_height)
         self._y = self._top
+
+    @property
+    def _provenance_rows(self) -> int:
+        document = self._editor.document
+        return 4 if document is None or document.refined is None else 5
 
     @property
     def _panel_height(self) -> float:
@@ -99,16 +104,18 @@ class Legend:
         assert editor.history is not None
         shares = editor.derived.painter.shares(editor.history.document)  # too slow for a drag
         grey = (0.55, 0.55, 0.55)
-        rows = (
+        rows: list[tuple[Hatch | None, str, float]] = [
             (None, t("from the photo"), shares.from_photo),
             (LIFTED, t("invented on the object"), shares.from_lifter),
             (INPAINTED, t("invented behind it"), shares.from_inpainter),
-        )
+        ]
+        if self._provenance_rows > len(rows) + 1:
+            rows.append((REFINED, t("refined by the network"), shares.from_refiner))
         for hatch, text, share in rows:
             self._swatch(grey, hatch)
             self._text(f"{share:.0%}".replace("%", " %"), WHITE, side=1.0)
             self._row(text)
-        is_changed = shares.from_photo + shares.from_lifter + shares.from_inpainter > 0
+        is_changed = shares.changed > 0
         said = t("of the changed pixels")
         if editor.preview is not None:
             said = t("of the changed pixels, before this drag")
@@ -154,6 +161,8 @@ class Legend:
             bottom, top = ImVec2(x, high.y + 1), ImVec2(x + side + 1, low.y)
             if hatch.slant < 0:
                 bottom, top = ImVec2(x + side + 1, high.y + 1), ImVec2(x, low.y)
+            if hatch.slant == 0:
+                top = ImVec2(x, low.y)
             self._draw.add_line(bottom, top, ink, width)
         self._draw.pop_clip_rect()
 

@@ -11,6 +11,10 @@ from .theme import theme
 from .widgets import bold_text, note
 
 PADDING = 20.0  # points
+LEAST_AROUND = 8.0  # points of the window above and below, and at the sides
+SCROLLING = (  # no frame but a scroll bar, where large texts need more than there is room for
+    imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
+)
 
 
 @contextmanager
@@ -23,10 +27,13 @@ def modal(title: str, width: float, about: str = "", height: float = 0.0) -> Ite
         imgui.open_popup(title)
     centre = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(centre, imgui.Cond_.always, ImVec2(0.5, 0.5))
+    display, around = imgui.get_io().display_size, theme.pt(2 * LEAST_AROUND)
+    room = ImVec2(max(display.x - around, 1.0), max(display.y - around, 1.0))
+    imgui.set_next_window_size_constraints(ImVec2(1.0, 1.0), room)
     imgui.set_next_window_size(theme.size(width, height))
     imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(PADDING, PADDING))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
-    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
+    flags = SCROLLING | imgui.WindowFlags_.no_saved_settings
     is_shown = imgui.begin_popup_modal(title, None, flags)[0]
     imgui.pop_style_var(2)
     if is_shown:

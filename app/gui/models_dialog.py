@@ -14,6 +14,7 @@ from .hub_rows import draw_hub_rows
 from .modal import PADDING, modal
 from .theme import Icon, theme
 from .widgets import Kind, bold_text, button, gap, half_width, note, rule, tooltip
+from .worker_rows import draw_worker_rows
 
 WIDTH = 560.0  # points
 BUTTON = 120.0
@@ -50,6 +51,7 @@ def _draw_rows(editor: Editor) -> None:
     for own in editor.models.added:
         _draw_added(editor, own)
     draw_hub_rows(editor)
+    draw_worker_rows(editor)
     if not editor.models.states:
         note(t("Looking at what is there…"))
     imgui.end_child()

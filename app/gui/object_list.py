@@ -13,7 +13,7 @@ from ..texts import t
 from .landmarks import mark
 from .rows import end_row, fill_row, text_top
 from .theme import SMALL_SIZE, Icon, theme
-from .widgets import Kind, button, heading, icon_button, note
+from .widgets import Kind, button, drawn_button, heading, icon_button, note
 
 ROW = 32.0  # points
 BETWEEN = 12.0  # points from a row to the next
@@ -134,7 +134,7 @@ def _take_clicks(editor: Editor, k: int, size: ImVec2) -> bool:
     if editor.objects.renaming == k:  # its field has the mouse
         imgui.dummy(size)
         return False
-    if imgui.invisible_button(f"##object{k}", size) and not _is_dragged:
+    if drawn_button(f"##object{k}", size) and not _is_dragged:
         editor.objects.choose(k)
     assert editor.document is not None
     mark(f"row of {editor.document.objects[k].name}")

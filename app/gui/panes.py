@@ -10,6 +10,8 @@ from imgui_bundle import ImVec2, imgui
 from .layout import Rect
 from .theme import theme
 
+TOOLS, INSPECTOR, STATUS, START = "##tools", "##inspector", "##status", "##start"  # their names
+
 FLAGS = (
     imgui.WindowFlags_.no_decoration
     | imgui.WindowFlags_.no_move

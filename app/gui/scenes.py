@@ -18,6 +18,7 @@ PAINTED_VEIL = 0.45  # while it is painted: a stroke in progress has no outline
 MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
+REFINED = Hatch((0.0, 0.85, 0.75), slant=0.0)
 OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
@@ -53,9 +54,16 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     elif shown is Shown.PROVENANCE:
         mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
     shades = editor.derived.lights.layers(document, view)
+    if shown in (Shown.COMPOSITE, Shown.PROVENANCE):  # the other views tell what is below it
+        refined = editor.derived.refined.layers(document, view, shown is Shown.PROVENANCE)
+        if renderer == "gl":
+            objects = (*objects, *refined)
+        else:
+            layers = (*layers, *refined)
     return Scene(
         photo, surround, plate, shades, layers, objects, mask,
-        hatch=hatch, marks=LIFTED, blend=editor.derived.blend(document, view), split=split,
+        hatch=hatch, marks=LIFTED, refined=REFINED, blend=editor.derived.blend(document, view),
+        split=split,
     )  # fmt: skip
 
 
@@ -121,6 +129,7 @@ def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObj
         item = SplatObject(splats, texture, camera, is_marked=part.is_marked, is_tint=is_tint)
         if not part.is_painted:
             look = derived.lights.of(document, part.k)
-            item = replace(item, gain=look.gain, relit=look.relit, grain=look.grain)
+            light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
+            item = replace(item, **light, blur=look.blur)
         found.append(item)
     return tuple(found)

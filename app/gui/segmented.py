@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, imgui
 
 from .landmarks import clean, mark
 from .theme import FIELD, RADIUS, theme
-from .widgets import tooltip
+from .widgets import drawn_button, tooltip
 
 T = TypeVar("T")
 INSET = 2.0  # points between the row's edge and the chosen part
@@ -40,7 +40,7 @@ def segmented(name: str, choices: Sequence[Choice[T]], chosen: T) -> T:
         size = ImVec2(round(start.x + (i + 1) * part) - low.x, height)
         imgui.set_cursor_screen_pos(low)
         imgui.begin_disabled(choice.why_not is not None)
-        if imgui.invisible_button(f"##{name}{i}", size):
+        if drawn_button(f"##{name}{i}", size):
             chosen = choice.value
         mark(choice.label if clean(choice.label) else choice.hint)
         imgui.end_disabled()

@@ -16,16 +16,17 @@ from ..resources import resource
 from ..texts import t
 from .landmarks import mark
 from .layout import Rect
-from .panes import FLAGS
+from .panes import FLAGS, START
 from .recovery_list import draw_recovery, recovery_height
 from .theme import TITLE_SIZE, Icon, theme
-from .widgets import Kind, bold_text, button, fitted, tooltip
+from .widgets import Kind, bold_text, button, drawn_button, fitted, tooltip
 
 SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flower", "Flower"))
 COLUMN = 720.0  # points, width of everything
 DROP_HEIGHT = 240.0
 THUMB = (168.0, 112.0)
 SAMPLES_HEIGHT = THUMB[1] + 156.0  # with the title above them, their names and what is around
+LEAST_GAP = 12.0  # points between two of them, which are smaller where there is no room
 RECENT = 4  # files shown
 RECENT_TITLE, RECENT_ROW = 44.0, 28.0  # heights
 
@@ -44,7 +45,7 @@ class StartScreen:
         imgui.set_next_window_pos(ImVec2(rect.x, rect.y))
         imgui.set_next_window_size(ImVec2(rect.width, rect.height))
         imgui.push_style_color(imgui.Col_.window_bg, theme.vec("surround"))
-        imgui.begin("##start", None, FLAGS & ~UNLIKE)
+        imgui.begin(START, None, FLAGS & ~UNLIKE)
         imgui.pop_style_color()
         column = min(theme.pt(COLUMN), rect.width - theme.pt(48))
         recent = [Path(r) for r in editor.settings.recent[:RECENT]]
@@ -88,17 +89,18 @@ class StartScreen:
         with bold_text():
             imgui.text_unformatted(t("Or try one of these"))
         imgui.dummy(theme.size(0, 0))
-        gap = (column - len(SAMPLES) * theme.pt(THUMB[0])) / (len(SAMPLES) - 1)
+        count, least = len(SAMPLES), theme.pt(LEAST_GAP)
+        width = min(theme.pt(THUMB[0]), (column - (count - 1) * least) / count)
+        gap = (column - count * width) / (count - 1)
         for i, (name, title) in enumerate(SAMPLES):
             if i:
                 imgui.same_line(0, gap)
-            self._draw_sample(editor, name, title)
+            self._draw_sample(editor, name, title, ImVec2(width, width * THUMB[1] / THUMB[0]))
 
-    def _draw_sample(self, editor: Editor, name: str, title: str) -> None:
-        size = theme.size(*THUMB)
+    def _draw_sample(self, editor: Editor, name: str, title: str, size: ImVec2) -> None:
         low = imgui.get_cursor_screen_pos()
         imgui.begin_group()
-        if imgui.invisible_button(f"##{name}", ImVec2(size.x, size.y)):
+        if drawn_button(f"##{name}", size):
             editor.filing.open_sample(Path(str(resource(f"assets/samples/{name}.jpg"))))
         mark(title)
         is_hovered = imgui.is_item_hovered()

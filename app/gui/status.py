@@ -11,11 +11,12 @@ from ..editing.models import DOWNLOAD
 from ..editor import Editor
 from ..feedback import Message
 from ..jobs import Job
+from ..private import without_names
 from ..texts import t
 from .fade import fades
 from .landmarks import mark
 from .layout import Rect
-from .panes import edge, pane
+from .panes import STATUS, edge, pane
 from .theme import Icon, theme
 from .widgets import icon_button, small_text, tooltip
 
@@ -25,7 +26,7 @@ BAR_HEIGHT = 6.0
 
 
 def draw_status(editor: Editor, rect: Rect, hint: str) -> None:
-    with pane("##status", rect, padding=(12, 0)), small_text():
+    with pane(STATUS, rect, padding=(12, 0)), small_text():
         imgui.set_cursor_pos_y((rect.height - imgui.get_font_size()) / 2)
         right = rect.width - theme.pt(12) - _facts_width(editor)
         _draw_facts(editor, rect, right)
@@ -130,10 +131,15 @@ def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
 
 
 def _whole_parts(hint: str, room: float) -> str:
-    """As many of a hint's parts as have room, window units."""
+    """As many of a hint's parts as have room (window units), or of the first one's words."""
     while imgui.calc_text_size(hint).x > room and " · " in hint:
         hint = hint.rpartition(" · ")[0]
-    return hint
+    if imgui.calc_text_size(hint).x <= room:
+        return hint
+    words = hint.split(" ")
+    while words and imgui.calc_text_size(" ".join(words) + "…").x > room:
+        words.pop()
+    return " ".join(words) + "…" if words else ""
 
 
 def _draw_buttons(editor: Editor, message: Message) -> None:
@@ -150,7 +156,7 @@ def _draw_buttons(editor: Editor, message: Message) -> None:
     if message.details:
         imgui.set_cursor_pos_y(top)
         if imgui.button(t("Details")):
-            imgui.set_clipboard_text(message.details)
+            imgui.set_clipboard_text(without_names(message.details))
             editor.say(t("The details are in the clipboard"))
         tooltip(t("Copies this:") + "\n" + message.details[-600:])
         imgui.same_line(0, theme.pt(8))

@@ -230,7 +230,7 @@ def _set_colours(style: imgui.Style) -> None:
         "check_mark": "on_accent", "checkbox_selected_bg": "accent",
         "button": "raised", "button_hovered": "hovered",
         "button_active": "pressed", "header": "raised", "header_hovered": "hovered",
-        "header_active": "pressed", "separator": "line", "nav_cursor": "accent",
+        "header_active": "pressed", "separator": "line", "nav_cursor": "text",
         "title_bg": "panel", "title_bg_active": "panel", "slider_grab": "accent",
         "slider_grab_active": "accent_hovered", "plot_histogram": "accent",
         "input_text_cursor": "accent",

@@ -8,6 +8,7 @@ from ..commands import COMMANDS, keys_of, run
 from ..editor import Editor
 from ..texts import t
 from ..view import ToolName
+from . import panes
 from .landmarks import mark
 from .layout import Rect
 from .panes import edge, pane
@@ -27,7 +28,7 @@ TOOLS = (
 
 
 def draw_toolbar(editor: Editor, rect: Rect) -> None:
-    with pane("##tools", rect, padding=(6, 8)):
+    with pane(panes.TOOLS, rect, padding=(6, 8)):
         for tool, icon, name, hint in TOOLS:
             _draw_tool(editor, tool, icon, name, hint)
         right = rect.x + rect.width - 0.5

@@ -16,6 +16,7 @@ from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
 LABEL_WIDTH = 72.0  # points, of the names left of the fields
 GAP = 8.0  # between two that stand side by side
+TIP_GAP = 8.0  # points between a control that the keyboard reached and its tooltip
 STEPPER = 24.0  # points, width of a field's - and + buttons
 FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it ends a pixel before
 
@@ -45,9 +46,15 @@ def bold_text(size: float = 0.0) -> Iterator[None]:
 
 
 def tooltip(text: str) -> None:
-    """For the last item, shown after a moment; over greyed-out items too."""
+    """For the last item, shown after a moment; over greyed-out items too.
+
+    Where the keyboard has come to the item, it is shown at once, beside the item.
+    """
     flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
-    if imgui.is_item_hovered(flags):
+    is_reached = imgui.is_item_focused() and imgui.get_io().nav_visible
+    if is_reached:
+        _place_tooltip()
+    if is_reached or imgui.is_item_hovered(flags):
         imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
         imgui.begin_tooltip()
@@ -56,6 +63,17 @@ def tooltip(text: str) -> None:
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
         imgui.pop_style_var(2)
+
+
+def _place_tooltip() -> None:
+    """Below the last item, above it in the window's lower half; it ends where the item ends where
+    that is at the right."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    room = imgui.get_io().display_size
+    is_low, is_right = high.y > room.y / 2, high.x > room.x / 2
+    gap = theme.pt(TIP_GAP)
+    at = ImVec2(high.x if is_right else low.x, low.y - gap if is_low else high.y + gap)
+    imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(float(is_right), float(is_low)))
 
 
 def button(
@@ -108,6 +126,11 @@ def icon_button(
     imgui.pop_style_color()
     tooltip(hint if why_not is None else f"{hint}\n{why_not}")
     return is_pressed
+
+
+def drawn_button(name: str, size: ImVec2) -> bool:
+    """A button that its caller draws; `size` in window units. Tab reaches it, too."""
+    return imgui.invisible_button(name, size, imgui.ButtonFlags_.enable_nav)
 
 
 def half_width() -> float:

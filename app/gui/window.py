@@ -19,6 +19,7 @@ from ..commands import run
 from ..derived import import_core
 from ..editor import Editor
 from ..filing import Filing
+from ..motion import motion
 from ..options import WindowOptions
 from ..render.renderer import Renderer
 from ..settings import read_settings, settings_path, write_settings
@@ -65,6 +66,7 @@ KEY_NAMES = {
     glfw.KEY_UP: "Up",
     glfw.KEY_DOWN: "Down",
     glfw.KEY_TAB: "Tab",
+    glfw.KEY_SPACE: "Space",
     glfw.KEY_HOME: "Home",
     glfw.KEY_END: "End",
     glfw.KEY_PAGE_UP: "PageUp",
@@ -72,6 +74,7 @@ KEY_NAMES = {
     glfw.KEY_INSERT: "Insert",
     **{glfw.KEY_F1 + n: f"F{n + 1}" for n in range(12)},
 }
+ONCE = (glfw.KEY_ENTER, glfw.KEY_KP_ENTER, glfw.KEY_SPACE)  # held down, they do it once
 CURSORS = {
     Shape.ARROW: glfw.ARROW_CURSOR,
     Shape.CROSS: glfw.CROSSHAIR_CURSOR,
@@ -181,6 +184,7 @@ class Window:
 
     def _warm_up(self) -> None:
         """In a thread."""
+        motion.ask_system()
         import_core()
         self._renderer.rehearse()
 
@@ -205,9 +209,12 @@ class Window:
         if 0 in size:  # minimised
             return False
         self._adopt_look()
-        is_still = self._options.frames is not None or self.editor.settings.is_motion_reduced
+        is_still = self._options.frames is not None
+        is_still = is_still or motion.is_reduced(self.editor.settings.motion)
+        imgui.get_io().config_input_text_cursor_blink = not is_still
         fades.begin(time.monotonic(), is_on=not is_still and not self.editor.hand.is_busy)
         imgui.backends.opengl3_new_frame()
+        self._input.focus.begin(self.editor, self._shortcuts.recording is not None)
         self._size.begin_frame()
         imgui.new_frame()
         layout = lay_out(*self._size.size, self.editor.document is not None)
@@ -221,6 +228,7 @@ class Window:
             draw_toolbar(self.editor, layout.strip)
             draw_inspector(self.editor, layout.inspector)
             draw_overlays(self.editor, layout.canvas, ratio)
+            self._input.crosshair.draw(self.editor, layout.canvas, ratio)
         draw_status(self.editor, layout.status, self._input.hint(self.editor))
         self._popups.draw(self.editor)
         self._dialogs.draw(self.editor)
@@ -316,7 +324,7 @@ class Window:
         """Names the chord while the modifiers are what they were when the key went down."""
         if action not in (glfw.PRESS, glfw.REPEAT):
             return
-        if action == glfw.REPEAT and key in (glfw.KEY_ENTER, glfw.KEY_KP_ENTER):
+        if action == glfw.REPEAT and key in ONCE:
             return  # one press is one step
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
         if name:

@@ -171,11 +171,16 @@ class Hands:
 
 
 @contextmanager
-def opened(environment: dict[str, str], path: Path | None, *options: str) -> Iterator[Hands]:
-    """Hands on a window that shows this photo or session; skips where nobody can type."""
+def opened(
+    environment: dict[str, str], path: Path | None, *options: str, by: tuple[str, ...] = ()
+) -> Iterator[Hands]:
+    """Hands on a window that shows this photo or session; skips where nobody can type.
+
+    `by`: what starts the program, if something stands before its command.
+    """
     if shutil.which("xdotool") is None:
         pytest.skip("xdotool is not installed")
-    command = [sys.executable, "-m", "app", *options, *([] if path is None else [str(path)])]
+    command = [*by, sys.executable, "-m", "app", *options, *([] if path is None else [str(path)])]
     title = "ObjectMorpher" if path is None else path.name
     with subprocess.Popen(command, env=environment, cwd=ROOT) as window:
         hands = Hands(environment, window)

@@ -111,15 +111,18 @@ class Canvas:
             low, high = ImVec2(at.x - reach, at.y - reach), ImVec2(at.x + reach, at.y + reach)
             self.draw.add_rect_filled(low, high, color, theme.pt(2))
 
-    def brush(self, color: str = WHITE) -> None:
-        """The brush's outline around the pointer: where it covers half."""
+    def brush(self, is_erasing: bool = False) -> None:
+        """The brush's outline around the pointer: where it covers half. An eraser has a minus."""
         pointer, view = self.editor.pointer, self.editor.view
         if pointer is None:
             return
         at, reach = self.on_canvas(pointer.xy)[0], view.zoom / self.ratio
         half = view.brush.radius * (1 + view.brush.hardness) / 2
         for radius, alpha in ((half, 1.0), (view.brush.radius, 0.45)):
-            self.circle(at, max(radius * reach, 1.5), color, alpha)
+            self.circle(at, max(radius * reach, 1.5), WARM if is_erasing else WHITE, alpha)
+        if is_erasing:
+            arm = theme.pt(4)
+            self.line(ImVec2(at.x - arm, at.y), ImVec2(at.x + arm, at.y), WARM, alpha=1.0)
 
     def circle(self, at: ImVec2, radius: float, color: str, alpha: float = 1.0) -> None:
         """A thin one; `radius` in window units."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...tools.mask_tool import erases
-from .canvas import WARM, WHITE, Canvas
+from .canvas import Canvas
 from .select import draw_edge
 
 
@@ -13,4 +13,4 @@ def draw_mask(canvas: Canvas) -> None:
     if editor.masking.painting is None:
         draw_edge(canvas)
     if editor.pointer is not None:
-        canvas.brush(WARM if erases(editor, editor.pointer) else WHITE)
+        canvas.brush(erases(editor, editor.pointer))

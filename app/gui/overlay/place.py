@@ -16,7 +16,7 @@ from .other import draw_other
 
 MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
 PIECES = 96  # of a ring
-COLOURS = {"yaw": "#8FE3B0", "pitch": "#FFC27A", "roll": WHITE}
+COLOURS = {"yaw": "#70A020", "pitch": "#F08080", "roll": WHITE}
 SHAFT = 5.0  # points, half the arrow's width at its near end
 HEAD = 11.0  # points, length of the arrow's heads
 BESIDE = (18.0, 14.0)  # points from the pointer to the value

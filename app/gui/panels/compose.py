@@ -12,6 +12,7 @@ from objectmorpher_core.joining import (
     LEAST_FEATHER,
     MOST_FEATHER,
     MOST_SHADOW,
+    USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
@@ -21,10 +22,13 @@ from ...commands import run
 from ...commands.compose import not_moved
 from ...editor import Editor
 from ...job_functions import Variant
-from ...texts import sentence, t
+from ...texts import t
+from ...tools.place_tool import wrapped
 from ...view import Composed
 from ..command_button import command_button
 from ..dial import SIDE, dial
+from ..landmarks import mark
+from ..method_choice import draw_method
 from ..pictures import pictures
 from ..segmented import Choice, segmented
 from ..theme import RADIUS, theme
@@ -34,6 +38,7 @@ from ..widgets import (
     Change,
     Number,
     checkbox,
+    drawn_button,
     half_width,
     heading,
     note,
@@ -42,9 +47,10 @@ from ..widgets import (
     tooltip,
 )
 from .brush import draw_brush_fields, draw_radius
+from .network import draw_network
 
-INPAINTERS = {"auto": "Automatic", "patchmatch": "Patches", "telea": "Smooth"}
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
+DEGREES = 72.0  # points, width of the direction's field
 THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
 
 
@@ -58,6 +64,8 @@ def draw_compose(editor: Editor) -> None:
     rule()
     _draw_light(editor)
     rule()
+    draw_network(editor)
+    rule()
     _draw_edge(editor)
 
 
@@ -69,17 +77,7 @@ def _draw_background(editor: Editor) -> None:
         run(editor, "bare")
     if (trouble := editor.composing.trouble) is not None:
         note(trouble)
-    names = ["auto", *compose.BACKENDS]
-    labels = [t(INPAINTERS.get(name, name)) for name in names]
-    missing = [compose.missing(name) for name in names]
-    reasons = [None if m is None else sentence(m) for m in missing]
-    choices = tuple(
-        Choice(name, label, why_not=reason)
-        for name, label, reason in zip(names, labels, reasons, strict=True)
-    )
-    chosen = segmented("inpainter", choices, editor.composing.inpainter)
-    if chosen != editor.composing.inpainter:
-        editor.composing.choose_inpainter(chosen)
+    draw_method(editor, "inpaint")
     half = half_width()
     command_button(editor, "fill_again", width=half)
     imgui.same_line()
@@ -119,7 +117,7 @@ def _draw_variants(editor: Editor) -> None:
 def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> None:
     start, draw = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
     end = ImVec2(start.x + size.x, start.y + size.y)
-    if imgui.invisible_button(f"##variant{k}", size):
+    if drawn_button(f"##variant{k}", size):
         editor.composing.choose_variant(variant)
     is_hovered = imgui.is_item_hovered()
     tooltip(t("Variant {number}", number=k + 1))
@@ -182,7 +180,14 @@ def _draw_direction(editor: Editor) -> None:
     imgui.same_line(0, theme.pt(12))
     imgui.set_cursor_pos_y(top + drop)
     imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(f"{change.value:.0f}°")
+    imgui.set_next_item_width(theme.pt(DEGREES))
+    is_changed, turned = imgui.drag_float("##degrees", change.value, 0.5, 0.0, 0.0, "%.0f°")
+    mark(t("Falls to"))
+    is_done = imgui.is_item_deactivated_after_edit()
+    if is_changed or is_done:
+        change = Change(wrapped(turned), is_changed, is_done)
+        changed = replace(shadow, direction=change.value)
+        _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
     imgui.set_cursor_pos_y(top + theme.pt(SIDE + 4))
     imgui.dummy(ImVec2(0, 0))
 
@@ -203,12 +208,14 @@ def _draw_light(editor: Editor) -> None:
         (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
         (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
         (t("Grain"), 100 * USUAL_GRAIN, item.grain, composing.preview_grain),
+        (t("Focus"), 100 * USUAL_DEFOCUS, item.defocus, composing.preview_defocus),
     )
     for name, usual, share, preview in rows:
         change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
         _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
     note(t("Light around its new place; light that stays where it was while it turns."))
     note(t("Grain: the photo's own, where moving the object has smoothed it."))
+    note(t("Focus: nearer or farther, as blurred as the photo is there."))
 
 
 def _draw_edge(editor: Editor) -> None:

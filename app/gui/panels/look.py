@@ -12,7 +12,7 @@ from ...view import Shown
 from ..command_button import command_button
 from ..rows import end_row, fill_row, text_top
 from ..theme import Icon, theme
-from ..widgets import checkbox, gap, heading, note, small_text, tooltip
+from ..widgets import checkbox, drawn_button, gap, heading, note, small_text, tooltip
 from .shape import draw_shape
 
 ROW = 28.0  # points
@@ -47,7 +47,7 @@ def _draw_view(editor: Editor, shown: Shown) -> None:
     start = imgui.get_cursor_screen_pos()
     size = ImVec2(imgui.get_content_region_avail().x, theme.pt(ROW))
     imgui.begin_disabled(reason is not None)
-    is_pressed = imgui.invisible_button(name, size)
+    is_pressed = drawn_button(name, size)
     imgui.end_disabled()
     draw = imgui.get_window_draw_list()
     end = ImVec2(start.x + size.x, start.y + size.y)

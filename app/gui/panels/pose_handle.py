@@ -15,6 +15,7 @@ from ..theme import Icon, theme
 from ..widgets import (
     Number,
     checkbox,
+    drawn_button,
     gap,
     half_width,
     heading,
@@ -57,7 +58,7 @@ def _draw_row(editor: Editor, h: int) -> None:
     start = imgui.get_cursor_screen_pos()
     size = ImVec2(imgui.get_content_region_avail().x, theme.pt(ROW))
     imgui.set_next_item_allow_overlap()
-    if imgui.invisible_button(f"##handle{h}", size):
+    if drawn_button(f"##handle{h}", size):
         io = imgui.get_io()
         if io.key_shift or io.key_ctrl:
             editor.posing.toggle(h)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from imgui_bundle import imgui
 
@@ -11,6 +12,7 @@ from ...shortcuts import Shortcuts
 from ...view import Popup
 from ..fade import fades
 from .about import draw_about
+from .compute import ComputeFields
 from .preferences import draw_preferences
 from .shortcuts import ShortcutsPopup
 
@@ -24,7 +26,7 @@ class Popups:
         self._shortcuts = shortcuts
         self._drawn: dict[Popup, Callable[[Editor], None]] = {
             Popup.SHORTCUTS: ShortcutsPopup(shortcuts).draw,
-            Popup.PREFERENCES: draw_preferences,
+            Popup.PREFERENCES: partial(draw_preferences, compute=ComputeFields()),
             Popup.ABOUT: draw_about,
         }
 

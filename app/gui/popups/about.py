@@ -7,6 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from ... import __version__
 from ...editor import Editor
 from ...logs import log_path
+from ...report import report
 from ...resources import resource
 from ...texts import t
 from ..widgets import Kind, button, gap, note, shown_path
@@ -24,17 +25,10 @@ def draw_about(editor: Editor) -> None:
         note(t("After “ObjectMorpher” (CVPR 2026). Everything runs on this computer."))
         gap(12)
         note(t("The log is {path}", path=shown_path(log_path())))
-        if button(t("Copy the log"), Kind.PLAIN, width=200):
-            imgui.set_clipboard_text(_log())
-            editor.say(t("The log is in the clipboard"))
+        if button(t("Copy report"), Kind.PLAIN, width=200):
+            imgui.set_clipboard_text(report(log_path().parent))
+            editor.say(t("The report is in the clipboard, without names of folders and photos"))
         gap(12)
         imgui.begin_child("##licences", ImVec2(0, 0))
         note(resource("assets/licences.txt").read_text(encoding="utf-8"))
         imgui.end_child()
-
-
-def _log() -> str:
-    try:
-        return log_path().read_text(encoding="utf-8")
-    except OSError:
-        return ""

@@ -9,10 +9,12 @@ from imgui_bundle import ImVec2, imgui
 
 from ...editor import Editor
 from ...texts import t
+from ..modal import SCROLLING
 from ..theme import FIELD, Icon, theme
 from ..widgets import bold_text, icon_button
 
 PAD = 20.0  # points
+LABEL = 132.0  # points, of the names left of the fields
 LEAST_AROUND = 48.0  # points of the window that stay visible around it
 SHADOW = 18  # points around it that are darker, it stands above the panels
 TITLE = 20.0  # ImGui's font size
@@ -30,8 +32,8 @@ def popup(editor: Editor, title: str, width: float, height: float) -> Iterator[N
     imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(10))
     imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
     imgui.push_style_color(imgui.Col_.border, theme.vec("pressed"))
-    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_saved_settings
-    imgui.begin(f"{title}##popup", None, flags | imgui.WindowFlags_.no_move)
+    flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move
+    imgui.begin(f"{title}##popup", None, flags | SCROLLING)
     imgui.pop_style_color()
     imgui.pop_style_var(3)
     _draw_shadow(size)
@@ -58,3 +60,10 @@ def _draw_shadow(size: ImVec2) -> None:
         ink = theme.u32("#000000", 0.3 * share**2 * alpha)
         draw.add_rect(start, end, ink, theme.pt(10) + k, thickness=1.5)
     draw.pop_clip_rect()
+
+
+def label(text: str) -> None:
+    """The name of the field that is drawn next."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), text)
+    imgui.same_line(theme.pt(LABEL))

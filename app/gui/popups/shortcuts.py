@@ -32,7 +32,7 @@ class ShortcutsPopup:
     def draw(self, editor: Editor) -> None:
         with popup(editor, t("Keyboard and pointer"), *SIZE):
             self._draw_head()
-            imgui.begin_child("##keys", ImVec2(0, 0))
+            imgui.begin_child("##keys", ImVec2(0, 0), imgui.ChildFlags_.nav_flattened)
             imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
             if imgui.begin_table("##table", COLUMNS):
                 self._draw_columns(editor)

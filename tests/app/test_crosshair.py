@@ -1,0 +1,95 @@
+"""Keys that point: the crosshair clicks, drags and pans as a mouse would."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import CENTRE, wait_for_jobs
+
+from app.editor import Editor
+from app.gui.input import Input
+from app.shortcuts import Shortcuts
+from app.tools.pose_strokes import DEPTH_STEP
+from app.view import ToolName
+from objectmorpher_core.document import Document
+
+
+@pytest.fixture
+def keys(editor: Editor) -> Input:
+    return Input(Shortcuts(editor))
+
+
+def press(keys: Input, editor: Editor, *chords: str) -> None:
+    for chord in chords:
+        keys._run_key(editor, chord)
+
+
+def place(keys: Input, editor: Editor) -> np.ndarray:
+    """(2,) image px of the crosshair."""
+    return editor.view.image_from_canvas(keys.crosshair.pointer().xy)
+
+
+def test_the_three_paces_of_an_arrow(keys: Input, editor: Editor) -> None:
+    press(keys, editor, "Right", "Left")
+    start = keys.crosshair.pointer().xy
+    for chord, far in (("Right", 8), ("Shift+Down", 64), ("Alt+Left", editor.view.zoom)):
+        before = keys.crosshair.pointer().xy
+        press(keys, editor, chord)
+        moved = float(np.abs(keys.crosshair.pointer().xy - before).sum())
+        assert moved == pytest.approx(max(far, 1.0)), chord
+    assert not np.array_equal(start, keys.crosshair.pointer().xy)
+
+
+def test_taking_hold_draws_a_box_and_escape_takes_it_back(keys: Input, editor: Editor) -> None:
+    for _ in range(2):
+        press(keys, editor, "Left", *["Shift+Left"] * 3, *["Shift+Up"] * 3, "Shift+Enter")
+        assert editor.hand.is_busy
+        press(keys, editor, *["Shift+Right"] * 5)
+        press(keys, editor, "Escape")
+        assert not editor.hand.is_busy
+        keys.crosshair.hide()
+    press(keys, editor, "Left", *["Shift+Left"] * 3, *["Shift+Up"] * 3)
+    low = place(keys, editor)
+    press(keys, editor, "Shift+Enter", *["Shift+Right"] * 6, *["Shift+Down"] * 6)
+    high = place(keys, editor)
+    press(keys, editor, "Shift+Enter")
+    wait_for_jobs(editor)
+    assert editor.mask is not None
+    assert editor.selection.prompt.box is not None
+    np.testing.assert_allclose(editor.selection.prompt.box, (*low, *high), atol=1.0)
+
+
+def test_space_adds_and_with_shift_takes_away(keys: Input, editor: Editor) -> None:
+    there = editor.view.canvas_from_image(np.array(CENTRE))
+    press(keys, editor, "Right", "Left")
+    keys.crosshair.move(editor, *(there - keys.crosshair.pointer().xy))
+    press(keys, editor, "Enter")
+    wait_for_jobs(editor)
+    press(keys, editor, *["Shift+Left"] * 2, "Shift+Space")
+    wait_for_jobs(editor)
+    clicks = editor.selection.prompt.clicks
+    assert [click.is_foreground for click in clicks] == [True, False]
+    np.testing.assert_allclose((clicks[0].x, clicks[0].y), CENTRE, atol=0.5)
+
+
+def test_at_the_edge_a_zoomed_photo_moves_along(keys: Input, editor: Editor) -> None:
+    assert editor.photo_size is not None
+    editor.view.set_zoom(16.0, (360.0, 280.0), editor.photo_size)
+    left = editor.view.left
+    press(keys, editor, *["Shift+Right"] * 9)
+    assert editor.view.left > left
+    assert keys.crosshair.pointer().x < editor.view.width
+
+
+def test_page_keys_move_in_depth_and_undo_is_one_step(
+    keys: Input, editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    editor.view.tool = ToolName.PLACE
+    press(keys, editor, "Shift+PageUp", "PageDown", "Alt+Right")
+    assert editor.placing.placement is not None
+    assert editor.placing.placement.depth == pytest.approx(9 * DEPTH_STEP)
+    assert editor.placing.placement.move[0] == pytest.approx(0.1)
+    for _ in range(3):
+        editor.undo()
+    assert editor.placing.placement.is_identity

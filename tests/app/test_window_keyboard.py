@@ -1,0 +1,173 @@
+"""The whole job by keyboard: no event of a mouse, and what has the keys is seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import CENTRE, HEIGHT, WIDTH
+from hands import Hands, opened
+from PIL import Image
+from test_window import POSE_TOOL, PRIMARY
+
+pytestmark = [pytest.mark.window, pytest.mark.slow]
+
+GONE = (20, -1.1)  # px of the photo that the handle is moved by
+SLOW, STAYS = 2.0, 0.15  # s that a busy machine may take; s without a change
+MOST = 60  # presses until a control is reached
+NEAR = 6.0  # px of the screen
+
+
+class Keys:
+    """Only the keyboard of a user."""
+
+    def __init__(self, hands: Hands) -> None:
+        self._hands = hands
+
+    def press(self, *keys: str) -> None:
+        self._hands.xdotool("key", "--delay", 15, *keys)
+
+    def type(self, text: str) -> None:
+        self._hands.xdotool("type", "--delay", 5, text)
+
+    def wait(self, label: str) -> None:
+        self._hands.area(label)
+
+    @property
+    def focus(self) -> str:
+        """What has the keys, or "" for the photo."""
+        shown = [label for label in self._hands.places() if label.startswith("Focus: ")]
+        return shown[0].removeprefix("Focus: ") if shown else ""
+
+    def reach(self, label: str, by: str = "Tab") -> None:
+        """Presses one key until the ring is around the control that says `label`."""
+        for _ in range(MOST):
+            if self.focus == label:
+                return
+            before = self._hands.places()
+            self.press(by)
+            self.settle(before)
+        pytest.fail(f"{label} was not reached; the ring is around {self.focus!r}")
+
+    def settle(self, before: object) -> None:
+        """Waits until something else is shown, and then until that stays."""
+        end = time.monotonic() + SLOW
+        while self._hands.places() == before and time.monotonic() < end:
+            time.sleep(0.02)
+        seen = None
+        while (now := self._hands.places()) != seen and time.monotonic() < end:
+            seen = now
+            time.sleep(STAYS)
+
+    def point(self, x: float, y: float) -> None:
+        """Moves the crosshair to px of the photo."""
+        before = self._hands.places()
+        self.press("Right")
+        self.settle(before)
+        for pace, far in (("shift+", 64.0), ("", 8.0)):
+            here = self._hands.place("Crosshair")
+            there = self._hands.on_photo(x, y, (WIDTH, HEIGHT))
+            for axis, (back, on) in enumerate((("Left", "Right"), ("Up", "Down"))):
+                steps = round((there[axis] - here[axis]) / far)
+                if steps:
+                    before = self._hands.places()
+                    self.press(*[pace + (on if steps > 0 else back)] * abs(steps))
+                    self.settle(before)
+        there = self._hands.on_photo(x, y, (WIDTH, HEIGHT))
+        self._hands.wait(
+            lambda: bool(np.hypot(*np.subtract(self._hands.place("Crosshair"), there)) < NEAR),
+            "pointing by keys",
+        )
+
+
+@pytest.fixture
+def hands(window_environment: dict[str, str]) -> Iterator[Hands]:
+    """On the start screen."""
+    with opened(window_environment, None) as hands:
+        yield hands
+
+
+def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_path: Path) -> None:
+    keys, (x, y) = Keys(hands), CENTRE
+    keys.wait("Cat")
+    keys.reach("Open a photo…")
+    keys.press("Return")
+    keys.wait("Cancel")
+    keys.type(str(photo_path))
+    keys.press("Return")
+    keys.wait("Photo")
+
+    keys.point(x, y)
+    keys.press("Return")
+    hands.wait(lambda: hands.is_accent(PRIMARY), "selecting")
+    keys.press("Return")
+    hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
+    hands.wait(lambda: not hands.is_accent(PRIMARY), "asking for a drag")
+
+    keys.point(x - 20, y + 10)
+    keys.press("space")  # a second handle, which holds
+    keys.wait("Handle 1")
+    before = hands.places()
+    keys.press("Escape")
+    keys.settle(before)
+    keys.point(x, y - 30)
+    keys.press("space")
+    keys.wait("Handle 2")
+    before = hands.place("Handle 2")
+    keys.press("shift+Right", "shift+Right", "Up", "alt+Up", "Prior")
+    photo = hands.area("Photo")
+    px = (photo[2] - photo[0]) / WIDTH
+    hands.wait(
+        lambda: np.allclose(
+            np.subtract(hands.place("Handle 2"), before) / px, (20, -1.1), atol=0.3
+        ),
+        "moving the handle",
+    )
+    hands.wait(lambda: hands.is_accent(PRIMARY), "posing")
+
+    keys.reach("Depth")
+    picture = hands.picture()
+    Image.fromarray(picture).save(tmp_path / "ring.png")
+    x0, y0, x1, y1 = (round(v) for v in hands.area("Depth"))
+    ring = picture[y0 - 6 : y1 + 6, x0 - 6 : x1 + 6].astype(int)
+    inside = picture[y0 + 2 : y1 - 2, x0 + 2 : x1 - 2].astype(int)
+    assert (ring.min(-1) > 200).sum() - (inside.min(-1) > 200).sum() > 2 * (x1 - x0)
+    keys.press("Return", "ctrl+a")
+    keys.type("0.2")
+    keys.press("Return")
+
+    keys.press("Escape", "6")
+    keys.reach("Fill in again")
+    keys.press("Return")
+    keys.reach("Harmonise")
+    keys.press("Return")
+    keys.wait("Place")  # what harmonising can be set to
+
+    keys.press("F10")
+    keys.reach("Menu: File", by="Left")
+    keys.press("Escape", "Escape", "F6")
+    hands.wait(lambda: keys.focus == "Tool: Select", "going to the next part of the window")
+    keys.press("F1")
+    keys.wait("Reset all")
+    keys.press("Escape")
+    hands.wait(lambda: "Reset all" not in hands.places(), "closing the help")
+    keys.press("ctrl+e")
+    exported = tmp_path / "edited.png"
+    keys.wait("Cancel")
+    keys.reach("JPEG")
+    keys.press("Return")  # it chooses, and does not export yet
+    keys.wait("Export ball-edited.jpg")
+    keys.reach("PNG", by="Left")
+    keys.press("Return")
+    keys.wait("Export ball-edited.png")
+    assert not list(photo_path.parent.glob("*-edited*"))
+    keys.reach("Name", by="shift+Tab")
+    keys.press("ctrl+a")
+    keys.type(str(exported))
+    keys.press("Return")
+    hands.wait(exported.exists, "exporting")
+    changed = np.asarray(Image.open(exported)) != np.asarray(Image.open(photo_path))
+    assert changed.any()
