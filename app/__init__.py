@@ -1,3 +1,5 @@
 """The program around objectmorpher_core: window and command line."""
 
-__version__ = "0.1.0"
+from objectmorpher_core import __version__
+
+__all__ = ["__version__"]

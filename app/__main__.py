@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 # One BLAS thread: the solver's matrices are small, and a second thread costs more than it helps.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-SAMPLE_EDIT = ("--click", "300,215", "--turn", "18,0,0")  # what the first run does headless
+SAMPLE_EDIT = ("--click", "280,150", "--turn", "18,0,0")  # what the first run does headless
 HEADLESS_OUT = Path("objectmorpher-edited.png")
 
 
@@ -24,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the program; returns its exit code."""
     from . import cli
 
+    _forgive_characters()
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if arguments and (
         arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
@@ -33,6 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not has_display():
         return _edit_headless(options.file)
     return _run_window(cli.window_options(options))
+
+
+def _forgive_characters() -> None:
+    """What a terminal or a pipe has no character for is a question mark there, and no error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _run_window(options: WindowOptions) -> int:
@@ -49,12 +58,18 @@ def _run_window(options: WindowOptions) -> int:
         return 1
     imports.join()
 
+    from .first_start import start_compiling
     from .gui.window import run_window
     from .logs import start_log
     from .settings import settings_path
 
     start_log(settings_path().parent)
-    return run_window(options, handle)
+    compiling = start_compiling() if options.frames is None else None
+    try:
+        return run_window(options, handle)
+    finally:
+        if compiling is not None:
+            compiling.kill()
 
 
 def has_display() -> bool:

@@ -34,6 +34,7 @@ REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one co
 def build_blend(derived: Derived, document: Document, view: View) -> F32:
     """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
     from objectmorpher_core.compose import composite
+    from objectmorpher_core.compose.defocus import reach_of
     from objectmorpher_core.compose.order import leaves_a_hole
     from objectmorpher_core.compose.plate import hole_margin
 
@@ -47,6 +48,7 @@ def build_blend(derived: Derived, document: Document, view: View) -> F32:
         # What moved leaves a hole, unless a copy of it is still there.
         has_left = leaves_a_hole(document.objects, k)
         reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
+        reach += reach_of(derived.lights.of(document, k).blur)
         own = _distance(splats, world, document.photo.camera, view, has_left)
         distance = np.minimum(distance, own - reach)
     margin = document.feather * hole_margin(*document.photo.size)

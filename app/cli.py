@@ -6,7 +6,6 @@ A failure is one sentence on stderr and a non-zero exit; nothing is then written
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -15,23 +14,11 @@ from typing import Any
 
 from . import __version__
 from .options import RENDERERS, WindowOptions
-from .terminal import PROGRAM
+from .subcommands import Subcommand, add_subcommands, lazily
+from .terminal import FAILURES, PROGRAM, failure_sentence
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED, MISUSED = 1, 2  # exit codes
-FAILURES = (ValueError, OSError, RuntimeError)  # that are one sentence for the user
-COMMANDS = (
-    "edit",
-    "batch",
-    "select",
-    "replay",
-    "info",
-    "convert",
-    "models",
-    "doctor",
-    "bench",
-    "train",
-)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -51,10 +38,7 @@ def main(arguments: Sequence[str]) -> int:
         sys.stderr.write(f"{PROGRAM}: interrupted\n")
         return 130
     except FAILURES as error:
-        sys.stderr.write(f"{PROGRAM}: {sentence(error)}\n")
-        return FAILED
-    except MemoryError:
-        sys.stderr.write(f"{PROGRAM}: there is not enough memory for this photo\n")
+        sys.stderr.write(f"{PROGRAM}: {failure_sentence(error)}\n")
         return FAILED
     return 0
 
@@ -67,36 +51,31 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
-    _add_edit(commands.add_parser("edit", help="edit a photo without a window"))
-    _add_batch(commands.add_parser("batch", help="run many edit scripts, whatever becomes of each"))
-    _add_select(commands.add_parser("select", help="write the mask of the chosen object"))
-    _add_replay(commands.add_parser("replay", help="render a saved session again"))
-    _add_info(commands.add_parser("info", help="what a session holds"))
-    _add_convert(commands.add_parser("convert", help="turn splat and mesh files into each other"))
-    _add_bench(commands.add_parser("bench", help="measure, on objects it makes itself"))
-    _add_models(commands.add_parser("models", help="list, get and check learned weights"))
-    _add_doctor(commands.add_parser("doctor", help="what runs here, and what would help"))
-    _add_train(commands.add_parser("train", help="make the product's own networks anew"))
+    add_subcommands(parser, "command", SUBCOMMANDS)
     return parser
 
 
-def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
+def window_parser() -> argparse.ArgumentParser:
     """The options of the editor's window: `objectmorpher [FILE]`."""
     parser = _Parser(prog=PROGRAM, description="Open the editor.")
     add = parser.add_argument
     add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
     add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
-    add("--renderer", choices=RENDERERS, default="auto")
-    add("--theme", choices=("dark", "light"))
+    add("--renderer", choices=RENDERERS, default="auto", help="gl draws on the GPU, tiles does not")
+    add("--theme", choices=("dark", "light"), help="this once; else as in the preferences")
     add("--scale", type=float, metavar="S", help="pixels per point")
     add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
-    add("--seed", type=int, default=0)
+    add("--seed", type=int, default=0, help="of all that is random")
     add("--frames", type=int, metavar="N", help="close after N frames")
     add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
     add("--frame-log", type=Path, metavar="F.json", help="when each frame was shown")
-    return parser.parse_args(list(arguments))
+    return parser
+
+
+def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
+    """What they say on this command line."""
+    return window_parser().parse_args(list(arguments))
 
 
 def window_options(options: argparse.Namespace) -> WindowOptions:
@@ -128,15 +107,19 @@ def _add_choosing(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_edit(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("photo", type=Path, nargs="?", metavar="PHOTO")
+    parser.add_argument(
+        "photo", type=Path, nargs="?", metavar="PHOTO", help="else the script names it"
+    )
     parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
     _add_choosing(parser)
     add = parser.add_argument_group("backends").add_argument
-    add("--lift", metavar="NAME", help="auto, relief, trellis or cupid")
-    add("--inpaint", metavar="NAME", help="auto, patchmatch or telea")
+    add("--inpaint", metavar="NAME", help="auto, pixelhacker, lama, migan, patchmatch or telea")
+    add("--lift", metavar="NAME", help="auto, relief, trellis, cupid, or a worker")
     add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
         help="the background R px around X2,Y2 is filled in from around X,Y")  # fmt: skip
-    add("--refine", metavar="NAME", help="none (also auto) or harmonise: light, grain")
+    add("--refine", metavar="NAME",
+        help="none (also auto), harmonise (light, grain, focus), qwen or klein")  # fmt: skip
+    add("--refine-strength", type=float, metavar="S", help="how much of a network's, 0 to 1")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add = parser.add_argument_group("the object's shape").add_argument
     add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
@@ -173,8 +156,9 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("placing the whole object, after the handles").add_argument
     add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
     add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
-    add("--scale", type=float, metavar="S")
-    add("--shadow", metavar="auto|none", help="default auto: its own goes with it, where found")
+    add("--scale", type=float, metavar="S", help="times as large")
+    add("--shadow", metavar="auto|none",
+        help="default auto: its own goes with it, its reflection goes, where found")  # fmt: skip
     add("--remove", action="store_true", default=None, help="it is gone, what is behind it shows")
     add("--front", action="append", type=_list(2, 2), metavar="X,Y",
         help="on a thing that stays in front of what is edited")  # fmt: skip
@@ -186,8 +170,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         metavar="EDIT.json",
         help="the same options from a file, and further objects (docs/formats.md)",
     )
-    add("--session", type=Path, metavar="S.omorph")
-    add("--save-mask", type=Path, metavar="FILE")
+    add("--session", type=Path, metavar="S.omorph", help="for the editor, and for replay")
+    add("--save-mask", type=Path, metavar="FILE", help="what was selected")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
     add("--save-depth", type=Path, metavar="FILE", help="its nearness, 16 bit: white is nearest")
@@ -198,8 +182,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--seconds", type=float, default=4.0, metavar="S", help="its length, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
-    add("--report", type=Path, metavar="R.json")
-    parser.set_defaults(run=_lazily("edit"))
+    add("--report", type=Path, metavar="R.json", help="seconds, handles, footprint and more")
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
@@ -214,27 +197,25 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--overwrite", action="store_true", help="also what is newer already")
     add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
-    parser.set_defaults(run=_lazily("batch"))
 
 
 def _add_select(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("photo", type=Path, metavar="PHOTO")
-    parser.add_argument("-o", "--out", type=Path, metavar="MASK.png", required=True)
+    add = parser.add_argument
+    add("photo", type=Path, metavar="PHOTO", help="a picture file")
+    add("-o", "--out", type=Path, metavar="MASK.png", required=True, help="white is the object")
     _add_choosing(parser)
-    parser.set_defaults(run=_lazily("select"))
 
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("session", type=Path, metavar="SESSION")
-    parser.add_argument("-o", "--out", type=Path, metavar="OUT", required=True)
-    parser.add_argument("--report", type=Path, metavar="R.json")
-    parser.set_defaults(run=_lazily("replay"))
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="an .omorph file")
+    add("-o", "--out", type=Path, metavar="OUT", required=True, help="the edited photo")
+    add("--report", type=Path, metavar="R.json", help="the figures of it")
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("session", type=Path, metavar="SESSION", help="an .omorph file")
     parser.add_argument("--json", action="store_true", help="as one JSON object")
-    parser.set_defaults(run=_lazily("info"))
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:
@@ -246,65 +227,37 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
     add("--flip", action="store_true",
         help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
-    parser.set_defaults(run=_lazily("convert"))
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("deform", "render"))
+    parser.add_argument("what", choices=("deform", "render"), help="which part of the program")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write there, not to stdout")
     parser.add_argument("--quick", action="store_true", help="few repetitions, one size")
-    parser.set_defaults(run=_lazily("bench"))
+
+
+def _add_warm_up(parser: argparse.ArgumentParser) -> None:
+    parser.description = "A minute or two after an installation, seconds afterwards."
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:
     parser.description = "Learned weights: fetched ones, and those that you bring."
-    parser.add_argument("action", choices=("list", "get", "path", "verify", "add", "remove"))
+    actions = ("list", "get", "path", "verify", "add", "remove")
+    parser.add_argument("action", choices=actions, help="path: where it is; add: one of yours")
     parser.add_argument("id", nargs="?", help="one of the list; default all of them")
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE",
         help="to add: add depth FILE, or add sam2 FOLDER, which is used where it is")  # fmt: skip
     add = parser.add_argument_group("downloads").add_argument
     add("--yes", dest="is_agreed", action="store_true", help="its size and licence are all right")
     add("--accept-licence", metavar="NAME", help="for those with a star in the list")
+    add("--convert", dest="is_converted", action="store_true",
+        help="to add pixelhacker: take the numbers out of its pickles")  # fmt: skip
     add("--offline", dest="is_offline", action="store_true",
         help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
-    parser.set_defaults(run=_lazily("models"))
 
 
 def _add_doctor(parser: argparse.ArgumentParser) -> None:
     parser.description = "Tells which backend each stage would use on this machine, and why."
     parser.add_argument("--json", dest="is_json", action="store_true", help="as one JSON object")
-    parser.set_defaults(run=_lazily("doctor"))
-
-
-def _add_train(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Trains on endless made-up objects; called again it goes on."
-    add = parser.add_argument
-    add("network", choices=("shape",), help="which one")
-    add("--folder", type=Path, required=True, metavar="DIR", help="samples and checkpoints")
-    add("--samples", type=int, default=8192, metavar="N", help="objects to make")
-    add("--passes", type=float, default=4.0, metavar="P", help="over all of them")
-    add("--minutes", type=float, metavar="M", help="at most; go on with another call")
-    add("--hold-out", type=_words, metavar="A,B", help="families that are not trained on")
-    add("--start", type=Path, metavar="ONNX", help="exported weights to go on from")
-    add("--seed", type=int, default=0, help="0 to 49; another seed draws other samples")
-    add("-o", "--output", type=Path, metavar="F.onnx", help="default: shape.onnx in the folder")
-    add("--report", type=Path, metavar="F.json", help="figures; default: beside the weights")
-    parser.set_defaults(run=_lazily("train"))
-
-
-def _words(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
-
-
-def _lazily(name: str) -> Callable[[argparse.Namespace], None]:
-    """The subcommand's function, imported when it runs: `--help` stays instant."""
-
-    def run(options: argparse.Namespace) -> None:
-        from . import cli_commands
-
-        getattr(cli_commands, f"run_{name}")(options)
-
-    return run
 
 
 def _joined_negatives(arguments: Sequence[str]) -> list[str]:
@@ -349,11 +302,38 @@ def _fill_from(text: str) -> dict[str, Any]:
     return {"source": _list(2, 2)(source), "to": target[:2], **radius}
 
 
-def sentence(error: BaseException) -> str:
-    """One line for the user: what failed, in the words of whoever noticed."""
-    if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
-        reason = {FileNotFoundError: "does not exist", PermissionError: "cannot be read"}
-        if error.filename is not None:
-            return f"{error.filename} {reason.get(type(error), 'is a folder, not a file')}"
-    text = str(error) or type(error).__name__
-    return json.dumps(text)[1:-1] if "\n" in text else text
+def _command(
+    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
+) -> Subcommand:
+    run = lazily("cli_commands", f"run_{name.replace('-', '_')}")
+    return Subcommand(name, help, add_options, run)
+
+
+SUBCOMMANDS = (
+    _command("edit", "edit a photo without a window", _add_edit),
+    Subcommand(
+        "batch", "run many edit scripts, whatever becomes of each", _add_batch,
+        lazily("cli_batch", "run_batch"),
+    ),
+    _command("select", "write the mask of the chosen object", _add_select),
+    _command("replay", "render a saved session again", _add_replay),
+    _command("info", "what a session holds", _add_info),
+    _command("convert", "turn splat and mesh files into each other", _add_convert),
+    _command("bench", "measure, on objects it makes itself", _add_bench),
+    Subcommand(
+        "models", "list, get and check learned weights", _add_models,
+        lazily("cli_models", "run_models"),
+    ),
+    Subcommand(
+        "doctor", "what runs here, and what would help", _add_doctor,
+        lazily("cli_doctor", "run_doctor"),
+    ),
+    _command("warm-up", "compile the kernels now, not when needed", _add_warm_up),
+    Subcommand("train", "make the product's own networks", lazily("cli_train", "add_train")),
+    Subcommand(
+        "serve", "compute for the windows of other computers", lazily("cli_serve", "add_serve"),
+        lazily("cli_serve", "run_serve"),
+    ),
+    Subcommand("evaluate", "how good results are", lazily("cli_evaluate", "add_evaluate")),
+)  # fmt: skip
+COMMANDS = tuple(subcommand.name for subcommand in SUBCOMMANDS)

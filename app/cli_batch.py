@@ -16,9 +16,10 @@ from typing import Any
 
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import ENDINGS, encode_picture
-from objectmorpher_core.script import BatchItem, ScriptError, parse_scripts
+from objectmorpher_core.script import BatchItem, ScriptError, beside, files_of, parse_scripts
 
-from .terminal import UsageError, progress_bar
+from .cli_commands import check_outputs, edited_by, json_bytes
+from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 USUAL_ENDING = ".png"
 
@@ -40,8 +41,6 @@ class Task:
 
 def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
-    from .cli_commands import check_outputs
-
     if options.report:
         check_outputs([], {options.report: (".json",)})
     if options.out is not None and not options.out.is_dir():
@@ -58,8 +57,6 @@ def run_batch(options: argparse.Namespace) -> None:
 
 def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
     """The summary; an error where something failed."""
-    from .cli_commands import json_bytes
-
     counts = {
         state: sum(e["state"] == state for e in entries) for state in ("done", "kept", "failed")
     }
@@ -73,8 +70,6 @@ def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
 
 def _entry(task: Task, is_overwriting: bool) -> dict[str, Any]:
     """What became of an edit."""
-    from .cli import FAILURES, sentence
-
     entry: dict[str, Any] = {"script": str(task.script), "out": task.name}
     start = time.perf_counter()
     try:
@@ -83,17 +78,13 @@ def _entry(task: Task, is_overwriting: bool) -> dict[str, Any]:
         if not is_overwriting and _is_newer(task):
             return entry | {"state": "kept", "seconds": 0.0}
         figures = _edit(task.item)
-    except (*FAILURES, MemoryError) as error:
-        is_memory = isinstance(error, MemoryError)
-        told = "there is not enough memory for this photo" if is_memory else sentence(error)
-        return entry | {"state": "failed", "error": told}
+    except FAILURES as error:
+        return entry | {"state": "failed", "error": failure_sentence(error)}
     seconds = round(time.perf_counter() - start, 3)
     return entry | {"state": "done", "seconds": seconds, "report": figures}
 
 
 def _edit(item: BatchItem) -> dict[str, Any]:
-    from .cli_commands import check_outputs, edited_by
-
     out = Path(item.out or "")
     check_outputs([Path(name) for name in _inputs(item)], {out: ENDINGS})
     with progress_bar("Opening") as progress:
@@ -103,8 +94,6 @@ def _edit(item: BatchItem) -> dict[str, Any]:
 
 
 def _inputs(item: BatchItem) -> list[str]:
-    from .cli_commands import files_of
-
     scripts = (item.script, *(each.script for each in item.others.objects))
     names = (item.photo, *(name for script in scripts for name in files_of(script)))
     return [name for name in names if name is not None]
@@ -133,16 +122,13 @@ def _say(entry: dict[str, Any]) -> None:
 
 def _tasks(options: argparse.Namespace) -> Iterator[Task]:
     """All edits in their order. One that makes no sense is a task that fails."""
-    from .cli import sentence
-    from .cli_commands import beside
-
     photos = _files(options.photo or [], ENDINGS)
     taken: set[Path] = set()
     for script in _files(options.scripts, (".json",)):
         try:
             items = parse_scripts(script.read_text(encoding="utf-8"))
         except (ValueError, OSError) as error:
-            yield Task(script, None, sentence(error))
+            yield Task(script, None, failure_sentence(error))
             continue
         for number, item in enumerate(items, 1):
             stem = script.stem if len(items) == 1 else f"{script.stem}-{number}"

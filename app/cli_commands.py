@@ -9,16 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.animation import Clip, frames
+from objectmorpher_core.animation import Clip
 from objectmorpher_core.arrays import Mask
-from objectmorpher_core.compose.composite import straight_cutout
-from objectmorpher_core.compose.depth_map import depth_picture
-from objectmorpher_core.compose.layers import layers
-from objectmorpher_core.compose.plate import plate_picture
 from objectmorpher_core.document import Document
 from objectmorpher_core.files import write_all
-from objectmorpher_core.image import ENDINGS, Picture, encode_mask, encode_picture
-from objectmorpher_core.openraster import encode_openraster
+from objectmorpher_core.image import ENDINGS, encode_mask, encode_picture
+from objectmorpher_core.outputs import NEED_PLATE, OUTPUTS, encode_output
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.progress import Progress
@@ -26,34 +22,29 @@ from objectmorpher_core.script import (
     BatchItem,
     EditScript,
     ScriptError,
+    beside,
+    files_of,
     parse_scripts,
     script_from,
 )
 from objectmorpher_core.scripted import refuse_missing
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
-from objectmorpher_core.video_file import ENDINGS as VIDEO_ENDINGS
-from objectmorpher_core.video_file import encode_video
 
-from .cli_batch import run_batch
-from .cli_doctor import run_doctor
-from .cli_models import run_models
-from .cli_train import run_train
-from .terminal import PROGRAM, UsageError, progress_bar
+from .terminal import UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
-EXTRAS = {  # further outputs of `edit` and the endings each may have
-    "session": (".omorph",),
-    "save_mask": (".png",),
-    "save_plate": ENDINGS,
-    "save_object": (".png", ".tif", ".tiff", ".webp"),
-    "save_splats": SPLAT_ENDINGS,
-    "save_depth": (".png", ".tif", ".tiff"),
-    "save_layers": (".ora",),
-    "save_video": VIDEO_ENDINGS,
-    "report": (".json",),
+EXTRAS = {  # further outputs of `edit` and what each holds
+    "session": "session",
+    "save_mask": "mask",
+    "save_plate": "plate",
+    "save_object": "object",
+    "save_splats": "splats",
+    "save_depth": "depth",
+    "save_layers": "layers",
+    "save_video": "video",
+    "report": "report",
 }
-NEED_PLATE = {"save_plate", "save_layers", "save_video"}
 LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
 
 
@@ -69,7 +60,7 @@ def run_edit(options: argparse.Namespace) -> None:
         out = Path(item.out or "")
         extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
         check_outputs(inputs, {out: ENDINGS})
-        check_outputs(inputs, {path: EXTRAS[name] for name, path in extras.items()})
+        check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in extras.items()})
         everything = [*outputs, out, *extras.values()]
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
@@ -89,42 +80,19 @@ def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) ->
 def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path, bytes]:
     out = Path(item.out or "")
     with progress_bar("Opening") as progress:
-        edited = edited_by(item, progress, bool(NEED_PLATE & set(extras)))
+        edited = edited_by(item, progress, any(EXTRAS[name] in NEED_PLATE for name in extras))
         with edited.stopwatch.stage("save"):
-            outputs = {out: encode_picture(edited.picture, out.suffix)}
+            outputs = {out: encode_output("photo", edited, out)}
             for name, path in extras.items():
                 if name != "report":
-                    outputs[path] = _extra(name, edited, path, clip)
+                    outputs[path] = encode_output(EXTRAS[name], edited, path, clip)
         if "report" in extras:
             outputs[extras["report"]] = json_bytes(edited.report())
     return outputs
 
 
-def _extra(name: str, edited: Edited, path: Path, clip: Clip) -> bytes:
-    """The bytes of one of the further outputs."""
-    document = edited.document
-    if name == "session":
-        from objectmorpher_core.session_file import encode_session
-
-        return encode_session(document)
-    if name == "save_mask":
-        return encode_mask(_mask(document))
-    if name == "save_plate":
-        plate = Picture(plate_picture(document), is_grey=document.photo.picture.is_grey,
-                        icc=document.photo.picture.icc)  # fmt: skip
-        return encode_picture(plate, path.suffix)
-    if name == "save_object":
-        cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
-        picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
-        return encode_picture(picture, path.suffix)
-    if name == "save_depth":
-        return encode_picture(depth_picture(document, edited.puppets), path.suffix)
-    if name == "save_layers":
-        return encode_openraster(layers(document)[1], edited.picture)
-    if name == "save_video":
-        return encode_video(frames(document, clip), clip.rate, path.suffix)
-    item = document.objects[edited.first]
-    return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
+def _endings(what: str) -> tuple[str, ...]:
+    return (".json",) if what == "report" else OUTPUTS[what]
 
 
 def run_select(options: argparse.Namespace) -> None:
@@ -214,6 +182,13 @@ def run_convert(options: argparse.Namespace) -> None:
     write_all({options.out: data})
 
 
+def run_warm_up(options: argparse.Namespace) -> None:
+    """`objectmorpher warm-up`"""
+    from .first_start import compile_kernels
+
+    compile_kernels()
+
+
 def run_bench(options: argparse.Namespace) -> None:
     """`objectmorpher bench`"""
     from . import bench
@@ -248,33 +223,6 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
     if out is None:
         raise UsageError("where to? add -o OUT.png")
     return [replace(items[0], photo=str(photo), out=str(out))]
-
-
-def beside(item: BatchItem, folder: Path) -> BatchItem:
-    """File names of a script are relative to the script."""
-
-    def at(name: str | None) -> str | None:
-        return None if name is None else str(folder / name)
-
-    def found(name: str | None) -> str | None:
-        """Beside the script, or, as in older ones, where the command is run."""
-        is_beside = name is None or (folder / name).exists() or not Path(name).exists()
-        return at(name) if is_beside else name
-
-    def own(script: EditScript) -> EditScript:
-        return replace(
-            script, mask=at(script.mask), front_mask=at(script.front_mask),
-            hidden=found(script.hidden), splats=found(script.splats),
-        )  # fmt: skip
-
-    objects = tuple(replace(each, script=own(each.script)) for each in item.others.objects)
-    others = replace(item.others, objects=objects)
-    return BatchItem(own(item.script), at(item.photo), at(item.out), others)
-
-
-def files_of(script: EditScript) -> tuple[str | None, ...]:
-    """What an edit reads beside the photo."""
-    return script.mask, script.front_mask, script.hidden, script.splats
 
 
 def _script(options: argparse.Namespace) -> EditScript:
@@ -316,17 +264,3 @@ def _line(value: Any) -> str:
     if isinstance(value, dict):
         return " ".join(f"{k} {_line(v)}" for k, v in value.items())
     return str(value)
-
-
-__all__ = [
-    "PROGRAM",
-    "run_batch",
-    "run_convert",
-    "run_doctor",
-    "run_edit",
-    "run_info",
-    "run_models",
-    "run_replay",
-    "run_select",
-    "run_train",
-]

@@ -30,6 +30,7 @@ from .layers import Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
+from .refined_view import RefinedView
 from .shape import Shape, Shapes, build_shape
 from .surface_facts import SurfaceFacts
 from .view import View
@@ -76,6 +77,7 @@ class Derived:
         self._posed: dict[int, Memo] = {}  # of each object
         self._drafts: dict[int, Memo] = {}
         self.layers, self.fronts = Layers(self), Fronts()
+        self.refined = RefinedView()
         self.painter = Painter(self)
         self.facts = SurfaceFacts(self)
         self.lights = Lights(self)

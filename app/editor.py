@@ -23,15 +23,18 @@ from .candidate import Candidates
 from .chores import Chores
 from .derived import Derived
 from .editing.composing import Composing
+from .editing.computing import Computing
 from .editing.exporting import Exporting
 from .editing.handle_numbers import HandleNumbers
 from .editing.hinting import Hinting
 from .editing.looking import Looking
 from .editing.masking import Masking
+from .editing.methods import Methods
 from .editing.models import Models
 from .editing.objects import Objects
 from .editing.placing import Placing
 from .editing.posing import Posing
+from .editing.refining import Refining
 from .editing.rigging import Rigging
 from .editing.selection import Selection
 from .editing.shaping import Shaping
@@ -69,7 +72,8 @@ class Editor:
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.exporting, self.models = Exporting(self), Models(self)
         self.composing, self.looking = Composing(self), Looking(self)
-        self.hinting = Hinting(self)
+        self.methods, self.computing = Methods(self), Computing(self)
+        self.hinting, self.refining = Hinting(self), Refining(self)
         self.candidates = Candidates(self)
         self.derived.layers.ask = self.tasks.render_exact
         self.derived.lights.ask = self.tasks.light
@@ -176,6 +180,7 @@ class Editor:
         self.tasks.forget()
         self.composing.forget()
         self.hinting.forget()
+        self.refining.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
         self.hover, self.message = Hover(), None
@@ -269,6 +274,7 @@ class Editor:
         is_changed = self.tasks.ensure_fronts() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
+        is_changed = self.refining.deliver() or is_changed
         self.autosave.poll()
         self.candidates.poll(time.monotonic())
         return is_changed

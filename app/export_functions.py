@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,18 +22,19 @@ if TYPE_CHECKING:
 
 def write_export(document: Document, plan: Plan, progress: Progress) -> None:
     """Renders what the plan asks for and writes it. Raises OutputError, ImageError."""
-    from objectmorpher_core.files import write_all
+    from objectmorpher_core.files import make_folder, write_all
 
     progress(0.02, "drawing")
     if plan.is_folder:
         outputs = _layer_files(document, plan, progress)
         is_new = not plan.path.exists()
         try:
-            plan.path.mkdir(exist_ok=True)
+            make_folder(plan.path)
             write_all(outputs)
         except OSError:
-            if is_new and plan.path.is_dir():
-                plan.path.rmdir()
+            if is_new:
+                with suppress(OSError):  # what the disk keeps, it keeps
+                    plan.path.rmdir()
             raise
         return
     data = _encoded(document, plan, progress)
@@ -100,7 +102,8 @@ def _cutout(document: Document, thing: EditObject, progress: Progress) -> Pictur
 
     photo = document.photo
     if thing.is_moved:
-        alone = replace(document, objects=(replace(thing, is_visible=True),), plate=None)
+        objects = (replace(thing, is_visible=True),)
+        alone = replace(document, objects=objects, plate=None, refined=None)
         result = composite(alone, progress=progress)
         samples = straight_cutout(result, photo.pixels.dtype, photo.size)
     else:

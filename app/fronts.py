@@ -39,7 +39,7 @@ class Fronts:
             self._kept.pop(id(matte), None)
             if len(self._kept) == MOST:
                 del self._kept[next(iter(self._kept))]  # the oldest
-            kept = self._kept[id(matte)] = (matte, view.place, _drawn(levels, view))
+            kept = self._kept[id(matte)] = (matte, view.place, drawn(levels, view))
         return kept[2]
 
 
@@ -51,8 +51,12 @@ def _levels(matte: Matte) -> TextureLevels:
     return build_levels(own, matte.alpha, matte.left, matte.top)
 
 
-def _drawn(levels: TextureLevels, view: View) -> Layer | None:
-    """As the photo's own texture is looked up: linear between its pixels, single ones when near."""
+def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | None:
+    """As the photo's own texture is looked up: linear between its pixels, single ones when near.
+
+    `levels` hold premultiplied colours, of which `strength` in [0, 1] is shown.
+    None where nothing of it is on the canvas.
+    """
     height, width = levels.levels[0].shape[:2]
     corner = np.array([levels.left, levels.top])
     low = np.floor(view.canvas_from_image(corner)).astype(int)
@@ -69,7 +73,7 @@ def _drawn(levels: TextureLevels, view: View) -> Layer | None:
     level = np.ascontiguousarray(levels.levels[times])
     shown = cv2.warpAffine(level, matrix, (x1 - x0, y1 - y0), flags=way | cv2.WARP_INVERSE_MAP)
     box = (float(x0), float(y0), float(x1), float(y1))
-    return Layer(box, _as_u8(shown))
+    return Layer(box, _as_u8(shown * np.float32(strength)))
 
 
 def _as_u8(premultiplied: np.ndarray) -> U8:

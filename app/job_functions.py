@@ -31,13 +31,18 @@ from .layers import Rendered, Request, render
 from .shape import build_shape, rehearse
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.refine import Refiner
+    from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.compose.repair import Patch
+    from objectmorpher_core.doctor import Stage
     from objectmorpher_core.gaussians import Gaussians
     from objectmorpher_core.importing import Import, Scene
     from objectmorpher_core.joining import Shadow
     from objectmorpher_core.lift.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
+    from objectmorpher_core.refined import Refined
+    from objectmorpher_core.refining import Refining
     from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
@@ -271,24 +276,49 @@ class Cutout:
     ground: float | None  # degrees above it from which one looks, where that is known
 
 
-def take_shadow(cutout: Cutout, choice: Choice, progress: Progress) -> tuple[Shadow, Plate] | None:
-    """A shadow like the object's in the photo, and the background without that one.
+def take_shadow(
+    cutout: Cutout, choice: Choice, progress: Progress
+) -> tuple[Shadow | None, Plate] | None:
+    """A shadow like the object's in the photo, and the background without that and its reflection.
 
-    None where no shadow of it is sure.
+    None where neither is sure; a background alone where no shadow is.
     """
     from objectmorpher_core import compose
-    from objectmorpher_core.compose.old_shadow import shadowless_plate
-    from objectmorpher_core.compose.shadow_fit import find_old_shadow
+    from objectmorpher_core.compose.old_shadow import traceless_plate
+    from objectmorpher_core.compose.old_traces import find_old_traces
 
-    progress(0.0, "Looking for its shadow")
-    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
-    if old is None:
+    progress(0.0, "Looking for its shadow and reflection")
+    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
+    if not old.found:
         return None
-    inpainter, step = compose.load(choice.backend), part(progress, 0.1, 1.0)
-    plate = shadowless_plate(
-        cutout.pixels, cutout.covered, (old,), inpainter, step, choice.seed, choice.hints
+    inpainter = compose.load(choice.backend, bool(choice.hints))
+    step = part(progress, 0.1, 1.0)
+    plate = traceless_plate(
+        cutout.pixels, cutout.covered, old.found, inpainter, step, choice.seed, choice.hints
     )
-    return old.shadow, plate
+    return (None if old.shadow is None else old.shadow.shadow), plate
+
+
+_refiners: dict[str, Refiner] = {}  # the last one, for its pipeline takes long to load
+
+
+def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
+    """What of the edit a network is to see."""
+    from objectmorpher_core.refining import coarse_edit
+
+    return coarse_edit(document, progress)
+
+
+def refine(edit: CoarseEdit, how: Refining, progress: Progress) -> Refined:
+    """The edit as a network makes it look."""
+    from objectmorpher_core.compose import refine
+    from objectmorpher_core.compose.refine import refinement
+
+    refiner = refine.load(how.backend)
+    if refiner.name not in _refiners:
+        _refiners.clear()
+        _refiners[refiner.name] = refiner
+    return refinement.refine(edit, _refiners[refiner.name], progress, how.seed, how.strength)
 
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:
@@ -300,3 +330,10 @@ def write_session(document: Document, path: Path, progress: Progress) -> None:
     data = encode_session(document)
     progress(0.9, "writing")
     write_all({path: data})
+
+
+def look_at_stages(progress: Progress) -> tuple[Stage, ...]:
+    """What each stage's backends can do on this machine; may load PyTorch, to ask for a GPU."""
+    from objectmorpher_core import doctor
+
+    return doctor.look_at_stages()

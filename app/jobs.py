@@ -14,19 +14,22 @@ import math
 import multiprocessing
 import os
 import queue
+import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from objectmorpher_core.progress import Cancelled
 
 from .logs import crash_folder, note_crashes
-from .wire import Reader, Writer
+from .wire import Connection, Reader, Writer
+
+if TYPE_CHECKING:
+    from .remote.elsewhere import Elsewhere
 
 log = logging.getLogger(__name__)
 
@@ -116,8 +119,8 @@ class Worker:
         for target in (self._write, self._read):
             threading.Thread(target=target, daemon=True).start()
 
-    def send(self, job: Job) -> None:
-        self._requests.put((job.number, job.function, job.arguments))
+    def send(self, job: Job, function: Callable[..., Any]) -> None:
+        self._requests.put((job.number, function, job.arguments))
 
     def close(self) -> None:
         """Ends the process, whatever it does."""
@@ -160,6 +163,7 @@ class Jobs:
         self._waiting: dict[str, Job] = {}  # kind -> newest request, in the order they came
         self._count = 0
         self.current: Job | None = None
+        self.elsewhere: Elsewhere | None = None  # what has jobs done by a server
 
     def start(
         self,
@@ -264,15 +268,15 @@ class Jobs:
             job.started = time.monotonic()
             self._worker = self._worker or Worker(self._warm, self._wake)
             self._worker.stop.value = 0
-            self._worker.send(job)
+            placed = self.elsewhere.placed(job.function) if self.elsewhere else job.function
+            self._worker.send(job, placed)
 
     def _restart(self) -> None:
         """Another process, which knows nothing of what was read before."""
         assert self._worker is not None
         self._deaths = 0 if self._worker.has_answered else self._deaths + 1
         self._worker.close()
-        is_hopeless = self._deaths >= TRIES
-        self._worker = None if is_hopeless else Worker(self._warm, self._wake)
+        self._worker = Worker(self._warm, self._wake) if self._deaths < TRIES else None
 
     def _take(self, what: str, number: int, value: Any) -> None:
         job = self.current
@@ -287,6 +291,8 @@ class Jobs:
             job.fraction, job.note = value
         elif what == "cancelled" or job.stop_asked is not None:
             self._finish(job, job.cancelled)
+        elif what == "failed" and self._comes_back(job, value):
+            self._finish(job, lambda: self._again(job))  # here, this time
         elif what == "failed":
             value.write_log(job.title)
             self._finish(job, lambda: job.failed(value.retried_by(lambda: self._again(job))))
@@ -294,6 +300,11 @@ class Jobs:
             level = logging.DEBUG if job.is_quiet else logging.INFO
             log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
             self._finish(job, lambda: _accept(job, value))
+
+    def _comes_back(self, job: Job, error: JobError) -> bool:
+        """Whether a server gave no answer."""
+        asked = self.elsewhere
+        return asked is not None and asked.takes_back(job.function, error.name, error.sentence)
 
     def _crash(self, job: Job | None) -> None:
         """The process ended by itself, or someone ended it."""
@@ -368,7 +379,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
 
 def _lower_priority() -> None:
     """A drag must not stutter because a lift runs."""
-    if hasattr(os, "nice"):
+    if sys.platform != "win32":
         os.nice(15)
 
 

@@ -20,6 +20,7 @@ from objectmorpher_core.arrays import U8
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import Document
 
+from .layer_light import in_light
 from .painter import PAINTED
 from .view import Shown, View
 
@@ -48,6 +49,7 @@ class Layer:
     is_coarse: bool = False  # with fewer px than its box; else px for px
     is_draft: bool = False  # to be replaced by the exact picture
     is_tint: bool = False  # lies over everything, translucent
+    is_weighed: bool = False  # by the edit's share already: the blend does not count
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its colours
 
     @property
@@ -157,7 +159,7 @@ class Layers:
         if part.is_painted:
             return work.shown
         look = self._derived.lights.of(document, part.k)
-        if look.relit is not None or look.grain is not None:
+        if look.relit is not None or look.grain is not None or look.blur > 0:
             return _lit(work, look)
         return work.shown if look.gain == work.shown.gain else replace(work.shown, gain=look.gain)
 
@@ -358,23 +360,11 @@ def _sharp_layer(
 
 
 def _lit(work: _Work, look: Lit) -> Layer:
-    """What is shown of a part, in a light that varies over it, and with grain."""
+    """What is shown of a part, in a light that varies over it, in focus or not, and with grain."""
     shown, kept = work.shown, work.lit
-    if kept is not None and kept[0] is shown and kept[1] is look:
-        return kept[2]
-    left, top, zoom = work.view[:3]
-    x0, y0 = shown.box[:2]
-    place = (left + x0 / zoom, top + y0 / zoom, zoom)
-    from objectmorpher_core.compose.harmonize import NEUTRAL, lit_rgba
-
-    rgba, gain = shown.pixels, look.gain
-    if look.relit is not None:
-        rgba = look.relit.lit_rgba(rgba, *place)
-    if look.grain is not None:  # last: it is as strong as the photo's at the brightness shown
-        rgba, gain = look.grain.grained_rgba(lit_rgba(rgba, gain), *place), NEUTRAL
-    result = replace(shown, rgba=rgba, gain=gain)
-    work.lit = shown, look, result
-    return result
+    if kept is None or kept[0] is not shown or kept[1] is not look:
+        kept = work.lit = shown, look, in_light(shown, look, work.view)
+    return kept[2]
 
 
 def _floats(box: Box) -> tuple[float, float, float, float]:

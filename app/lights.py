@@ -71,12 +71,12 @@ class Lights:
         from objectmorpher_core.compose.lighting import NOTHING
 
         item = document.objects[k]
-        has_any = item.shadow.strength or item.harmony or item.relight or item.grain
+        shares = (item.harmony, item.relight, item.grain, item.defocus)
+        has_any = item.shadow.strength or any(shares)
         if not item.is_moved or not item.is_visible or not has_any:
             self._kept.pop(k, None)
             return NOTHING
         splats, now = self._derived.posed(document, k), time.monotonic()
-        shares = (item.harmony, item.relight, item.grain)
         sources = (splats, item.shadow, *shares, document.plate, document.horizon)
         kept = self._kept.get(k)
         if kept is None or not same(kept.sources, sources):
@@ -120,9 +120,10 @@ class Lights:
 
     # The picture
 
-    def state(self, document: Document) -> tuple[int, ...]:
-        """The same where the shadows are."""
-        return tuple(id(self.of(document, k).shade) for k in range(len(document.objects)))
+    def state(self, document: Document) -> tuple[float, ...]:
+        """Changes where a shadow or a blur does."""
+        looks = [self.of(document, k) for k in range(len(document.objects))]
+        return (*(id(look.shade) for look in looks), *(look.blur for look in looks))
 
     def layers(self, document: Document, view: View) -> tuple[Layer, ...]:
         """The shadows on the canvas."""

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from objectmorpher_core.document import Document
+from objectmorpher_core.limits import FILE_BYTES as MAX_BYTES
 from objectmorpher_core.progress import Progress
 
 SESSION_ENDING = ".omorph"
 PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
 OBJECT_ENDINGS = (".ply", ".splat", ".spz", ".obj", ".glb", ".gltf", ".stl", ".off")
 ZIP_MAGIC = b"PK\x03\x04"
-MAX_BYTES = 4 << 30  # of a file; no photo and no session is larger
 BLOCK = 1 << 24  # bytes read at a time
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
 
     from .derived import Derived
+    from .layers import Layer
 
 PAINTED = (Shown.DEPTH, Shown.NORMALS, Shown.STRAIN)
 SMALL = 320  # px, longer side of the picture on which shares are counted
@@ -34,6 +35,7 @@ class Shares:
     from_photo: float = 0.0
     from_lifter: float = 0.0
     from_inpainter: float = 0.0
+    from_refiner: float = 0.0
     changed: float = 0.0  # of all pixels of the photo
 
 
@@ -176,8 +178,19 @@ def _count_shares(derived: Derived, document: Document) -> Shares:
         return Shares()
     by_lifter = float((lifted * edited)[is_changed].mean())
     by_inpainter = float((inpainted * edited)[is_changed].mean())
-    changed = float(is_changed.mean())
-    return Shares(1 - by_lifter - by_inpainter, by_lifter, by_inpainter, changed)
+    by_refiner = float(_refined_alpha(derived, document, view)[is_changed].mean())
+    rest = 1 - by_refiner  # as the composite's figures: a refinement lies over all the others
+    by_lifter, by_inpainter = rest * by_lifter, rest * by_inpainter
+    from_photo = rest - by_lifter - by_inpainter
+    return Shares(from_photo, by_lifter, by_inpainter, by_refiner, float(is_changed.mean()))
+
+
+def _refined_alpha(derived: Derived, document: Document, view: View) -> F32:
+    """(h, w) of the refinement, on a view's canvas."""
+    alpha = np.zeros((view.height, view.width), np.float32)
+    for layer in derived.refined.layers(document, view):
+        _paste(layer, alpha)
+    return alpha
 
 
 def _front_alpha(derived: Derived, document: Document, k: int, view: View) -> F32:
@@ -185,6 +198,10 @@ def _front_alpha(derived: Derived, document: Document, k: int, view: View) -> F3
     alpha = np.zeros((view.height, view.width), np.float32)
     layer = derived.fronts.layer(document.objects[k], view)
     if layer is not None:
-        x0, y0, x1, y1 = (int(v) for v in layer.box)
-        alpha[y0:y1, x0:x1] = layer.rgba[..., 3] / np.float32(255)
+        _paste(layer, alpha)
     return alpha
+
+
+def _paste(layer: Layer, alpha: F32) -> None:
+    x0, y0, x1, y1 = (int(v) for v in layer.box)
+    alpha[y0:y1, x0:x1] = layer.rgba[..., 3] / np.float32(255)

@@ -11,11 +11,14 @@ from pathlib import Path
 import platformdirs
 
 from objectmorpher_core.document import GAUSSIANS
+from objectmorpher_core.files import make_folder, write_all
 
 log = logging.getLogger(__name__)
 
 RECENT = 6  # files remembered
+LARGEST = 1e9  # of any number that is no whole one
 AUTO = "auto"
+HERE, SERVER = "here", "server"  # where jobs run
 TABLES = ("backends", "shortcuts")  # of the file; everything else is a line of it
 
 
@@ -26,6 +29,7 @@ class Backends:
     segment: str = AUTO
     lift: str = AUTO
     inpaint: str = AUTO
+    refine: str = AUTO
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Settings:
     theme: str = "dark"  # or "light"
     scale: float = 0.0  # canvas px per point; 0: the monitor's
     dialogs: str = AUTO  # file dialogs: "auto" (the system's where there are any) or "built-in"
-    is_motion_reduced: bool = False
+    motion: str = AUTO  # "auto" (as the system has it), "full" or "reduced"
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
     export_what: str = "Photo"  # the last export's, see `export_plan.py`
@@ -49,6 +53,8 @@ class Settings:
     history_mb: int = 1024  # MiB that steps which can be undone may hold
     recent: tuple[str, ...] = ()  # paths, newest first
     language: str = "en"
+    compute: str = HERE  # where long jobs run: HERE or SERVER
+    server: str = ""  # its address; the token has a file of its own
     backends: Backends = field(default_factory=Backends)
     shortcuts: dict[str, str] = field(default_factory=dict)  # command -> keys of the user's own
 
@@ -72,11 +78,13 @@ def read_settings(path: Path) -> Settings:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return Settings()
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         log.warning("The settings %s cannot be read (%s); defaults are used", path.name, error)
         return Settings()
     backends = Backends(**_matching(Backends(), values.pop("backends", {})))
     shortcuts = _words(values.pop("shortcuts", {}))
+    if values.pop("is_motion_reduced", False) is True:  # its earlier name
+        values.setdefault("motion", "reduced")
     for name in ("recent", "declined_models"):
         if isinstance(values.get(name), list):
             values[name] = tuple(str(r) for r in values[name])
@@ -95,10 +103,8 @@ def write_settings(path: Path, settings: Settings) -> None:
     ):
         lines += ["", f"[{title}]", *(f"{k} = {_toml(v)}" for k, v in table.items())]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(f".{os.getpid()}.tmp")
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        temporary.replace(path)
+        make_folder(path.parent)
+        write_all({path: ("\n".join(lines) + "\n").encode("utf-8", "replace")})
     except OSError as error:
         log.warning("The settings cannot be written: %s", error)
 
@@ -118,11 +124,18 @@ def _matching(defaults: object, values: object) -> dict:
     fitting = {}
     for name, default in known.items():
         value = values.get(name)
-        if type(default) is float and type(value) is int:
-            value = float(value)
+        if type(default) is float and isinstance(value, int | float):
+            # NaN compares false; a whole number may be too large for a float.
+            is_usable = not isinstance(value, bool) and abs(value) <= LARGEST
+            value = float(value) if is_usable else None
         if type(value) is type(default):
             fitting[name] = value
     return fitting
+
+
+def _escape(letter: str) -> str:
+    """TOML takes no halves of surrogate pairs, which stand for odd bytes of a file's name."""
+    return "?" if "\ud800" <= letter <= "\udfff" else f"\\U{ord(letter):08x}"
 
 
 def _toml(value: object) -> str:
@@ -130,7 +143,7 @@ def _toml(value: object) -> str:
         return str(value).lower()
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        return '"' + "".join(c if c.isprintable() else _escape(c) for c in escaped) + '"'
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
     return str(value)

@@ -9,7 +9,10 @@ from .editor import Editor
 from .texts import t
 
 # What has a meaning everywhere.
-FIXED = ("Escape", "Enter", "Left", "Right", "Up", "Down", "X", "Space", "?")
+FIXED = (
+    "Escape", "Enter", "Left", "Right", "Up", "Down", "PageUp", "PageDown", "X", "Space", "?",
+    "Tab", "F6", "F10",
+)  # fmt: skip
 
 
 class Shortcuts:
@@ -49,7 +52,7 @@ class Shortcuts:
             return False
         if keys == "Escape":
             return True
-        if keys in FIXED or keys.removeprefix("Shift+") in FIXED:
+        if keys.removeprefix("Shift+").removeprefix("Alt+") in FIXED:
             self._editor.complain(t("{keys} has a fixed meaning; choose other keys", keys=keys))
             return True
         self.choose(name, keys)

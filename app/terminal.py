@@ -1,7 +1,8 @@
-"""What the subcommands say on the terminal."""
+"""What the subcommands say on the terminal: progress bars, and failures in one sentence."""
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,10 +10,23 @@ from contextlib import contextmanager
 from objectmorpher_core.progress import Progress, silent
 
 PROGRAM = "objectmorpher"
+FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
 
 
 class UsageError(ValueError):
     """The command line asks for something impossible; one sentence."""
+
+
+def failure_sentence(error: BaseException) -> str:
+    """One line for the user: what failed, in the words of whoever noticed."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
+        reason = {FileNotFoundError: "does not exist", PermissionError: "cannot be read"}
+        if error.filename is not None:
+            return f"{error.filename} {reason.get(type(error), 'is a folder, not a file')}"
+    text = str(error) or type(error).__name__
+    return json.dumps(text)[1:-1] if "\n" in text else text
 
 
 @contextmanager

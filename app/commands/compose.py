@@ -5,6 +5,7 @@ from __future__ import annotations
 from objectmorpher_core import compose
 
 from ..editing.composing import SHADOW, VARIANTS
+from ..editing.refining import REFINE
 from ..editor import Editor
 from ..tasks import PLATE
 from ..texts import sentence, t
@@ -81,6 +82,25 @@ def _cannot_take(editor: Editor) -> str | None:
     return not_moved(editor) or editor.composing.trouble
 
 
+def _cannot_refine(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(REFINE):
+        return t("The edit is being refined")
+    if (reason := nothing_lifted(editor)) is not None:
+        return reason
+    assert editor.document is not None
+    if not any(item.is_moved for item in editor.document.objects):
+        return t("Move the object first")
+    if (trouble := editor.composing.trouble) is not None:
+        return trouble
+    reason = editor.methods.why_not("refine")
+    return None if reason is None else sentence(reason)
+
+
+def _not_refined(editor: Editor) -> str | None:
+    is_refined = editor.refining.refined is not None
+    return nothing_lifted(editor) or (None if is_refined else t("The edit is not refined"))
+
+
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
     "take_from": Command(
@@ -97,6 +117,14 @@ COMMANDS: dict[str, Command] = {
     ),
     "take_shadow": Command(
         "Shadow as in the photo", "", lambda e: e.composing.take_shadow(), _cannot_take
+    ),
+    "refine": Command("Refine", "", lambda e: e.refining.run(), _cannot_refine),
+    "refine_again": Command(
+        "Another", "", lambda e: e.refining.run_again(),
+        lambda e: _not_refined(e) or _cannot_refine(e),
+    ),
+    "unrefine": Command(
+        "Remove refinement", "", lambda e: e.refining.remove(), _not_refined
     ),
     "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
 }  # fmt: skip

@@ -9,6 +9,11 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("X (hold)", "Show the photo as it was"),
         ("Esc", "Take back the stroke, deselect"),
         ("Enter", "The next step, which the large button names"),
+        ("Tab, Shift+Tab", "To the panel, from control to control"),
+        ("F6, Shift+F6, F10", "Next part of the window, the one before, the menus"),
+        ("Arrows", "A crosshair on the photo · Shift: far · Alt: 1 px"),
+        ("Space, Shift+Space", "Click, right-click at the crosshair"),
+        ("Shift+Enter", "Take hold at the crosshair, let go: arrows drag"),
     ),
     "Select": (
         ("Click, Enter", "Add to the selection"),
@@ -28,7 +33,8 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Alt-click", "Pin that stays"),
         ("Right-click", "Remove a point"),
         ("Click on another object", "Choose it"),
-        ("Arrows, with Shift", "Nudge by 1 px, by 10 px"),
+        ("Arrows, with Shift, Alt", "Nudge by 1 px, by 10 px, by 0.1 px"),
+        ("PageUp, PageDown", "Farther, nearer · Shift: much · Alt: little"),
     ),
     "Place": (
         ("Drag", "Move the object"),
@@ -36,6 +42,8 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Wheel while dragging", "Nearer, farther"),
         ("Corner", "Scale"),
         ("Ring", "Turn · Shift: in steps of 15°"),
+        ("Arrows, with Shift, Alt", "Nudge by 1 px, by 10 px, by 0.1 px"),
+        ("PageUp, PageDown", "Farther, nearer · Shift: much · Alt: little"),
     ),
     "Compose": (
         ("Drag", "Repair the background, or say from where it is taken"),

@@ -72,4 +72,4 @@ def _alone(document: Document, k: int, orbit: Orbit) -> Document:
     )
     others = (replace(other, is_visible=False) for other in document.objects)
     objects = tuple(placed if i == k else other for i, other in enumerate(others))
-    return replace(document, objects=objects)
+    return replace(document, objects=objects, refined=None)

@@ -154,11 +154,11 @@ class Placing:
 
     # Steps
 
-    def nudge(self, dx: float, dy: float) -> None:
-        """Moves the object by image px; one step each."""
+    def nudge(self, dx: float, dy: float, depth: float = 0.0) -> None:
+        """Moves the object by image px, and by its diameters away; one step each."""
         editor = self._editor
         if self.placement is not None and not editor.hand.is_busy:
-            self.move_to(self.hold().moved(np.array([dx, dy])))
+            self.move_to(self.hold().moved(np.array([dx, dy]), depth))
             editor.commit(t("Nudge object"))
 
     def reset(self) -> None:

@@ -249,11 +249,11 @@ class Posing:
         self.settle()
         self._editor.commit(label)
 
-    def nudge(self, dx: float, dy: float) -> None:
-        """Moves the selected handles by image px; one step each."""
+    def nudge(self, dx: float, dy: float, depth: float = 0.0) -> None:
+        """Moves the selected handles by image px, and by object diameters away; one step each."""
         if self.selected and not self._editor.hand.is_busy:
             delta = np.array([dx, dy])
-            self.drag_all({h: self.spot(h).moved(delta, 0.0) for h in self.selected})
+            self.drag_all({h: self.spot(h).moved(delta, depth) for h in self.selected})
             self.finish(t("Nudge point"))
 
     def remove(self, handle: int | None = None) -> None:

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import hands
 import numpy as np
@@ -20,12 +21,16 @@ from PIL import Image
 from app.commands import run
 from app.editor import Editor
 from app.settings import Settings
-from app.view import ToolName
+from app.view import ToolName, View
 from objectmorpher_core.document import Document, Placement
+
+if TYPE_CHECKING:
+    from desk import Desk
 
 WIDTH, HEIGHT = 180, 140  # px of the made photo
 CENTRE = (90.0, 72.0)  # px, of the ball in it
 RADII = (34.0, 44.0)
+CANVAS = ((720, 560), 1.0, None)
 
 
 def made_photo() -> np.ndarray:
@@ -65,7 +70,7 @@ def data_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session")
 def shared_editor(compiled: None, data_folder: None) -> Iterator[Editor]:
     editor = Editor(Settings(gaussians=3000))
-    editor.view.resize((720, 560), 1.0, None)
+    editor.view.resize(*CANVAS)
     yield editor
     editor.shut_down()
 
@@ -75,6 +80,8 @@ def editor(shared_editor: Editor, photo_path: Path) -> Editor:
     """An editor with the made photo open; the worker is shared, it takes seconds to start."""
     shared_editor.close_document()
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
+    shared_editor.view = View()  # nothing of it stays from the test before
+    shared_editor.view.resize(*CANVAS)
     open_file(shared_editor, photo_path)
     assert shared_editor.message is None, shared_editor.message
     return shared_editor
@@ -134,6 +141,33 @@ def duplicate(editor: Editor, document: Document, *move: float) -> None:
     run(editor, "duplicate")
     editor.placing.move_to(Placement(move=(move[0], move[1])))
     editor.commit("Move object")
+
+
+@pytest.fixture
+def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of settings that are the test's own; no server is named by the environment."""
+    monkeypatch.setenv("OBJECTMORPHER_SETTINGS", str(tmp_path / "own" / "settings.toml"))
+    monkeypatch.delenv("OBJECTMORPHER_SERVER", raising=False)
+    monkeypatch.delenv("OBJECTMORPHER_TOKEN", raising=False)
+    return tmp_path / "own"
+
+
+@pytest.fixture
+def alone(own_settings: Path) -> Iterator[Editor]:
+    """An editor with those settings and a worker of its own."""
+    editor = Editor(Settings())
+    yield editor
+    editor.shut_down()
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    """A window's jobs and the server that they may go to."""
+    from desk import Desk
+
+    desk = Desk()
+    yield desk
+    desk.close()
 
 
 @pytest.fixture(scope="session")

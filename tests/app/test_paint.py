@@ -10,9 +10,11 @@ from app.derived import Derived
 from app.editor import Editor
 from app.painter import PAINTED, shown_now
 from app.view import Shown, ToolName, View
-from objectmorpher_core import edits
+from objectmorpher_core import edits, refine_edits
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.refined import Refined
+from objectmorpher_core.refining import coarse_edit
 from objectmorpher_core.rotations import matrix_from_vector
 
 COUNTED = 0.06  # of all changed pixels: the view counts on a small picture, its blend is coarser
@@ -123,6 +125,21 @@ def test_shares_are_about_those_of_the_export(editor: Editor, ball: Document, tu
     for name in ("from_photo", "from_lifter", "from_inpainter"):
         assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
     assert editor.derived.painter.shares(ball).from_photo == 0  # nothing is changed
+
+
+@pytest.mark.parametrize("strength", [1.0, 0.4])
+def test_a_refinements_share_is_about_that_of_the_export(
+    editor: Editor, ball: Document, strength: float
+) -> None:
+    document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0), turn=(30.0, 0.0, 0.0)))
+    edit = coarse_edit(document)
+    made = Refined(edit.left, edit.top, 255 - edit.coarse, edit.shown, "klein", strength=strength)
+    document = refine_edits.set_refined(document, made)
+    shares, exact = editor.derived.painter.shares(document), composite(document).shares
+    for name in ("from_photo", "from_lifter", "from_inpainter", "from_refiner"):
+        assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
+    parts = shares.from_photo + shares.from_lifter + shares.from_inpainter + shares.from_refiner
+    assert parts == pytest.approx(1, abs=F32) and shares.from_refiner > strength / 2
 
 
 def test_the_number_of_changed_pixels_is_about_that_of_the_export(
