@@ -47,7 +47,7 @@ def tell(story: stories.Story) -> None:
         if display is None:
             raise SystemExit("no free X display was found")
         settings = f'dialogs = "built-in"\nexport_folder = "{folder / PICTURES}"\n'
-        settings += "is_motion_reduced = true\n"
+        settings += 'motion = "reduced"\n'
         environment = window_environment(display, folder, settings) | {
             "HOME": str(folder),
             "XDG_DATA_HOME": str(platformdirs.user_data_path()),  # the models are there
