@@ -1,5 +1,6 @@
 # make run               opens the editor on a sample photo; PHOTO=my.jpg opens that one
 # make test              sets everything up and runs the tests; ARGS="-k session" runs some
+# make test-slow         the tests that take longer: CI's second stage
 #
 # Both work in a fresh clone: they make .venv and install into it. A second call is fast.
 
@@ -11,8 +12,15 @@ SHELL := /bin/bash
 
 PYTHON := .venv/bin/python
 PIP := $(PYTHON) -m pip --disable-pip-version-check
+# Bytecode, also where PYTHONDONTWRITEBYTECODE says that no import writes any: every window has a
+# worker process, which would compile all sources anew.
+COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core tests
 PHOTO ?=
 ARGS ?=
+LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
+# Several test files at a time, one of them by one process; JOBS=0 is for debuggers.
+JOBS ?= auto
+PYTEST = $(PYTHON) -m pytest -n $(JOBS) --maxprocesses 4 --dist loadfile
 
 # Installs Debian packages where this is Debian or Ubuntu and we may; fails quietly elsewhere.
 define APT
@@ -26,14 +34,47 @@ apt_install() {
 endef
 
 help:
-	@sed -n 's/^# //p' Makefile | head -2
+	@sed -n 's/^# //p' Makefile | head -3
 
 run: .make/run
-	@$(PYTHON) -m app models get || echo "The learned models could not be fetched; the built-in methods are used instead."
+	@$(COMPILE)
+	$(PYTHON) -m app models get || echo "The learned models could not be fetched; the built-in methods are used instead."
 	if [ -n "$(PHOTO)" ]; then exec $(PYTHON) -m app "$(PHOTO)"; else exec $(PYTHON) -m app --sample; fi
 
 test: .make/test
-	@$(PYTHON) -m pytest -m "not slow" $(ARGS)
+	@$(COMPILE)
+	$(PYTEST) -m "not slow" $(ARGS)
+
+.PHONY: test-slow
+test-slow: .make/test
+	@$(COMPILE)
+	$(PYTEST) -m slow $(ARGS)
+
+# The tests of what needs PyTorch or Ray, which `make test` leaves out: networks of their real code,
+# tiny and with random weights. TORCH names the build that pip is to install.
+.PHONY: test-models
+TORCH ?= torch==2.13.0
+BESIDE := 'torchmetrics>=1.6' 'h5py>=3.11' # others' measures and files, to compare ours with
+test-models: .make/models
+	@$(COMPILE)
+	for part in tests/app tests/core; do # apart: each has a conftest.py of its own
+	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE 'torch|transformers|diffusers|huggingface_hub|peft|onnx|h5py|"ray"' $$part --include='test_*.py' | sort)
+	done
+
+.make/models: .make/test
+	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,train,cluster]'
+	touch $@
+
+# The study's page in a real browser, which `make test` leaves out: Chromium is large.
+.PHONY: test-browser
+test-browser: .make/browser
+	@$(PYTHON) -m pytest -m "slow or not slow" $(ARGS) tests/app/test_study_browser.py
+
+.make/browser: .make/test
+	@$(PIP) install -q -e '.[dev,browser]'
+	$(APT)
+	command -v chromedriver >/dev/null || apt_install chromium chromium-driver
+	touch $@
 
 .make/run: .make/venv pyproject.toml
 	@echo "Installing ObjectMorpher into .venv (minutes, the first time)"
@@ -49,6 +90,7 @@ test: .make/test
 
 .make/test: .make/venv pyproject.toml
 	@echo "Installing ObjectMorpher and its test tools into .venv (minutes, the first time)"
+	if [ -n "$(LOCK)" ]; then $(PIP) install --progress-bar on --require-hashes -r "$(LOCK)"; fi
 	$(PIP) install --progress-bar on -e '.[dev]'
 	$(APT)
 	missing=()
@@ -115,6 +157,11 @@ evidence: .make/test
 	    $(PYTHON) docs/$$page/make_$$page.py
 	done
 
+# Makes the table of docs/models.md anew: what each network takes, counted at its real size.
+.PHONY: estimates
+estimates: .make/models
+	@$(PYTHON) docs/estimates/make_estimates.py
+
 # Does the edits of docs/tour again in a window of their own, and takes the pictures of it and of
 # the README; STORIES="dark views" does some of them.
 .PHONY: tour
@@ -125,3 +172,70 @@ tour: .make/test
 .PHONY: feel
 feel: .make/test
 	@$(PYTHON) docs/tour/make_feel.py
+
+# Builds the pages of docs/ as a site in build/site; a broken link or an unknown name is an error.
+# Its tools have an environment of their own: the program needs none of them.
+.PHONY: docs
+SITE := .make/docs/bin/python
+docs: .make/docs.stamp
+	@NO_MKDOCS_2_WARNING=1 $(SITE) -m mkdocs build --strict --quiet
+	echo "The pages are in build/site"
+
+.make/docs.stamp: .make/venv pyproject.toml
+	@$(PYTHON) -m venv .make/docs
+	extra=$$($(PYTHON) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"], sep="\n")')
+	mapfile -t wanted <<< "$$extra"
+	$(SITE) -m pip --disable-pip-version-check install -q "$${wanted[@]}"
+	touch $@
+
+# Makes the figures of docs/concepts anew, with the program itself.
+.PHONY: figures
+figures: .make/test
+	@$(PYTHON) docs/concepts/make_figures.py
+
+# Damages files of every kind and has them read: docs/reliability.md. SECONDS says for how long.
+.PHONY: fuzz
+fuzz: .make/test
+	@$(PYTHON) -m tests.fuzz --seconds $(or $(SECONDS),600) $(ARGS)
+
+# Lets every system call go wrong with which something is written; ARGS=--power cuts the power.
+.PHONY: faults
+faults: .make/test
+	@$(PYTHON) -m tests.faults $(ARGS)
+
+# The installers for this system, into dist/: a folder with the program, a Debian package, and an
+# AppImage (APPIMAGE_RUNTIME names the AppImage project's run-time file). docs/install.md
+.PHONY: packages
+KINDS ?= folder deb appimage
+packages: .make/packaging/ready
+	@.make/packaging/bin/python packaging/build.py $(KINDS)
+
+# Of the oldest Python that we support and the system's own, whose libraries are shipped.
+PACKAGED_PYTHON ?= python3.11
+.make/packaging/ready: packaging/locks/packaging.txt
+	@mkdir -p .make
+	rm -rf .make/packaging
+	$(PACKAGED_PYTHON) -m venv .make/packaging
+	.make/packaging/bin/python -m pip install -q --require-hashes -r packaging/locks/packaging.txt
+	touch $@
+
+# Versions and hashes of all that installers and tests hold; UPGRADE=1 asks for the newest.
+.PHONY: locks
+locks: .make/packaging/uv
+	@UV=.make/packaging/uv/bin/uv UPGRADE=$(UPGRADE) packaging/make_locks.sh
+
+.make/packaging/uv:
+	@mkdir -p .make/packaging
+	$(PACKAGED_PYTHON) -m venv $@
+	$@/bin/python -m pip install -q uv
+
+# What is needed to run: the table of licences, a bill of materials (CycloneDX), and what is known
+# of weaknesses, where the service that knows answers.
+.PHONY: supply-chain
+supply-chain: .make/packaging/ready
+	@mkdir -p dist
+	.make/packaging/bin/python packaging/licences.py | tee dist/licences.txt
+	.make/packaging/bin/cyclonedx-py requirements packaging/locks/run-time.txt --pyproject pyproject.toml \
+	    --of JSON -o dist/objectmorpher.cdx.json
+	.make/packaging/bin/pip-audit -r packaging/locks/run-time.txt --no-deps --disable-pip ||
+	    echo "Weaknesses were found, or could not be looked up"

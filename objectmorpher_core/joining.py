@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 MOST_SHADOW = 4.0  # x the object's height, length of its shadow
-USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN = 0.8, 0.75, 1.0  # of an object that is harmonised
+# Of an object that is harmonised.
+USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN, USUAL_DEFOCUS = 0.8, 0.75, 1.0, 1.0
 LEAST_FEATHER, MOST_FEATHER = 0.25, 3.0  # x the usual width of the blend
 
 

@@ -7,6 +7,7 @@ in a third of the time that numba's own parallel loops take, and wait for nobody
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -38,7 +39,7 @@ def in_threads(
 @cache
 def core_count() -> int:
     """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
+    if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -30,11 +31,40 @@ def photo(name: str) -> np.ndarray:
     return pixels
 
 
+def saved(name: str, folder: Path) -> Path:
+    """`photo` as a PNG file in a folder."""
+    from PIL import Image
+
+    path = folder / f"{name}.png"
+    Image.fromarray(photo(name)).save(path)
+    return path
+
+
+def outlined(name: str) -> np.ndarray:
+    """(H, W) bool, what was outlined by hand in a photo (tests/core/segment/truth)."""
+    from PIL import Image
+
+    path = Path(__file__).parent / "core" / "segment" / "truth" / f"{name}.png"
+    return np.array(Image.open(path).convert("L")) > 127
+
+
 def _motorcycle() -> np.ndarray:
     """The left one of the stereo pair; `data.stereo_motorcycle` reads the other, too."""
-    from pathlib import Path
-
     import skimage
     from skimage import io
 
     return io.imread(Path(skimage.__file__).parent / "data" / "motorcycle_left.png")
+
+
+def small_cup(step: int, across: float, up: float):
+    """Pixels, camera and mask of the coffee photo's cup at every `step`-th pixel.
+
+    The mask is an ellipse of the radii `across` and `up`, in px of the small photo.
+    """
+    from objectmorpher_core.camera import Camera
+
+    pixels = photo("coffee")[::step, ::step].copy()
+    height, width = pixels.shape[:2]
+    y, x = np.mgrid[:height, :width]
+    mask = ((x - 0.5 * width) / across) ** 2 + ((y - 0.5 * height) / up) ** 2 < 1
+    return pixels, Camera.from_fov(width, height), mask

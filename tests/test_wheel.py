@@ -77,7 +77,7 @@ def test_every_resource_is_inside(installed, tmp_path):
 def test_an_edit(installed, tmp_path):
     photo = ROOT / "assets" / "samples" / "coffee.jpg"
     run(
-        installed / "objectmorpher", "edit", photo, "--click", "300,215", "--turn", "15,0,0",
+        installed / "objectmorpher", "edit", photo, "--click", "280,150", "--turn", "15,0,0",
         "-o", "out.png", cwd=tmp_path,
     )  # fmt: skip
     assert (tmp_path / "out.png").stat().st_size > 10_000

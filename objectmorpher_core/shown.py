@@ -1,0 +1,22 @@
+"""A stranger's value in a sentence of ours: on one line, and not longer than it can be read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+LONGEST = 60  # characters
+
+
+def shown(value: Any) -> str:
+    """`value` as Python writes it, its middle left out where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits; depth
+        return "..."
+    return named(text)
+
+
+def named(text: str) -> str:
+    """A name without quotation marks, as `shown`."""
+    text = "".join(c if c.isprintable() else "?" for c in text)  # lone surrogates are not
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 13]}...{text[-10:]}"

@@ -1,0 +1,76 @@
+"""Whether a long session stayed as it was; and its picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+SLOWER = 1.1  # x the first drags' time
+WIDTH, HEIGHT, LEFT, TOP, GAP = 720, 150, 60, 24, 40  # px of a panel, and around it
+PANELS = (
+    ("MiB", (("memory", "editor", "#0072b2"), ("worker", "worker", "#d55e00"))),
+    ("ms of a drag", (("drag", "", "#0072b2"),)),
+    ("count", (("files", "open files", "#0072b2"), ("threads", "threads", "#009e73"),
+               ("textures", "GL textures", "#d55e00"), ("buffers", "GL buffers", "#cc79a7"))),
+)  # fmt: skip
+
+
+def problems(samples: Sequence[Any]) -> list[str]:
+    """What grew or became slower; `samples` are `session.Sample`s at even distances.
+
+    The first quarter fills the history and every cache, and is not judged but for the drags.
+    """
+    quarter = len(samples) // 4
+    early, late = samples[quarter : 2 * quarter], samples[-quarter:]
+    found = []
+    for name, room in (("memory", 1.05), ("worker", 1.05)):
+        before, after = (max(getattr(s, name) for s in part) for part in (early, late))
+        if after > room * before:
+            found.append(f"{name}: {before:.0f} MiB, and {after:.0f} at the end")
+    for name in ("files", "threads", "children", "textures", "buffers"):  # they come and go
+        before, after = max(getattr(s, name) for s in early), min(getattr(s, name) for s in late)
+        if after > before:
+            found.append(f"{name}: {before}, and {after} at the end")
+    first, last = (min(s.drag for s in part) for part in (samples[:quarter], late))
+    if last > SLOWER * first:
+        found.append(f"drag: {first:.1f} ms, and {last:.1f} at the end")
+    return found
+
+
+def chart(samples: Sequence[Any]) -> str:
+    """As SVG: memory, time of a drag, and what is open, over the edits."""
+    width, height = LEFT + WIDTH + 120, len(PANELS) * (HEIGHT + GAP) + TOP
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+        'font-family="sans-serif" font-size="12">',
+        '<rect width="100%" height="100%" fill="white"/>',
+    ]
+    for k, (unit, lines) in enumerate(PANELS):
+        top = TOP + k * (HEIGHT + GAP)
+        most = max(getattr(s, name) for s in samples for name, *_ in lines) or 1
+        parts.append(f'<text x="{LEFT}" y="{top - 6}">{unit}</text>')
+        for share in (0.0, 0.5, 1.0):
+            y = top + HEIGHT * (1 - share)
+            parts.append(f'<path d="M{LEFT} {y:.1f}h{WIDTH}" stroke="#ddd"/>')
+            parts.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">'
+                         f"{most * share:.3g}</text>")  # fmt: skip
+        ends = []
+        for name, label, colour in lines:
+            points = [
+                (LEFT + WIDTH * s.edits / samples[-1].edits,
+                 top + HEIGHT * (1 - getattr(s, name) / most))
+                for s in samples
+            ]  # fmt: skip
+            path = "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+            parts.append(f'<path d="M{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+            ends.append((points[-1][1], label, colour))
+        place = -1e9
+        for y, label, colour in sorted(ends):
+            place = max(y + 4, place + 14)
+            parts.append(
+                f'<text x="{LEFT + WIDTH + 8}" y="{place:.1f}" fill="{colour}">{label}</text>'
+            )
+    last = samples[-1]
+    parts.append(f'<text x="{LEFT + WIDTH}" y="{height - 8}" text-anchor="end">'
+                 f"{last.edits:,} edits, {last.minutes:.0f} minutes</text></svg>\n")  # fmt: skip
+    return "\n".join(parts)

@@ -1,0 +1,54 @@
+"""A long session neither grows nor becomes slower; and one that does is found out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("moderngl")
+
+from tests import photos
+from tests.soak.judging import chart, problems
+from tests.soak.session import Sample, Session
+
+EDITS, EVERY = 240, 20
+
+
+def level(count: int) -> list[Sample]:
+    return [Sample(k, 1.0, 900, 400, 5.0, 30, 8, 2, 12, 40) for k in range(1, count + 1)]
+
+
+def test_what_stays_as_it_is_is_no_problem() -> None:
+    assert problems(level(40)) == []
+
+
+@pytest.mark.parametrize("name", ["memory", "worker", "drag", "files", "threads", "children",
+                                  "textures", "buffers"])  # fmt: skip
+def test_what_grows_is_told(name: str) -> None:
+    grown = [replace(s, **{name: getattr(s, name) * (1 + k / 20)}) for k, s in enumerate(level(40))]
+    (problem,) = problems(grown)
+    assert problem.startswith(name)
+
+
+def test_the_picture_holds_every_line() -> None:
+    told = chart(level(40))
+    assert told.count('fill="none"') == 7 and told.endswith("</svg>\n")
+
+
+@pytest.mark.slow
+def test_a_day_of_edits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OBJECTMORPHER_DATA", str(tmp_path / "data"))
+    try:
+        session = Session(
+            photos.saved("astronaut", tmp_path), photos.outlined("astronaut"), tmp_path
+        )
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    try:
+        samples = list(session.samples(EDITS, EVERY))
+    finally:
+        session.close()
+    assert len(samples) == EDITS // EVERY
+    assert problems(samples) == []

@@ -1,0 +1,238 @@
+"""The documentation is true where a machine can tell: links, anchors, commands, names, examples."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib.util
+import re
+import runpy
+import shlex
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+import objectmorpher_core as om
+from app import cli
+from objectmorpher_core.script import script_from
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted([
+    *DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md",
+    *(ROOT / "packaging").rglob("*.md"), *(ROOT / "tests").rglob("*.md"),
+])  # fmt: skip
+EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
+FENCE = re.compile(r"^(```+|~~~+)(\w*)[^\n]*\n(.*?)^\1\s*$", re.M | re.S)
+LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
+OUTSIDE = ("https://", "http://", "mailto:")
+
+
+def name_of(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+every_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
+
+
+@cache
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def prose(page: Path) -> str:
+    """Without code, in which brackets are no links."""
+    return re.sub(r"(`+)[^`].*?\1", "", FENCE.sub("", text_of(page)), flags=re.S)
+
+
+@cache
+def anchors(page: Path) -> frozenset[str]:
+    """Those of a page's headings, as the repository's pages and the site make them."""
+    found: dict[str, int] = {}
+    names = set()
+    for heading in re.findall(r"^#{1,6}\s+(.+?)\s*#*$", FENCE.sub("", text_of(page)), re.M):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+        slug = re.sub(r"[^\w\- ]", "", plain.lower()).replace(" ", "-")
+        number = found[slug] = found.get(slug, -1) + 1
+        names.add(slug if number == 0 else f"{slug}-{number}")
+    return frozenset(names)
+
+
+@every_page
+def test_every_link_leads_somewhere(page):
+    for link in LINK.findall(prose(page)):
+        if link.startswith(OUTSIDE):
+            continue
+        path, _, anchor = unquote(link).partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{name_of(page)} links to {link}"
+        assert ROOT in target.parents, f"{link} is outside the repository"
+        if anchor:
+            assert target.suffix == ".md", link
+            assert anchor in anchors(target), f"{name_of(page)} links to {link}"
+
+
+def test_every_page_is_in_the_sites_navigation():
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    listed = re.findall(r"([\w/-]+\.md)\s*$", text[text.index("\nnav:") :], re.M)
+    assert sorted(listed) == sorted(str(p.relative_to(DOCS)) for p in DOCS.rglob("*.md"))
+
+
+@every_page
+def test_every_picture_has_its_file_and_a_picture_is_no_larger_than_it_must_be(page):
+    for link in re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", prose(page)):
+        assert (page.parent / link).stat().st_size < 700_000, link
+
+
+def test_pictures_of_the_documentation_are_shown_somewhere():
+    shown = {
+        (page.parent / link).resolve()
+        for page in PAGES
+        for link in re.findall(r"\]\(([^)\s#]+\.(?:jpg|png|svg))\)", text_of(page))
+    }
+    kept = [p for kind in ("jpg", "svg") for p in DOCS.rglob(f"*.{kind}")]
+    assert [name_of(p) for p in kept if p not in shown] == []
+
+
+def typed(page: Path) -> list[str]:
+    """What the page says to type, continued lines joined: code blocks that are no Python."""
+    found: list[str] = []
+    for _, kind, block in FENCE.findall(text_of(page)):
+        if kind in ("", "sh", "bash", "console"):
+            found += re.sub(r"\\\n\s*", "", block).splitlines()
+    return [re.sub(r"\s+#.*", "", line).strip() for line in found]
+
+
+def commands(page: Path) -> list[str]:
+    """The same, and the commands that are named within a sentence, whole or not."""
+    named = re.findall(r"(?<!`)`((?:objectmorpher|make) [^`]+)`(?!`)", text_of(page))
+    return [*typed(page), *(" ".join(line.split()) for line in named)]
+
+
+def parsed(line: str) -> str:
+    """What the program's parser says about a command line; empty: it takes it."""
+    words = shlex.split(line)[1:]
+    if any(w in ("...", "…") for w in words) or "--help" in words:
+        return ""
+    try:
+        is_command = bool(words) and words[0] in _parsers()
+        if is_command:
+            options = cli.build_parser().parse_args(cli._joined_negatives(words))
+            if options.command in ("edit", "select"):
+                said = {n: v for n, v in vars(options).items() if n in SCRIPT and v is not None}
+                script_from(said)
+        else:
+            cli.parse_window(words)
+    except (SystemExit, ValueError) as error:
+        return str(error)
+    return ""
+
+
+SCRIPT = frozenset(vars(script_from({})))
+UNFINISHED = re.compile(r"(?<![\w-])[A-Z]+\b|\[|…|\||<")  # it stands for what is to be said
+
+
+@every_page
+def test_every_whole_command_is_one_that_the_program_takes(page, capsys):
+    for line in typed(page):
+        if line.startswith("objectmorpher ") and not UNFINISHED.search(line):
+            problem = parsed(line)
+            assert not problem, f"{line}: {capsys.readouterr().err}"
+
+
+@every_page
+def test_every_command_and_option_that_is_named_exists(page):
+    for line in commands(page):
+        if not line.startswith("objectmorpher "):
+            continue
+        verb = line.split()[1]
+        assert verb in _parsers() or "." in verb or re.match(r"[A-Z\[-]", verb), line
+        known = (
+            _options(verb)
+            if verb in _parsers()
+            else set(cli.window_parser()._option_string_actions)
+        )
+        assert set(re.findall(r"(?<=\s)--[a-z-]+", line)) <= known | {"--help", "--version"}, line
+
+
+@cache
+def _parsers() -> dict[str, argparse.ArgumentParser]:
+    """The parser of each command."""
+    actions = cli.build_parser()._actions
+    return next(dict(a.choices) for a in actions if isinstance(a, argparse._SubParsersAction))
+
+
+@cache
+def _options(verb: str) -> frozenset[str]:
+    """All that the command and those inside it know."""
+    found: set[str] = set()
+    parsers = [_parsers()[verb]]
+    while parsers:
+        for action in parsers.pop()._actions:
+            found.update(action.option_strings)
+            if isinstance(action, argparse._SubParsersAction):
+                parsers += action.choices.values()
+    return frozenset(found)
+
+
+@every_page
+def test_every_target_of_make_exists(page):
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
+    for line in commands(page):
+        if re.match(r"make [a-z-]+(\s|$)", line):
+            assert line.split()[1] in targets, line
+
+
+@every_page
+def test_every_file_that_is_named_exists(page):
+    """`objectmorpher_core/deform/arap.py` and the like, in whole paths from the root."""
+    tops = "objectmorpher_core|app|tests|docs|packaging|shaders|assets"
+    for name in re.findall(rf"`((?:{tops})/[\w./-]*)`", FENCE.sub("", text_of(page))):
+        assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("name", ["make_cli", "make_keys"])
+def test_a_reference_is_what_the_program_says(name):
+    script = DOCS / "reference" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, script)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text(encoding="utf-8") == module.page(), f"run {name_of(script)}"
+
+
+def test_every_command_and_every_option_is_in_the_reference():
+    text = text_of(DOCS / "reference" / "cli.md")
+    for verb in _parsers():
+        assert f"## objectmorpher {verb}\n" in text
+        for option in _options(verb) - {"-h", "--help"}:
+            assert f"`{option}`" in text, option
+
+
+def test_the_librarys_reference_names_all_that_is_stable():
+    text = text_of(DOCS / "reference" / "python-api.md")
+    named = set(re.findall(r"^::: objectmorpher_core\.api\.(\w+)$", text, re.M))
+    assert named == set(om.__all__) - {"__version__"}
+
+
+@every_page
+def test_python_on_a_page_names_what_there_is(page):
+    for _, kind, block in FENCE.findall(text_of(page)):
+        if kind != "python":
+            continue
+        tree = ast.parse(block)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                is_om = isinstance(node.value, ast.Name) and node.value.id == "om"
+                assert not is_om or node.attr in om.__all__, node.attr
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=name_of)
+def test_an_example_runs(example, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(example), run_name="__main__")
+    promised = re.findall(r'save\(\s*"([\w.-]+)"', text_of(example))
+    assert promised
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(promised)

@@ -1,0 +1,73 @@
+"""Nothing that is read can run: no pickle, and no reader that would take one."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("app", "objectmorpher_core", "packaging")
+SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+RUNNING = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"}
+# Between the window and the worker that it started itself: no byte of it comes from elsewhere.
+OWN_PIPE = {"app/wire.py"}
+ONLY_ITS_ERROR = {"objectmorpher_core/evaluation/measures/trunk_files.py"}  # that torch raises
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def calls(path: Path) -> Iterator[tuple[str, ast.Call]]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func), node
+
+
+def given(call: ast.Call, name: str) -> str | None:
+    """What a keyword of a call is."""
+    return next((ast.unparse(k.value) for k in call.keywords if k.arg == name), None)
+
+
+def uses(path: Path) -> set[str]:
+    """Modules of RUNNING that a file imports, and what it uses of them."""
+    tree, found = ast.parse(path.read_text(encoding="utf-8")), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {a.name.split(".")[0] for a in node.names} & RUNNING
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module.split(".")[0]} & RUNNING
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_no_module_that_runs_what_it_reads_is_imported(path: Path) -> None:
+    if name_of(path) in OWN_PIPE:
+        return
+    found = uses(path)
+    if name_of(path) in ONLY_ITS_ERROR:
+        text = path.read_text(encoding="utf-8")
+        assert text.count("pickle.") == text.count("pickle.UnpicklingError") > 0
+        return
+    assert not found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_numpy_and_torch_read_numbers_only(path: Path) -> None:
+    for name, call in calls(path):
+        if name in ("np.load", "numpy.load"):
+            assert given(call, "allow_pickle") in (None, "False"), f"line {call.lineno}"
+        if name in ("torch.load", "torch.jit.load"):
+            assert given(call, "weights_only") == "True", f"line {call.lineno}"
+        assert name not in ("eval", "exec", "os.system", "yaml.load"), f"line {call.lineno}"
+
+
+def test_what_comes_from_the_wire_is_not_the_pipes() -> None:
+    """The server's messages are decoded by `message.py`, which knows no pickle."""
+    for path in (ROOT / "app" / "remote").glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        modules = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+        assert not any(m is not None and m.endswith("wire") for m in modules), path.name
