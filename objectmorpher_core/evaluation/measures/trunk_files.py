@@ -96,7 +96,7 @@ def read(path: Path, shapes: Shapes) -> dict[str, Any]:
         raise EvaluationError(f"{path} is no table of tensors")
     taken = {}
     for name, shape in shapes.items():
-        tensor = found.get(name)
+        tensor: Any = found.get(name)
         if not isinstance(tensor, torch.Tensor) or tuple(tensor.shape) != shape:
             what = tuple(tensor.shape) if isinstance(tensor, torch.Tensor) else "not there"
             raise EvaluationError(f"{path}: {name} is {what}, it should be {shape}")
