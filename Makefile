@@ -58,7 +58,7 @@ BESIDE := 'torchmetrics>=1.6' 'h5py>=3.11' # others' measures and files, to comp
 test-models: .make/models
 	@$(COMPILE)
 	for part in tests/app tests/core; do # apart: each has a conftest.py of its own
-	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE 'torch|transformers|diffusers|huggingface_hub|peft|onnx|h5py|"ray"' $$part --include='test_*.py' | sort)
+	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|h5py|"ray"' $$part --include='test_*.py' | sort)
 	done
 
 .make/models: .make/test
@@ -161,6 +161,12 @@ evidence: .make/test
 .PHONY: estimates
 estimates: .make/models
 	@$(PYTHON) docs/estimates/make_estimates.py
+
+# Runs the networks at their real sizes, with random weights, on the device that there is, and writes
+# what they took into docs/models.md; NETWORKS="pixelhacker qwen" runs some.
+.PHONY: measured
+measured: .make/models
+	@$(PYTHON) docs/estimates/measure_networks.py $(NETWORKS)
 
 # Does the edits of docs/tour again in a window of their own, and takes the pictures of it and of
 # the README; STORIES="dark views" does some of them.

@@ -1,4 +1,4 @@
-"""The published networks at their real sizes, on PyTorch's meta device: shapes without numbers."""
+"""The published networks at their real sizes; on PyTorch's meta device shapes without numbers."""
 
 from __future__ import annotations
 
@@ -82,10 +82,10 @@ LORA = {  # what the adapters of rank 16 sit on
 RANK = 16
 
 
-def build(name: str) -> nn.Module:
-    """The network called `name`, on the meta device."""
-    with torch.device("meta"):
-        return _networks()[name]().eval()
+def build(name: str, device: str = "meta") -> nn.Module:
+    """The network called `name`; on another device than "meta" with the numbers it starts with."""
+    with torch.device(device):
+        return _networks()[name]().eval().requires_grad_(False)
 
 
 def parameters(network: nn.Module) -> int:
