@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import os
 import signal
 import sys
@@ -56,8 +57,12 @@ def run_serve(options: argparse.Namespace) -> None:
     if unknown:
         raise UsageError(f"there is no stage {unknown[0]!r}; there are {', '.join(STAGES)}")
     least, most = _range(options.replicas)
-    if options.max_body < 1 or not 0 <= options.port < 65536 or options.cpus <= 0:
+    if options.max_body < 1 or not 0 <= options.port < 65536 or not 0 < options.cpus < math.inf:
         raise UsageError("--max-body and --cpus are numbers above zero, --port is below 65536")
+    if options.gpus is not None and not 0 <= options.gpus < math.inf:
+        raise UsageError("--gpus is a number of GPUs, or a share of one")
+    if options.store is not None and options.store < 1:
+        raise UsageError("--store is a number of MB above zero")
     token, is_new = _token(options.token_file)
     if not options.alone and find_spec("ray") is None:
         raise UsageError("Ray is not installed: `pip install 'objectmorpher[cluster]'`, or --alone")

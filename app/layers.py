@@ -27,7 +27,7 @@ from .view import Shown, View
 if TYPE_CHECKING:
     from objectmorpher_core.compose.lighting import Lit
     from objectmorpher_core.raster.posed import PosedSplats
-    from objectmorpher_core.raster.reference import Picture3D
+    from objectmorpher_core.raster.reference_layers import Picture3D
     from objectmorpher_core.raster.texture import TextureLevels
     from objectmorpher_core.raster.tiles import Drawable
 

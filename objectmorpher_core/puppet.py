@@ -18,7 +18,7 @@ from .gaussians import Gaussians
 from .raster import tiles
 from .raster.picking import pick
 from .raster.posed import PosedSplats, RestSplats
-from .raster.reference import Picture3D
+from .raster.reference_layers import Picture3D
 from .raster.texture import TextureLevels
 from .raster.thinning import thinned
 from .raster.tiles import Drawable

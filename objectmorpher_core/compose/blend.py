@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import F32, Mask, Pixels
 from ..pixels import pixels_from_unit, unit_pixels
-from ..raster.reference import Picture3D
+from ..raster.reference_layers import Picture3D
 from ..threads import in_threads
 
 STILL = 0.05  # px: a surface that moved less is where it was

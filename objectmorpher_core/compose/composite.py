@@ -22,7 +22,7 @@ from ..puppet import Puppet, puppet_of
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
-from ..raster.reference import Picture3D
+from ..raster.reference_layers import Picture3D
 from .blend import FEATHER_START as FEATHER_START  # the view looks here for these two
 from .blend import (
     NEAR,

@@ -25,7 +25,7 @@ from ..arrays import F32, F64, U8, frozen
 from ..camera import Camera
 from ..raster import tiles
 from ..raster.posed import PosedSplats
-from ..raster.reference import Picture3D
+from ..raster.reference_layers import Picture3D
 from ..raster.rules import RULES
 from ..raster.sampling import sample
 from ..raster.singles import HALF, ZERO

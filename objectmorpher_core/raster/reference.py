@@ -31,47 +31,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F32, F64
+from ..arrays import F64
 from ..camera import Camera
 from .posed import PosedSplats, projection_jacobians, view_limits
+from .reference_layers import MEDIAN, Composite, Picture3D, Projected, Samples, Sums, smoothstep
 from .rules import LAYERS, RULES, Splatting
-from .texture import TextureLevels, sample_texture
-
-MEDIAN = 0.5  # of alpha: where the object is
-
-
-@dataclass(frozen=True, eq=False)
-class Picture3D:
-    """A rendered object."""
-
-    color: F32  # (h, w, 3) sRGB in [0, 1], premultiplied
-    alpha: F32  # (h, w)
-    # (h, w) world units: of the layer with which alpha, from the front, reaches a half; else of the
-    # first that is visible; inf where there is none
-    depth: F32
-    from_photo: F32  # (h, w) share of the pixel that shows the photo at its own pixels' detail
-    shift: F32  # (h, w, 2) photo px from where the pixel is to where it looks, the same layer
-
-
-@dataclass(frozen=True, eq=False)
-class Projected:
-    """Gaussians on the screen, in the order of their depth."""
-
-    centre: F64  # (N, 2) view px
-    conic: F64  # (N, 3) inverse of the filtered screen covariance: xx, xy, yy
-    extent: F64  # (N, 2) view px, half-size of the box outside which alpha is 0
-    depth: F64  # (N,) world units
-    slope: F64  # (N, 2) depth per view px, within the Gaussian
-    shift: F64  # (N, 2) photo px: u0 minus the photo point at `centre`
-    shift_slope: F64  # (N, 2, 2) per view px: A minus that of the unmoved photo
-    magnified: F64  # (N,) photo px per view px, the larger
-    weight: F64  # (N,) alpha's, see step 1
-    photo: F64  # (N,) share of alpha that shows the photo
-    body: F64  # (N,) share that shows the Gaussian's own colour
-    matted: F64  # (N,) how much the matte's edge is to be trusted
-    solidity: F64  # (N,) alpha of the photo part where it is not
-    seen: F64  # (N,) 1 = the photo part was visible in the photo
-    color: F64  # (N, 3)
+from .texture import TextureLevels
 
 
 def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projected:
@@ -97,7 +62,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     volume = np.cbrt(np.abs(np.linalg.det(motion)))
     zoom = camera.focal / means[:, 2] / rest.zoom[index]
     stretch = singular[:, 1] * zoom * volume
-    carried = _ramp(stretch, RULES.streak_end, RULES.streak_start)
+    carried = smoothstep(stretch, RULES.streak_end, RULES.streak_start)
     seen = texture.visibility[index].astype(np.float64)
     cosine = _cosines(rest.normals[index], motion, means)
     solidity = texture.solidity[index].astype(np.float64)
@@ -106,7 +71,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     ramp, front = RULES.facing_ramp, np.ones(len(index))
     if kind.is_surface:
         front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
-    brim = _ramp(np.abs(cosine), RULES.brim_end, RULES.brim_start)
+    brim = smoothstep(np.abs(cosine), RULES.brim_end, RULES.brim_start)
     facing = solidity * front + (1 - solidity) * brim
     photo = seen * carried if kind.has_colors else carried
     body = (1 - photo) * solidity
@@ -130,8 +95,8 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         weight=weight,
         photo=photo,
         body=body,
-        matted=_ramp(stretch, RULES.matte_end, RULES.matte_start)
-        * _ramp(cosine - rest.cosines[index], RULES.turned_end, RULES.turned_start),
+        matted=smoothstep(stretch, RULES.matte_end, RULES.matte_start)
+        * smoothstep(cosine - rest.cosines[index], RULES.turned_end, RULES.turned_start),
         solidity=solidity,
         seen=seen,
         color=gaussians.colors[index].astype(np.float64),
@@ -162,18 +127,7 @@ def _cosines(normals: F64, motion: F64, means: F64) -> F64:
     return -(moved * means).sum(1) / np.maximum(lengths, 1e-30)
 
 
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """One Gaussian at the pixels of its box."""
-
-    window: tuple[slice, slice]
-    alpha: F64  # (h, w)
-    gradient: F64  # (h, w, 2) of alpha, per px
-    depth: F64  # (h, w)
-    shift: F64  # (h, w, 2)
-
-
-def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> _Samples | None:
+def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> Samples | None:
     """Gaussian `i` on the pixels that it may touch, None where there are none."""
     kind = splats.rest.splatting
     x0, y0 = np.floor(p.centre[i] - p.extent[i]).astype(int).clip(0, (camera.width, camera.height))
@@ -191,7 +145,7 @@ def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> _Samp
     depth = p.depth[i] + p.slope[i, 0] * dx + p.slope[i, 1] * dy
     shift = p.shift[i] + np.stack([dx, dy], -1) @ p.shift_slope[i].T
     window = (slice(y0, y1), slice(x0, x1))
-    return _Samples(window, alpha, np.where(alpha[..., None] > 0, gradient, 0), depth, shift)
+    return Samples(window, alpha, np.where(alpha[..., None] > 0, gradient, 0), depth, shift)
 
 
 def render(
@@ -203,14 +157,14 @@ def render(
     there = [(i, s) for i, s in enumerate(samples) if s is not None]
     if not splats.is_layered:
         return _composite_one_by_one(p, there, camera)
-    out = _Composite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
+    out = Composite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
     fronts: list[_Front] = []
     for layer in range(LAYERS):
         shares = {i: _remaining(p, i, s, fronts, splats) for i, s in there}
         front = _find_front(p, there, shares, camera)
         if np.isinf(front.depth).all():
             break
-        sums = _Sums(camera.height, camera.width)
+        sums = Sums(camera.height, camera.width)
         for i, s in there:
             member = shares[i] * (front.depth[s.window] < np.inf)
             if layer < LAYERS - 1:
@@ -222,7 +176,7 @@ def render(
 
 
 def _composite_one_by_one(
-    p: Projected, there: list[tuple[int, _Samples]], camera: Camera
+    p: Projected, there: list[tuple[int, Samples]], camera: Camera
 ) -> Picture3D:
     """Step 3. The depth is that of the sample with which alpha reaches a half, else the mean."""
     shape = (camera.height, camera.width)
@@ -253,7 +207,7 @@ class _Front:
 
 
 def _find_front(
-    p: Projected, there: list[tuple[int, _Samples]], shares: dict[int, F64], camera: Camera
+    p: Projected, there: list[tuple[int, Samples]], shares: dict[int, F64], camera: Camera
 ) -> _Front:
     """The nearest samples of those that are left: `shares` of each, (h, w) of its box."""
     shape = (camera.height, camera.width)
@@ -268,7 +222,7 @@ def _find_front(
     return _Front(depth, shift, is_photo)
 
 
-def _membership(p: Projected, i: int, s: _Samples, front: _Front, splats: PosedSplats) -> F64:
+def _membership(p: Projected, i: int, s: Samples, front: _Front, splats: PosedSplats) -> F64:
     """(h, w) of a box: how much of a sample belongs to the layer of `front`."""
     depth, shift = front.depth[s.window], front.shift[s.window]
     there = np.isfinite(depth)
@@ -276,133 +230,12 @@ def _membership(p: Projected, i: int, s: _Samples, front: _Front, splats: PosedS
     if p.photo[i] > 0:
         looks = np.linalg.norm(s.shift - shift, axis=-1) / splats.texture_gap
         away = np.where(front.is_photo[s.window], np.maximum(away, looks), away)
-    return _ramp(away**2, RULES.fade**2, 1.0)
+    return smoothstep(away**2, RULES.fade**2, 1.0)
 
 
-def _remaining(p: Projected, i: int, s: _Samples, fronts: list[_Front], splats: PosedSplats) -> F64:
+def _remaining(p: Projected, i: int, s: Samples, fronts: list[_Front], splats: PosedSplats) -> F64:
     """(h, w) of a box: the share of a sample that belongs to none of the layers so far."""
     left = np.ones(s.alpha.shape)
     for front in fronts:
         left = left * (1 - _membership(p, i, s, front, splats))
     return left
-
-
-class _Sums:
-    """Over the samples of one layer, per pixel."""
-
-    def __init__(self, height: int, width: int) -> None:
-        self.total = np.zeros((height, width))  # of alpha
-        self.body = np.zeros((height, width))  # of it, what the photo does not give
-        self.slope = np.zeros((height, width, 2))  # gradient of `total`
-        self.body_slope = np.zeros((height, width, 2))
-        self.clear = np.ones((height, width))  # product of 1 - alpha
-        self.body_clear = np.ones((height, width))
-        self.depth = np.zeros((height, width))
-        self.shift = np.zeros((height, width, 2))
-        self.matted = np.zeros((height, width))
-        self.unmatted = np.zeros((height, width))  # solidity of the part that is not matted
-        self.magnified = np.zeros((height, width))
-        self.seen = np.zeros((height, width))
-        self.color = np.zeros((height, width, 3))
-
-    def add(self, p: Projected, i: int, s: _Samples, member: F64) -> None:
-        """Adds a Gaussian's samples; `member` (h, w) is how much of them belongs here."""
-        at, alpha = s.window, member * s.alpha
-        gradient = member[..., None] * s.gradient
-        photo, body = alpha * p.photo[i], alpha * p.body[i]
-        both = p.photo[i] + p.body[i]
-        self.total[at] += alpha * both
-        self.body[at] += body
-        self.slope[at] += gradient * both
-        self.body_slope[at] += gradient * p.body[i]
-        self.clear[at] *= 1 - np.minimum(alpha * both, 1)
-        self.body_clear[at] *= 1 - np.minimum(body, 1)
-        self.depth[at] += alpha * both * s.depth
-        self.shift[at] += photo[..., None] * s.shift
-        self.matted[at] += photo * p.matted[i]
-        self.unmatted[at] += photo * (1 - p.matted[i]) * p.solidity[i]
-        self.magnified[at] += photo * max(p.magnified[i] / RULES.sharp, 1.0)
-        self.seen[at] += photo * p.seen[i]
-        self.color[at] += body[..., None] * p.color[i]
-
-
-class _Composite:
-    """Layers over one another, front to back (steps 5 to 7)."""
-
-    def __init__(
-        self, texture: TextureLevels, camera: Camera, photo_camera: Camera, is_surface: bool
-    ) -> None:
-        self.texture, self.camera, self.photo_camera = texture, camera, photo_camera
-        self.is_surface = is_surface
-        shape = (camera.height, camera.width)
-        self.color = np.zeros((*shape, 3))
-        self.alpha = np.zeros(shape)
-        self.depth = np.full(shape, np.inf)
-        self.from_photo = np.zeros(shape)
-        self.shift = np.zeros((*shape, 2))
-        self.last_shift = np.zeros((*shape, 2))  # of the previous layer
-        self.last_share = np.zeros(shape)  # of it, that shows the photo
-        self.last_through = np.ones(shape)  # transmittance before it
-        self.last_whole = np.zeros(shape)  # its coverage
-
-    def add(self, layer: _Sums) -> None:
-        """Composites the next layer."""
-        at = np.nonzero(layer.total > 0)
-        total, body = layer.total[at], layer.body[at]
-        photo = np.maximum(total - body, 0)
-        is_photo = photo > 1e-6 * total
-        weight = np.maximum(photo, 1e-30)
-        shift = layer.shift[at] / weight[:, None]
-        ratio = self.photo_camera.focal / self.camera.focal
-        xy = np.stack([at[1], at[0]], 1) + 0.5 - [self.camera.cx, self.camera.cy]
-        look = xy * ratio + [self.photo_camera.cx, self.photo_camera.cy] + shift
-        look = np.where(is_photo[:, None], look, 0)
-        lod = np.log2(np.maximum(layer.magnified[at] / weight, 1.0))
-        sample = sample_texture(self.texture, look, lod)
-        matte = (sample[:, 3] * layer.matted[at] + layer.unmatted[at]) / weight
-        matte = np.where(is_photo, matte, 0.0)
-        if self.is_surface:
-            whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
-            solid = _coverage(body, np.linalg.norm(layer.body_slope[at], axis=1))
-        else:
-            whole, solid = 1 - layer.clear[at], 1 - layer.body_clear[at]
-        alpha = matte * whole + (1 - matte) * solid
-        shown = photo * matte
-        mixed = (shown[:, None] * sample[:, :3] + layer.color[at]) / np.maximum(
-            shown + body, 1e-30
-        )[:, None]
-        size = np.array([self.photo_camera.width, self.photo_camera.height])
-        within = ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
-        seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
-        distance = np.linalg.norm(shift - self.last_shift[at], axis=1)
-        same = _ramp(distance, RULES.apart, RULES.same_point)
-        share = np.where(is_photo, photo / total, 0.0)
-        same = same * share * self.last_share[at]
-        clear = 1 - self.alpha[at]
-        apart, split = clear * alpha, self.last_through[at] * (1 - self.last_whole[at]) * alpha
-        through = np.minimum(apart + same * (split - apart), clear)
-        self.last_through[at] = clear + same * (self.last_through[at] - clear)
-        covered = same * self.last_whole[at]
-        self.last_whole[at] = 1 - (1 - covered) * (1 - whole)
-        self.last_shift[at], self.last_share[at] = shift, share
-        first = np.isinf(self.depth[at]) & (alpha > RULES.visible)
-        first |= (self.alpha[at] < MEDIAN) & (self.alpha[at] + through >= MEDIAN)
-        self.depth[at] = np.where(first, layer.depth[at] / total, self.depth[at])
-        self.shift[at] = np.where((first & is_photo)[:, None], shift, self.shift[at])
-        self.color[at] += through[:, None] * mixed
-        self.from_photo[at] += through * seen
-        self.alpha[at] += through
-
-    def picture(self) -> Picture3D:
-        arrays = (self.color, self.alpha, self.depth, self.from_photo, self.shift)
-        return Picture3D(*(a.astype(np.float32) for a in arrays))
-
-
-def _ramp(value: np.ndarray, zero: float, one: float) -> np.ndarray:
-    t = np.clip((value - zero) / (one - zero), 0, 1)
-    return t * t * (3 - 2 * t)
-
-
-def _coverage(total: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    edge = (total - RULES.surface_level) / (RULES.edge_width * slope + 1e-6)
-    return np.clip(0.5 + edge, 0, 1)

@@ -18,7 +18,7 @@ from app.bench.scenes import Scene, cloud_scene, lift_scene
 from app.bench.timing import seconds
 from objectmorpher_core.document import Placement
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.raster.reference import Picture3D
+from objectmorpher_core.raster.reference_layers import Picture3D
 
 CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}  # DESIGN section 6
 ALWAYS = CONTRACT | {"scene", "frame_least_ms", "first_frame_ms", "solve_ms"}

@@ -31,7 +31,7 @@ from ...pixels import unit_pixels
 from ...progress import Progress, part, silent
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats
-from ...raster.reference import Picture3D
+from ...raster.reference_layers import Picture3D
 from ...segment import SelectionError
 from . import TrainingError, pose_sources
 from .pictures import Picture

@@ -57,8 +57,16 @@ def triplets_in(folder: Path) -> tuple[Stored, ...]:
     found = [
         Stored(str(name), at.parent)
         for at in sorted(folder.glob(f"shard-*/{SHARD}"))
-        for name in read_json(at)["made"]
+        for name in _made(at)
     ]
     if not found:
         raise TrainingError(f"no triplet of {folder} was good enough: see its {SHARD} files")
     return tuple(found)
+
+
+def _made(at: Path) -> list[object]:
+    """Names of a shard's triplets. Raises TrainingError."""
+    made = read_json(at).get("made")
+    if not isinstance(made, list):
+        raise TrainingError(f"{at} does not say which triplets were made")
+    return made

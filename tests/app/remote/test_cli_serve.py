@@ -27,6 +27,9 @@ ROOT = Path(__file__).parents[3]
         (("--replicas", "many"), "MIN or MIN,MAX"),
         (("--port", "99999"), "numbers above zero"),
         (("--max-body", "0"), "numbers above zero"),
+        (("--cpus", "nan"), "numbers above zero"),
+        (("--gpus", "-1"), "number of GPUs"),
+        (("--store", "-5"), "number of MB"),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_a_sentence(

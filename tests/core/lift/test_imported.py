@@ -26,7 +26,7 @@ from objectmorpher_core.lift.imported import lift_imported
 from objectmorpher_core.lift.placement import Proposal, Registrar
 from objectmorpher_core.pipeline import export
 from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.raster.reference import Picture3D
+from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_core.segment.matte import build_matte
 from tests import shapes
 from tests.core.lift import registered

@@ -52,6 +52,13 @@ def test_triplets_come_back_as_they_were_made(tmp_path):
     assert found["reasons"] == {"every third is rejected": 2}
 
 
+def test_a_shard_that_does_not_say_what_it_holds_is_refused(tmp_path):
+    out = made_up.write_triplets(tmp_path / "out", 7, 3)
+    (out / "shard-00001" / "shard.json").write_text("{}")
+    with pytest.raises(TrainingError, match="does not say which triplets"):
+        triplets_in(out)
+
+
 def test_what_is_there_is_not_made_again_and_what_is_not_is(tmp_path):
     out = begun(tmp_path / "out")
     assert write_shard(out, PARTS[1], HOW, make=made_up.make)
