@@ -2,6 +2,7 @@
 
     python packaging/licences.py                 the table
     python packaging/licences.py --texts FOLDER  and every licence's text, for an installer
+    python packaging/licences.py --page          and docs/licences.md anew
 
 It looks at the environment it runs in. What may not be there: the GPL and AGPL, but for parts with
 the exception that GCC's run-time libraries have.
@@ -23,6 +24,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
+PAGE = PROJECT.parent / "docs" / "licences.md"
+EXTRAS = ("models", "cluster", "train")  # that people install; the others are for our own tests
+START, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 TEXT = re.compile(r"(^|/)(LICEN[CS]E|COPYING|COPYRIGHT|NOTICE|AUTHORS)[^/]*$", re.I)
 COPYLEFT = re.compile(r"(?<!L)(AGPL|GPL|Affero|(?<!Lesser )General Public License)", re.I)
 LESSER = re.compile(r"LGPL|Lesser General Public|Library General Public", re.I)
@@ -72,6 +76,20 @@ def run_time(project: Path = PROJECT) -> list[Distribution]:
     return [found[name] for name in sorted(found)]
 
 
+def of_extras(project: Path = PROJECT) -> dict[str, list[Licence]]:
+    """What each of EXTRAS asks for, those packages that are in this environment."""
+    told = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    found: dict[str, list[Licence]] = {}
+    for extra in EXTRAS:
+        found[extra] = []
+        for line in told[extra]:
+            try:
+                found[extra].append(licence_of(distribution(Requirement(line).name)))
+            except PackageNotFoundError as error:
+                raise LookupError(f"{line} is not installed here") from error
+    return found
+
+
 def licence_of(package: Distribution) -> Licence:
     """By its expression, its classifiers or its words, the first of them that is there."""
     about = package.metadata
@@ -111,15 +129,35 @@ def table(licences: list[Licence]) -> str:
     return "\n".join(f"{n:{widths[0]}}  {v:{widths[1]}}  {t}" for n, v, t in rows)
 
 
+def in_page(licences: list[Licence]) -> str:
+    """In Markdown."""
+    lines = ["| package | licence |", "|---|---|"]
+    lines += [f"| {one.package} | {one.terms} |" for one in licences]
+    return "\n".join(lines) + "\n"
+
+
+def write_page(page: Path = PAGE) -> None:
+    """The tables of docs/licences.md between their marks. Raises LookupError."""
+    tables = {"run-time": [licence_of(package) for package in run_time()], **of_extras()}
+    text = page.read_text(encoding="utf-8")
+    for name, licences in tables.items():
+        start, end = text.index(START.format(name)), text.index(END.format(name))
+        text = text[:start] + START.format(name) + in_page(licences) + text[end:]
+    page.write_text(text, encoding="utf-8")
+
+
 def main() -> int:
     """Prints the table; 1 where a licence may not be there."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--texts", type=Path, metavar="FOLDER")
+    parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
     licences = [licence_of(package) for package in run_time()]
     sys.stdout.write(table(licences) + "\n")
     if options.texts is not None:
         write_texts(licences, options.texts)
+    if options.page:
+        write_page()
     bad = [one.package for one in licences if one.is_copyleft or not one.terms]
     if bad:
         sys.stderr.write(f"may not be shipped, or says nothing: {', '.join(bad)}\n")

@@ -46,6 +46,13 @@ def test_no_package_that_is_needed_to_run_is_under_the_gpl() -> None:
     assert [(one.package, one.terms) for one in found if one.is_copyleft] == []
 
 
+def test_the_page_names_all_that_is_needed_to_run() -> None:
+    page = licences.PAGE.read_text("utf-8")
+    table = page[page.index(licences.START.format("run-time")) :]
+    names = set(re.findall(r"^\| ([a-z0-9-]+) \|", table[: table.index("## ")], re.M))
+    assert names - {"package"} == {package.name.lower() for package in licences.run_time()}
+
+
 def test_no_text_of_theirs_is_the_gpl_but_for_gccs_libraries() -> None:
     for one in map(licences.licence_of, licences.run_time()):
         for text in one.texts:
