@@ -1,6 +1,6 @@
 """Run as a program by the tests: work on a Ray of two nodes on this machine, workers killed.
 
-Arguments: a folder with scripts/, out/ and truth/. Prints what happened as JSON.
+Arguments: a folder with scripts/, out/, truth/ and subjects/. Prints what happened as JSON.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from app import cli
+from app import cli, cli_paper
 from app.remote import truth_photos
 from app.remote.spread import spread
+from objectmorpher_core.evaluation.subjects.folders import read_subjects
 from objectmorpher_core.evaluation.truth.running import claim
 
 PHOTOS = (0, 1, 2)
@@ -45,10 +46,19 @@ def main(folder: Path) -> None:
     jobs = [asked | {"photo": k} for k in PHOTOS]
     photos = [answer["name"] for answer in spread(truth_photos._photo, jobs, cluster.address)]
     killed.append(killing.stopped())
+    subjects = run_subjects(folder, cluster.address)
     done = [truth_photos._jobs(asked)[k].is_done for k in PHOTOS]
     cluster.shutdown()
     told = {"status": status, "killed": killed, "photos": photos, "done": done}
+    told["subjects"] = subjects
     print(json.dumps(told | {"batch": json.loads(report.read_text())}))
+
+
+def run_subjects(folder: Path, address: str) -> list[str]:
+    """What `evaluate paper --run` says that it could not edit."""
+    words = ["evaluate", "paper", str(folder / "subjects"), "--run", str(folder / "ours")]
+    options = cli.build_parser().parse_args([*words, "--ray", address])
+    return list(cli_paper.run_ours(options, read_subjects(options.folder)))
 
 
 class Killing:

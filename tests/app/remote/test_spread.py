@@ -52,8 +52,20 @@ def write_scripts(at: Path) -> None:
     (at / "none.json").write_text(json.dumps(common | {"photo": "nowhere.png"}))
 
 
+def write_subjects(at: Path) -> None:
+    """One that can be edited, and one that names a lifter that does not exist."""
+    inside = shapes.mask("disc")
+    for name, more in (("a", {}), ("b", {"lift": "nobody"})):
+        (at / name).mkdir(parents=True)
+        (at / name / "image.png").write_bytes(shapes.png(shapes.picture(inside)))
+        (at / name / "m.png").write_bytes(shapes.mask_png(inside))
+        told = {"mask": "m.png", "inpaint": "telea", "turn": [9, 0, 0]} | more
+        (at / name / "guidance.json").write_text(json.dumps(told))
+
+
 def test_killed_workers_lose_nothing(folder: Path) -> None:
     write_scripts(folder / "scripts")
+    write_subjects(folder / "subjects")
     (folder / "out").mkdir()
     environment = os.environ | {"RAY_TMPDIR": str(folder), "RAY_USAGE_STATS_ENABLED": "0"}
     for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ADDRESS"):
@@ -81,4 +93,6 @@ def test_killed_workers_lose_nothing(folder: Path) -> None:
     own = folder / "own.png"
     assert cli.main(["edit", "--script", str(folder / "scripts/one.json"), "-o", str(own)]) == 0
     assert own.read_bytes() == (folder / "out" / f"many-{EDITS}.png").read_bytes()
+    assert [sentence[:3] for sentence in told["subjects"]] == ["b: "]
+    assert sorted(p.name for p in (folder / "ours").iterdir()) == ["a.jsonl", "a.png"]
     assert len(told["photos"]) == len(told["done"]) and all(told["done"])
