@@ -271,7 +271,7 @@ class Posing:
         editor.apply(label, editor.derived.solved(changed, editor.current, None))
 
     def send_back(self, handles: tuple[int, ...], label: str) -> None:
-        """These handles to where their points were in the photo; free to turn, if they are no pins."""
+        """These handles to where their points were in the photo; all but pins free to turn."""
         editor = self._editor
         if editor.document is None or editor.object is None or not handles:
             return
