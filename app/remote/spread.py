@@ -62,7 +62,8 @@ def _rows(perform: Perform, jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
     rows = [{"job": json.dumps(job)} for job in jobs]
     # A block a job: what is lost with a worker is one job, and one is asked for at a time.
     found = ray.data.from_items(rows, override_num_blocks=len(rows))
-    return iter(found.map(_answered, fn_args=(perform,), num_cpus=1).iter_rows())
+    answered: Any = _answered  # Ray's types know no `fn_args`
+    return iter(found.map(answered, fn_args=(perform,), num_cpus=1).iter_rows())
 
 
 def _answered(row: dict[str, Any], perform: Perform) -> dict[str, Any]:

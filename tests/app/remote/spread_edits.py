@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
@@ -28,15 +29,16 @@ ABLATION = "harmonise"
 def main(folder: Path) -> None:
     from ray.cluster_utils import Cluster
 
-    small = {"num_cpus": 1, "object_store_memory": 100 << 20}
+    small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 100 << 20}
     cluster = Cluster(initialize_head=True, head_node_args=small | {"include_dashboard": False})
     cluster.add_node(**small)
     cluster.wait_for_nodes()
+    address = str(cluster.address)
     out, truth = folder / "out", folder / "truth"
     killing = Killing(out, "*.png")
     report = folder / "report.json"
     status = cli.main([
-        "batch", str(folder / "scripts"), "-o", str(out), "--ray", cluster.address,
+        "batch", str(folder / "scripts"), "-o", str(out), "--ray", address,
         "--report", str(report),
     ])  # fmt: skip
     killed = [killing.stopped()]
@@ -44,9 +46,9 @@ def main(folder: Path) -> None:
     asked = {"folder": str(truth), "ablation": ABLATION, "seed": 0, "quick": True}
     killing = Killing(truth, "cases/*/*.json")
     jobs = [asked | {"photo": k} for k in PHOTOS]
-    photos = [answer["name"] for answer in spread(truth_photos._photo, jobs, cluster.address)]
+    photos = [answer["name"] for answer in spread(truth_photos._photo, jobs, address)]
     killed.append(killing.stopped())
-    subjects = run_subjects(folder, cluster.address)
+    subjects = run_subjects(folder, address)
     done = [truth_photos._jobs(asked)[k].is_done for k in PHOTOS]
     cluster.shutdown()
     told = {"status": status, "killed": killed, "photos": photos, "done": done}

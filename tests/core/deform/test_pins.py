@@ -10,7 +10,7 @@ import pytest
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings, Document
+from objectmorpher_core.document import DeformSettings, Document, Handle, Pose
 from objectmorpher_core.pose import turn_at
 from tests import shapes
 
@@ -41,8 +41,13 @@ def pulled(document: Document, is_pin: bool, **settings) -> tuple[Document, F64]
     item = document.objects[0]
     assert item.lifted is not None
     pose = Deformer(item.lifted, DeformSettings(**settings)).solve(item.handles).pose
-    turns = [np.linalg.norm(turn_at(pose, h.control_point)) for h in item.handles[:2]]
-    return edits.set_pose(document, 0, pose), np.array(turns)
+    return edits.set_pose(document, 0, pose), _turns(pose, item.handles)
+
+
+def _turns(pose: Pose, handles: tuple[Handle, ...]) -> F64:
+    """How far the first two are turned, rad."""
+    vectors = np.array([turn_at(pose, h.control_point) for h in handles[:2]])
+    return np.sqrt((vectors**2).sum(1))
 
 
 def test_a_body_does_not_roll_about_its_pins(document):
@@ -57,8 +62,9 @@ def test_a_pin_can_be_let_turn(document):
     for h in range(2):
         held = edits.turn_handle(held, 0, h, None)
     item = held.objects[0]
+    assert item.lifted is not None
     pose = Deformer(item.lifted, DeformSettings()).solve(item.handles).pose
-    assert min(np.linalg.norm(turn_at(pose, h.control_point)) for h in item.handles[:2]) > ROLLED
+    assert _turns(pose, item.handles).min() > ROLLED
 
 
 def test_the_papers_pins_hold_a_place_alone(document):
@@ -81,7 +87,7 @@ def test_a_pin_that_is_dragged_turns_freely(document):
     pinned = edits.add_handle(document, 0, on_top(0.0), is_pin=True)
     assert pinned.objects[0].handles[0].turn is not None
     assert edits.set_pin(pinned, 0, 0, False).objects[0].handles[0].turn is None
-    turned = edits.turn_handle(document := edits.add_handle(document, 0, on_top(0.0)), 0, 0,
-                               np.array([0.0, 0.0, 1.0]))  # fmt: skip
+    dragged = edits.add_handle(document, 0, on_top(0.0))
+    turned = edits.turn_handle(dragged, 0, 0, np.array([0.0, 0.0, 1.0]))
     kept = edits.set_pin(turned, 0, 0, True).objects[0].handles[0]
-    assert np.array_equal(kept.turn, (0.0, 0.0, 1.0))
+    assert kept.turn is not None and np.array_equal(kept.turn, (0.0, 0.0, 1.0))
