@@ -22,7 +22,7 @@ from app.remote.spread import spread
 from objectmorpher_core.evaluation.subjects.folders import read_subjects
 from objectmorpher_core.evaluation.truth.running import claim
 
-PHOTOS = (0, 1, 2)
+PHOTOS = (0, 1)  # of three edits in all
 ABLATION = "harmonise"
 
 

@@ -29,7 +29,7 @@ pytestmark = [
 ]
 
 HERE = Path(__file__).parent
-EDITS = 10
+EDITS = 6
 
 
 @pytest.fixture
