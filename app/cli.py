@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .cli_ray import add_ray
 from .options import RENDERERS, WindowOptions
 from .subcommands import Subcommand, add_subcommands, lazily
 from .terminal import FAILURES, PROGRAM, failure_sentence
@@ -197,6 +198,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--overwrite", action="store_true", help="also what is newer already")
     add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
+    add_ray(parser)
 
 
 def _add_select(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 """Many edit scripts, one after the other: `objectmorpher batch`.
 
 A failure does not stop the others. What was made already is left as it is, so that a batch that
-was stopped goes on where it was.
+was stopped goes on where it was. Each edit may be made on another machine (`remote/spread.py`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,16 @@ from typing import Any
 
 from objectmorpher_core.files import write_all
 from objectmorpher_core.image import ENDINGS, encode_picture
-from objectmorpher_core.script import BatchItem, ScriptError, beside, files_of, parse_scripts
+from objectmorpher_core.script import (
+    BatchItem,
+    beside,
+    files_of,
+    parse_scripts,
+    script_text,
+)
 
 from .cli_commands import check_outputs, edited_by, json_bytes
+from .cli_ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 USUAL_ENDING = ".png"
@@ -45,14 +52,15 @@ def run_batch(options: argparse.Namespace) -> None:
         check_outputs([], {options.report: (".json",)})
     if options.out is not None and not options.out.is_dir():
         raise UsageError(f"{options.out} is no folder")
+    check_ray(options)
     tasks = list(_tasks(options))
     if not tasks:
         raise UsageError("there is no script to run")
-    entries: list[dict[str, Any]] = []
-    for task in tasks:
-        entries.append(_entry(task, options.overwrite))
-        _say(entries[-1])
-    _finish(entries, options.report)
+    entries: dict[int, dict[str, Any]] = {}
+    for number, entry in _entries(tasks, options):
+        entries[number] = entry
+        _say(entry)
+    _finish([entries[number] for number in sorted(entries)], options.report)
 
 
 def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
@@ -68,20 +76,59 @@ def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
         raise RuntimeError(f"{counts['failed']} of {len(entries)} edits failed")
 
 
-def _entry(task: Task, is_overwriting: bool) -> dict[str, Any]:
-    """What became of an edit."""
-    entry: dict[str, Any] = {"script": str(task.script), "out": task.name}
+def _entries(
+    tasks: list[Task], options: argparse.Namespace
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """What became of each edit, with its number: in their order, or as a cluster is done."""
+    if options.ray is None:
+        for number, task in enumerate(tasks):
+            known = _known(task, options.overwrite)
+            yield number, _told(task) | (known or _outcome(task.item))
+        return
+    from .remote.spread import spread
+
+    jobs = []
+    for number, task in enumerate(tasks):
+        if (known := _known(task, options.overwrite)) is not None:
+            yield number, _told(task) | known
+        elif task.item is not None:
+            text = script_text(beside(task.item, Path.cwd()))  # with whole paths
+            jobs.append({"number": number, "edit": text})
+    for answer in spread(_made_there, jobs, options.ray):
+        number = answer["number"]
+        yield number, _told(tasks[number]) | answer["outcome"]
+
+
+def _made_there(job: dict[str, Any]) -> dict[str, Any]:
+    """In a worker of a cluster: one edit."""
+    (item,) = parse_scripts(job["edit"])
+    return {"number": job["number"], "outcome": _outcome(item)}
+
+
+def _told(task: Task) -> dict[str, Any]:
+    return {"script": str(task.script), "out": task.name}
+
+
+def _known(task: Task, is_overwriting: bool) -> dict[str, Any] | None:
+    """What becomes of an edit that is not to be made."""
+    if task.item is None or task.problem:
+        return {"state": "failed", "error": task.problem}
+    try:
+        is_kept = not is_overwriting and _is_newer(task)
+    except FAILURES as error:
+        return {"state": "failed", "error": failure_sentence(error)}
+    return {"state": "kept", "seconds": 0.0} if is_kept else None
+
+
+def _outcome(item: BatchItem | None) -> dict[str, Any]:
+    assert item is not None, "a task without an edit has a problem"
     start = time.perf_counter()
     try:
-        if task.item is None or task.problem:
-            raise ScriptError(task.problem)
-        if not is_overwriting and _is_newer(task):
-            return entry | {"state": "kept", "seconds": 0.0}
-        figures = _edit(task.item)
+        figures = _edit(item)
     except FAILURES as error:
-        return entry | {"state": "failed", "error": failure_sentence(error)}
+        return {"state": "failed", "error": failure_sentence(error)}
     seconds = round(time.perf_counter() - start, 3)
-    return entry | {"state": "done", "seconds": seconds, "report": figures}
+    return {"state": "done", "seconds": seconds, "report": figures}
 
 
 def _edit(item: BatchItem) -> dict[str, Any]:

@@ -7,10 +7,12 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .cli_figures import Number, aligned, cell, number, numbers
+from .cli_ray import add_ray, check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ def add_paper(parser: argparse.ArgumentParser) -> None:
     add("--run", dest="ours", type=Path, metavar="DIR",
         help=f"edit every subject with this program, into DIR, as the method {OURS}")  # fmt: skip
     add("--overwrite", action="store_true", help="also what --run has made already")
+    add_ray(parser)
     add("--weights", type=Path, metavar="DIR", help="official weights, as for metrics")
     add("--seed", type=int, default=0, metavar="N", help="of the intervals")
     add("--json", type=Path, metavar="FILE", help="every figure, also of every subject")
@@ -49,13 +52,16 @@ def run_paper(options: argparse.Namespace) -> None:
         raise UsageError("--seed is at least 0")
     if options.weights is not None and not options.weights.is_dir():
         raise UsageError(f"there is no folder {options.weights}")
+    check_ray(options)
+    if options.ray is not None and options.ours is None:
+        raise UsageError("--ray spreads what --run edits; without --run there is nothing to spread")
     methods = dict(options.results)
     if len(methods) < len(options.results) or (options.ours and OURS in methods):
         raise UsageError("--results: two methods have the same name")
     subjects = read_subjects(options.folder, methods)
     left: tuple[str, ...] = ()
     if options.ours is not None:
-        left = _run_ours(subjects, options.ours, options.overwrite)
+        left = run_ours(options, subjects)
         if len(left) == len(subjects):
             raise UsageError(f"none of the subjects could be edited: {left[0]}")
         subjects = with_results(subjects, OURS, options.ours)
@@ -130,37 +136,73 @@ def as_json(table: Table) -> dict[str, Any]:
     }
 
 
-def _run_ours(subjects: Sequence[Subject], folder: Path, is_overwriting: bool) -> tuple[str, ...]:
+def run_ours(options: argparse.Namespace, subjects: Sequence[Subject]) -> tuple[str, ...]:
     """Edits every subject into the folder; what was made already stays. Why some were not."""
-    from objectmorpher_core.evaluation.paper.interaction_log import encode_events
-    from objectmorpher_core.evaluation.paper.timed_run import run_subject
-    from objectmorpher_core.files import write_all
-    from objectmorpher_core.image import encode_picture
-    from objectmorpher_core.warm_up import warm_up
-
-    left = []
-    is_warm = False
+    folder, left = options.ours, []
+    wanted = []
     for subject in subjects:
-        picture = folder / f"{subject.name}.png"
-        log = picture.with_suffix(".jsonl")
-        if picture.is_file() and log.is_file() and not is_overwriting:
+        is_made = all(path.is_file() for path in _made(folder, subject.name))
+        if is_made and not options.overwrite:
             continue
         if subject.guidance.item is None:
             left.append(f"{subject.name}: {subject.guidance.reason}")
             continue
-        if not is_warm:  # compiling is an installation's time, not an edit's
-            warm_up()
-            is_warm = True
-        try:
-            with progress_bar(subject.name) as progress:
-                timed = run_subject(subject, progress)
-        except FAILURES as error:
-            left.append(f"{subject.name}: {failure_sentence(error)}")
-            continue
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        pixels = encode_picture(timed.picture, ".png")
-        write_all({picture: pixels, log: encode_events(timed.events)})
+        wanted.append(subject)
+    if options.ray is not None:
+        from .remote.spread import spread
+
+        at = {"source": str(options.folder.absolute()), "folder": str(folder.absolute())}
+        jobs = [at | {"name": subject.name} for subject in wanted]
+        with progress_bar("Editing") as progress:
+            for done, answer in enumerate(spread(_run_there, jobs, options.ray), 1):
+                left += answer["left"]
+                progress(done / len(jobs), answer["name"])
+    else:
+        left += [told for subject in wanted for told in _run_one(subject, folder)]
     return tuple(left)
+
+
+def _run_there(job: dict[str, Any]) -> dict[str, Any]:
+    """In a worker of a cluster: one subject."""
+    from objectmorpher_core.evaluation.subjects.folders import read_subjects
+
+    subjects = {subject.name: subject for subject in read_subjects(Path(job["source"]), {})}
+    name = job["name"]
+    return {"name": name, "left": _run_one(subjects[name], Path(job["folder"]))}
+
+
+def _run_one(subject: Subject, folder: Path) -> list[str]:
+    """Edits a subject; why not, if not."""
+    from objectmorpher_core.evaluation.paper.interaction_log import encode_events
+    from objectmorpher_core.evaluation.paper.timed_run import run_subject
+    from objectmorpher_core.files import write_all
+    from objectmorpher_core.image import encode_picture
+
+    _warm_up()
+    try:
+        with progress_bar(subject.name) as progress:
+            timed = run_subject(subject, progress)
+    except FAILURES as error:
+        return [f"{subject.name}: {failure_sentence(error)}"]
+    picture, log = _made(folder, subject.name)
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    pixels = encode_picture(timed.picture, ".png")
+    write_all({picture: pixels, log: encode_events(timed.events)})
+    return []
+
+
+@cache
+def _warm_up() -> None:
+    """Once: compiling is an installation's time, not an edit's."""
+    from objectmorpher_core.warm_up import warm_up
+
+    warm_up()
+
+
+def _made(folder: Path, name: str) -> tuple[Path, Path]:
+    """The picture and its log."""
+    picture = folder / f"{name}.png"
+    return picture, picture.with_suffix(".jsonl")
 
 
 def named_folder(text: str) -> tuple[str, Path]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from objectmorpher_core.files import write_all
 
+from .cli_ray import add_ray, check_ray
 from .subcommands import Subcommand, add_subcommands
 from .terminal import UsageError, progress_bar
 
@@ -67,8 +68,7 @@ def _add_pairs(parser: argparse.ArgumentParser) -> None:
     add("--size", type=int, default=1024, metavar="PX", help="longer side at most, default 1024")
     add("--least-iou", type=float, metavar="X", help="of the outlines, registered; default 0.75")
     add("--shard-size", type=int, default=32, metavar="N", help="pairs of a shard, default 32")
-    add("--ray", metavar="ADDRESS",
-        help="spread over a Ray cluster; local starts one here; default without Ray")  # fmt: skip
+    add_ray(parser)
     add("--made", type=int, default=0, metavar="N", help="first fill SOURCE with N made-up pairs")
     add("--seed", type=int, default=0, metavar="N", help="of all that is random")
 
@@ -112,8 +112,7 @@ def _make_pairs(options: argparse.Namespace) -> None:
     from objectmorpher_core.training.composition.sources import Looking, find_pairs
     from objectmorpher_core.training.composition.triplet import How, Limits
 
-    if options.ray is not None and (absent := _absent("ray", "pyarrow", "pandas")):
-        raise UsageError(f"--ray needs {absent}: `pip install 'objectmorpher[cluster]'`")
+    check_ray(options)
     if options.size < 64 or options.made < 0:
         raise UsageError("--size is at least 64 px, --made not negative")
     least = {} if options.least_iou is None else {"least_iou": options.least_iou}

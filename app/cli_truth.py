@@ -7,6 +7,9 @@ import json
 import sys
 from pathlib import Path
 
+from objectmorpher_core.progress import Progress
+
+from .cli_ray import add_ray, check_ray
 from .terminal import UsageError, progress_bar
 
 ABLATIONS = ("mesh", "harmonise", "links", "deform", "iterations", "camera")
@@ -30,6 +33,7 @@ def _add_made(parser: argparse.ArgumentParser) -> None:
         help="for cases, results and report; a run that was broken off goes on there")  # fmt: skip
     add("--quick", action="store_true", help="12 cases instead of all")
     add("--seed", type=int, default=0, metavar="N", help="of the made photos")
+    add_ray(parser)
 
 
 def run_made(options: argparse.Namespace) -> None:
@@ -42,9 +46,12 @@ def run_made(options: argparse.Namespace) -> None:
 
     if options.seed < 0:
         raise UsageError("--seed is at least 0")
+    check_ray(options)
     is_all = options.what == "truth"
     methods = METHODS if is_all else ABLATIONS[options.name]
     with progress_bar("Making the cases") as progress:
+        if options.ray is not None:
+            _run_spread(options, progress)  # what is in the folder then is not computed again
         rows = run(options.folder, methods, options.seed, options.quick, progress)
     table = build_table(rows, methods)
     for figure in ("psnr", "dinov2", "iou"):
@@ -55,3 +62,11 @@ def run_made(options: argparse.Namespace) -> None:
     outputs = {".html": page, ".csv": as_csv(rows), ".json": told}
     write_all({options.folder / (name + end): text.encode() for end, text in outputs.items()})
     sys.stdout.write(f"Pictures and all figures: {options.folder / name}.html, .csv, .json\n")
+
+
+def _run_spread(options: argparse.Namespace, progress: Progress) -> None:
+    """Fills the folder on a cluster, a photo with all its cases and methods after the other."""
+    from .remote.truth_photos import run_photos
+
+    whose = "" if options.what == "truth" else options.name
+    run_photos(options.folder, whose, options.seed, options.quick, options.ray, progress)

@@ -163,6 +163,7 @@ def add_handle(
 ) -> Document:
     """A handle on the rest surface `point` (3,) of object `k`; it stays until it is dragged.
 
+    A pin is held as it is turned, too: about points of its front alone a body would roll.
     Raises EditError where another handle has the same control point and another displacement.
     """
     item = document.objects[k]
@@ -176,7 +177,7 @@ def add_handle(
             if np.linalg.norm(moves[0] - moves[1]) > SAME_PLACE:
                 raise EditError("two points take the same control point to different places")
             return document
-    handle = Handle(index, np.asarray(point, dtype=np.float64), target, is_pin)
+    handle = Handle(index, np.asarray(point, dtype=np.float64), target).pinned(is_pin, item.pose)
     return document.with_object(k, replace(item, handles=(*item.handles, handle)))
 
 
@@ -204,9 +205,9 @@ def turn_handle(document: Document, k: int, h: int, turn: np.ndarray | None) -> 
 
 
 def set_pin(document: Document, k: int, h: int, is_pin: bool) -> Document:
-    """Whether handle `h` of object `k` is there to hold, or to be dragged."""
+    """Whether handle `h` of object `k` is there to hold, or to be dragged and to turn freely."""
     item = document.objects[k]
-    changed = replace(item.handles[h], is_pin=is_pin)
+    changed = item.handles[h].pinned(is_pin, item.pose)
     handles = tuple(changed if i == h else other for i, other in enumerate(item.handles))
     return document.with_object(k, replace(item, handles=handles))
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import F64, frozen
+from .rotations import vector_from_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,13 @@ class Handle:
         if self.turn is not None:
             object.__setattr__(self, "turn", frozen(self.turn, np.float64))
 
+    def pinned(self, is_pin: bool, pose: Pose | None) -> Handle:
+        """As a pin, which is held as it is turned in `pose`; or to be dragged, as it comes."""
+        if is_pin == self.is_pin:
+            return self
+        turn = turn_at(pose, self.control_point) if self.turn is None else self.turn
+        return replace(self, is_pin=is_pin, turn=turn if is_pin else None)
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -37,3 +45,8 @@ class Pose:
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, np.float64))
         object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
+
+
+def turn_at(pose: Pose | None, control_point: int) -> F64:
+    """The rotation vector (3,) of a control point; of one at rest without a pose."""
+    return np.zeros(3) if pose is None else vector_from_matrix(pose.rotations[control_point])

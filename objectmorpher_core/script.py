@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +133,30 @@ def parse_scripts(text: str) -> tuple[BatchItem, ...]:
     if not items:
         raise ScriptError("the script is empty")
     return tuple(_batch_item(item) for item in items)
+
+
+def script_text(item: BatchItem) -> str:
+    """JSON of which `parse_scripts` makes this one item."""
+    told: dict[str, Any] = {"photo": item.photo, "out": item.out, **_said_by(item.script)}
+    told = {key: value for key, value in told.items() if value is not None}
+    if item.others.objects:
+        told["objects"] = [_told(each) for each in item.others.objects]
+    if item.others.order:
+        told["order"] = list(item.others.order)
+    return json.dumps(told)
+
+
+def _told(each: FurtherObject) -> dict[str, Any]:
+    told = _said_by(each.script, each.said)
+    told |= {} if each.duplicate is None else {"duplicate": each.duplicate}
+    return told | ({"stay_in_front": True} if each.stay_in_front else {})
+
+
+def _said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
+    """The options that are no defaults, and those of `said`."""
+    default = asdict(EditScript())
+    told = asdict(script).items()
+    return {name: v for name, v in told if name in said or v != default[name]}
 
 
 def beside(item: BatchItem, folder: Path) -> BatchItem:

@@ -87,8 +87,8 @@ class Mirroring:
             target = point + plane.mirrored_vector(handle.target - handle.point)
             document = edits.move_handle(document, k, partner, target)
             turn = None if handle.turn is None else plane.mirrored_turn(handle.turn)
-            document = edits.turn_handle(document, k, partner, turn)
             document = edits.set_pin(document, k, partner, handle.is_pin)
+            document = edits.turn_handle(document, k, partner, turn)
         return document
 
     def _with_partner(

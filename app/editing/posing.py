@@ -10,7 +10,8 @@ import numpy as np
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.document import Document
-from objectmorpher_core.rotations import turned_by, vector_from_matrix
+from objectmorpher_core.pose import turn_at
+from objectmorpher_core.rotations import turned_by
 
 from ..derived import Spot
 from ..texts import t
@@ -76,11 +77,7 @@ class Posing:
         editor = self._editor
         assert editor.object is not None
         own, pose = editor.object.handles[handle], editor.object.pose
-        if own.turn is not None:
-            return own.turn
-        if pose is None:
-            return np.zeros(3)
-        return vector_from_matrix(pose.rotations[own.control_point])
+        return turn_at(pose, own.control_point) if own.turn is None else own.turn
 
     @property
     def is_restless(self) -> bool:
@@ -274,14 +271,15 @@ class Posing:
         editor.apply(label, editor.derived.solved(changed, editor.current, None))
 
     def send_back(self, handles: tuple[int, ...], label: str) -> None:
-        """These handles to where their points were in the photo, and free to turn."""
+        """These handles to where their points were in the photo; all but pins free to turn."""
         editor = self._editor
         if editor.document is None or editor.object is None or not handles:
             return
         changed, k = editor.document, editor.current
         for h in handles:
-            changed = edits.move_handle(changed, k, h, editor.object.handles[h].point)
-            changed = edits.turn_handle(changed, k, h, None)
+            own = editor.object.handles[h]
+            changed = edits.move_handle(changed, k, h, own.point)
+            changed = edits.turn_handle(changed, k, h, np.zeros(3) if own.is_pin else None)
         changed = self.mirroring.followed(changed, handles)
         editor.apply(label, editor.derived.solved(changed, k, None))
 

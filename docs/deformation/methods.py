@@ -53,6 +53,11 @@ def _solve(deformer: Deformer, handles: Handles) -> Pose:
     return deformer.solve(handles).pose
 
 
+def _hinged(deformer: Deformer, handles: Handles) -> Pose:
+    """Pins hold a place, not a turn."""
+    return _solve(deformer, tuple(replace(h, turn=None) if h.is_pin else h for h in handles))
+
+
 def _three_iterations(deformer: Deformer, handles: Handles) -> Pose:
     deformer.prepare(handles)
     rotations = deformer.rest().rotations
@@ -89,10 +94,11 @@ LAPLACIAN = Method("Laplacian instead of ARAP", _built(mode="laplacian"), _solve
 PAPERS_LINKS = Method("The paper's links", with_papers_links, _solve, _skin)
 EUCLIDEAN = Method("Euclidean links", _built(links="euclidean"), _solve, _skin)
 STEPS = Method("The paper, dragged in 60 steps", _built(is_faithful=True), _stepwise, _skin)
+HINGES = Method("Pins that are hinges", _built(), _hinged, _skin)
 THREE = Method("3 iterations from rest", _built(), _three_iterations, _skin)
 EQ5 = Method("Eq. 5 skinning", _built(), _solve, _skin_by_eq5)
 PAPER = Method("The paper as printed", _built(is_faithful=True), _solve, _skin)
-METHODS = (OURS, LAPLACIAN, PAPERS_LINKS, EUCLIDEAN, THREE, EQ5, PAPER, STEPS)
+METHODS = (OURS, LAPLACIAN, PAPERS_LINKS, EUCLIDEAN, HINGES, THREE, EQ5, PAPER, STEPS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,7 @@ class Model:
         points = self.lifted.control_points.astype(np.float64)
         node = int(((points - near) ** 2).sum(1).argmin())
         is_pin = not np.any(move) and more.get("turn") is None
-        return Handle(node, points[node], points[node] + move, is_pin=is_pin, **more)
+        return Handle(node, points[node], points[node] + move, **more).pinned(is_pin, None)
 
     def handles(self, *all_near: tuple, motion: Callable[[F64], F64] = lambda p: p) -> tuple:
         """Handles at the control points nearest to some points, taken to `motion` of them."""
@@ -96,10 +96,8 @@ class Model:
             handle = self.handle(near)
             target = motion(handle.point)
             is_pin = bool(np.allclose(target, handle.point))
-            found.setdefault(
-                handle.control_point,
-                Handle(handle.control_point, handle.point, target, is_pin=is_pin),
-            )
+            own = Handle(handle.control_point, handle.point, target).pinned(is_pin, None)
+            found.setdefault(handle.control_point, own)
         return tuple(found.values())
 
 

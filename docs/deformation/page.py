@@ -27,6 +27,7 @@ red dots are where handles were dragged to.
   nothing of the surface, and weights with the mean length of a link as falloff. No struts: these
   are our links through the body, from one side of a limb to the other.
 - **Euclidean links**: our weights, but links by straight distance, and no struts.
+- **Pins that are hinges**: they hold a point, as the paper's do, not the turn of what is around it.
 - **3 iterations from rest**: the paper's number, from a cold start, instead of our sub-steps and
   iteration until nothing moves.
 - **Eq. 5 skinning**: our pose, but the Gaussians follow by the paper's Eq. 5.

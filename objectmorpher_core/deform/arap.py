@@ -79,9 +79,10 @@ class ArapSolver:
         give = np.concatenate([constraints.softness, np.zeros(len(constraints.held))])
         patch = self._patch(self._grounds[touched])
         self._held = HeldResponse(self._response, patch, csr_array(rows), give / self._typical)
-        nodes = constraints.nodes
-        self._follow = self._held.follow(len(nodes))[self._unknown]  # (M, H) of the handles
-        self._parting = self._follow[nodes] - self._follow[nodes[:, :1]]  # (H, K, H)
+        nodes, blended = constraints.nodes[constraints.blended], constraints.blended
+        follow = self._held.follow(len(constraints.nodes))[self._unknown]  # (M, H)
+        self._follow = follow[:, blended]  # (M, B) of the handles whose arms turn
+        self._parting = self._follow[nodes] - self._follow[nodes[:, :1]]  # (B, K, B)
 
     def aim(self, targets: Targets) -> None:
         """Gives the constraints other targets: nothing is factored for that."""
@@ -147,9 +148,10 @@ class ArapSolver:
         The global step met them for a linear blend. For fixed rotations the excess over it, e,
         is linear in the positions, and these follow the targets linearly: one small system.
         """
-        excess = self._constraints.excess(bends, turned, positions)
+        blended = self._constraints.blended  # the others have none
+        excess = self._constraints.excess(bends, turned, positions)[blended]
         size = excess.size
-        system = np.einsum("hkab,hkg->hagb", bends, self._parting).reshape(size, size)
+        system = np.einsum("hkab,hkg->hagb", bends[blended], self._parting).reshape(size, size)
         system.flat[:: size + 1] += 1.0
         excess = np.linalg.solve(system, excess.ravel()).reshape(-1, 3)
         positions -= product(self._follow, excess)

@@ -53,6 +53,11 @@ class Constraints:
         return not self.arms.any()
 
     @cached_property
+    def blended(self) -> I32:
+        """(B,) those that are no control points."""
+        return np.flatnonzero(self.arms.any((1, 2))).astype(np.int32)
+
+    @cached_property
     def _binding(self) -> Binding:
         return Binding(self.nodes, self.weights, np.zeros((*self.nodes.shape, 3)))
 

@@ -143,8 +143,14 @@ class Deformer:
         return self._limited(handles, has_auto_anchors, seconds)
 
     def _effective(self, handles: tuple[Handle, ...]) -> tuple[Handle, ...]:
-        """Those that move anything: what is frozen stays, and they with it."""
-        return tuple(h for h in handles if not self.rig.is_held(h.control_point))
+        """Those that move anything: what is frozen stays, and they with it.
+
+        The paper's pins hold a place, not a turn.
+        """
+        free = (h for h in handles if not self.rig.is_held(h.control_point))
+        if self.settings.is_faithful:
+            return tuple(replace(h, turn=None) if h.is_pin else h for h in free)
+        return tuple(free)
 
     def _rigid(self, handles: tuple[Handle, ...]) -> Pose | None:
         """The pose of handles that are all moved as one body: that motion, with no energy."""

@@ -24,12 +24,14 @@ from ..measures import dino
 from .cases import Case, Wanted, make_case, wanted_cases
 from .chain import Chain
 from .methods import OURS, Given, Method
+from .motions import RIGID
 from .outcome import Outcome
 from .scores import Score, score
 from .stereo import NAME as STEREO
 from .stereo import stereo_case
 
 VERSION = 1  # of the cases: raised when they change
+VIEW = "view"  # the stereo pair's category
 MIB = 1 << 20
 
 
@@ -56,6 +58,18 @@ class Job:
     methods: tuple[Method, ...]
     seed: int
 
+    @property
+    def name(self) -> str:
+        """Of what is in the photo."""
+        return self.wanted[0].setting.solid if self.wanted else STEREO
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all of it is in the folder."""
+        return all(
+            _is_whole(_kept_rows(self, name, category)) for name, category, _ in _cases(self)
+        )
+
 
 def run(
     folder: Path,
@@ -65,20 +79,27 @@ def run(
     progress: Progress = silent,
 ) -> list[Row]:
     """Every method on every case. Raises EvaluationError: one sentence."""
-    _claim(folder, seed)
+    claim(folder, seed)
+    jobs = jobs_of(folder, methods, seed, is_quick)
+    rows: list[Row] = []
+    for k, job in enumerate(jobs):
+        progress(k / len(jobs), job.name)
+        rows += run_photo(job)
+    progress(1.0, "Done")
+    return sorted(rows, key=lambda row: row.case)
+
+
+def jobs_of(
+    folder: Path, methods: Mapping[str, Method], seed: int = 0, is_quick: bool = False
+) -> list[Job]:
+    """One for each photo; they may be done in any order, and on several machines."""
     found = wanted_cases(seed, is_quick)
     by_photo = sorted(found, key=lambda w: (repr(w.setting), w.number))
     jobs = [
         Job(folder, tuple(own), tuple(methods.values()), seed)
         for _, own in groupby(by_photo, key=lambda w: w.setting)
     ]
-    jobs.append(Job(folder, (), tuple(methods.values()), seed))
-    rows: list[Row] = []
-    for k, job in enumerate(jobs):
-        progress(k / len(jobs), job.wanted[0].setting.solid if job.wanted else STEREO)
-        rows += run_photo(job)
-    progress(1.0, "Done")
-    return sorted(rows, key=lambda row: row.case)
+    return [*jobs, Job(folder, (), tuple(methods.values()), seed)]
 
 
 def run_photo(job: Job) -> list[Row]:
@@ -88,8 +109,8 @@ def run_photo(job: Job) -> list[Row]:
     rows: list[Row] = []
     for name, category, make in _cases(job):
         home = job.folder / "cases" / name
-        done = {m.name: _kept(home / f"{m.name}.json", name, category) for m in job.methods}
-        if all(done.values()):
+        done = _kept_rows(job, name, category)
+        if _is_whole(done):
             rows += [row for row in done.values() if row is not None]
             continue
         case = make()
@@ -99,11 +120,11 @@ def run_photo(job: Job) -> list[Row]:
         shared = time.perf_counter() - begun
         _write_case(home, case)
         own: dict[str, Row] = {}
-        for method in sorted(job.methods, key=lambda m: m.name != OURS):
+        for method in job.methods:
+            if method.name not in done:
+                continue
             if (kept := done[method.name]) is not None:
                 own[method.name] = kept
-                continue
-            if method.only_bends and case.guidance.rigid is not None and OURS in own:
                 continue
             row, outcome = _measured(given, method, shared, network)
             own[method.name] = row
@@ -120,7 +141,7 @@ def run_photo(job: Job) -> list[Row]:
 
 def _cases(job: Job) -> Iterator[tuple[str, str, Callable[[], Case]]]:
     if not job.wanted:
-        yield STEREO, "view", stereo_case
+        yield STEREO, VIEW, stereo_case
     for wanted in job.wanted:
         yield wanted.name, wanted.motion.category, lambda w=wanted: make_case(w)
 
@@ -137,6 +158,22 @@ def _measured(
     return Row(case.name, case.category, method.name, found, seconds, cpu, shared, memory), outcome
 
 
+def _kept_rows(job: Job, case: str, category: str) -> dict[str, Row | None]:
+    """The methods that are to be run on a case; None of those that were not yet."""
+    names = {m.name for m in job.methods}
+    is_same = category in (*RIGID, VIEW) and OURS in names  # as ours, for what only bends
+    home = job.folder / "cases" / case
+    return {
+        m.name: _kept(home / f"{m.name}.json", case, category)
+        for m in job.methods
+        if not (is_same and m.only_bends)
+    }
+
+
+def _is_whole(rows: Mapping[str, Row | None]) -> bool:
+    return None not in rows.values()
+
+
 def _kept(path: Path, case: str, category: str) -> Row | None:
     if not path.exists():
         return None
@@ -148,8 +185,8 @@ def _kept(path: Path, case: str, category: str) -> Row | None:
         raise EvaluationError(f"{path} does not hold a case's figures: delete it") from error
 
 
-def _claim(folder: Path, seed: int) -> None:
-    """The folder is for these cases: empty, or begun with the same."""
+def claim(folder: Path, seed: int) -> None:
+    """The folder is for these cases: empty, or begun with the same. Raises EvaluationError."""
     path, told = folder / "run.json", {"cases": VERSION, "seed": seed}
     if path.exists():
         try:

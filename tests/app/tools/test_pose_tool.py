@@ -223,7 +223,7 @@ def test_numbers_move_turn_and_soften_one_step_each(posed: Editor) -> None:
     assert now.is_pin and not now.is_free
     run(posed, "reset_handle")
     back = posed.handle_numbers.read()
-    assert back is not None and back.is_free
+    assert back is not None and not back.is_free and back.turn == pytest.approx(0)
     np.testing.assert_allclose((back.x, back.y), numbers.rest, atol=1e-6)
     assert len(labels(posed)) == 6
 
