@@ -101,8 +101,8 @@ What is not found stays, and can be painted out of the background (B). A ground 
 own as large as a shadow hides it; so does an outline that stands nowhere.
 
 On photographs: the saucer's shadow and the motorcycle's. Of the free photographs that come with the
-tests' packages and with the project no third shows a shadow on its ground: the others are portraits,
-or things in the sky or under a cloudy one.
+tests' packages and with the project no third shows a shadow on its ground: the others are
+portraits, or things in the sky or under a cloudy one.
 
 ![Photos with the shadow and without](photos.jpg)
 """
