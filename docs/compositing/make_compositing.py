@@ -1,8 +1,8 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py [focus | reflections | plates]
+python docs/compositing/make_compositing.py [places | focus | reflections | plates]
 
-With `focus`, `reflections` or `plates`, only that section is made anew.
+With a section's name only that section is made anew.
 """
 
 from __future__ import annotations
@@ -25,7 +25,18 @@ import plates  # noqa: E402
 import reflections  # noqa: E402
 import shadows  # noqa: E402
 from meshes import fetched  # noqa: E402
-from page import FOCUS, PLATE, SHADOW, Measures, focus_section, plate_section, write_page  # noqa: E402
+from page import (  # noqa: E402
+    FOCUS,
+    GRAIN,
+    PLACE,
+    PLATE,
+    SHADOW,
+    Measures,
+    focus_section,
+    place_section,
+    plate_section,
+    write_page,
+)
 from photos import shadow_pairs  # noqa: E402
 from reflection_page import REFLECTION, reflection_section  # noqa: E402
 from solids import SOLIDS  # noqa: E402
@@ -44,6 +55,13 @@ def main() -> None:
         page = FOLDER / "README.md"
         rest = page.read_text(encoding="utf-8").split(PLATE.partition("\n")[0])[0]
         page.write_text(rest + plate_section(*_plates()), encoding="utf-8")
+        return
+    if sys.argv[1:] == ["places"]:
+        page = FOLDER / "README.md"
+        before, _, rest = page.read_text(encoding="utf-8").partition(PLACE.partition("\n")[0])
+        after = rest[rest.index(GRAIN.partition("\n")[0]) :]
+        section = place_section(places.measured(fetched()))
+        page.write_text(f"{before}{section}\n{after}", encoding="utf-8")
         return
     if sys.argv[1:] == ["focus"]:
         page = FOLDER / "README.md"

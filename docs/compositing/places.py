@@ -7,7 +7,7 @@ truth is its own picture in the light of the new place. Only light is compared: 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,9 +15,10 @@ import cv2
 import numpy as np
 import worlds
 from skimage import data
+from sklearn.datasets import load_sample_image
 from worlds import CAMERA, GAMMA, LIGHTS, SIDE
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.arrays import F64, Pixels
 from objectmorpher_core.compose.harmonize import at_strength, light_gain, light_map
 from objectmorpher_core.compose.silhouette import Silhouette
 from objectmorpher_core.document import Document, Photo
@@ -27,8 +28,17 @@ from objectmorpher_core.pixels import pixels_from_unit
 
 SIZE = 150  # px, of the object's square
 LEFT, RIGHT, TOP = 30, 332, 181  # px, where it is
-MATERIALS = ("brick", "gravel", "grass", "wood", "plain")
-PHOTOS = {"table": "coffee", "launch tower": "rocket", "portrait": "astronaut", "cat": "chelsea"}
+MATERIALS = ("brick", "gravel", "grass", "wood", "plain", "sky")
+PHOTOS: dict[str, Callable[[], Pixels]] = {
+    "table": data.coffee,
+    "launch tower": data.rocket,
+    "portrait": data.astronaut,
+    "cat": data.chelsea,
+    "dahlia": lambda: load_sample_image("flower.jpg"),
+    "pavilion": lambda: load_sample_image("china.jpg"),
+    "garage": lambda: data.stereo_motorcycle()[0],
+}
+SKY = np.s_[20:260, 330:620]  # of the rocket's photo: evening, darker farther up
 SOLIDS = ("duck", "teddy", "mug", "box")
 LEAST = 1.0  # levels: an error that nobody sees is none
 WORSE = 1.05
@@ -70,10 +80,14 @@ def lights() -> dict[str, F64]:
 def _backgrounds() -> Iterator[tuple[str, F64]]:
     """(h, w, 3) linear."""
     for kind in MATERIALS:
-        yield kind, _filled(worlds._texture(kind))
-    for name, source in PHOTOS.items():
-        picture = getattr(data, source)()[..., :3] / 255.0
-        yield name, _filled(picture**GAMMA)
+        sky = kind == "sky"
+        yield kind, _filled(_linear(data.rocket()[SKY]) if sky else worlds._texture(kind))
+    for name, make in PHOTOS.items():
+        yield name, _filled(_linear(make()))
+
+
+def _linear(picture: Pixels) -> F64:
+    return (picture[..., :3] / 255.0) ** GAMMA
 
 
 def _filled(picture: F64) -> F64:

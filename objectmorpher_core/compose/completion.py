@@ -165,15 +165,16 @@ def _pyramid(finest: _Level) -> list[_Level]:
 
 def smooth(values: F32, known: F32) -> F32:
     """(h, w, C) with what is not `known` (h, w) as a smooth mean of what is around it."""
-    total, mean = np.full(known.shape, 1e-9, np.float32), np.zeros_like(values)
+    total, mean = np.zeros(known.shape, np.float32), np.zeros_like(values)
     for n, sigma in enumerate(SIGMAS):
         share = np.float32(100.0**-n)
         total += share * cv2.GaussianBlur(known, (0, 0), sigma)
         for c in range(values.shape[2]):
             mean[..., c] += share * cv2.GaussianBlur(values[..., c] * known, (0, 0), sigma)
     everywhere = (values * known[..., None]).sum((0, 1)) / known.sum()
-    mean = np.where(total[..., None] > 2e-9, mean / total[..., None], everywhere)
-    return np.where(known[..., None] > 0, values, mean)
+    is_near = total > 1e-3 * share  # of the widest kernel's share: less is float32's rounding
+    mean = np.where(is_near[..., None], mean / np.where(is_near, total, 1)[..., None], everywhere)
+    return np.where(known[..., None] > 0, values, mean.astype(np.float32))
 
 
 class _Filling:

@@ -3,9 +3,16 @@
 What the background looks like around where the object was, and around where it is now, are two
 mean colours in linear light. Their ratio is what the object's light changes by, as far as one can
 tell: a background of another material looks like other light. So the ratio's colour counts half,
-small ratios count as none, and large ones are limited; and what is small is found at each place
-itself: where its quarters differ, and not as light does that falls evenly from place to place, as
-much again may differ between the places. `docs/compositing` measures both.
+large ratios are limited, and all of it counts the less, the less it exceeds its doubt:
+
+    w = x max(0, 1 - (d / x)^2),   d = what says nothing + spread + off
+
+(the non-negative garrote, Breiman 1995: below its doubt nothing is changed, far above it all is).
+The spread is found at each place itself: where its quarters differ, and not as light does that
+falls evenly from place to place, as much again may differ between the places. Off is how far the
+ratio's colour is from any that lamps, shade and sky differ by, which are warmer or colder than each
+other: red beside green is another material, and so its brightness says little, too.
+`docs/compositing` measures all that.
 
 A power of 2.2 stands for sRGB's curve: then the gain multiplies the encoded values, too, and the
 window does what the export does. An object that did not move has the gain 1, exactly.
@@ -30,8 +37,13 @@ NEUTRAL: Gain = (1.0, 1.0, 1.0)
 MAP = 96  # px, longer side of the small picture of the background
 RING = 0.15  # x the silhouette's longer side, how far around the object one looks
 LEAST, MOST = 0.6, 1.6  # gain in linear light
-DEAD = 0.04  # in logarithms of linear light: less is no difference of light
-DOUBT = 2.5  # x how far the quarters of a place are apart: that, too, says nothing
+DEAD = 0.08  # in logarithms of linear light: less is no difference of light
+DOUBT = 4.0  # x how far the quarters of a place are apart: that, too, says nothing
+# x how far the ratio's colour is off from warmer or colder: red, green, blue, luminance.
+OFF = np.array([2.0, 2.0, 2.0, 1.0])
+# Of logarithms of linear red, green and blue, less that of luminance: from a black body of 6500 K
+# to one of 4000 K red gains 0.30, green loses 0.06 and blue 0.66 (CIE 1931, sRGB).
+WARMER = np.array([0.30, -0.06, -0.66]) / np.linalg.norm([0.30, -0.06, -0.66])
 COLOUR = 0.5  # share of the ratio's colour that counts
 MIDDLE = (20, 80)  # percentiles of luminance: what is darker or brighter is not asked
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -70,7 +82,8 @@ def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> G
         return NEUTRAL
     whole, ratio = _difference(old.mean, new.mean)
     # What differs within each of the places for no light's reason may differ between them, too.
-    doubt = DOUBT * _spread(old, new, np.array([*ratio, whole]))
+    doubt = DEAD + DOUBT * _spread(old, new, np.array([*ratio, whole]))
+    doubt += OFF * float(np.linalg.norm(ratio - (ratio @ WARMER) * WARMER))
     wanted = _beyond(whole, doubt[3]) + COLOUR * _beyond(ratio, doubt[:3])
     linear = np.clip(wanted, np.log(LEAST), np.log(MOST))
     r, g, b = np.exp(linear / GAMMA).tolist()
@@ -124,8 +137,8 @@ def lit_rgba(rgba: U8, gain: Gain) -> U8:
 
 
 def _beyond(logarithm: np.ndarray, doubt: np.ndarray) -> np.ndarray:
-    """What of a logarithm is more than a difference that says nothing."""
-    return np.sign(logarithm) * np.maximum(np.abs(logarithm) - DEAD - doubt, 0)
+    """What of a logarithm counts, which may be wrong by `doubt` (> 0)."""
+    return logarithm * (1 - (doubt / np.maximum(np.abs(logarithm), doubt)) ** 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,6 +65,16 @@ def test_lines_are_found_where_they_are_and_nowhere_else():
     assert not find_lines(smooth(plain, known), HOLE)
 
 
+@pytest.mark.parametrize("radius", [26, 60])
+def test_the_first_guess_is_a_mean_of_what_is_around_deep_in_a_hole_too(radius):
+    hole = np.hypot(X - 80, Y - 80) < radius
+    sides = np.where(X < 80, 90.0, 170.0)[..., None].repeat(3, 2).astype(np.float32)
+    guess = smooth(sides * ~hole[..., None], (~hole).astype(np.float32))
+    assert guess.min() > 90 - 0.1 and guess.max() < 170 + 0.1
+    steps = np.abs(np.diff(guess[80, 80 - radius + 2 : 80 + radius - 2, 0]))
+    assert steps.max() < 40  # no rim around the middle
+
+
 def test_what_repeats_goes_on():
     tiles = noisy(60.0 + 120 * ((X // 10 + Y // 10) % 2))
     error = np.abs(filled(tiles).astype(float) - tiles)[HOLE]
@@ -171,16 +181,15 @@ def noise(picture: np.ndarray, where: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", ["gravel", "grass", "brick"])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_texture_goes_on_as_rough_as_it_is(name, seed):
+def test_a_texture_goes_on_as_rough_as_it_is(name):
     grey = getattr(skimage.data, name)()[90:390, 100:400]
     picture = np.repeat(grey[..., None], 3, 2)
     y, x = np.indices(grey.shape)
     away = np.hypot(y - 150, x - 150)
     emptied = np.where(away[..., None] < 60, np.uint8(0), picture)
-    result = load("patchmatch").inpaint(emptied, away < 60, silent, seed)
-    ratio = noise(result, away < 56) / noise(picture, (away > 64) & (away < 94))
-    assert 0.8 < ratio < 1.2
+    results = [load("patchmatch").inpaint(emptied, away < 60, silent, seed) for seed in (0, 1)]
+    rough = np.mean([noise(result, away < 56) for result in results])  # a draw spreads by 0.05
+    assert 0.8 < rough / noise(picture, (away > 64) & (away < 94)) < 1.2
 
 
 @pytest.mark.parametrize("name", ["gravel", "grass"])

@@ -70,3 +70,20 @@ def test_light_that_falls_evenly_is_followed_from_place_to_place():
     true = np.log(ramp[0, 62, 0] / ramp[0, 18, 0])
     found = np.log(np.array(light_gain(light, 80, *places)) ** GAMMA)
     assert np.abs(found - true).max() < 0.25 * abs(true)
+
+
+@pytest.mark.parametrize("other", [(0.5, 0.05, 0.1), (0.45, 0.16, 0.05), (0.35, 0.35, 0.5)])
+def test_a_colour_that_no_light_has_is_another_material_and_changes_nothing(other):
+    """A lawn beside a wall: how bright they are says nothing about the light on them."""
+    light = np.full((60, 80, 3), [0.12, 0.2, 0.06], np.float32)
+    light[:, 40:] = other
+    places = [Silhouette(np.ones((10, 10), np.float32), left, 20.0, 1.0) for left in (10.0, 60.0)]
+    assert np.abs(np.log(light_gain(light, 80, *places))).max() < 0.02
+
+
+def test_light_that_is_warmer_and_darker_is_both():
+    light = np.full((60, 80, 3), 0.3, np.float32)
+    light[:, 40:] *= np.exp([0.0, -0.42, -1.05]).astype(np.float32)  # 4000 K, not 6500 K
+    places = [Silhouette(np.ones((10, 10), np.float32), left, 20.0, 1.0) for left in (10.0, 60.0)]
+    red, green, blue = np.log(light_gain(light, 80, *places))
+    assert blue < green < red < -0.05
