@@ -223,7 +223,7 @@ class Editor:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        text = t("Now after: {label}", label=self.history.steps[index])
+        text = t("Now after: {label}", label=self.history.label(index))
         self._travel(partial(self.history.jump, index), text)
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
