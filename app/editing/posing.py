@@ -82,6 +82,10 @@ class Posing:
             return np.zeros(3)
         return vector_from_matrix(pose.rotations[own.control_point])
 
+    def forget(self) -> None:
+        """The document is closed."""
+        self._restless = None
+
     @property
     def is_restless(self) -> bool:
         """Whether the previewed pose still moves towards its rest."""

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from conftest import open_file, wait_for_jobs
 
-from app.commands import run
 from app.editor import Editor
 from app.tasks import PLATE
 from objectmorpher_core import edits

@@ -34,7 +34,8 @@ def main() -> int:
         photo = photos.saved("astronaut", Path(folder))
         session = Session(photo, photos.outlined("astronaut"), Path(folder))
         try:
-            hundreds = [session.hundred() for _ in range(2)][1:]
+            session.hundred()  # fills the caches
+            hundreds = [session.hundred()]
             print(json.dumps(dataclasses.asdict(hundreds[0])), flush=True)
             for sample in session.samples(options.edits, options.every):
                 print(json.dumps(dataclasses.asdict(sample)), flush=True)

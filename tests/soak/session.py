@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import random
@@ -29,16 +30,22 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Placement, Prompt
 
-SIZE = (360, 280)  # canvas px; software OpenGL takes a second of processor time for four times as many
-DRAWN = 20  # edits from one frame to the next
-MOVES = 4  # of the pointer in a drag
+SIZE = (
+    360,
+    280,
+)  # canvas px; software OpenGL takes a second of processor time for four times as many
+DRAWN = 50  # edits from one frame to the next
+MOVES = 3  # of the pointer in a drag
 MOST_HANDLES = 6
 MOST_OBJECTS = 4
 PATIENCE = 300.0  # s for a job
+SAVED, EXPORTED = 500, 1000  # edits from one time to the next
 REOPENED = 1000  # edits from one opening of the session to the next
 DRAGS = 40  # that a sample's time is the median of
 HUNDRED = 100  # edits that are done again and again, the same on the same session
-KINDS = ("drag",) * 6 + ("place",) * 6 + ("undo",) * 4 + ("light",) * 2 + ("unpick", "copy", "remove")
+KINDS = (
+    ("drag",) * 6 + ("place",) * 6 + ("undo",) * 4 + ("light",) * 2 + ("unpick", "copy", "remove")
+)
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,7 @@ class Session:
 
     def hundred(self) -> Hundred:
         """Opens the session of the beginning and does the same edits on it."""
+        self._save()
         self._reopen(self._start)
         usual, self._chance = self._chance, random.Random(11)
         self._drags.clear()
@@ -140,16 +148,14 @@ class Session:
         """One edit, often a frame, and now and then what takes a job."""
         self.edits += 1
         self._one(self.edits % DRAWN == 0)
-        if self.edits % 100 == 0:
-            self.editor.filing.save_as(self._folder / "day.omorph")
-            self._wait()
-        if self.edits % 250 == 0:
+        if self.edits % SAVED == 0:
+            self._save()
+        if self.edits % EXPORTED == 0:
             self.editor.exporting.export_to(self._folder / "day.png")
             self._wait()
         if self.edits % REOPENED == 0:
-            self.editor.filing.save_as(self._folder / "day.omorph")
-            self._wait()
-            self._reopen(self._folder / "day.omorph")
+            self._save()
+            self._reopen(self._day)
         self.editor.message = None
 
     def measure(self) -> Sample:
@@ -161,7 +167,7 @@ class Session:
         buffer.release()
         drag = statistics.median(self._drags or [0.0])
         task = Path("/proc/self/task")
-        kept = [f.stat().st_size for f in Path(os.environ["OBJECTMORPHER_DATA"]).rglob("*") if f.is_file()]
+        kept = _sizes(Path(os.environ["OBJECTMORPHER_DATA"]))
         children = [kid for t in task.iterdir() for kid in (t / "children").read_text().split()]
         return Sample(
             self.edits, (time.monotonic() - self._begun) / 60, _resident("self"),
@@ -228,15 +234,24 @@ class Session:
 
     # ---- the rest ---------------------------------------------------------------------------
 
+    @property
+    def _day(self) -> Path:
+        return self._folder / "day.omorph"
+
+    def _save(self) -> None:
+        self.editor.filing.save_as(self._day)
+        self._wait()
+
     def _reopen(self, session: Path) -> None:
         self._open(session)
         self._first = 0
         self.editor.view.tool = ToolName.POSE
 
     def _open(self, path: Path) -> None:
+        before = self.editor.history
         self.editor.filing.open(path)
         self._wait()
-        assert self.editor.document is not None, self.editor.message
+        assert self.editor.history is not before, self.editor.message  # else it asks something
 
     def _draw(self) -> None:
         scene = build_scene(self.editor, "gl")
@@ -261,6 +276,15 @@ def _alive(is_one: str, last: int) -> int:
     ask = getattr(ctypes.CDLL("libGL.so.1"), is_one)
     ask.restype, ask.argtypes = ctypes.c_ubyte, [ctypes.c_uint]
     return sum(ask(name) for name in range(1, last + 1))
+
+
+def _sizes(folder: Path) -> list[int]:
+    """Bytes of every file below; autosave writes and removes them meanwhile."""
+    found = []
+    for path in folder.rglob("*"):
+        with contextlib.suppress(FileNotFoundError):
+            found += [path.stat().st_size] if path.is_file() else []
+    return found
 
 
 def _resident(process: str) -> float:
