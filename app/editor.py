@@ -8,6 +8,7 @@ menu, shortcuts, tools and tests call the same ones. No GL, no ImGui, no window 
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from functools import partial
@@ -63,7 +64,6 @@ class Editor:
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
         self.autosave, self.recovery = Autosave(self), Recovery(self)
-        self.derived = Derived()
         self.tasks = Tasks(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
@@ -75,8 +75,7 @@ class Editor:
         self.methods, self.computing = Methods(self), Computing(self)
         self.hinting, self.refining = Hinting(self), Refining(self)
         self.candidates = Candidates(self)
-        self.derived.layers.ask = self.tasks.render_exact
-        self.derived.lights.ask = self.tasks.light
+        self.derived = self._nothing_derived()
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
         self.path: Path | None = None  # the session's file
@@ -160,7 +159,10 @@ class Editor:
 
     def start(self, document: Document, shapes: Shapes = ()) -> None:
         """A photo or a session was opened; `shapes` of its objects are ready."""
+        before = self.committed
         self.close_document()
+        if before is not None and before.photo is not document.photo:
+            self.derived = self._nothing_derived()
         self.derived.adopt(shapes)
         self.history = History(document, limit=self.settings.history_mb << 20)
         self.current = max(len(document.objects) - 1, 0)
@@ -170,6 +172,20 @@ class Editor:
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
+
+    def close(self) -> None:
+        """Closes the document, and lets go of what was computed for it: gigabytes, maybe."""
+        self.close_document()
+        self._forget_derived()
+
+    def _forget_derived(self) -> None:
+        self.derived = self._nothing_derived()
+        gc.collect()  # its parts know each other, and nothing else would let go of them soon
+
+    def _nothing_derived(self) -> Derived:
+        derived = Derived()
+        derived.layers.ask, derived.lights.ask = self.tasks.render_exact, self.tasks.light
+        return derived
 
     def close_document(self) -> None:
         self.hand.abort(self)
@@ -181,6 +197,7 @@ class Editor:
         self.composing.forget()
         self.hinting.forget()
         self.refining.forget()
+        self.posing.forget()
         self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
         self.hover, self.message = Hover(), None
@@ -223,7 +240,7 @@ class Editor:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        text = t("Now after: {label}", label=self.history.steps[index])
+        text = t("Now after: {label}", label=self.history.label(index))
         self._travel(partial(self.history.jump, index), text)
 
     def _travel(self, go: Callable[[], None], text: str) -> None:

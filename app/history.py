@@ -2,21 +2,22 @@
 
 Documents share what did not change, so a step costs what is new in it: kilobytes for a drag,
 hundreds of megabytes for the lift of a large object. The oldest steps go when there are too many
-of them, or when what they alone hold is too large.
+of them, or when what they alone hold is too large. What a step costs in time does not grow with
+the steps before it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 
 from objectmorpher_core.document import Document
 
-DEPTH = 500  # steps
+DEPTH = 10_001  # steps: a day's ten thousand edits, and the one that undoing them all leaves
 LIMIT = 1 << 30  # bytes that old steps may hold beside what the shown document holds
 
 
@@ -26,7 +27,6 @@ class Step:
 
     label: str  # "Move handle"
     document: Document
-    memory: Mapping[int, int] = field(default_factory=dict)  # id of a block of memory -> bytes
 
 
 class History:
@@ -35,8 +35,7 @@ class History:
     def __init__(self, document: Document, limit: int = LIMIT) -> None:
         """`limit`: bytes."""
         self._steps: list[Step] = []
-        self._memory: dict[int, int] = {}  # bytes of every block that a step holds
-        self._holders: Counter[int] = Counter()  # how many steps hold it
+        self._memory = _Memory()
         self._limit = limit
         self._cursor = 0
         self._saved: Document | None = document
@@ -74,7 +73,7 @@ class History:
         if document is self.document:
             return
         for step in self._steps[self._cursor + 1 :]:
-            self._let_go(step)
+            self._memory.let_go(step.document)
         del self._steps[self._cursor + 1 :]
         self._append(label, document)
         self._cursor = len(self._steps) - 1
@@ -85,8 +84,9 @@ class History:
         step = self._steps[self._cursor]
         if step.document is self._saved:
             self._saved = document
-        self._let_go(step)
-        self._steps[self._cursor] = self._taken(step.label, document)
+        self._memory.let_go(step.document)
+        self._steps[self._cursor] = Step(step.label, document)
+        self._memory.take(document)
         self._forget_oldest()
 
     @property
@@ -110,33 +110,88 @@ class History:
         """Shows the step at `index`, the nearest one where there is none."""
         self._cursor = min(max(index, 0), len(self._steps) - 1)
 
+    @property
+    def count(self) -> int:
+        """How many steps there are, those that were undone too."""
+        return len(self._steps)
+
+    def label(self, index: int) -> str:
+        """What was done in the step at `index`."""
+        return self._steps[index].label
+
     # Memory
 
     @property
     def old_bytes(self) -> int:
         """What the steps hold beside what the shown document holds."""
-        shown = self._steps[self._cursor].memory
-        return sum(self._memory.values()) - sum(shown.values())
+        return self._memory.bytes - self._memory.bytes_of(self.document)
 
     def _forget_oldest(self) -> None:
-        while self._cursor > 0 and (len(self._steps) > DEPTH or self.old_bytes > self._limit):
-            self._let_go(self._steps.pop(0))
+        while self._cursor > 0 and (
+            len(self._steps) > DEPTH
+            or (self._memory.bytes > self._limit and self.old_bytes > self._limit)
+        ):
+            self._memory.let_go(self._steps.pop(0).document)
             self._cursor -= 1
 
     def _append(self, label: str, document: Document) -> None:
-        self._steps.append(self._taken(label, document))
+        self._steps.append(Step(label, document))
+        self._memory.take(document)
 
-    def _taken(self, label: str, document: Document) -> Step:
-        memory = dict(_blocks(document))
-        self._memory |= memory
-        self._holders.update(memory.keys())
-        return Step(label, document, memory)
 
-    def _let_go(self, step: Step) -> None:
-        for key in step.memory:
-            self._holders[key] -= 1
-            if self._holders[key] == 0:
-                del self._holders[key], self._memory[key]
+class _Memory:
+    """The bytes behind some documents, those that several of them share counted once.
+
+    It counts parts (the photo, an object, the plate ...), which documents share as they are: an
+    edit of one object of twenty costs the look at that one. Whoever asks keeps the documents
+    alive, so that no part's `id` becomes another's.
+    """
+
+    def __init__(self) -> None:
+        self.bytes = 0
+        self._blocks: dict[int, Mapping[int, int]] = {}  # part -> its blocks of memory -> bytes
+        self._documents: Counter[int] = Counter()  # part -> how many documents hold it
+        self._parts: Counter[int] = Counter()  # block -> how many parts hold it
+
+    def take(self, document: Document) -> None:
+        for part in _parts(document):
+            key = id(part)
+            self._documents[key] += 1
+            if key in self._blocks:
+                continue
+            self._blocks[key] = blocks = dict(_blocks(part))
+            for block, size in blocks.items():
+                self.bytes += size if self._parts[block] == 0 else 0
+                self._parts[block] += 1
+
+    def let_go(self, document: Document) -> None:
+        for part in _parts(document):
+            key = id(part)
+            self._documents[key] -= 1
+            if self._documents[key] > 0:
+                continue
+            del self._documents[key]
+            for block, size in self._blocks.pop(key).items():
+                self._parts[block] -= 1
+                if self._parts[block] == 0:
+                    del self._parts[block]
+                    self.bytes -= size
+
+    def bytes_of(self, document: Document) -> int:
+        """What one of the documents holds, all by itself."""
+        blocks: dict[int, int] = {}
+        for part in _parts(document):
+            blocks |= self._blocks[id(part)]
+        return sum(blocks.values())
+
+
+def _parts(document: Document) -> Iterator[Any]:
+    """What documents share as a whole; a part may be there twice."""
+    for f in fields(document):
+        value = getattr(document, f.name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if is_dataclass(part):
+                yield part
 
 
 def _blocks(value: Any) -> Iterator[tuple[int, int]]:

@@ -86,6 +86,7 @@ class Job:
     done: Callable[[Any], None]
     failed: Callable[[JobError], None]
     cancelled: Callable[[], None]
+    replaced: Callable[[], None]
     kind: str
     fraction: float = 0.0
     note: str = ""
@@ -173,26 +174,28 @@ class Jobs:
         done: Callable[[Any], None],
         failed: Callable[[JobError], None],
         cancelled: Callable[[], None] = lambda: None,
+        replaced: Callable[[], None] = lambda: None,
         kind: str = "",
         is_quiet: bool = False,
         is_spare: bool = False,
     ) -> None:
         """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
 
-        A request of the same `kind` that waits or runs is replaced; its answer never comes.
+        A request of the same `kind` that waits or runs is replaced: its answer never comes, and
+        `replaced` is all that it is told.
         A quiet one is not the user's: the status line does not show it. A spare one besides gives
         way: any other request ends it.
         """
         self._count += 1
         kind = kind or function.__name__
         job = Job(
-            title, function, arguments, done, failed, cancelled, kind,
+            title, function, arguments, done, failed, cancelled, replaced, kind,
             number=self._count, is_quiet=is_quiet, is_spare=is_spare,
         )  # fmt: skip
         self._wait_for(job)
 
     def _wait_for(self, job: Job) -> None:
-        self._waiting.pop(job.kind, None)
+        displaced = self._waiting.pop(job.kind, None)
         self._waiting[job.kind] = job
         current = self.current
         if current is not None and (
@@ -200,6 +203,8 @@ class Jobs:
         ):
             self._ask_to_stop(current, RELUCTANCE)
         self._send_next()
+        if displaced is not None:
+            displaced.replaced()
 
     def promote(self, kind: str, wanted: str) -> bool:
         """The spare job that runs is the user's own from now on, of the kind `wanted`.
@@ -322,7 +327,9 @@ class Jobs:
     def _finish(self, job: Job, tell: Callable[[], None]) -> None:
         self.current = None
         is_replaced = job.kind in self._waiting
-        if not is_replaced:  # a replaced request is not the user's question any more
+        if is_replaced:  # it is not the user's question any more
+            job.replaced()
+        else:
             tell()
         self._send_next()
 

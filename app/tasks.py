@@ -250,6 +250,11 @@ class Tasks:
                 fill_in = Action(t("Fill in"), self.fill_background)
                 editor.say(t("The background behind the object is not filled in"), fill_in)
 
+        def forget() -> None:
+            """Another question took its place: where this one comes up again, it is asked again."""
+            if self._no_plate is wanted:
+                self._no_plate = None
+
         def fail(error: JobError) -> None:
             """Nothing else leads to a background: whatever it was, there is another try."""
             retry = None if error.is_expected else self.fill_background
@@ -259,7 +264,7 @@ class Tasks:
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document),
             Choice(editor.settings.backends.inpaint, document.seed, document.hints),
-            done=accept, failed=fail, cancelled=say_so, kind=PLATE,
+            done=accept, failed=fail, cancelled=say_so, replaced=forget, kind=PLATE,
         )  # fmt: skip
 
     def fill_background(self) -> None:

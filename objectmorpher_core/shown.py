@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 LONGEST = 60  # characters
+REASON = 200  # characters of a sentence that quotes what a file says
 
 
 def shown(value: Any) -> str:
@@ -20,3 +21,9 @@ def named(text: str) -> str:
     """A name without quotation marks, as `shown`."""
     text = "".join(c if c.isprintable() else "?" for c in text)  # lone surrogates are not
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 13]}...{text[-10:]}"
+
+
+def reason(error: BaseException) -> str:
+    """What an error says, which may quote a file: on one line, and cut where it is long."""
+    text = "".join(c if c.isprintable() else "?" for c in str(error))
+    return text if len(text) <= REASON else f"{text[: REASON - 3]}..."

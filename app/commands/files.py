@@ -10,7 +10,7 @@ COMMANDS: dict[str, Command] = {
     "save": Command("Save session", "Ctrl+S", lambda e: e.filing.save()),
     "save_as": Command("Save session as…", "Ctrl+Shift+S", asks_for(Dialog.SAVE)),
     "export": Command("Export photo…", "Ctrl+E", lambda e: e.exporting.open()),
-    "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close_document)),
+    "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close)),
     "models": Command("Models…", "", lambda e: e.models.open(), never),
     "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.guard(e.quit), never),
 }

@@ -126,7 +126,7 @@ class Composing:
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             editor.derived.lights.hidden(document), Choice(self.inpainter, seed, hints),
-            done=accept, failed=fail, cancelled=end, kind=PLATE,
+            done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
         )  # fmt: skip
 
     def try_variants(self) -> None:

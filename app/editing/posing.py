@@ -79,6 +79,10 @@ class Posing:
         own, pose = editor.object.handles[handle], editor.object.pose
         return turn_at(pose, own.control_point) if own.turn is None else own.turn
 
+    def forget(self) -> None:
+        """The document is closed."""
+        self._restless = None
+
     @property
     def is_restless(self) -> bool:
         """Whether the previewed pose still moves towards its rest."""

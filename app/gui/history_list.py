@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from ..editor import Editor
+from ..history import History
 from ..texts import t
 from .rows import fill_row, text_top
 from .theme import theme
@@ -23,20 +24,32 @@ def draw_history(editor: Editor) -> None:
         return
     rule()
     heading(t("History"))
-    steps, cursor = history.steps, history.cursor
-    height = theme.pt(ROW) * min(len(steps), MOST)
+    cursor, row = history.cursor, theme.pt(ROW)
+    height = row * min(history.count, MOST)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(0, 0))
     is_visible = imgui.begin_child("##history", ImVec2(0, height), imgui.ChildFlags_.nav_flattened)
-    for k, label in enumerate(steps):
-        if _draw_step(k, label, cursor):
-            editor.travel(k)
-        if is_visible and k == cursor and _has_moved(cursor, len(steps)):
-            imgui.set_scroll_here_y(0.5)
+    if is_visible:
+        if _has_moved(cursor, history.count):
+            imgui.set_scroll_y((cursor + 0.5) * row - 0.5 * height)
+        _draw_steps(editor, history, row)
     imgui.end_child()
     imgui.pop_style_var()
     if not _seen.is_shown:  # it was just switched on, maybe below the panel's end
         imgui.set_scroll_here_y(1.0)
         _seen.is_shown = True
+
+
+def _draw_steps(editor: Editor, history: History, row: float) -> None:
+    """The rows that are seen, each `row` px high: there may be thousands of them."""
+    clipper = imgui.ListClipper()
+    clipper.begin(history.count, row)
+    cursor, chosen = history.cursor, None
+    while clipper.step():
+        for k in range(clipper.display_start, clipper.display_end):
+            if _draw_step(k, history.label(k), cursor):
+                chosen = k
+    if chosen is not None:
+        editor.travel(chosen)
 
 
 def _draw_step(k: int, label: str, cursor: int) -> bool:

@@ -25,6 +25,7 @@ from ..gaussians import Gaussians
 from ..image import to_u8
 from ..limits import WORKER_GAUSSIANS as MOST
 from ..progress import Progress, part
+from ..shown import reason
 from ..splat_files import FORMATS, MESH_ENDINGS, SplatFileError, read, read_object
 from ..splat_files.ply_table import read_header
 from . import LiftError, Subject
@@ -149,7 +150,7 @@ def read_answer(folder: Path, name: str, count: int) -> tuple[Gaussians, Seen | 
         if seen is None:  # a pose is told of the frame of the file; without one any frame will do
             made = read_object(at, count)
     except (SplatFileError, OSError) as error:
-        raise LiftError(f"what the worker {name} made cannot be used: {error}") from error
+        raise LiftError(f"what the worker {name} made cannot be used: {reason(error)}") from error
     if len(made) > MOST:
         raise LiftError(f"the worker {name} made {len(made):,} Gaussians, more than {MOST:,}")
     return made, seen
@@ -188,7 +189,7 @@ def _seen(at: Path, name: str) -> Seen | None:
         if not (math.isfinite(camera.cx + camera.cy) and 0 < camera.focal < math.inf):
             raise ValueError("the camera is none")
     except WRONG as error:
-        raise LiftError(f"the camera of the worker {name} is of no use: {error}") from error
+        raise LiftError(f"the camera of the worker {name} is of no use: {reason(error)}") from error
     return Seen(matrix, camera)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import F64
 from ..limits import WORKER_FILE
+from ..shown import shown
 
 VERSION = 1  # of the protocol
 TOLERANCE = 1e-3  # of a turn's rows, in its size
@@ -23,7 +24,7 @@ def read_told(at: Path) -> Any:
         raise ValueError("it is no small file")
     told = json.loads(at.read_text(encoding="utf-8"))
     if told["version"] != VERSION:
-        raise ValueError(f"version {told['version']!r} is not known")
+        raise ValueError(f"version {shown(told['version'])} is not known")
     return told
 
 

@@ -30,6 +30,7 @@ import platformdirs
 
 from ..files import write_all
 from ..limits import WORKER_FILE as BYTES
+from ..shown import named, reason, shown
 from . import LiftError
 
 FOLDER = "OBJECTMORPHER_WORKERS"  # environment variable
@@ -103,7 +104,7 @@ def read_worker(name: str) -> Worker:
     except RecursionError as error:
         raise LiftError(f"the worker's file {at} is of no use: it is nested too deep") from error
     except (OSError, ValueError) as error:
-        raise LiftError(f"the worker's file {at} is of no use: {error}") from error
+        raise LiftError(f"the worker's file {at} is of no use: {reason(error)}") from error
 
 
 def accept_licence(name: str, accepted: str) -> None:
@@ -147,22 +148,22 @@ def _worker(told: dict, name: str, here: Path) -> Worker:
     """Raises ValueError."""
     texts = ("licence", "licence_kind", "page")
     if unknown := sorted(set(told) - {"name", "command", "timeout", *texts}):
-        raise ValueError(f"{unknown[0]} is not known")
+        raise ValueError(f"{named(unknown[0])} is not known")
     if told.get("name", name) != name:
-        raise ValueError(f"it is called {told['name']!r}, its file {name!r}")
+        raise ValueError(f"it is called {shown(told['name'])}, its file {name!r}")
     command = told.get("command")
     if not isinstance(command, list) or not command or not all(isinstance(c, str) for c in command):
         raise ValueError("command is not a list of texts")
     timeout = told.get("timeout", TIMEOUT)
     is_number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
     if not is_number or not 0 < timeout <= LONGEST:
-        raise ValueError(f"timeout is {timeout!r}, not seconds of at most a day")
+        raise ValueError(f"timeout is {shown(timeout)}, not seconds of at most a day")
     licence, kind, page = (told.get(key, "") for key in texts)
     for key in texts:
         if not isinstance(told.get(key, ""), str):
             raise ValueError(f"{key} is not a text")
     if (kind or FREE) not in KINDS:
-        raise ValueError(f"licence_kind is {kind!r}, not one of {', '.join(KINDS)}")
+        raise ValueError(f"licence_kind is {shown(kind)}, not one of {', '.join(KINDS)}")
     if kind not in ("", FREE) and not licence.strip():
         raise ValueError("a licence that has to be accepted has a name")
     stands = {"{here}": str(here.absolute()), "{python}": sys.executable}

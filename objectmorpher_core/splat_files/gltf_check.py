@@ -16,6 +16,7 @@ from ..limits import MESH_NODES as MAX_NODES
 from ..limits import MESH_TRIANGLES as MAX_TRIANGLES
 from ..limits import MESH_VERTICES as MAX_VERTICES
 from ..limits import TEXTURE_SIDE as MAX_SIDE
+from ..shown import shown
 from .limits import SplatFileError
 from .mesh_folder import MeshFolder
 
@@ -75,7 +76,7 @@ def _split(data: bytes) -> tuple[bytes, int]:
 def _check_extensions(tree: Json) -> None:
     version = str(tree["asset"]["version"])
     if not version.startswith("2."):
-        raise SplatFileError(f"the glTF file is of version {version[:10]}, not 2")
+        raise SplatFileError(f"the glTF file is of version {shown(version)}, not 2")
     for name in tree.get("extensionsRequired", []):
         if name not in UNDERSTOOD:
             raise SplatFileError(f"the glTF file needs {str(name)[:60]}, which is not supported")

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import job_functions
+import numpy as np
 import pytest
 from conftest import open_file, wait_for_jobs
 
 from app.editor import Editor
+from app.tasks import PLATE
 from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.document import Document, Placement, Prompt
 
 
 def retry(editor: Editor) -> None:
@@ -81,6 +83,45 @@ def test_a_background_that_was_cancelled_can_be_asked_for(editor: Editor, ball: 
     assert editor.message is not None and editor.message.action is not None
     assert not editor.message.is_error
     editor.message.action.run()
+    wait_for_jobs(editor)
+    assert editor.document is not None and editor.document.plate is not None
+
+
+def test_a_background_is_there_again_after_it_was_taken_off_a_moved_object(
+    editor: Editor, ball: Document
+) -> None:
+    """Where it came with the session, it is filled in; where it was filled in here, it is kept."""
+    editor.start(ball)
+    fills = []
+    for move in (5.0, 9.0):
+        document = editor.document
+        assert document is not None
+        moved = edits.set_placement(document, 0, Placement(move=(move, 0.0)))
+        editor.apply("Move object", moved)
+        wait_for_jobs(editor)
+        editor.apply("Without background", edits.set_plate(moved, None))
+        wait_for_jobs(editor)
+        assert editor.document is not None
+        fills.append(editor.document.plate)
+    assert fills[0] is not None and fills[0] is not ball.plate
+    assert fills[1] is fills[0]
+
+
+def test_a_background_that_gave_way_to_another_is_filled_in_when_it_is_wanted_again(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    mask = np.zeros_like(ball.objects[0].mask)
+    mask[:20, :20] = True
+    two = edits.set_mask(edits.add_object(ball), 1, mask, Prompt())
+    assert two.plate is None
+    editor.apply("Select", two)
+    editor.poll()
+    assert editor.jobs.is_busy(PLATE)
+    editor.undo()
+    editor.composing.fill_from((), "Take from here", lambda: None)  # as a drag of a source does
+    wait_for_jobs(editor)
+    editor.apply("Select", two)
     wait_for_jobs(editor)
     assert editor.document is not None and editor.document.plate is not None
 

@@ -25,7 +25,7 @@ from .readers import by_name, readers
 
 ROOT = Path(__file__).parents[2]
 TURN = 600.0  # s that a process reads, at most
-SILENCE = 200.0  # s of a clock on the wall after which a process counts as stuck
+SILENCE = 600.0  # s after which a process counts as stuck; its kernels may be compiled first
 
 
 @dataclass

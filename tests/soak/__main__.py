@@ -29,14 +29,20 @@ def main() -> int:
     samples = []
     with tempfile.TemporaryDirectory() as folder:
         os.environ["OBJECTMORPHER_DATA"] = folder
-        from .session import Session
+        from .session import REOPENED, Session
 
         photo = photos.saved("astronaut", Path(folder))
         session = Session(photo, photos.outlined("astronaut"), Path(folder))
         try:
+            session.hundred()  # fills the caches
+            hundreds = [session.hundred()]
+            print(json.dumps(dataclasses.asdict(hundreds[0])), flush=True)
             for sample in session.samples(options.edits, options.every):
                 print(json.dumps(dataclasses.asdict(sample)), flush=True)
                 samples.append(sample)
+                if sample.edits % REOPENED == 0:
+                    hundreds.append(session.hundred())
+                    print(json.dumps(dataclasses.asdict(hundreds[-1])), flush=True)
         finally:
             session.close()
     if options.chart:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import os
 import random
 import statistics
 import threading
@@ -28,14 +30,22 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Placement, Prompt
 
-SIZE = (720, 560)  # canvas px
-MOVES = 6  # of the pointer in a drag
+SIZE = (
+    360,
+    280,
+)  # canvas px; software OpenGL takes a second of processor time for four times as many
+DRAWN = 50  # edits from one frame to the next
+MOVES = 3  # of the pointer in a drag
 MOST_HANDLES = 6
 MOST_OBJECTS = 4
 PATIENCE = 300.0  # s for a job
+SAVED, EXPORTED = 500, 1000  # edits from one time to the next
 REOPENED = 1000  # edits from one opening of the session to the next
 DRAGS = 40  # that a sample's time is the median of
-KINDS = ("drag",) * 10 + ("place",) * 4 + ("undo",) * 4 + ("light", "unpick", "copy", "remove")
+HUNDRED = 100  # edits that are done again and again, the same on the same session
+KINDS = (
+    ("drag",) * 6 + ("place",) * 6 + ("undo",) * 4 + ("light",) * 2 + ("unpick", "copy", "remove")
+)
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,20 @@ class Sample:
     children: int  # processes
     textures: int  # of OpenGL
     buffers: int
+    steps: int  # that can be undone
+    kept: int  # files in the program's own folder
+    disk: float  # MiB in it
+
+
+@dataclass(frozen=True)
+class Hundred:
+    """What the same hundred edits of the same session cost after so many others."""
+
+    edits: int  # done before
+    main: float  # s of the main thread
+    process: float  # s of all threads, so of OpenGL's in software too
+    drag: float  # ms of the main thread in a drag, median
+    wall: float  # s
 
 
 class Session:
@@ -82,6 +106,9 @@ class Session:
         assert self.editor.is_lifted, self.editor.message
         self.editor.view.tool = ToolName.POSE
         self._first = self.editor.history.cursor  # nothing before it is undone
+        self._start = folder / "start.omorph"
+        self.editor.filing.save_as(self._start)
+        self._wait()
         self._places = np.argwhere(mask)[:, ::-1] + 0.5  # image px of the object
 
     def close(self) -> None:
@@ -96,24 +123,39 @@ class Session:
                 self._wait()
                 yield self.measure()
 
-    def edit(self) -> None:
-        """One edit, a frame, and now and then what takes a job."""
-        self.edits += 1
+    def hundred(self) -> Hundred:
+        """Opens the session of the beginning and does the same edits on it."""
+        self._save()
+        self._reopen(self._start)
+        usual, self._chance = self._chance, random.Random(11)
+        self._drags.clear()
+        begun = time.thread_time(), time.process_time(), time.monotonic()
+        for k in range(HUNDRED):
+            self._one(k % DRAWN == 0)
+        ended = time.thread_time(), time.process_time(), time.monotonic()
+        main, process, wall = (b - a for a, b in zip(begun, ended, strict=True))
+        self._chance = usual
+        drag = 1e3 * statistics.median(self._drags)
+        return Hundred(self.edits, main, process, drag, wall)
+
+    def _one(self, is_drawn: bool) -> None:
         getattr(self, f"_{self._chance.choice(KINDS)}")()
         self.editor.poll()
-        self._draw()
-        if self.edits % 100 == 0:
-            self.editor.filing.save_as(self._folder / "day.omorph")
-            self._wait()
-        if self.edits % 250 == 0:
+        if is_drawn:
+            self._draw()
+
+    def edit(self) -> None:
+        """One edit, often a frame, and now and then what takes a job."""
+        self.edits += 1
+        self._one(self.edits % DRAWN == 0)
+        if self.edits % SAVED == 0:
+            self._save()
+        if self.edits % EXPORTED == 0:
             self.editor.exporting.export_to(self._folder / "day.png")
             self._wait()
         if self.edits % REOPENED == 0:
-            self.editor.filing.save_as(self._folder / "day.omorph")
-            self._wait()
-            self._open(self._folder / "day.omorph")
-            self._first = 0
-            self.editor.view.tool = ToolName.POSE
+            self._save()
+            self._reopen(self._day)
         self.editor.message = None
 
     def measure(self) -> Sample:
@@ -125,12 +167,13 @@ class Session:
         buffer.release()
         drag = statistics.median(self._drags or [0.0])
         task = Path("/proc/self/task")
+        kept = _sizes(Path(os.environ["OBJECTMORPHER_DATA"]))
         children = [kid for t in task.iterdir() for kid in (t / "children").read_text().split()]
         return Sample(
             self.edits, (time.monotonic() - self._begun) / 60, _resident("self"),
             0.0 if pid is None else _resident(str(pid)), 1e3 * drag,
             len(list(Path("/proc/self/fd").iterdir())), threading.active_count(), len(children),
-            *counts,
+            *counts, len(self.editor.history.steps), len(kept), sum(kept) / 2**20,
         )  # fmt: skip
 
     # ---- edits ------------------------------------------------------------------------------
@@ -191,10 +234,24 @@ class Session:
 
     # ---- the rest ---------------------------------------------------------------------------
 
+    @property
+    def _day(self) -> Path:
+        return self._folder / "day.omorph"
+
+    def _save(self) -> None:
+        self.editor.filing.save_as(self._day)
+        self._wait()
+
+    def _reopen(self, session: Path) -> None:
+        self._open(session)
+        self._first = 0
+        self.editor.view.tool = ToolName.POSE
+
     def _open(self, path: Path) -> None:
+        before = self.editor.history
         self.editor.filing.open(path)
         self._wait()
-        assert self.editor.document is not None, self.editor.message
+        assert self.editor.history is not before, self.editor.message  # else it asks something
 
     def _draw(self) -> None:
         scene = build_scene(self.editor, "gl")
@@ -219,6 +276,15 @@ def _alive(is_one: str, last: int) -> int:
     ask = getattr(ctypes.CDLL("libGL.so.1"), is_one)
     ask.restype, ask.argtypes = ctypes.c_ubyte, [ctypes.c_uint]
     return sum(ask(name) for name in range(1, last + 1))
+
+
+def _sizes(folder: Path) -> list[int]:
+    """Bytes of every file below; autosave writes and removes them meanwhile."""
+    found = []
+    for path in folder.rglob("*"):
+        with contextlib.suppress(FileNotFoundError):
+            found += [path.stat().st_size] if path.is_file() else []
+    return found
 
 
 def _resident(process: str) -> float:
