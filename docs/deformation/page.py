@@ -48,8 +48,9 @@ red dots are where handles were dragged to.
 - **Miss**: the largest distance of a handle's surface point from its target, in % of the object's
   diameter.
 - **Inside out**: the area of triangles that face against the surface around them.
-- **Solve**: median of five solves from rest, with the links and the set of handles known. It is
-  of the machine that made this page, and the only number here that changes from run to run.
+- **Solve**: median of five solves from rest, with the links and the set of handles known, in time
+  of the solving thread. It is of the machine that made this page, and the only number here that
+  changes from run to run.
 """
 
 
