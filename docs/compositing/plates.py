@@ -23,6 +23,7 @@ from objectmorpher_core.segment import dino_tokens
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 PATCH = 7  # px, of plain PatchMatch: the authors' usual
 SEED = 0
+BLUR = 2.0  # px, standard deviation
 TILE = 14 * 16  # px of the crop that DINOv2 compares
 
 
@@ -77,6 +78,7 @@ class Filled:
     """One fill of one hole."""
 
     psnr: float  # dB, in the hole
+    blurred: float  # dB, the same of the fill without what is finer than BLUR
     ssim: float  # in the hole
     unlike: float  # 1 - cosine of DINOv2's tokens, those that the hole touches
     hed: float  # HED-VGG perceptual, in the hole
@@ -118,7 +120,10 @@ def _middle(hole: Mask) -> Mask:
 def _scored(
     photo: Pixels, filled: Pixels, hole: Mask, around: tuple[slice, slice], seconds: float
 ) -> Filled:
-    error = ((filled.astype(float) - photo)[hole] ** 2).mean()
+    psnr, blurred = (
+        10 * np.log10(255**2 / max(((p.astype(float) - photo)[hole] ** 2).mean(), 1e-9))
+        for p in (filled, cv2.GaussianBlur(filled, (0, 0), BLUR))
+    )
     _, alike = structural_similarity(photo, filled, channel_axis=2, full=True)
     tokens = [
         dino_tokens.shared().tokens(cv2.resize(p[around], (TILE, TILE))) for p in (photo, filled)
@@ -128,8 +133,8 @@ def _scored(
     unlike = 1 - (one * other).sum(-1)[share > 0.2].mean()
     before, after = (np.ascontiguousarray(p[around]) for p in (photo, filled))
     (seen,) = _hed_vgg()(before, after, [hole[around].astype(np.float64)])
-    psnr = 10 * np.log10(255**2 / max(error, 1e-9))
-    return Filled(psnr, float(alike[hole].mean()), float(unlike), seen, seconds, filled[around])
+    ssim = float(alike[hole].mean())
+    return Filled(psnr, blurred, ssim, float(unlike), seen, seconds, filled[around])
 
 
 @cache

@@ -172,7 +172,8 @@ def smooth(values: F32, known: F32) -> F32:
         for c in range(values.shape[2]):
             mean[..., c] += share * cv2.GaussianBlur(values[..., c] * known, (0, 0), sigma)
     everywhere = (values * known[..., None]).sum((0, 1)) / known.sum()
-    is_near = total > 1e-3 * share  # of the widest kernel's share: less is float32's rounding
+    # A thousandth of the widest kernel's share: what is less is float32's rounding.
+    is_near = total > 1e-3 * 100.0 ** (1 - len(SIGMAS))
     mean = np.where(is_near[..., None], mean / np.where(is_near, total, 1)[..., None], everywhere)
     return np.where(known[..., None] > 0, values, mean.astype(np.float32))
 
