@@ -10,13 +10,13 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parents[1]))
-
-from tests.soak.judging import chart, problems
-from tests.soak.session import Sample
 
 
 def main() -> None:
+    sys.path.insert(0, str(HERE.parents[1]))
+    from tests.soak.judging import chart, problems
+    from tests.soak.session import Sample
+
     lines = (HERE / "day.jsonl").read_text(encoding="utf-8").splitlines()
     told = [json.loads(line) for line in lines if line.startswith("{")]
     samples = [Sample(**values) for values in told if "memory" in values]
