@@ -289,7 +289,7 @@ def _ball(count: int) -> Gaussians:
     scales = np.full((count, 3), 0.4 * np.sqrt(4 * np.pi / count), np.float32)
     return Gaussians(
         (radius * way).astype(np.float32), upright, scales,
-        np.full(count, 0.95, np.float32), cup[rows, columns].astype(np.float32) / 255,
+        np.full(count, 0.95, np.float32), cup[rows, columns].astype(np.float32) / np.float32(255),
     )  # fmt: skip
 
 
