@@ -8,7 +8,6 @@ menu, shortcuts, tools and tests call the same ones. No GL, no ImGui, no window 
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Callable
 from functools import partial
@@ -41,6 +40,7 @@ from .editing.selection import Selection
 from .editing.shaping import Shaping
 from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
+from .freed_memory import give_back
 from .history import History
 from .job_functions import WARM
 from .jobs import RELUCTANCE, JobError, Jobs
@@ -180,7 +180,7 @@ class Editor:
 
     def _forget_derived(self) -> None:
         self.derived = self._nothing_derived()
-        gc.collect()  # its parts know each other, and nothing else would let go of them soon
+        give_back()
 
     def _nothing_derived(self) -> Derived:
         derived = Derived()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import product
 
-import numba
 import numpy as np
 
 from .arrays import F64, frozen
+from .kernel_files import numba
 
 OPPOSED = -0.3  # cosine of two normals, below which they are of different surfaces
 CAPACITY = 1024  # cells that the table of kept points has room for at first

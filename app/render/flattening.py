@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
 from objectmorpher_core.arrays import F32, U8, frozen
+from objectmorpher_core.kernel_files import numba
 from objectmorpher_core.threads import EXACT, in_threads
 
 from ..blend import CELL

@@ -5,11 +5,11 @@ A third of the time of skinning them whole, and the same 32 bits as `PosedSplats
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from objectmorpher_core.arrays import F32, frozen
 from objectmorpher_core.deform.skinning import Skin, nodes_of
+from objectmorpher_core.kernel_files import numba
 from objectmorpher_core.raster.depth_order import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.rules import RULES

@@ -18,11 +18,11 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F32, F64, U8, frozen
 from ..camera import Camera
+from ..kernel_files import numba
 from ..raster import tiles
 from ..raster.posed import PosedSplats
 from ..raster.reference_layers import Picture3D

@@ -8,11 +8,11 @@ place's detail in the photo on top of the small result's colours:
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import F32, I32, Mask, Pixels, frozen
 from ..image import resized
+from ..kernel_files import numba
 
 LOW_PASS = 2  # small pixels: what is coarser comes from the search, what is finer from the photo
 BLEND_STEEPNESS = 2.0  # x, of the blend between two sources' detail

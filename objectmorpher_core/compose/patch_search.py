@@ -13,8 +13,9 @@ beside it in px, and a bit for each hint that holds there.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from ..kernel_files import numba
 
 NEVER = np.float32(1e12)  # penalty of a source that must not be taken
 LINE_COST = 80.0  # squared levels of 255 per squared px beside where the line says

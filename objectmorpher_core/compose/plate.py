@@ -30,6 +30,7 @@ COARSE = 4.0  # px of hole margin at which the correction is computed
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
 CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
 LEAST_CONTEXT = 64  # px
+STRIP = 256  # rows that are joined at a time: of 100 megapixels all at once take 10 GB
 
 
 def hole_margin(width: int, height: int) -> float:
@@ -82,14 +83,22 @@ def build_plate(
         filled = inpainter.inpaint(*cut_out, step, seed)
     progress(0.9, "joining it to the photo")
     inner = (slice(y0, y1), slice(x0, x1))
-    fill = unit_pixels(filled[y0 - top : y1 - top, x0 - left : x1 - left])
-    photo, away = unit_pixels(pixels[inner]), away[inner]
+    fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
+    away = away[inner]
     weight = np.clip((SEAM * margin - away) / (0.6 * SEAM * margin), 0, 1)  # of the fill
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
-    fill = np.clip(fill + correction(photo - fill, ring, margin), 0, 1)
-    mixed = photo + weight[..., None] * (fill - photo)
-    joined = np.where(is_invented[..., None], pixels_from_unit(mixed, pixels.dtype), pixels[inner])
+    difference = np.zeros(photo.shape, np.float32)
+    strips = [slice(first, first + STRIP) for first in range(0, len(photo), STRIP)]
+    for strip in strips:
+        difference[strip] = unit_pixels(photo[strip]) - unit_pixels(fill[strip])
+    change, joined = correction(difference, ring, margin), np.empty_like(photo)
+    del difference
+    for strip in strips:
+        true, new = unit_pixels(photo[strip]), unit_pixels(fill[strip])
+        mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
+        mixed = pixels_from_unit(mixed, pixels.dtype)
+        joined[strip] = np.where(is_invented[strip, :, None], mixed, photo[strip])
     return Plate(int(x0), int(y0), joined, is_invented, inpainter.name, seed)
 
 

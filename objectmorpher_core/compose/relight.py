@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F32, F64, U8
 from ..camera import Camera
+from ..kernel_files import numba
 from ..raster import tiles
 from ..raster.posed import PosedSplats
 from ..raster.texture import build_levels

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import F64, frozen
+from ..kernel_files import numba
 from ..threads import FAST
 
 WINDOW = 12  # previous steps that are combined

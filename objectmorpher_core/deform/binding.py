@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numba
 import numpy as np
 
 from ..arrays import F64, I32, frozen
+from ..kernel_files import numba
 from ..threads import FAST, LEAST_ROWS, in_threads
 from .graph import Graph
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numba
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from ..arrays import F64, I32, Sparse, frozen, frozen_rows
+from ..kernel_files import numba
 from ..threads import FAST
 from .binding import Binding
 from .response import Response

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import F32, F64, frozen
+from ..kernel_files import numba
 
 COUNT = 512  # control points, paper 3.2
 MIN_COUNT = 4  # fewer do not span a volume

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
 from ..arrays import F64, frozen
+from ..kernel_files import numba
 from ..rotations import quats_from_matrices
 from ..threads import FAST, LEAST_ROWS, in_threads
 from .binding import Binding

@@ -9,10 +9,10 @@ two hands meet, each holds its own side.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import F64, Sparse, frozen, frozen_rows
+from ..kernel_files import numba
 from .struts import thickness
 from .surface_links import Surface
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numba
-
+from ..kernel_files import numba
 from ..threads import FAST
 
 # Five times its length a Gaussian still looks like the surface it lies on; what is stretched

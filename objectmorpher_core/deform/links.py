@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba
 import numpy as np
 from scipy.sparse import csr_array
 
 from ..arrays import F32, F64, Sparse, frozen, frozen_rows
+from ..kernel_files import numba
 from ..threads import FAST
 from .rotation_fit import fit_rotations
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numba
 import numpy as np
 from scipy.linalg import cholesky, get_lapack_funcs
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from ..arrays import F64, Sparse, frozen
+from ..kernel_files import numba
 from ..threads import FAST
 
 SPARSE_FROM = 1500  # unknowns: from here two sparse triangular solves beat a dense product

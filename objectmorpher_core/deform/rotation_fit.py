@@ -6,9 +6,9 @@ computed at once.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import FAST
 
 BLOCK = 32  # fits that are made together

@@ -26,10 +26,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
 from ..arrays import F64, frozen
+from ..kernel_files import numba
 from ..threads import FAST, LEAST_ROWS, in_threads
 from .binding import LANES, NEIGHBOURS, Binding
 from .jacobians import LEAST_STRETCH, MOST_STRETCH, limit_row, margin

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ..arrays import F64, Sparse, frozen, frozen_rows
 from ..document import Pose
+from ..kernel_files import numba
 from ..threads import FAST
 
 

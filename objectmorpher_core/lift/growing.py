@@ -9,10 +9,10 @@ out consists of the source's own pixels, as sharp as they are.
 from __future__ import annotations
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F32, Mask, frozen
+from ..kernel_files import numba
 
 COARSEST = 24  # px, longer side of the picture in which it begins
 LEAST = 60  # px of the source there

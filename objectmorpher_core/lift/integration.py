@@ -8,10 +8,10 @@ pixel's ray, in which a tangent plane seen in perspective is linear (Queau, Duro
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import F32, F64, Mask
+from ..kernel_files import numba
 
 SLOPE_ERROR = 0.25  # expected, of the normals: change of depth per length across the ray
 GRAZING = 0.2  # cosine to the ray, below which a normal tells no slope

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ..arrays import F64, frozen
 from ..camera import Camera
+from ..kernel_files import numba
 from ..progress import Progress
 from ..rotations import matrices_from_quats
 from ..threads import FAST, core_count, in_threads

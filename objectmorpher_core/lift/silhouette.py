@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F64, Mask
 from ..distances import distance_inside
+from ..kernel_files import numba
 from ..segment.matte import extended_mask, frame_extension
 from .bilinear import bilinear
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from scipy.spatial import KDTree
 
 from ..arrays import F32, F64, frozen
 from ..camera import Camera
 from ..gaussians import Gaussians
+from ..kernel_files import numba
 from ..poisson_disk import thin_to_spacing
 from ..raster.singles import ONE, ZERO
 from ..rotations import matrices_from_quats

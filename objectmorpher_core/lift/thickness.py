@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F64
+from ..kernel_files import numba
 from .bilinear import bilinear
 from .cuts import Cuts
 from .silhouette import Silhouette, is_covered

@@ -249,4 +249,4 @@ def check_safetensors(at: Path) -> None:
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ModelError(f"{at.name} is not a {PLAIN} file, or only its beginning") from error
     if needed != size:
-        raise ModelError(f"{at.name} is cut off: {size} of {needed} bytes are there")
+        raise ModelError(f"{at.name} is cut off: {size} of {shown(needed)} bytes are there")

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ..arrays import F32, frozen
+from ..kernel_files import numba
 from ..threads import FAST, core_count, in_threads
 from .columns import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
 from .singles import HALF, ONE, ZERO

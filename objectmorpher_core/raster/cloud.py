@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import FAST
 from . import columns as p
 from .bell import SIXTEENTH, rows_of

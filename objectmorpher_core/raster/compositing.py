@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import FAST
 from . import tile_memory as m
 from .look_up import look_up

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ..arrays import frozen
+from ..kernel_files import numba
 from ..threads import FAST
 
 BITS = 8  # of a digit: more of them would write to more places than a processor keeps in reach

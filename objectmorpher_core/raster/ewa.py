@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from ..deform import skinning
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT
+from ..kernel_files import numba
 from ..threads import FAST
 from . import columns as p
 from .posed import (

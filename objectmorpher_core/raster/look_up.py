@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import EXACT
 from . import tile_memory as m
 from .intrinsics import sixteen_texels

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
 from ..arrays import F32, frozen
 from ..camera import Camera
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
+from ..kernel_files import numba
 from ..threads import FAST, in_threads
 from . import ewa
 from .columns import FRONT, PLAIN_SPAN, SPAN, SX, Z

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from .singles import HALF, ONE, ZERO
 
 CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian of a surface is 0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import EXACT
 from .intrinsics import sixteen_texels
 from .singles import HALF, ONE, TWO, ZERO

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
 from ..arrays import F32, I32, U8
+from ..kernel_files import numba
 from ..threads import EXACT, in_threads
 from .intrinsics import between, bytes_over, four_texels
 from .reference import Picture3D

@@ -7,9 +7,9 @@ interpolated. Between nodes it is off by less than a hundredth of a pixel.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import FAST
 from . import columns as p
 from . import tile_memory as m

@@ -9,9 +9,9 @@ one layer everywhere, nobody looks for the layer's front: that is so on most of 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import FAST
 from . import columns as p
 from . import tile_memory as m

@@ -7,9 +7,9 @@ two strips; the functions serve tiles of any height.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from ..kernel_files import numba
 from ..threads import EXACT
 from .binning import TILE
 from .rules import LAYERS

@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F32, I32, Mask
+from ..kernel_files import numba
 
 SMOOTHNESS = 1e-5  # colour variance (of sRGB in [0, 1]) below which a window says nothing
 TOLERANCE = 3e-4  # of the residual's length, over the right-hand side's

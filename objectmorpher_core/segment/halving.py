@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import cv2
-import numba
 import numpy as np
 
 from ..arrays import F32, frozen
+from ..kernel_files import numba
 from ..pixels import unit_pixels
 from ..threads import in_threads
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ..arrays import F32, I32, Pixels
+from ..kernel_files import numba
 from ..threads import in_threads
 from .halving import doubled, halved, halved_pixels, unit
 

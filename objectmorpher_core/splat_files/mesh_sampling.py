@@ -53,7 +53,7 @@ class _Cover:
 def sample_surface(surface: Surface, count: int, seed: int = 0) -> Gaussians:
     """About `count` Gaussians on the surface; open sheets get one on either side.
 
-    Raises SplatFileError for a surface without area or all transparent.
+    Raises SplatFileError for a surface without area, all transparent, or of 1e-40 units.
     """
     count = min(count, MAX_COUNT)
     surface, is_closed = oriented(surface)
@@ -67,7 +67,10 @@ def sample_surface(surface: Surface, count: int, seed: int = 0) -> Gaussians:
     if is_sheet.mean() > CLOSE_ENOUGH:  # those count twice
         cover = _thinned(cover, round(count / (1 + is_sheet.mean())), rng)
         inward, is_sheet = _open_sides(cover)
-    return _gaussians(cover, inward, is_sheet)
+    found = _gaussians(cover, inward, is_sheet)
+    if not (found.scales > 0).all():  # in 32 bits
+        raise SplatFileError("the mesh is too small to have a size")
+    return found
 
 
 def _thrown(

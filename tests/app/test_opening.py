@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import time
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,7 @@ from conftest import CENTRE, open_file, wait_for_jobs, wait_until
 from app.editor import Editor
 from app.jobs import Jobs
 from app.settings import Backends
+from objectmorpher_core.document import Document
 
 FRAME = 0.05  # s that a look at what has come in may take, while a large photo is opened
 MEGAPIXELS = (6000, 4000)
@@ -172,3 +175,17 @@ def test_a_sample_is_nobodys_file(editor: Editor, photo_path: Path) -> None:
     assert editor.settings is settings
     open_file(editor, photo_path)
     assert editor.source == photo_path
+
+
+def test_what_was_computed_for_a_closed_document_is_let_go(editor: Editor, ball: Document) -> None:
+    """A session opened in its place, or none: neither keeps gigabytes alive."""
+    other = replace(ball, photo=replace(ball.photo, name="other.png"))
+    for leave in (lambda: editor.start(other), editor.close):
+        editor.start(ball)
+        wait_for_jobs(editor)
+        kept = weakref.ref(editor.derived.shape(ball.photo, ball.objects[0]))
+        assert kept() is not None
+        leave()
+        wait_for_jobs(editor)
+        gc.collect()
+        assert kept() is None

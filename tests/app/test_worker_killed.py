@@ -113,6 +113,8 @@ def killed_at_random(editor: Editor, ball: Document, folder: Path, kills: int) -
         if not is_hit:
             lasts[what] = after  # it takes less
         found[what] += is_hit
+        if is_hit:
+            print(f"killed {found.total()} times, now: {what}", flush=True)  # seen with -s
         assert moves < 10 * kills + 10, f"{what} is over before it can be killed"
         wait_for_jobs(editor)
         committed = editor.committed

@@ -17,7 +17,9 @@ EDITS, EVERY = 240, 20
 
 
 def level(count: int) -> list[Sample]:
-    return [Sample(k, 1.0, 900, 400, 5.0, 30, 8, 2, 12, 40) for k in range(1, count + 1)]
+    return [
+        Sample(k, 1.0, 900, 400, 5.0, 30, 8, 2, 12, 40, 9, 4, 17.0) for k in range(1, count + 1)
+    ]
 
 
 def test_what_stays_as_it_is_is_no_problem() -> None:

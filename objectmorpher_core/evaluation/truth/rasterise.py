@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ...arrays import F64, I32
+from ...kernel_files import numba
 
 SAMPLES = 3  # by as many in a pixel: odd, so that one is in its middle
 

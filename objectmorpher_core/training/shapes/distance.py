@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from ...kernel_files import numba
 from ...threads import FAST
 
 # Kinds of primitives, and what their numbers mean; all lie about their own origin.

@@ -1,0 +1,49 @@
+"""Kernels that several processes compile at once are never taken for each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from numba.core import caching
+
+from objectmorpher_core import kernel_files  # noqa: F401  (names the files)
+
+ROOT = Path(__file__).parents[2]
+Files: Any = caching.IndexDataCacheFile
+KEYS = ("8 bits", "16 bits")
+
+
+def test_two_processes_that_write_at_once_leave_no_wrong_kernel(tmp_path: Path) -> None:
+    """Each has read the list before the other wrote it; the first one's data come last."""
+    one, other = Files(str(tmp_path), "blend", 1), Files(str(tmp_path), "blend", 1)
+    write, lists = one._save_data, {"now": True}
+
+    def late(name: str, data: str) -> None:
+        if lists.pop("now", None):
+            other._load_index = dict  # as it was before
+            other.save(KEYS[1], KEYS[1])
+        write(name, data)
+
+    one._save_data = late
+    one.save(KEYS[0], KEYS[0])
+    found = Files(str(tmp_path), "blend", 1)
+    assert all(found.load(key) in (None, key) for key in KEYS)
+    assert any(found.load(key) == key for key in KEYS)
+
+
+def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
+    files = Files(str(tmp_path), "blend", 1)
+    for key in (*KEYS, KEYS[0]):
+        files.save(key, key)
+    assert [Files(str(tmp_path), "blend", 1).load(key) for key in KEYS] == list(KEYS)
+    assert len(list(tmp_path.glob("*.nbc"))) == len(KEYS)
+    assert Files(str(tmp_path), "blend", 2).load(KEYS[0]) is None  # of other sources
+
+
+def test_no_kernel_is_kept_otherwise() -> None:
+    for package in ("objectmorpher_core", "app"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            is_here = path.name == "kernel_files.py"
+            lines = path.read_text(encoding="utf-8").splitlines()
+            assert is_here or "import numba" not in lines, path
