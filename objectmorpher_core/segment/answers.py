@@ -20,7 +20,7 @@ OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's
 NEARBY = 6  # px of the reduced photo beyond what a click changes where the edge is found anew
 SHARPNESS = 3.0  # exponent: how much more a better region is likely to be meant than another
 BLUR = 1.0  # px of the reduced photo, how far the outline found may be from the one meant
-ISLAND = 0.2  # x area of what clicks touch; an answer's smaller islands go with a click elsewhere
+ISLAND = 0.2  # x area of what clicks touch; smaller islands that a click cuts off go
 DIAGONAL = 0.79  # pi / 4: px of an outline for each step of its staircase, all directions alike
 
 
@@ -62,7 +62,7 @@ def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Ans
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEARBY + 1, 2 * NEARBY + 1))
     near = cv2.dilate(found.mask.astype(np.uint8), kernel) > 0
     mask = sharpen_band(image, changed, near, _band(pieces))
-    return Answer(_tidy(mask, _reduced(pieces, prompt), ISLAND), (*answer.others, *found.others))
+    return Answer(_tidy(mask, _reduced(pieces, prompt), near), (*answer.others, *found.others))
 
 
 def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
@@ -100,19 +100,23 @@ def _band(pieces: Pieces) -> int:
     return int(np.clip(round(OFF_EDGE * pieces.side), 2, BAND))
 
 
-def _tidy(mask: Mask, small: Prompt, island: float = np.inf) -> Mask:
+def _tidy(mask: Mask, small: Prompt, near: Mask | None = None) -> Mask:
     """Without specks, with its clicks; `small`: the prompt in px of the reduced photo.
 
-    Islands that no click touches stay where they are as large as `island` x what is touched.
+    Islands that no click touches go; after a click that changes what is in `near` (h, w) those
+    stay that are elsewhere, or large.
     """
     mask = mask.copy()
     for click in small.clicks:
         mask[int(click.y), int(click.x)] = click.is_foreground
     kept = keep_touched(mask, small)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats((mask & ~kept).astype(np.uint8))
-    is_large = stats[:, cv2.CC_STAT_AREA] >= island * kept.sum()
-    is_large[0] = False
-    return fill_small_holes(kept | is_large[labels], small)
+    if near is not None:
+        _, labels, stats, _ = cv2.connectedComponentsWithStats((mask & ~kept).astype(np.uint8))
+        stays = stats[:, cv2.CC_STAT_AREA] >= ISLAND * kept.sum()
+        stays |= ~np.isin(np.arange(len(stats)), labels[near])
+        stays[0] = False
+        kept = kept | stays[labels]
+    return fill_small_holes(kept, small)
 
 
 def _reduced(pieces: Pieces, prompt: Prompt) -> Prompt:
