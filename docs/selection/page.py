@@ -43,7 +43,8 @@ gets the same kind of clicks, for its own errors) and *subject only* (`--segment
 click). *Box*: one box around the object, no click.
 
 A click takes {_milliseconds(seconds)} of a busy core (median; 90 % within
-{_milliseconds(seconds, 90)}, closer looks that encode anew among them), once the photo is encoded, which takes {encoding_seconds():.1f} s and happens once per photo.
+{_milliseconds(seconds, 90)}, closer looks that encode anew among them), once the photo is encoded,
+which takes {encoding_seconds():.1f} s and happens once per photo.
 {machine}.
 
 `make evidence PAGES=selection` makes this page anew.
