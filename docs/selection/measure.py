@@ -77,7 +77,7 @@ def measure() -> list[Row]:
 
 
 def measure_later() -> list[Row]:
-    """Those that were drawn when all was built."""
+    """Those that were drawn later."""
     return [_row(each) for each in LATER]
 
 

@@ -50,7 +50,7 @@ TRUTHS = (
     Truth("headlight", "motorcycle", "part", True),
 )
 
-# Drawn after corrections had been mended, to see whether that holds for other things.
+# Drawn before corrections were decided in finer pieces, to see whether that holds for other things.
 LATER = (
     Truth("flag", "astronaut", "whole", True),  # cut by the frame, of the background's white
     Truth("mast", "rocket", "whole", True),  # six pixels wide, half in a lattice
