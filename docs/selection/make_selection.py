@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy, as the progr
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from measure import measure, measure_large  # noqa: E402
+from measure import measure, measure_large, measure_later  # noqa: E402
 from page import write_page  # noqa: E402
 from panels import draw_objects  # noqa: E402
 
@@ -25,7 +25,7 @@ from tests.core.segment.truth_masks import TRUTHS, truth_mask  # noqa: E402
 def main() -> None:
     rows = measure()
     machine = f"Measured on {os.cpu_count()} cores ({platform.machine()}), no GPU"
-    page = write_page(rows, measure_large(), machine)
+    page = write_page(rows, measure_later(), measure_large(), machine)
     (HERE.parent / "selection.md").write_text(page, encoding="utf-8")
     masks = {each.name: truth_mask(each.name) for each in TRUTHS}
     draw_objects(rows, masks, HERE / "objects.jpg")

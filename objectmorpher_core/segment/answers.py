@@ -9,17 +9,18 @@ import numpy as np
 
 from ..arrays import RGB, Mask
 from ..document import Click, Prompt
+from .correcting import said, wrong
 from .edges import BAND, sharpen_band
-from .piece_choice import Choice, Ground, Region, correct
+from .piece_choice import Choice, Ground, Region
 from .pieces import Pieces
-from .relabel import relabel, touching
+from .relabel import relabel
 from .selection import SMALLEST, fill_small_holes, keep_touched
 
 OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's edge
 NEARBY = 6  # px of the reduced photo beyond what a click changes where the edge is found anew
 SHARPNESS = 3.0  # exponent: how much more a better region is likely to be meant than another
 BLUR = 1.0  # px of the reduced photo, how far the outline found may be from the one meant
-ISLAND = 0.2  # x area of what clicks touch; an answer's smaller islands go with a click elsewhere
+ISLAND = 0.2  # x area of what clicks touch; smaller islands that a click cuts off go
 DIAGONAL = 0.79  # pi / 4: px of an outline for each step of its staircase, all directions alike
 
 
@@ -45,7 +46,7 @@ def begin(
     if whole is not None:
         nested = mask & whole if prompt.level == "part" else mask | whole
         mask = whole if nested.all() or nested.sum() < SMALLEST else nested
-    return Answer(mask, _relative(choice.others))
+    return Answer(mask, choice.relative)
 
 
 def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Answer:
@@ -56,12 +57,12 @@ def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Ans
     if before[row, column] == click.is_foreground:
         return answer
     changed = before.copy()
-    is_wrong, others = _wrong(ground, before, prompt)
-    changed[is_wrong] = click.is_foreground
+    found = wrong(ground, image, before, prompt)
+    changed[found.mask] = click.is_foreground
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEARBY + 1, 2 * NEARBY + 1))
-    near = cv2.dilate(is_wrong.astype(np.uint8), kernel) > 0
+    near = cv2.dilate(found.mask.astype(np.uint8), kernel) > 0
     mask = sharpen_band(image, changed, near, _band(pieces))
-    return Answer(_tidy(mask, _reduced(pieces, prompt), ISLAND), (*answer.others, *others))
+    return Answer(_tidy(mask, _reduced(pieces, prompt), near), (*answer.others, *found.others))
 
 
 def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
@@ -89,7 +90,7 @@ def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> flo
 
 def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:
     """What a first click means, its pieces decided anew by what is like them."""
-    known = _said(ground.pieces, prompt, True)
+    known = said(ground.pieces, prompt, True)
     voted = relabel(ground.pieces, choice.pieces, known) & ground.inside(prompt)
     return replace(choice, pieces=voted)
 
@@ -99,60 +100,23 @@ def _band(pieces: Pieces) -> int:
     return int(np.clip(round(OFF_EDGE * pieces.side), 2, BAND))
 
 
-def _relative(regions: tuple[Region, ...]) -> tuple[Region, ...]:
-    """The regions, the best of them with the score 1."""
-    best = max(max(region.score for region in regions), 1e-9)
-    return tuple(Region(region.pieces, region.score / best) for region in regions)
-
-
-def _wrong(ground: Ground, before: Mask, prompt: Prompt) -> tuple[Mask, tuple[Region, ...]]:
-    """(h, w) what the prompt's last click says is wrong about a mask (h, w); what it may mean."""
-    pieces, click = ground.pieces, prompt.clicks[-1]
-    column, row = pieces.pixel(click.x, click.y)
-    differs = before != click.is_foreground
-    piece, flippable = pieces.at(click.x, click.y), pieces.mean(differs) > 0.5
-    if not flippable[piece]:  # a sliver of a piece
-        _, labels = cv2.connectedComponents((differs & (pieces.labels == piece)).astype(np.uint8))
-        return labels == labels[row, column], ()
-    walls = tuple(
-        pieces.at(c.x, c.y) for c in prompt.clicks if c.is_foreground != click.is_foreground
-    )
-    flippable &= ground.inside(prompt)
-    choice = correct(ground, click, flippable, walls)
-    had = pieces.mean(before) > 0.5
-    found = had | choice.pieces if click.is_foreground else had & ~choice.pieces
-    if ground.is_of_large:  # votes made it worse there: IoU 0.79 to 0.63 of the distant tower
-        flipped = choice.pieces
-    else:
-        said = _said(pieces, prompt, True), _said(pieces, prompt, False)
-        is_like = (relabel(pieces, found, *said, piece) == click.is_foreground) | choice.pieces
-        flipped = touching(pieces, is_like & flippable, choice.pieces)
-    others = tuple(
-        Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
-        for r in _relative(choice.others)
-    )
-    return pieces.paint(flipped) & differs, others
-
-
-def _said(pieces: Pieces, prompt: Prompt, is_foreground: bool) -> tuple[int, ...]:
-    """The pieces that clicks say are in the object, or are not."""
-    clicks = (c for c in prompt.clicks if c.is_foreground == is_foreground)
-    return tuple(pieces.at(c.x, c.y) for c in clicks)
-
-
-def _tidy(mask: Mask, small: Prompt, island: float = np.inf) -> Mask:
+def _tidy(mask: Mask, small: Prompt, near: Mask | None = None) -> Mask:
     """Without specks, with its clicks; `small`: the prompt in px of the reduced photo.
 
-    Islands that no click touches stay where they are as large as `island` x what is touched.
+    Islands that no click touches go; after a click that changes what is in `near` (h, w) those
+    stay that are elsewhere, or large.
     """
     mask = mask.copy()
     for click in small.clicks:
         mask[int(click.y), int(click.x)] = click.is_foreground
     kept = keep_touched(mask, small)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats((mask & ~kept).astype(np.uint8))
-    is_large = stats[:, cv2.CC_STAT_AREA] >= island * kept.sum()
-    is_large[0] = False
-    return fill_small_holes(kept | is_large[labels], small)
+    if near is not None:
+        _, labels, stats, _ = cv2.connectedComponentsWithStats((mask & ~kept).astype(np.uint8))
+        stays = stats[:, cv2.CC_STAT_AREA] >= ISLAND * kept.sum()
+        stays |= ~np.isin(np.arange(len(stats)), labels[near])
+        stays[0] = False
+        kept = kept | stays[labels]
+    return fill_small_holes(kept, small)
 
 
 def _reduced(pieces: Pieces, prompt: Prompt) -> Prompt:

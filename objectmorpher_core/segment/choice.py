@@ -41,6 +41,7 @@ class Ground:
     walk: Walk  # crosses from part to part of an object
     inside: Mask  # (h, w) cells in the box
     salience: F32 | None  # (SIDE, SIDE) subject map
+    least: float = 0.0  # x photo's area: what is around a click is larger
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +52,25 @@ class Choice:
     subject: F32 | None
 
 
-def guess(walk: Walk, strict: Walk, rgb: RGB, prompt: Prompt, salience: F32 | None) -> F32:
+def guess(
+    walks: tuple[Walk, Walk],
+    rgb: RGB,
+    prompt: Prompt,
+    salience: F32 | None,
+    least: float = 0.0,
+) -> F32:
     """(SIDE, SIDE) guess in [0, 1] that a place of the photo (H, W, 3) belongs to the object.
 
-    `walk` crosses from part to part of an object, `strict` stops at the borders of parts too.
+    The first of `walks` crosses from part to part of an object, the second stops at the borders of
+    parts too. What a click is on covers more than `least` of the photo.
     """
+    walk, strict = walks
     inside = _to_cells(box_mask(rgb.shape, prompt).astype(np.float32), walk.shape) > 0.5
     wanted = [_cell(c, rgb, walk) for c in prompt.clicks if c.is_foreground]
     unwanted = [_cell(c, rgb, walk) for c in prompt.clicks if not c.is_foreground]
     for cell in wanted:
         inside[cell] = True
-    ground = Ground(walk, inside, salience)
+    ground = Ground(walk, inside, salience, least)
     choices = [_around_click(ground, cell) for cell in wanted]
     if prompt.is_subject:
         choices += _subjects(ground)
@@ -164,7 +173,7 @@ def _around_click(ground: Ground, cell: tuple[int, int]) -> Choice:
             subject = subject * _enlarge(inside.astype(np.float32))
             cells = _to_cells(subject, walk.shape)
             masks.append(cells > 0.5)
-    regions = [Region(mask, walk.contrast(mask)) for mask in masks if mask.any()]
+    regions = [Region(mask, walk.contrast(mask)) for mask in masks if mask.mean() > ground.least]
     if not regions:
         raise SelectionError("nothing stands out there: draw a box or add clicks")
     best = max(regions, key=lambda region: _score(region, cells, other))

@@ -20,6 +20,7 @@ COLOR_STEP = 14.0  # CIELAB units; two colours this far apart are 0.5 apart in t
 TEMPERATURE = 0.3
 STRICT_TEMPERATURE = 0.1
 BOX_SIDE = 320  # px, the square in which a box is drawn
+SPECK = 0.01  # x photo's area: 40 cells, of which half are not at the outline
 UNDECIDED = 0.7  # guess inside a box: colours decide
 MEAN_SHIFT = (6, 12)  # cells' px and CIELAB units within which texture is one colour
 
@@ -63,9 +64,16 @@ class GrabCut:
 
         def find(meant: Prompt) -> Mask:
             progress(0.4, "looking for its outline")
-            soft = guess(*walks, rgb, meant, salience) if walks else _box_guess(rgb, meant)
-            progress(0.6, "cutting out the object")
-            return cut(rgb, soft, meant, seed)
+            if walks is None:
+                return cut(rgb, _box_guess(rgb, meant), meant, seed)
+            try:
+                return cut(rgb, guess(walks, rgb, meant, salience), meant, seed)
+            except SelectionError:
+                if not any(click.is_foreground for click in meant.clicks):
+                    raise
+            # What stands out most there is a speck that its surroundings swallow: what it is on.
+            progress(0.6, "looking further around")
+            return cut(rgb, guess(walks, rgb, meant, salience, SPECK), meant, seed)
 
         mask = at_level(prompt, find)
         progress(1.0, "cut out the object")

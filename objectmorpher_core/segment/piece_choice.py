@@ -14,13 +14,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import F32, F64, Mask
 from ..document import Click, Prompt
 from .pieces import Pieces
-from .relabel import touching
+from .relabel import islands, touching
 from .selection import SelectionError, box_mask
 
 CENTRED_WHOLE = 0.3  # exponent: how much a click is in the middle of the whole that it means
@@ -66,6 +64,12 @@ class Choice:
     pieces: Mask  # (n,)
     others: tuple[Region, ...]  # the best first
 
+    @property
+    def relative(self) -> tuple[Region, ...]:
+        """The others, the best of them with the score 1."""
+        best = max(max(region.score for region in self.others), 1e-9)
+        return tuple(Region(region.pieces, region.score / best) for region in self.others)
+
 
 @dataclass(frozen=True)
 class _Taste:
@@ -73,6 +77,7 @@ class _Taste:
 
     minor: float
     larger: float
+    reach: float = 0.0  # px of all that may be meant, where that is more than what is allowed
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +87,7 @@ class Ground:
     pieces: Pieces
     salience: F32 | None  # (h, w) subject map at the pieces' size
     is_of_large: bool = False  # of a large photo, or of a tile of one
+    tokens: F32 | None = None  # (r, c, d) of the photo
 
     def inside(self, prompt: Prompt) -> Mask:
         """(n,) pieces most of which are in the prompt's box, and those of positive clicks."""
@@ -115,12 +121,15 @@ def choose(ground: Ground, prompt: Prompt) -> Choice:
     return whole
 
 
-def correct(ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...]) -> Choice:
+def correct(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], reach: float = 0.0
+) -> Choice:
     """The part of the pieces `allowed` (n,) that a click on a wrong place means.
 
-    It holds none of `walls`, the pieces of clicks that say the contrary.
+    It holds none of `walls`, the pieces of clicks that say the contrary. `reach`: px of all that
+    it could mean, where the pieces are a part of that only.
     """
-    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION, reach)
     regions = _parts(ground, click, allowed, walls, taste)
     regions += _left_over(ground, click, allowed, walls, taste)
     regions += _reached(ground, click, allowed, walls, taste)
@@ -218,7 +227,7 @@ def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Tast
     """Pieces (n,), and how much a click on a place within `allowed` (n,) means just them."""
     pieces = ground.pieces
     cut = (mask[pieces.left] != mask[pieces.right]) & allowed[pieces.left] & allowed[pieces.right]
-    share = pieces.area[mask].sum() / pieces.area[allowed].sum()
+    share = pieces.area[mask].sum() / max(pieces.area[allowed].sum(), taste.reach)
     contrast, left = ALL_OF_IT, 1.0
     if cut.any():
         contrast = (pieces.gap * pieces.length)[cut].sum() / pieces.length[cut].sum()
@@ -255,7 +264,7 @@ def _group(ground: Ground, click: Click, whole: Mask) -> Mask:
     group = larger[k] if best > WORTH_A_GROUP * _score(plain, whole, None) else whole
     gap = np.square(pieces.features - pieces.features[whole].mean(0)).sum(-1)
     like = (gap <= ALIKE * np.quantile(gap[whole], LIKENESS)) & ~whole
-    for island in _islands(pieces, like):
+    for island in islands(pieces, like):
         if LIKE_AREA[0] < pieces.share(island) / pieces.share(whole) < LIKE_AREA[1]:
             group = group | island
     return group
@@ -274,8 +283,8 @@ def _subjects(ground: Ground, inside: Mask) -> Choice:
     choices = []
     for k in range(1, count):
         if stats[k, cv2.CC_STAT_AREA] >= SMALLEST_SUBJECT * largest:
-            depth = _depth(labels == k)
-            row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+            inmost = depth(labels == k)
+            row, column = np.unravel_index(int(inmost.argmax()), inmost.shape)
             place = (float(column) + 0.5) * wide / width, (float(row) + 0.5) * tall / height
             choices.append(_around_click(ground, Click(*place), inside))
     together = np.any([choice.pieces for choice in choices], axis=0)
@@ -365,26 +374,17 @@ def _subject_around(ground: Ground, piece: int) -> F64 | None:
 
 def _centred(pieces: Pieces, mask: Mask, click: Click) -> float:
     """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
-    depth = _depth(pieces.paint(mask)[::2, ::2])
+    deep = depth(pieces.paint(mask)[::2, ::2])
     column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
-    near = depth[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    near = deep[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
     here = near.max() if near.size else 0.0
-    return max(float(here / max(depth.max(), 1e-6)), OFF_CENTRE)
+    return max(float(here / max(deep.max(), 1e-6)), OFF_CENTRE)
 
 
-def _depth(mask: Mask) -> F32:
+def depth(mask: Mask) -> F32:
     """(h, w) px to the edge of a mask; the frame is one."""
     framed = np.pad(mask, 1).astype(np.uint8)
     return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
-
-
-def _islands(pieces: Pieces, mask: Mask) -> list[Mask]:
-    """The connected sets (n,) of pieces in a mask (n,)."""
-    linked = mask[pieces.left] & mask[pieces.right]
-    ends = (pieces.left[linked], pieces.right[linked])
-    graph = coo_array((np.ones(int(linked.sum())), ends), (pieces.count, pieces.count))
-    _, labels = connected_components(graph, directed=False)
-    return [(labels == k) & mask for k in np.unique(labels[mask])]
 
 
 def _only(pieces: Pieces, piece: int) -> Mask:

@@ -28,7 +28,7 @@ COLOR_TEMPERATURE = 12.0  # CIELAB units
 COLOR_ALONE_TEMPERATURE = 4.0  # the same, where there are no tokens
 COLOR_WORTH = 0.25  # gap of two colours far apart, in 1 - cosine of tokens
 COLOR_STEP = 25.0  # CIELAB units that make most of that gap
-STAMINA = 0.999  # the chance that a walk goes on
+STAMINA = 0.999  # the chance that a walk goes on, in the pieces of a photo
 SPAN = 1.15  # x area: a region has the most contrast among those of about its size
 
 
@@ -54,9 +54,16 @@ class Growth:
 
 
 class Pieces:
-    """Precomputed for a photo (H, W, 3) and its tokens (h, w, d), if any: about `count` pieces."""
+    """Precomputed for a photo (H, W, 3) and its tokens (h, w, d), if any: about `count` pieces.
 
-    def __init__(self, rgb: RGB, tokens: F32 | None, count: int = PIECES) -> None:
+    A walk goes as far as among pieces of the side `like` px, where that is given.
+    """
+
+    _stamina = STAMINA
+
+    def __init__(
+        self, rgb: RGB, tokens: F32 | None, count: int = PIECES, like: float | None = None
+    ) -> None:
         self.photo_shape = rgb.shape[:2]
         image = reduced(rgb)
         self.shape = height, width = image.shape[:2]
@@ -74,6 +81,8 @@ class Pieces:
         frame = np.concatenate([self.labels[[0, -1]].ravel(), self.labels[:, [0, -1]].ravel()])
         self.frame = np.bincount(frame, minlength=self.count) / frame.size  # share of the frame
         self.side = float(self.area.mean() ** 0.5)  # px of the reduced photo, of a piece
+        if like is not None:  # the square of how far a walk goes grows with its steps
+            self._stamina = 1 - (1 - STAMINA) * (self.side / like) ** 2
         self._solver: Any = None
 
     def _measure(self, lines: BorderLine, lab: F32, tokens: F32 | None) -> None:
@@ -179,7 +188,7 @@ class Pieces:
 
     def _open(self) -> Any:
         if self._solver is None:
-            self._solver = splu(_restarting(self._links))
+            self._solver = splu(_restarting(self._links, self._stamina))
         return self._solver
 
     def _visits_within(self, start: F64, allowed: Mask, walls: tuple[int, ...]) -> tuple[F64, Mask]:
@@ -187,7 +196,7 @@ class Pieces:
         chosen = np.flatnonzero(allowed)
         links = self._links[chosen][:, chosen]
         is_free = ~np.isin(chosen, walls)
-        system, free = _restarting(links)[is_free][:, is_free], chosen[is_free]
+        system, free = _restarting(links, self._stamina)[is_free][:, is_free], chosen[is_free]
         visits = np.zeros(self.count)
         visits[free] = splu(system.tocsc()).solve(start[free])
         _, islands = connected_components(links[is_free][:, is_free])
@@ -247,9 +256,9 @@ def _superpixels(image: RGB, count: int) -> np.ndarray:
     return labels.reshape(height, width).astype(np.int32)
 
 
-def _restarting(links: Sparse) -> Sparse:
+def _restarting(links: Sparse, stamina: float) -> Sparse:
     degrees = np.asarray(links.sum(1)).ravel() + 1e-9
-    return (sparse.diags(degrees) - STAMINA * links).tocsc()
+    return (sparse.diags(degrees) - stamina * links).tocsc()
 
 
 def _cosine_gap(a: F32, b: F32) -> F64:

@@ -55,7 +55,7 @@ class View:
         if salience is not None:
             size = (pieces.shape[1], pieces.shape[0])
             salience = np.asarray(cv2.resize(salience, size), np.float32)
-        self.ground = Ground(pieces, salience, is_of_large)
+        self.ground = Ground(pieces, salience, is_of_large, embedding.tokens)
         self._image = reduced(rgb)
         self._known: dict[Prompt, Answer] = {}
         self._choices: dict[Prompt, Choice] = {}

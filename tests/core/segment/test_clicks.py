@@ -16,10 +16,12 @@ from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.pipeline import Reading
 from objectmorpher_core.progress import silent
 from tests.core.segment.simulated_user import Step, boundary_f, inmost, overlap, use
-from tests.core.segment.truth_masks import TRUTHS, draw_mask, truth, truth_mask
+from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
 
 HELPS = 0.01  # IoU that a click in the middle of the largest error may cost
+SPOILS = 0.002  # IoU: rounding at the edges near the click
+NEAR = 8  # px between what one click changes and the edge that is found anew for it
 BAD = 0.75  # IoU below which a mask is not what was meant
 FEW = ("astronaut", "coffee", "dahlia", "spoon")
 RANDOM_CLICKS = 6
@@ -60,7 +62,7 @@ def steps(name: str) -> list[Step]:
 # The truth ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [each.name for each in TRUTHS])
+@pytest.mark.parametrize("name", [each.name for each in (*TRUTHS, *LATER)])
 def test_a_reference_mask_is_what_its_outline_draws(name):
     np.testing.assert_array_equal(truth_mask(name), draw_mask(name))
     assert truth_mask(name).shape == photo(truth(name).photo).shape[:2]
@@ -128,6 +130,32 @@ def test_a_correction_changes_nothing_that_hangs_not_together_with_it():
     assert rows.size > 0
     assert columns.max() < 120
     assert rows.min() > 350
+
+
+def test_wherever_a_later_click_is_nothing_changes_that_hangs_not_together_with_it():
+    """Random places of two photos, to be added and to be taken away."""
+    rng = np.random.default_rng(1)
+    for name, first in (("astronaut", (193, 350)), ("flower", inmost(truth_mask("dahlia")))):
+        before = select(name, first)
+        changes = []
+        for _ in range(RANDOM_CLICKS):
+            x, y = rng.uniform((0, 0), before.shape[::-1])
+            after = select(name, first, (x, y, not before[int(y), int(x)]))
+            changed = (before != after).astype(np.uint8)
+            _, labels = cv2.connectedComponents(cv2.dilate(changed, np.ones((2 * NEAR + 1,) * 2)))
+            assert labels[int(y), int(x)] > 0
+            assert (labels[changed > 0] == labels[int(y), int(x)]).mean() > 0.999
+            changes.append(changed.mean())
+        assert min(changes) < 0.1
+
+
+@pytest.mark.parametrize(
+    "name", ["coin", "cameraman", pytest.param("pagoda", marks=pytest.mark.slow)]
+)
+def test_a_click_on_a_narrow_error_spoils_nothing_beside_it(name):
+    """The error is narrower than the photo's pieces, and what is right lies in the same ones."""
+    ious = [step.iou for step in steps(name)]
+    assert min(np.diff(ious)) > -SPOILS
 
 
 def test_a_thing_that_is_held_stays_whole_when_who_holds_it_is_taken_away():

@@ -71,3 +71,31 @@ def test_what_a_click_cuts_off_stays_where_it_is_no_speck(width: int, stays: boo
     assert found[left].mean() > 0.9
     assert found[middle].mean() < 0.1
     assert (found[right].mean() > 0.8) == stays
+
+
+def test_an_island_stays_when_a_click_is_elsewhere():
+    """A small one that no click touches, and a large one, of which a click takes a part away."""
+    large, part, small = (
+        (slice(40, 120), slice(20, 100)),
+        (slice(100, 120), slice(20, 100)),
+        (slice(60, 72), slice(200, 212)),
+    )
+    image = picture((FACE, *large), (COAT, *part), (FACE, *small))
+    mask = np.zeros(image.shape[:2], bool)
+    mask[large] = mask[small] = True
+    prompt = Prompt((Click(60, 70), Click(60, 110, False)))
+    found = add_click(Ground(Pieces(image, None), None), image, Answer(mask, ()), prompt).mask
+    assert found[part].mean() < 0.1
+    assert found[small].all()
+
+
+@pytest.mark.parametrize("width", [3, 4, 6])
+def test_a_strip_narrower_than_the_pieces_goes_without_what_it_runs_along(width: int):
+    body, strip = (slice(30, 130), slice(80, 140)), (slice(30, 130), slice(140, 140 + width))
+    image = picture((FACE, *body), (COAT, *strip))
+    mask = np.zeros(image.shape[:2], bool)
+    mask[body] = mask[strip] = True
+    prompt = Prompt((Click(110, 80), Click(140 + width / 2, 80, False)))
+    found = add_click(Ground(Pieces(image, None), None), image, Answer(mask, ()), prompt).mask
+    assert found[strip].mean() < 0.5
+    assert found[body].mean() > 0.98

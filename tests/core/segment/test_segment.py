@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import Prompt
+from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import SelectionError
 from tests.core.segment.contract import *  # noqa: F403
@@ -121,6 +121,14 @@ def test_with_weights_auto_is_dino(dino):
 def test_colours_alone_find_the_flower(flower):
     mask = segment.load("grabcut").segment(flower, prompt([(310, 240)]), None, silent)
     assert overlap(mask, ellipses(flower.shape, (308, 223, 138, 137))) > SKETCH
+
+
+@pytest.mark.parametrize("at", [(300, 215), (175, 125), (375, 375)])
+def test_colours_alone_answer_a_click_on_a_speck_by_what_it_is_on(coffee, at):
+    """What stands out most there is a highlight of a few cells, that colours then swallow."""
+    found = segment.load("grabcut").segment(coffee, Prompt((Click(*at),)), None, silent)
+    assert found[at[1], at[0]]
+    assert 0.01 < found.mean() < 0.5
 
 
 def test_colours_alone_find_the_pagoda_in_its_box(china):
