@@ -110,8 +110,8 @@ def _tables(rows: list[Row]) -> str:
 
 def _later(rows: list[Row]) -> str:
     lines = ["## Drawn later\n\nOutlined before corrections were decided in finer pieces, to see "
-             "whether that holds for other things: their figures were in view while DEEP was chosen. In no "
-             "mean above.\n",
+             "whether that holds for other things: their figures were in view while DEEP was "
+             "chosen. In no mean above.\n",
              _line(["", "Kind", "IoU, 1 click", "2", "3", "F, 3 clicks", "Box IoU"]),
              "|---|---" + "|---:" * 5 + "|"]  # fmt: skip
     for row in rows:
