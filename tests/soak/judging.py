@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,13 +48,13 @@ def chart(samples: Sequence[Any]) -> str:
     ]
     for k, (unit, lines) in enumerate(PANELS):
         top = TOP + k * (HEIGHT + GAP)
-        most = max(getattr(s, name) for s in samples for name, *_ in lines) or 1
+        most = _round(max(getattr(s, name) for s in samples for name, *_ in lines))
         parts.append(f'<text x="{LEFT}" y="{top - 6}">{unit}</text>')
         for share in (0.0, 0.5, 1.0):
             y = top + HEIGHT * (1 - share)
             parts.append(f'<path d="M{LEFT} {y:.1f}h{WIDTH}" stroke="#ddd"/>')
             parts.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">'
-                         f"{most * share:.3g}</text>")  # fmt: skip
+                         f"{most * share:,g}</text>")  # fmt: skip
         ends = []
         for name, label, colour in lines:
             points = [
@@ -74,3 +75,9 @@ def chart(samples: Sequence[Any]) -> str:
     parts.append(f'<text x="{LEFT + WIDTH}" y="{height - 8}" text-anchor="end">'
                  f"{last.edits:,} edits, {last.minutes:.0f} minutes</text></svg>\n")  # fmt: skip
     return "\n".join(parts)
+
+
+def _round(most: float) -> float:
+    """The next of some round numbers, as the end of an axis."""
+    decade = 10.0 ** math.floor(math.log10(max(most, 1)))
+    return next(n * decade for n in (1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10) if n * decade >= most)
