@@ -14,14 +14,15 @@ HERE = Path(__file__).parent
 
 def main() -> None:
     sys.path.insert(0, str(HERE.parents[1]))
-    from tests.soak.judging import chart, problems
-    from tests.soak.session import Sample
+    from tests.soak.judging import chart, problems, slower
+    from tests.soak.session import Hundred, Sample
 
     lines = (HERE / "day.jsonl").read_text(encoding="utf-8").splitlines()
     told = [json.loads(line) for line in lines if line.startswith("{")]
     samples = [Sample(**values) for values in told if "memory" in values]
     (HERE / "day.svg").write_text(chart(samples), encoding="utf-8")
-    print("\n".join(problems(samples)) or "Nothing grew.")
+    hundreds = [Hundred(**values) for values in told if "main" in values]
+    print("\n".join(problems(samples) + slower(hundreds)) or "Nothing grew.")
 
 
 if __name__ == "__main__":

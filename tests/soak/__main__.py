@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from tests import photos
 
-from .judging import chart, problems
+from .judging import chart, problems, slower
 
 
 def main() -> int:
@@ -47,7 +47,7 @@ def main() -> int:
             session.close()
     if options.chart:
         options.chart.write_text(chart(samples), encoding="utf-8")
-    found = problems(samples)
+    found = problems(samples) + slower(hundreds)
     print("\n".join(found))
     return int(bool(found))
 

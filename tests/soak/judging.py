@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-SLOWER = 1.1  # x the first drags' time
+SLOWER = 1.1  # x the time of the same edits at the beginning
+ENDS = 3  # of the repeated edits at either end, whose least time counts: others load the machine
 WIDTH, HEIGHT, LEFT, TOP, GAP = 720, 150, 60, 24, 40  # px of a panel, and around it
 PANELS = (
     ("MiB", (("memory", "editor", "#0072b2"), ("worker", "worker", "#d55e00"))),
@@ -17,9 +18,9 @@ PANELS = (
 
 
 def problems(samples: Sequence[Any]) -> list[str]:
-    """What grew or became slower; `samples` are `session.Sample`s at even distances.
+    """What grew; `samples` are `session.Sample`s at even distances.
 
-    The first quarter fills the history and every cache, and is not judged but for the drags.
+    The first quarter fills the history and every cache, and is not judged.
     """
     quarter = len(samples) // 4
     early, late = samples[quarter : 2 * quarter], samples[-quarter:]
@@ -32,9 +33,22 @@ def problems(samples: Sequence[Any]) -> list[str]:
         before, after = max(getattr(s, name) for s in early), min(getattr(s, name) for s in late)
         if after > before:
             found.append(f"{name}: {before}, and {after} at the end")
-    first, last = (min(s.drag for s in part) for part in (samples[:quarter], late))
-    if last > SLOWER * first:
-        found.append(f"drag: {first:.1f} ms, and {last:.1f} at the end")
+    return found
+
+
+def slower(hundreds: Sequence[Any], most: float = SLOWER) -> list[str]:
+    """Where the same edits, `session.Hundred`s, take more than `most` x as long at the end.
+
+    The samples' own drags are of objects and handles that become more and fewer.
+    """
+    ends = min(ENDS, len(hundreds) // 2)
+    found = []
+    for name in ("main", "drag"):
+        first, last = (
+            min(getattr(h, name) for h in p) for p in (hundreds[:ends], hundreds[-ends:])
+        )
+        if last > most * first:
+            found.append(f"{name}: {first:.3g}, and {last:.3g} at the end")
     return found
 
 

@@ -10,10 +10,11 @@ import pytest
 pytest.importorskip("moderngl")
 
 from tests import photos
-from tests.soak.judging import chart, problems
-from tests.soak.session import Sample, Session
+from tests.soak.judging import chart, problems, slower
+from tests.soak.session import Hundred, Sample, Session
 
 EDITS, EVERY = 240, 20
+MOST = 1.4  # x the first hundred edits: other tests run beside it
 
 
 def level(count: int) -> list[Sample]:
@@ -26,12 +27,20 @@ def test_what_stays_as_it_is_is_no_problem() -> None:
     assert problems(level(40)) == []
 
 
-@pytest.mark.parametrize("name", ["memory", "worker", "drag", "files", "threads", "children",
+@pytest.mark.parametrize("name", ["memory", "worker", "files", "threads", "children",
                                   "textures", "buffers"])  # fmt: skip
 def test_what_grows_is_told(name: str) -> None:
     grown = [replace(s, **{name: getattr(s, name) * (1 + k / 20)}) for k, s in enumerate(level(40))]
     (problem,) = problems(grown)
     assert problem.startswith(name)
+
+
+def test_what_becomes_slower_is_told() -> None:
+    even = [Hundred(k, 2.0 + 0.3 * (k % 2), 3.0, 50.0, 9.0) for k in range(10)]
+    assert slower(even) == []
+    slowing = [replace(h, drag=50.0 * (1 + k / 20)) for k, h in enumerate(even)]
+    (problem,) = slower(slowing)
+    assert problem.startswith("drag")
 
 
 def test_the_picture_holds_every_line() -> None:
@@ -49,8 +58,12 @@ def test_a_day_of_edits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     except RuntimeError as error:
         pytest.skip(str(error))
     try:
+        session.hundred()  # fills the caches
+        hundreds = [session.hundred(), session.hundred()]
         samples = list(session.samples(EDITS, EVERY))
+        hundreds += [session.hundred(), session.hundred()]
     finally:
         session.close()
     assert len(samples) == EDITS // EVERY
     assert problems(samples) == []
+    assert slower(hundreds, MOST) == []
