@@ -14,7 +14,7 @@ from tests.soak.judging import chart, problems, slower
 from tests.soak.session import Hundred, Sample, Session
 
 EDITS, EVERY = 240, 20
-MOST = 1.4  # x the first hundred edits: other tests run beside it
+MOST = 1.6  # x the first hundred edits: other tests run beside it on the same cores
 
 
 def level(count: int) -> list[Sample]:
