@@ -30,10 +30,7 @@ from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Placement, Prompt
 
-SIZE = (
-    360,
-    280,
-)  # canvas px; software OpenGL takes a second of processor time for four times as many
+SIZE = (360, 280)  # canvas px: software OpenGL takes a second for four times as many
 DRAWN = 50  # edits from one frame to the next
 MOVES = 3  # of the pointer in a drag
 MOST_HANDLES = 6

@@ -3,37 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from ray_apart import HERE, NEEDS_RAY_DATA, own_folder, told_by
 
 from objectmorpher_core.training.composition.shards import SHARD
 from tests import shapes
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        any(find_spec(name) is None for name in ("ray", "pyarrow", "pandas")),
-        reason="Ray Data is not installed",
-    ),
-]
+pytestmark = [pytest.mark.slow, NEEDS_RAY_DATA]
 
-HERE = Path(__file__).parent
 PAIRS = 8
 
 
 @pytest.fixture
 def folder():
-    # Short: Ray's sockets lie in it, and their paths may have 107 characters.
-    at = Path(tempfile.mkdtemp(prefix="om"))
-    yield at
-    shutil.rmtree(at, ignore_errors=True)
+    with own_folder() as at:
+        yield at
 
 
 def write_pairs(at: Path) -> Path:
@@ -55,18 +41,10 @@ def test_a_killed_worker_loses_nothing_and_each_shard_is_there_once(folder: Path
         at.mkdir()
     command = json.dumps(["{python}", str(HERE / "pose_worker.py"), str(notes)])
     (workers / "same-pose.toml").write_text(f'name = "same-pose"\ncommand = {command}\n')
-    environment = os.environ | {
-        "RAY_TMPDIR": str(folder), "OBJECTMORPHER_WORKERS": str(workers), "OMP_NUM_THREADS": "1",
-        "RAY_USAGE_STATS_ENABLED": "0",
-    }  # fmt: skip
-    for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ADDRESS"):
-        environment.pop(name, None)
-    done = subprocess.run(
-        [sys.executable, str(HERE / "spread_shards.py"), str(source), str(out), str(notes)],
-        capture_output=True, text=True, timeout=500, env=environment, cwd=HERE.parents[2],
+    told = told_by(
+        "spread_shards.py", folder, source, out, notes,
+        OBJECTMORPHER_WORKERS=str(workers), OMP_NUM_THREADS="1",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-2000:]
-    told = json.loads(done.stdout.splitlines()[-1])
     assert len(told["killed"]) == 1 and told["nodes"] == 2 and told["workers"] >= 3
     assert told["asked"] > PAIRS  # what the killed one had begun was begun anew
     assert told["unfinished"] >= 1  # and what it left behind is no shard

@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from ray_apart import NEEDS_RAY_DATA, own_folder, told_by
 
 from app import cli
 from tests import shapes
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(
-        any(find_spec(name) is None for name in ("ray", "pyarrow", "pandas")),
-        reason="Ray Data is not installed",
-    ),
+    NEEDS_RAY_DATA,
     pytest.mark.skipif(
         any(find_spec(name) is None for name in ("skimage", "sklearn")),
         reason="the benchmark's photos are not installed",
     ),
 ]
 
-HERE = Path(__file__).parent
 EDITS = 6
 
 
 @pytest.fixture
 def folder():
-    # Short: Ray's sockets lie in it, and their paths may have 107 characters.
-    at = Path(tempfile.mkdtemp(prefix="om"))
-    yield at
-    shutil.rmtree(at, ignore_errors=True)
+    with own_folder() as at:
+        yield at
 
 
 def write_scripts(at: Path) -> None:
@@ -67,15 +57,7 @@ def test_killed_workers_lose_nothing(folder: Path) -> None:
     write_scripts(folder / "scripts")
     write_subjects(folder / "subjects")
     (folder / "out").mkdir()
-    environment = os.environ | {"RAY_TMPDIR": str(folder), "RAY_USAGE_STATS_ENABLED": "0"}
-    for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ADDRESS"):
-        environment.pop(name, None)
-    done = subprocess.run(
-        [sys.executable, str(HERE / "spread_edits.py"), str(folder)],
-        capture_output=True, text=True, timeout=500, env=environment, cwd=HERE.parents[2],
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-2000:]
-    told = json.loads(done.stdout.splitlines()[-1])
+    told = told_by("spread_edits.py", folder, folder)
     assert all(told["killed"])
     batch = told["batch"]
     assert told["status"] == cli.FAILED
