@@ -159,10 +159,10 @@ class Editor:
 
     def start(self, document: Document, shapes: Shapes = ()) -> None:
         """A photo or a session was opened; `shapes` of its objects are ready."""
-        before = self.committed
+        is_of_another = self.committed is not None and self.committed.photo is not document.photo
         self.close_document()
-        if before is not None and before.photo is not document.photo:
-            self.derived = self._nothing_derived()
+        if is_of_another:
+            self._forget_derived()
         self.derived.adopt(shapes)
         self.history = History(document, limit=self.settings.history_mb << 20)
         self.current = max(len(document.objects) - 1, 0)
