@@ -19,6 +19,7 @@ from ..commands import run
 from ..derived import import_core
 from ..editor import Editor
 from ..filing import Filing
+from ..freed_memory import set_aside
 from ..motion import motion
 from ..options import WindowOptions
 from ..render.renderer import Renderer
@@ -186,6 +187,7 @@ class Window:
         """In a thread."""
         motion.ask_system()
         import_core()
+        set_aside()
         self._renderer.rehearse()
 
     def _wait(self) -> int:

@@ -198,9 +198,9 @@ def test_cancelling_ends_the_job_over_there(front: Front, server: Server) -> Non
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        client.call(server, "count", (500,), progress)
+        client.call(server, "count", (5000,), progress)
     assert client.call(server, "count", (1,), silent) == 1  # its place is free again
-    assert time.monotonic() - start < 5  # the first one would take 10 s
+    assert time.monotonic() - start < 50  # the first one would take 100
     assert served_jobs.seen.count("counted") == before + 1
 
 
@@ -217,7 +217,7 @@ def test_jobs_queue_and_the_first_that_finds_no_place_is_told_so(
 
     def work() -> None:
         with pytest.raises(Cancelled):
-            client.call(server, "count", (500,), progress)
+            client.call(server, "count", (5000,), progress)
 
     threads = [threading.Thread(target=work) for _ in range(3)]
     for thread in threads:

@@ -251,11 +251,13 @@ def test_most_bad_masks_are_told_and_few_good_ones_are_doubted():
 def test_how_sure_it_is_costs_nothing_after_the_mask():
     reading = Reading(photo("coffee"), dino(), photo("coffee"), embedding("coffee"))
     asked = Prompt((Click(300, 130), Click(60, 300, False)))
+    start = time.process_time()
     found = reading.segment(asked)
+    segmenting = time.process_time() - start
     assert found.confidence is not None
-    start = time.perf_counter()
+    start = time.process_time()
     assert dino().confidence(photo("coffee"), asked, embedding("coffee")) == found.confidence
-    assert time.perf_counter() - start < 0.01
+    assert time.process_time() - start < 0.1 * segmenting
     np.testing.assert_array_equal(reading.segment(asked).mask, found.mask)
 
 

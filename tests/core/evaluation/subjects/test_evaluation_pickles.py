@@ -134,9 +134,9 @@ def test_sharing_and_nesting_do_not_blow_up():
     value: list = []
     for _ in range(45):
         value = [value, value]
-    start = time.perf_counter()
+    start = time.process_time()
     assert len(read_plain(pickle.dumps(value))) == 2
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
     endless: list = []
     endless.append(endless)
     deep: list = []
