@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .cli_figures import cell, number, numbers
 from .cli_paper import add_paper, run_paper
+from .cli_ray import add_ray, check_ray
 from .cli_study import add_results, add_study, run_results, run_study
 from .cli_truth import add_ablation, add_truth, run_made
 from .subcommands import Subcommand, add_subcommands
@@ -53,6 +54,7 @@ def _add_metrics(metrics: argparse.ArgumentParser) -> None:
     add("--subsets", type=int, default=100, metavar="N", help="of KID, default 100")
     add("--seed", type=int, default=0, metavar="N", help="of KID's subsets and of the intervals")
     add("--json", type=Path, metavar="FILE", help="every figure, also of every picture")
+    add_ray(metrics)
 
 
 def _run_metrics(options: argparse.Namespace) -> None:
@@ -64,13 +66,20 @@ def _run_metrics(options: argparse.Namespace) -> None:
 
     if options.subset_size < 2 or options.subsets < 1 or options.seed < 0:
         raise UsageError("--subset-size is at least 2, --subsets at least 1, --seed at least 0")
+    check_ray(options)
     if options.weights is not None and not options.weights.is_dir():
         raise UsageError(f"there is no folder {options.weights}")
     only = tuple(w.strip() for w in options.only.split(",") if w.strip()) if options.only else ()
     subsets = Subsets(options.subsets, options.subset_size, options.seed)
     pairs = find_pairs(options.a, options.b, options.mask)
+    choices = Choices(only, options.weights, subsets)
     with progress_bar("Measuring") as progress:
-        results = measure(pairs, Choices(only, options.weights, subsets), progress)
+        if options.ray is not None:
+            from .remote.measuring import measure_spread
+
+            results = measure_spread(pairs, choices, options.ray, progress)
+        else:
+            results = measure(pairs, choices, progress)
     sys.stdout.write(table(results))
     if options.json is not None:
         told = json.dumps(as_json(results), indent=1, allow_nan=False)

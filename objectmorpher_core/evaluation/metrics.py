@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -142,65 +142,97 @@ METRICS = (*ONE_BY_ONE, *AS_SETS)
 USUAL = tuple(name for name in METRICS if name not in ("sifid-64", "sifid-768"))
 
 
+@dataclass(frozen=True)
+class Taken:
+    """What the measures need of one pair."""
+
+    name: str
+    values: Mapping[tuple[str, str], float]  # by measure and region
+    features: Mapping[str, tuple[F64, F64]]  # (d,) of A and B, by the first measure that needs them
+
+
+class Opened:
+    """The measures of `choices` that can be taken here of `pairs` pairs, and why others cannot."""
+
+    def __init__(self, choices: Choices, pairs: int) -> None:
+        """Raises EvaluationError: an unknown name, or one asked for that cannot be taken."""
+        names = tuple(dict.fromkeys(choices.metrics or USUAL))
+        unknown = [name for name in names if name not in METRICS]
+        if unknown:
+            known = ", ".join(METRICS)
+            raise EvaluationError(f"there is no measure {unknown[0]!r}; there are {known}")
+        self._choices = choices
+        self._networks = _Networks(choices.weights)
+        self._ones: dict[str, Measure] = {}
+        self._sets: dict[str, Features] = {}
+        self._lacking = tuple(self._open(names, pairs))
+        if self._lacking and choices.metrics and not choices.is_lenient:
+            left = self._lacking[0]
+            raise EvaluationError(f"{left.metric} cannot be measured: {left.reason}")
+
+    def _open(self, names: Sequence[str], pairs: int) -> Iterator[Lacking]:
+        for name in names:
+            reason = trunk_files.why_missing(name, self._choices.weights)
+            if name in AS_SETS and pairs < 2:
+                reason = "the distance of two sets needs two pictures in each"
+            if reason:
+                yield Lacking(name, reason)
+            elif name in ONE_BY_ONE:
+                self._ones[name] = ONE_BY_ONE[name](self._networks)
+            else:
+                self._sets[name] = AS_SETS[name](self._networks)
+
+    @property
+    def _leaders(self) -> dict[str, str]:
+        """By the name of a measure of sets: the first one of the same features."""
+        first: dict[Features, str] = {}
+        return {name: first.setdefault(features, name) for name, features in self._sets.items()}
+
+    def take(self, pair: Pair) -> Taken:
+        """All of one pair. Raises EvaluationError."""
+        a, b, mask = pair.read()
+        regions = _regions(mask)
+        values: dict[tuple[str, str], float] = {}
+        for name, take in self._ones.items():
+            try:
+                found = take(a, b, tuple(regions.values()))
+            except EvaluationError as error:
+                raise EvaluationError(f"{pair.name}: {error}") from error
+            values |= {(name, region): v for region, v in zip(regions, found, strict=True)}
+        leaders = dict.fromkeys(self._leaders.values())
+        return Taken(pair.name, values, {n: (self._sets[n](a), self._sets[n](b)) for n in leaders})
+
+    def results(self, taken: Sequence[Taken]) -> Results:
+        """Of all pairs, whoever took them, in their order."""
+        values: dict[tuple[str, str], dict[str, float]] = {}
+        for one in taken:
+            for key, value in one.values.items():
+                values.setdefault(key, {})[one.name] = value
+        seed = self._choices.subsets.seed
+        scores = [
+            Score(name, region, mean_with_interval(tuple(each.values()), seed), each)
+            for (name, region), each in values.items()
+        ]
+        distances = _distances(self._choices.subsets)
+        for name, leader in self._leaders.items():
+            sides = zip(*(one.features[leader] for one in taken), strict=True)
+            x, y = (np.stack(side) for side in sides)
+            scores.append(Score(name, WHOLE, distances[name](x, y), {}))
+        return Results(len(taken), tuple(scores), self._lacking, self._networks.used)
+
+
 def measure(pairs: Sequence[Pair], choices: Choices, progress: Progress = silent) -> Results:
     """All chosen measures of all pairs. Raises EvaluationError: one sentence.
 
     A region that holds nothing in some picture is left out of the mean there. A measure whose
     network is not here is told among the lacking; if it is asked for by its name, that is an error.
     """
-    names = tuple(dict.fromkeys(choices.metrics or USUAL))
-    unknown = [name for name in names if name not in METRICS]
-    if unknown:
-        raise EvaluationError(f"there is no measure {unknown[0]!r}; there are {', '.join(METRICS)}")
-    networks = _Networks(choices.weights)
-    ones, sets, lacking = _open(names, choices, networks, len(pairs))
-    if lacking and choices.metrics and not choices.is_lenient:
-        raise EvaluationError(f"{lacking[0].metric} cannot be measured: {lacking[0].reason}")
-    values: dict[tuple[str, str], dict[str, float]] = {}
-    gathered: dict[Features, list[tuple[F64, F64]]] = {features: [] for features in sets.values()}
+    opened, taken = Opened(choices, len(pairs)), []
     for k, pair in enumerate(pairs):
         progress(k / len(pairs), pair.name)
-        a, b, mask = pair.read()
-        regions = _regions(mask)
-        for name, take in ones.items():
-            try:
-                found = take(a, b, tuple(regions.values()))
-            except EvaluationError as error:
-                raise EvaluationError(f"{pair.name}: {error}") from error
-            for region, value in zip(regions, found, strict=True):
-                values.setdefault((name, region), {})[pair.name] = value
-        for features, rows in gathered.items():
-            rows.append((features(a), features(b)))
-    scores = [
-        Score(name, region, mean_with_interval(tuple(each.values()), choices.subsets.seed), each)
-        for (name, region), each in values.items()
-    ]
-    distances = _distances(choices.subsets)
-    for name, features in sets.items():
-        x, y = (np.stack(side) for side in zip(*gathered[features], strict=True))
-        scores.append(Score(name, WHOLE, distances[name](x, y), {}))
+        taken.append(opened.take(pair))
     progress(1.0, "measured")
-    return Results(len(pairs), tuple(scores), lacking, networks.used)
-
-
-def _open(
-    names: Sequence[str], choices: Choices, networks: _Networks, pairs: int
-) -> tuple[dict[str, Measure], dict[str, Features], tuple[Lacking, ...]]:
-    """What can be measured here, and what cannot."""
-    ones: dict[str, Measure] = {}
-    sets: dict[str, Features] = {}
-    lacking = []
-    for name in names:
-        reason = trunk_files.why_missing(name, choices.weights)
-        if name in AS_SETS and pairs < 2:
-            reason = "the distance of two sets needs two pictures in each"
-        if reason:
-            lacking.append(Lacking(name, reason))
-        elif name in ONE_BY_ONE:
-            ones[name] = ONE_BY_ONE[name](networks)
-        else:
-            sets[name] = AS_SETS[name](networks)
-    return ones, sets, tuple(lacking)
+    return opened.results(taken)
 
 
 def _distances(subsets: Subsets) -> Mapping[str, Distance]:

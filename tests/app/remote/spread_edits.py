@@ -50,10 +50,21 @@ def main(folder: Path) -> None:
     killed.append(killing.stopped())
     subjects = run_subjects(folder, address)
     done = [truth_photos._jobs(asked)[k].is_done for k in PHOTOS]
+    measured = measure_pictures(out, folder, address)
     cluster.shutdown()
     told = {"status": status, "killed": killed, "photos": photos, "done": done}
-    told["subjects"] = subjects
+    told |= {"subjects": subjects, "measured": measured}
     print(json.dumps(told | {"batch": json.loads(report.read_text())}))
+
+
+def measure_pictures(out: Path, folder: Path, address: str) -> int:
+    """Each of them and the next one, by the cluster."""
+    paths = sorted(out.glob("*.png"))
+    (folder / "next").mkdir()
+    for path, other in zip(paths, (*paths[1:], paths[0]), strict=True):
+        (folder / "next" / path.name).write_bytes(other.read_bytes())
+    asked = ["evaluate", "metrics", str(out), str(folder / "next")]
+    return cli.main([*asked, "--json", str(folder / "spread.json"), "--ray", address])
 
 
 def run_subjects(folder: Path, address: str) -> list[str]:

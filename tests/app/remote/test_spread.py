@@ -77,4 +77,8 @@ def test_killed_workers_lose_nothing(folder: Path) -> None:
     assert own.read_bytes() == (folder / "out" / f"many-{EDITS}.png").read_bytes()
     assert [sentence[:3] for sentence in told["subjects"]] == ["b: "]
     assert sorted(p.name for p in (folder / "ours").iterdir()) == ["a.jsonl", "a.png"]
+    here = folder / "here.json"
+    asked = ["evaluate", "metrics", str(folder / "out"), str(folder / "next")]
+    assert told["measured"] == cli.main([*asked, "--json", str(here)]) == 0
+    assert json.loads(here.read_text()) == json.loads((folder / "spread.json").read_text())
     assert len(told["photos"]) == len(told["done"]) and all(told["done"])
