@@ -44,6 +44,7 @@ def drawn(scene: Scene, frame: int = 0) -> Picture3D:
     return tiles.render(scene.splats(frame), scene.texture, scene.camera, scene.puppet.camera)
 
 
+@pytest.mark.slow
 def test_the_report_has_the_keys_that_the_design_names(tmp_path: Path) -> None:
     file = tmp_path / "render.json"
     assert cli.main(["bench", "render", "--quick", "--json", str(file)]) == 0

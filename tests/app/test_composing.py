@@ -116,6 +116,7 @@ def test_painting_needs_the_background(editor: Editor, ball: Document) -> None:
     assert editor.message is not None and "alone" in editor.message.text
 
 
+@pytest.mark.slow
 def test_filling_again_is_a_step_of_its_own(bare: Editor, ball: Document) -> None:
     assert ball.plate is not None
     run(bare, "fill_again")
@@ -127,6 +128,7 @@ def test_filling_again_is_a_step_of_its_own(bare: Editor, ball: Document) -> Non
     wait_for_jobs(bare)
 
 
+@pytest.mark.slow
 def test_variants_can_be_looked_at_and_chosen(bare: Editor, ball: Document) -> None:
     run(bare, "variants")
     wait_until(bare, lambda: bool(bare.composing.variants))
@@ -192,6 +194,7 @@ def lifted_of(pixels: np.ndarray) -> Document:
     return edits.set_placement(document, 0, Placement(move=(-60.0, 0.0)))
 
 
+@pytest.mark.slow
 def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     shade = thrown(35.0, 0.8)
     document = standing(shade)
@@ -210,6 +213,7 @@ def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     assert editor.document is document
 
 
+@pytest.mark.slow
 def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) -> None:
     document = standing(None)
     editor.start(document)
@@ -220,6 +224,7 @@ def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) 
     assert editor.message.text.startswith("No shadow or reflection is sure")
 
 
+@pytest.mark.slow
 def test_its_reflection_in_the_photo_goes_and_none_is_drawn(editor: Editor) -> None:
     document = lifted_of(photo_with(mirrored()))
     editor.start(document)

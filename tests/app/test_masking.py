@@ -131,6 +131,7 @@ def test_painting_a_lifted_object_asks_for_a_new_lift_and_undo_brings_it_back(
     assert editor.document is lifted
 
 
+@pytest.mark.slow
 def test_the_lift_keeps_a_drawn_soft_edge(editor: Editor) -> None:
     select_ball(editor)
     editor.view.selecting.reach = 6.0

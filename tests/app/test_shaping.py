@@ -60,6 +60,7 @@ def test_the_thickness_is_live_and_one_step(editor: Editor) -> None:
     assert editor.shaping.settings.thickness == 1.0
 
 
+@pytest.mark.slow
 def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor) -> None:
     lift_ball(editor)
     assert editor.document is not None
@@ -84,6 +85,7 @@ def test_a_posed_object_stays_posed_when_it_becomes_thicker(editor: Editor) -> N
     assert reached[0] * thing.lifted.scale == pytest.approx(0.2 * scale, rel=0.2)
 
 
+@pytest.mark.slow
 def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
     lift_ball(editor)
     first = lifted_of(editor)
@@ -116,6 +118,7 @@ def test_what_is_painted_nearer_comes_nearer(editor: Editor) -> None:
     assert depth(near) < depth(lifted_of(editor)) - 0.02
 
 
+@pytest.mark.slow
 def test_words_before_the_lift_count_at_the_lift(editor: Editor) -> None:
     editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)
@@ -134,6 +137,7 @@ def test_words_before_the_lift_count_at_the_lift(editor: Editor) -> None:
     assert (again.hidden == editor.shaping.settings.hidden).all()
 
 
+@pytest.mark.slow
 def test_escape_takes_a_painted_stroke_back(editor: Editor) -> None:
     lift_ball(editor)
     document = editor.document
@@ -160,6 +164,7 @@ def figure(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_object_out_of_a_file_takes_the_place_of_what_is_selected(
     editor: Editor, figure: Path
 ) -> None:
@@ -176,6 +181,7 @@ def test_an_object_out_of_a_file_takes_the_place_of_what_is_selected(
     assert editor.preview is None, "a file's shape has no thickness"
 
 
+@pytest.mark.slow
 def test_placed_by_hand_it_is_fitted_from_there(editor: Editor, figure: Path) -> None:
     editor.selection.add_click(*CENTRE, True)
     wait_for_jobs(editor)

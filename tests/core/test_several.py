@@ -49,6 +49,7 @@ def _exact(edited: Edited) -> None:
     assert edited.composite.outside_footprint_changed == 0
 
 
+@pytest.mark.slow
 def test_each_object_does_as_it_is_told_alone(folder):
     """Two edits that do not touch are the two edits by themselves, each on its side."""
     right = SMALL | {"mask": str(folder / "right.png"), "turn": [20, 0, 0]}
@@ -62,6 +63,7 @@ def test_each_object_does_as_it_is_told_alone(folder):
     assert difference.max() <= 1, "the plate is another one, no pixel of the object is"
 
 
+@pytest.mark.slow
 def test_an_object_is_the_same_whichever_comes_first(folder):
     """The list says who covers whom only where nothing else does."""
     one, two = {"move": [6, 5]}, {"turn": [20, 0, 0]}
@@ -82,6 +84,7 @@ def test_a_copy_has_what_it_is_not_told_from_its_original():
     assert [o["role"] for o in edited.report()["objects"]] == ["edited", "copy"]
 
 
+@pytest.mark.slow
 def test_beside_a_copy_the_original_keeps_its_bytes():
     edited = _run(_item(objects=[{"duplicate": 1, "move": [0, 62], "scale": 0.5}]))
     _exact(edited)
@@ -90,6 +93,7 @@ def test_beside_a_copy_the_original_keeps_its_bytes():
     assert edited.document.plate is not None
 
 
+@pytest.mark.slow
 def test_a_copy_can_be_bent_otherwise():
     bend = [{"at": [45, 55], "to": [60, 45]}]
     edited = _run(_item(objects=[{"duplicate": 1, "move": [60, 30], "handle": bend}]))
@@ -130,6 +134,7 @@ def test_the_order_says_who_covers_whom(folder, order):
     assert drawn == order
 
 
+@pytest.mark.slow
 def test_what_stays_in_front_keeps_its_bytes(folder):
     stays = {"mask": str(folder / "right.png"), "stay_in_front": True}
     edited = _run(_item(move=[62, 8, -0.4], objects=[stays]))
@@ -146,6 +151,7 @@ def test_what_stays_in_front_keeps_its_bytes(folder):
     assert (before.picture.pixels != edited.picture.pixels).any()
 
 
+@pytest.mark.slow
 def test_a_session_of_several_is_replayed_to_the_byte(folder):
     right = SMALL | {"mask": str(folder / "right.png"), "move": [-25, 0]}
     objects = [right, {"duplicate": 2, "turn": [20, 0, 0], "move": [-50, 30]}]
@@ -155,6 +161,7 @@ def test_a_session_of_several_is_replayed_to_the_byte(folder):
     assert [o["number"] for o in again.report()["objects"]] == [1, 2, 3]
 
 
+@pytest.mark.slow
 def test_the_keys_of_one_object_are_those_of_the_first():
     one = _run(_item(move=[6, 5])).report()
     assert "objects" not in one

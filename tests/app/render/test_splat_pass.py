@@ -62,7 +62,9 @@ def test_placed(splat_pass, placement):
 
 @pytest.mark.parametrize("largeness", [0.5, 2.0])
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (20.0, 40.0, 0.0)])
-@pytest.mark.parametrize("zoom", ZOOMS)
+@pytest.mark.parametrize(
+    "zoom", [pytest.param(zoom, marks=() if zoom == "1x" else pytest.mark.slow) for zoom in ZOOMS]
+)
 def test_bent(splat_pass, zoom, turn, largeness):
     """A pixel in which two Gaussians are as deep as each other may show either in front."""
     scene, pose = bent("star", 1200, largeness)

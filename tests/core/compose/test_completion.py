@@ -180,6 +180,7 @@ def noise(picture: np.ndarray, where: np.ndarray) -> float:
     return float((grey - cv2.GaussianBlur(grey, (0, 0), 2))[where].std())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gravel", "grass", "brick"])
 def test_a_texture_goes_on_as_rough_as_it_is(name):
     grey = getattr(skimage.data, name)()[90:390, 100:400]

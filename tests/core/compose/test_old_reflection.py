@@ -122,6 +122,7 @@ def test_the_background_is_without_it():
     assert _error(result, laid) < 0.4 * _error(pixels, laid)
 
 
+@pytest.mark.slow
 def test_a_script_that_moves_a_thing_leaves_no_reflection_behind():
     laid, pixels = mirrored(), photo_with(mirrored())
     script = {"move": [-75, 0], "inpaint": "telea", "gaussians": 800}
@@ -166,6 +167,7 @@ def test_a_part_of_the_photo_is_taken_off_as_in_the_whole():
     assert np.abs(whole[90:170, 60:200].astype(int) - part).max() <= 1
 
 
+@pytest.mark.slow
 def test_a_large_photo_is_treated_as_a_small_one():
     pixels = photo_with(mirrored(1.0), 0.5, _textured("grass"))
     zoom = 4

@@ -60,6 +60,7 @@ def test_a_repair_changes_what_is_painted_and_nothing_else(name, places):
     assert repaired.plate.seed == document.plate.seed + 1
 
 
+@pytest.mark.slow
 def test_another_seed_fills_differently_and_strokes_add_up():
     document = _document()
     one, other = _stroke((80, 60), (95, 66)), _stroke((30, 100), (50, 100))

@@ -155,6 +155,7 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(weights, tmp_path):
         measure(pairs, Choices(("lpips-alex",), tmp_path))
 
 
+@pytest.mark.slow
 def test_everything_in_one_run(plain_weights, tmp_path):
     weights = plain_weights
     for name in "ab":

@@ -89,6 +89,7 @@ def test_more_trust_is_nearer_to_what_is_seen():
     assert errors == sorted(errors, reverse=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_is_a_body_nowhere_less_than_nothing_thick(kind):
     sample = make_sample(11, families=(kind,))

@@ -143,6 +143,7 @@ def test_the_whole_group_ends_with_the_worker(folder, subject, tmp_path, how):
     time.sleep(max(0.0, 3.0 - (time.monotonic() - begun)))  # the child would have written by now
 
 
+@pytest.mark.slow
 def test_without_a_camera_it_is_registered(folder, subject):
     install(folder, WROTE)
     found = lifted(subject)
