@@ -114,6 +114,6 @@ def _may_reach(points: F64, known: F64) -> Mask:
     low = known.min(0) - 2 * REACH
     marked = np.zeros(((np.ptp(known, axis=0) + 4 * REACH) / cell).astype(int) + 1, bool)
     marked[tuple(((known - low) / cell).astype(int).T)] = True
-    apart = distance_transform_edt(~marked)  # between the cells' centres, in cells
+    apart = np.asarray(distance_transform_edt(~marked))  # between the cells' centres, in cells
     own = ((points - low) / cell).clip(0, np.array(marked.shape) - 1).astype(int)
     return np.asarray(apart[tuple(own.T)] <= GRID + np.sqrt(3))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64
+from ..arrays import F64, Mask
 from ..threads import LEAST_ROWS, in_threads
 
 NEIGHBOURS = 6  # whose distance is the width of a cell: with those around it, nothing leaks
@@ -51,7 +51,7 @@ def sides(points: F64, normals: F64) -> Sides:
     border = np.zeros(shape, bool)
     border[0] = True
     free = np.logical_not(marked)
-    outside = np.asarray(binary_propagation(border, mask=free))
+    outside: Mask = np.asarray(binary_propagation(border, mask=free), bool)
 
     def first_open(directions: F64) -> F64:
         found = np.full(len(points), np.inf)

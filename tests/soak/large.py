@@ -65,8 +65,9 @@ class Desk:
         wall, own, main, worker = np.subtract(self._clocks(), begun)
         told = {
             "step": name, "wall_s": round(wall, 2), "editor_s": round(own, 2),
-            "main_s": round(main, 2), "worker_s": round(worker, 2), "editor_mib": round(_most("self")),
-            "worker_mib": round(_most(self._worker)), "editor_now_mib": round(_resident("self")),
+            "main_s": round(main, 2), "worker_s": round(worker, 2),
+            "editor_mib": round(_most("self")), "worker_mib": round(_most(self._worker)),
+            "editor_now_mib": round(_resident("self")),
         }  # fmt: skip
         print(json.dumps(told | more), flush=True)
 
