@@ -29,8 +29,8 @@ from objectmorpher_core.segment import Found
 
 from . import job_functions
 from .feedback import Action
+from .job_error import JobError
 from .job_functions import Choice, Cut
-from .jobs import JobError
 from .layers import Rendered, Request
 from .memo import same
 from .shape import rehearse

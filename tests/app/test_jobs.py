@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from PIL import UnidentifiedImageError
 
-from app.jobs import JobError, Jobs
+from app.job_error import JobError
+from app.jobs import Jobs
 from app.opening import OpeningError
 
 
@@ -151,7 +152,7 @@ def test_the_log_tells_the_programs_failures_from_the_requests(
     worker: Jobs, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = Log()
-    with caplog.at_level(logging.INFO, "app.jobs"):
+    with caplog.at_level(logging.INFO, "app.job_error"):
         for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
             start(worker, log, function)
             run_until(worker, lambda: worker.is_idle)
