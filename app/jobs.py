@@ -231,7 +231,9 @@ class Jobs:
 
     def _send_next(self) -> None:
         if self.current is None and self._waiting:
-            job = self.current = self._waiting.pop(next(iter(self._waiting)))
+            users = (kind for kind, job in self._waiting.items() if not job.is_spare)
+            first = next(users, next(iter(self._waiting)))  # a spare one gives way here, too
+            job = self.current = self._waiting.pop(first)
             job.started = time.monotonic()
             self._worker = self._worker or Worker(self._warm, self._wake)
             self._worker.stop.value = 0

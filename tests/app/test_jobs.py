@@ -108,6 +108,18 @@ def test_only_the_newest_request_of_a_kind_is_answered(worker: Jobs) -> None:
     assert log.cancels == 0
 
 
+def test_a_spare_request_waits_for_those_that_come_later(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.wait, 0.1)
+    for value, is_spare in ((1.0, True), (2.0, False)):
+        worker.start(
+            "Test", job_functions.double, np.array([value]), done=log.answers.append,
+            failed=log.errors.append, kind=f"double {value}", is_spare=is_spare,
+        )  # fmt: skip
+    run_until(worker, lambda: len(log.answers) == 3)
+    assert [float(np.ravel(answer)[0]) for answer in log.answers[1:]] == [4.0, 2.0]
+
+
 def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     log = Log()
     start(worker, log, job_functions.fail)

@@ -14,6 +14,7 @@ from conftest import wait_for_jobs, wait_until
 
 from app.commands import run
 from app.editor import Editor
+from app.tasks import READ, WRITE
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
 from objectmorpher_core.image import ImageError, read_picture
@@ -143,6 +144,24 @@ def assert_it_goes_on(editor: Editor, folder: Path) -> None:
 def test_killed_in_each_job(editor: Editor, ball: Document, tmp_path: Path) -> None:
     assert killed_at_random(editor, ball, tmp_path, 3) == dict.fromkeys(FUNCTIONS, 1)
     assert_it_goes_on(editor, tmp_path)
+
+
+def test_what_is_asked_for_next_does_not_wait_for_the_photo(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    """The new process has to read it again, which takes seconds; a click would need that."""
+    editor.start(ball)
+    seconds(editor, tmp_path, "save")
+    worker = editor.jobs._worker
+    assert worker is not None
+    worker.process.kill()
+    wait_until(editor, lambda: editor.jobs.is_busy(READ))
+    path = tmp_path / "ball.omorph"
+    editor.filing.save_as(path)
+    wait_until(editor, lambda: not editor.jobs.is_busy(f"{WRITE} {path}"))
+    assert editor.message is None or not editor.message.details, editor.message
+    assert editor.jobs.is_busy(READ), "it is read afterwards"
+    wait_for_jobs(editor)
 
 
 @pytest.mark.slow
