@@ -27,27 +27,42 @@ FUNCTIONS = {  # what is asked -> what the worker runs
 }  # fmt: skip
 
 
+def wait_for_answers(editor: Editor) -> None:
+    """As `wait_for_jobs`, but not for what gives way: another process reads the photo again."""
+
+    def is_answered() -> bool:
+        current, waiting = editor.jobs.current, editor.jobs._waiting.values()
+        jobs = [*waiting, *([current] if current else [])]
+        return not editor.poll() and editor.chores.is_idle and all(job.is_spare for job in jobs)
+
+    wait_until(editor, is_answered)
+
+
+def is_running(editor: Editor, what: str) -> bool:
+    """Whether it is what runs in the worker."""
+    job = editor.jobs.current
+    return job is not None and job.function.__name__ == FUNCTIONS[what]
+
+
 def ask(editor: Editor, folder: Path, what: str) -> None:
     """One of the jobs that run in the worker; it is what runs there then."""
-    wait_for_jobs(editor)
+    wait_for_answers(editor)
     if what == "save":
         editor.filing.save_as(folder / "ball.omorph")
     elif what == "export":
         editor.exporting.export_to(folder / "ball.png")
     else:
         run(editor, "fill_again")
-    wait_until(editor, lambda: editor.jobs.current is not None)
-    job = editor.jobs.current
-    assert job is not None and job.function.__name__ == FUNCTIONS[what]
+    wait_until(editor, lambda: is_running(editor, what))
 
 
 def seconds(editor: Editor, folder: Path, what: str) -> float:
     """What the job takes where nobody kills it."""
     ask(editor, folder, what)
     start = time.monotonic()
-    wait_until(editor, lambda: editor.jobs.current is None)
+    wait_until(editor, lambda: not is_running(editor, what))
     took = time.monotonic() - start
-    wait_for_jobs(editor)
+    wait_for_answers(editor)
     assert editor.message is None or not editor.message.details, editor.message
     return took
 
@@ -117,7 +132,7 @@ def killed_at_random(editor: Editor, ball: Document, folder: Path, kills: int) -
         if is_hit:
             print(f"killed {found.total()} times, now: {what}", flush=True)  # seen with -s
         assert moves < 10 * kills + 10, f"{what} is over before it can be killed"
-        wait_for_jobs(editor)
+        wait_for_answers(editor)
         committed = editor.committed
         assert committed is not None and committed.objects[0].placement == placement
         assert_whole(folder)
