@@ -117,7 +117,7 @@ def test_a_spare_request_waits_for_those_that_come_later(worker: Jobs) -> None:
             failed=log.errors.append, kind=f"double {value}", is_spare=is_spare,
         )  # fmt: skip
     run_until(worker, lambda: len(log.answers) == 3)
-    assert [float(np.ravel(answer)[0]) for answer in log.answers[1:]] == [4.0, 2.0]
+    assert [np.asarray(answer).item() for answer in log.answers[1:]] == [4.0, 2.0]
 
 
 def test_a_failure_is_a_sentence(worker: Jobs) -> None:
