@@ -17,8 +17,8 @@ from objectmorpher_core.document import Click, Photo, Prompt
 from objectmorpher_core.segment import Found
 
 from . import job_functions
+from .job_error import JobError
 from .job_functions import Choice
-from .jobs import JobError
 from .tasks import SELECT, Question
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from typing import Any
 
 from objectmorpher_core.progress import Cancelled, Progress
 
-from .jobs import JobError
+from .job_error import JobError
 
 log = logging.getLogger(__name__)
 

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
 MOST_SHAPES = 24  # remembered: every object of a document needs its own in each frame
+SPARE_SHAPES = 4  # more than there are objects: of what was undone
 POSES = 3  # remembered of each object: as it is, as a stroke has it, as somebody looks at it
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
@@ -138,9 +139,15 @@ class Derived:
 
     def adopt(self, shapes: Shapes) -> None:
         """Takes over shapes of the document's objects that were made elsewhere."""
+        self.make_room(len(shapes))
         for thing, shape in shapes:
             self._shapes(lambda shape=shape: shape, thing.lifted, thing.deform, thing.rig)
             self._latest = (thing.lifted, thing.deform, shape)
+
+    def make_room(self, objects: int) -> None:
+        """Remembers what so many objects need in each frame."""
+        self._shapes.make_room(objects + SPARE_SHAPES)
+        self.fronts.make_room(objects)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""

@@ -42,8 +42,9 @@ from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
 from .freed_memory import give_back
 from .history import History
+from .job_error import JobError
 from .job_functions import WARM
-from .jobs import RELUCTANCE, JobError, Jobs
+from .jobs import RELUCTANCE, Jobs
 from .recovery import Recovery
 from .settings import Settings
 from .shape import Shapes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.progress import Progress
 
 from .export_plan import Format
-from .jobs import JobError
+from .job_error import JobError
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document
 from .shape import Shapes, build_ready
 from .texts import t

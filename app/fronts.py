@@ -26,8 +26,13 @@ class Fronts:
     """The pictures of each view, remembered."""
 
     def __init__(self) -> None:
-        self._levels = Memo(MOST)
+        self._levels, self._most = Memo(MOST), MOST
         self._kept: dict[int, tuple[Matte, tuple[float, ...], Layer | None]] = {}
+
+    def make_room(self, count: int) -> None:
+        """Remembers so many, which are shown together."""
+        self._most = max(MOST, count)
+        self._levels.make_room(count)
 
     def layer(self, item: EditObject, view: View) -> Layer | None:
         """Px for px; None where nothing of it is on the canvas."""
@@ -37,7 +42,7 @@ class Fronts:
         if kept is None or kept[0] is not matte or kept[1] != view.place:
             levels = self._levels(lambda: _levels(matte), matte)
             self._kept.pop(id(matte), None)
-            if len(self._kept) == MOST:
+            while len(self._kept) >= self._most:
                 del self._kept[next(iter(self._kept))]  # the oldest
             kept = self._kept[id(matte)] = (matte, view.place, drawn(levels, view))
         return kept[2]

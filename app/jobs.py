@@ -7,7 +7,6 @@ newest request counts. Cancelling asks first and ends the process a little later
 
 from __future__ import annotations
 
-import errno
 import importlib
 import logging
 import math
@@ -17,7 +16,6 @@ import queue
 import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from objectmorpher_core.progress import Cancelled
 
+from .job_error import JobError
 from .logs import crash_folder, note_crashes
 from .wire import Connection, Reader, Writer
 
@@ -35,45 +34,8 @@ log = logging.getLogger(__name__)
 
 PATIENCE = 0.35  # s between asking a job to stop and ending its process: the user waits
 RELUCTANCE = 2.0  # s, where nobody waits: a new process has to read the photo again
-OURS = ("app", "objectmorpher_core")  # packages
 TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
-# What the system says of a wrong request: no other try makes it right.
-LASTING = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL)
-
-
-@dataclass(frozen=True)
-class JobError:
-    """Why a job failed."""
-
-    name: str  # the exception's type, or "Crash"
-    sentence: str  # for the status line
-    trace: str  # for "Details" and the log
-    retry: Callable[[], None] | None = None  # asks for the same once more, where that may help
-    is_expected: bool = False  # one of our own errors: the request was at fault, not the program
-    may_pass: bool = False  # the machine was at fault: the same may succeed on another try
-
-    @classmethod
-    def of(cls, error: Exception, what: str) -> JobError:
-        """From an exception that is being handled; `what` failed."""
-        name = type(error).__name__
-        # Of others' kinds some are values' errors, too: numpy's of a singular matrix is one.
-        is_ours = type(error).__module__.partition(".")[0] in OURS
-        is_expected = is_ours and isinstance(error, ValueError)
-        sentence = str(error) or f"{what} failed ({name})"
-        return cls(
-            name, sentence, traceback.format_exc(),
-            is_expected=is_expected, may_pass=_may_pass(error),
-        )  # fmt: skip
-
-    def retried_by(self, again: Callable[[], None]) -> JobError:
-        """The same error, with `again` as its remedy if another try may help."""
-        return replace(self, retry=again) if self.may_pass else self
-
-    def write_log(self, title: str) -> None:
-        """That what is called `title` failed: an error of the program's, unless it was expected."""
-        level = logging.INFO if self.is_expected else logging.ERROR
-        log.log(level, "%s failed: %s\n%s", title, self.sentence, self.trace)
 
 
 @dataclass(eq=False)
@@ -269,7 +231,9 @@ class Jobs:
 
     def _send_next(self) -> None:
         if self.current is None and self._waiting:
-            job = self.current = self._waiting.pop(next(iter(self._waiting)))
+            users = (kind for kind, job in self._waiting.items() if not job.is_spare)
+            first = next(users, next(iter(self._waiting)))  # a spare one gives way here, too
+            job = self.current = self._waiting.pop(first)
             job.started = time.monotonic()
             self._worker = self._worker or Worker(self._warm, self._wake)
             self._worker.stop.value = 0
@@ -332,18 +296,6 @@ class Jobs:
         else:
             tell()
         self._send_next()
-
-
-def _may_pass(error: BaseException | None) -> bool:
-    """Whether the system failed, and not for good: a full disk, a lost drive, too little memory.
-
-    An error without a number is not the system's: Pillow calls a broken picture an OSError.
-    """
-    if error is None or isinstance(error, MemoryError):
-        return error is not None
-    if isinstance(error, OSError) and error.errno is not None and error.errno not in LASTING:
-        return True
-    return _may_pass(error.__cause__)
 
 
 def _accept(job: Job, value: Any) -> None:

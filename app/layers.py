@@ -199,6 +199,7 @@ class Layers:
     def _forget(self, document: Document) -> None:
         """Drops the pictures of objects that are not as they were."""
         lifted = {k for k, o in enumerate(document.objects) if o.lifted}
+        self._derived.make_room(len(document.objects))
         self._works = {
             part: work
             for part, work in self._works.items()

@@ -16,7 +16,7 @@ class Memo:
     """The last few results of one function, by the identity of what they came from."""
 
     def __init__(self, kept: int = KEPT) -> None:
-        self._kept = kept
+        self._least = self._kept = kept
         self._results: OrderedDict[tuple[int, ...], tuple[tuple[Any, ...], Any]] = OrderedDict()
 
     def __call__(self, build: Callable[[], T], *sources: Any) -> T:
@@ -28,6 +28,10 @@ class Memo:
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key][1]
+
+    def make_room(self, count: int) -> None:
+        """So many are asked for in turns: fewer that are kept would all be computed each time."""
+        self._kept = max(self._least, count)
 
 
 def same(a: Any, b: Any) -> bool:

@@ -17,7 +17,7 @@ from objectmorpher_core.session_tree import SessionError
 
 from .autosave import LOCK, Held, recovery_root
 from .file_lock import FileLock
-from .jobs import JobError
+from .job_error import JobError
 from .shape import Shapes, build_ready
 from .texts import t
 

@@ -29,8 +29,8 @@ from objectmorpher_core.segment import Found
 
 from . import job_functions
 from .feedback import Action
+from .job_error import JobError
 from .job_functions import Choice, Cut
-from .jobs import JobError
 from .layers import Rendered, Request
 from .memo import same
 from .shape import rehearse
@@ -88,6 +88,11 @@ class Tasks:
 
     def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
+        self._read(lambda: None, is_quiet)
+
+    def _read(
+        self, cancelled: Callable[[], None], is_quiet: bool, is_spare: bool = False
+    ) -> None:  # fmt: skip
         editor, document = self._editor, self._editor.document
         if document is None:
             return
@@ -98,20 +103,25 @@ class Tasks:
         editor.jobs.start(
             t("Reading the photo"), job_functions.read_photo, document.photo.pixels,
             editor.settings.backends.segment,
-            done=lambda _: None, failed=fail, kind=READ, is_quiet=is_quiet,
+            done=lambda _: None, failed=fail, cancelled=cancelled, kind=READ,
+            is_quiet=is_quiet, is_spare=is_spare,
         )  # fmt: skip
 
     def _read_again(self) -> None:
-        """The worker was started anew; the next click is not to wait for what it has forgotten."""
+        """The worker was started anew; the next click is not to wait for what it has forgotten.
+
+        Nor is what needs no reading, such as saving: the reading gives way, and is done later.
+        """
         document = self._editor.committed
         if document is not None and document.photo is not self._unreadable:
-            self.read_photo(is_quiet=True)
+            self._read(self._read_again, is_quiet=True, is_spare=True)
 
     def segment(self, question: Question) -> None:
         """Asks for the mask of a prompt; what was said before it is in it."""
         editor, document = self._editor, self._editor.document
         if document is None:
             return
+        editor.jobs.promote(READ, READ)  # this waits for it: it does not give way
         editor.message = None
         self.question = question
         photo = document.photo

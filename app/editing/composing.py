@@ -17,8 +17,8 @@ from objectmorpher_core.hint import Hint
 from objectmorpher_core.joining import Shadow
 
 from .. import job_functions
+from ..job_error import JobError
 from ..job_functions import Choice, Variant
-from ..jobs import JobError
 from ..layers import Layer
 from ..memo import same
 from ..tasks import PLATE

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..feedback import Action
-from ..jobs import JobError
+from ..job_error import JobError
 from ..remote.elsewhere import Elsewhere
 from ..settings import SERVER, settings_path
 from ..texts import t

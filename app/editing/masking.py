@@ -21,7 +21,7 @@ from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.segment.mask_painting import MaskPainting
 
 from .. import job_functions
-from ..jobs import JobError
+from ..job_error import JobError
 from ..tasks import SELECT, WRITE
 from ..texts import t
 from ..tools.pointer import Pointer

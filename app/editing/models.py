@@ -13,7 +13,7 @@ from objectmorpher_core.progress import Progress
 
 from .. import job_functions
 from ..feedback import Action
-from ..jobs import JobError
+from ..job_error import JobError
 from ..texts import t
 from .hub_models import HubModels
 from .workers import Workers

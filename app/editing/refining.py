@@ -10,7 +10,7 @@ from objectmorpher_core.document import Document
 from objectmorpher_core.refined import Refined
 
 from .. import job_functions
-from ..jobs import JobError
+from ..job_error import JobError
 from ..texts import t
 
 if TYPE_CHECKING:

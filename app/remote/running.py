@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from objectmorpher_core.progress import Cancelled, Progress
 
-from ..jobs import JobError
+from ..job_error import JobError
 from ..settings import AUTO
 from .message import MessageError, decode, encode
 from .offers import Offers

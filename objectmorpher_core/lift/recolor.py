@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
 
-from ..arrays import F32, F64
+from ..arrays import F32, F64, Mask
 from ..camera import Camera
 from ..document import LiftedObject, Matte
+from ..threads import LEAST_ROWS, in_threads
 from .bilinear import bilinear
 from .colours import BLUR
 
@@ -26,8 +28,11 @@ TOGETHER = 0.05  # x the evidence, for an exposure that is the same in all chann
 ROUNDS, UNBELIEVED = 4, 0.12  # of the fit; sRGB beyond which a difference is not one of light
 GLANCE = 4.0  # what is seen at a glance only has the photo's colour all the same
 CARRIED = 0.10  # object units: how far what is left of the difference is carried on
+REACH = 0.28  # object units, beyond which less than 1/2000 of it is left: nothing is looked for
 TELLING = 20_000  # Gaussians that are asked at most: the difference is smooth
 NEAREST = 12  # Gaussians that it is the mean of
+GRID = 8  # cells in REACH
+PIECE = 1 << 16  # Gaussians that are looked up at once: some 40 MB
 
 
 def recolored(lifted: LiftedObject, seen: F32, matte: Matte, camera: Camera) -> F32:
@@ -44,9 +49,10 @@ def recolored(lifted: LiftedObject, seen: F32, matte: Matte, camera: Camera) -> 
         return lifted.gaussians.colors
     lit = _in_light(own, own[sure], photo[sure])
     points = lifted.gaussians.means.astype(np.float64)
-    lit += _carried_on(points, points[sure], (photo - lit)[sure])
-    share = np.where(inside & (alpha > OPAQUE), np.minimum(GLANCE * seen, 1), 0.0)[:, None]
-    return np.clip(lit + share * (photo - lit), 0, 1).astype(np.float32)
+    share = np.where(inside & (alpha > OPAQUE), np.minimum(GLANCE * seen, 1), 0.0)
+    own_part = np.flatnonzero(share < 1)  # the rest is the photo's, whatever its light
+    lit[own_part] += _carried_on(points[own_part], points[sure], (photo - lit)[sure])
+    return np.clip(lit + share[:, None] * (photo - lit), 0, 1).astype(np.float32)
 
 
 def _in_light(colors: F64, own: F64, photo: F64) -> F64:
@@ -76,12 +82,38 @@ def _in_light(colors: F64, own: F64, photo: F64) -> F64:
 
 
 def _carried_on(points: F64, known: F64, rest: F64) -> F64:
-    """(N, 3) `rest` (n, 3) at the `known` points (n, 3), continued to `points` (N, 3)."""
+    """(N, 3) `rest` (n, 3) at the `known` points (n, 3), continued to `points` (N, 3).
+
+    Neighbours are looked for within REACH only. From the far side of an object all that is known
+    is about equally far: a tree would look at nearly all of it for each point.
+    """
     step = len(known) // TELLING + 1
     known, rest = known[::step], rest[::step]
-    count = min(NEAREST, len(known))
-    distance, near = KDTree(known).query(points, k=count)
-    width = np.maximum(distance[:, -1:], 1e-9)
-    weight = np.maximum(1 - (distance / (1.01 * width)) ** 2, 0)
-    mean = (rest[near] * weight[..., None]).sum(1) / weight.sum(1, keepdims=True)
-    return mean * np.exp(-((distance[:, :1] / CARRIED) ** 2))
+    tree, count = KDTree(known), min(NEAREST, len(known))
+    rest = np.vstack([rest, np.zeros(3)])  # the last one: of neighbours that are not there
+    carried, reached = np.zeros_like(points), np.flatnonzero(_may_reach(points, known))
+
+    def run(first: int, last: int) -> None:
+        for start in range(first, last, PIECE):
+            piece = reached[start : min(start + PIECE, last)]
+            distance, near = tree.query(points[piece], k=count, distance_upper_bound=REACH)
+            distance = distance.reshape(-1, count)
+            width = np.clip(distance[:, -1:], 1e-9, REACH)
+            weight = np.maximum(1 - (distance / (1.01 * width)) ** 2, 0)
+            total = np.maximum(weight.sum(1, keepdims=True), 1e-300)
+            mean = (rest[near.reshape(-1, count)] * weight[..., None]).sum(1) / total
+            carried[piece] = mean * np.exp(-((distance[:, :1] / CARRIED) ** 2))
+
+    in_threads(run, len(reached), least=LEAST_ROWS)
+    return carried
+
+
+def _may_reach(points: F64, known: F64) -> Mask:
+    """(N,) False where no `known` point (n, 3) is within REACH, by a grid of REACH / GRID."""
+    cell = REACH / GRID
+    low = known.min(0) - 2 * REACH
+    marked = np.zeros(((np.ptp(known, axis=0) + 4 * REACH) / cell).astype(int) + 1, bool)
+    marked[tuple(((known - low) / cell).astype(int).T)] = True
+    apart = np.asarray(distance_transform_edt(~marked))  # between the cells' centres, in cells
+    own = ((points - low) / cell).clip(0, np.array(marked.shape) - 1).astype(int)
+    return np.asarray(apart[tuple(own.T)] <= GRID + np.sqrt(3))

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..gaussians import Gaussians
 from ..limits import FILE_BYTES as MAX_BYTES
+from ..shown import named
 from .axes import half_turned
 from .compressed_ply import decode_compressed, encode_compressed, is_compressed, read_compressed
 from .limits import SplatFileError
@@ -55,7 +56,7 @@ def ending_of(path: Path) -> str:
         if name.endswith(ending):
             return ending
     known = " ".join((*FORMATS, *MESH_ENDINGS))
-    raise SplatFileError(f"{path.name} has none of the endings {known}")
+    raise SplatFileError(f"{named(path.name)} has none of the endings {known}")
 
 
 def encode(gaussians: Gaussians, path: Path) -> bytes:
@@ -63,7 +64,7 @@ def encode(gaussians: Gaussians, path: Path) -> bytes:
     ending = ending_of(path)
     if ending not in FORMATS:
         raise SplatFileError(
-            f"{path.name}: Gaussians cannot be written as {ending}; {' '.join(FORMATS)} can"
+            f"{named(path.name)}: Gaussians cannot be written as {ending}; {' '.join(FORMATS)} can"
         )
     return FORMATS[ending].encode(gaussians)
 
@@ -86,7 +87,7 @@ def read(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gaussians:
         else:
             gaussians = FORMATS[ending].decode(path.read_bytes())
     except SplatFileError as error:
-        raise SplatFileError(f"{path.name}: {error}") from error
+        raise SplatFileError(f"{named(path.name)}: {error}") from error
     return half_turned(gaussians) if is_flipped else gaussians
 
 
@@ -103,7 +104,7 @@ def read_object(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gau
     try:
         return centred(gaussians) if _is_mesh(path) else as_object(gaussians)
     except SplatFileError as error:
-        raise SplatFileError(f"{path.name}: {error}") from error
+        raise SplatFileError(f"{named(path.name)}: {error}") from error
 
 
 def _check_file(path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
 
 from ..limits import MESH_ASSET as MAX_ASSET
+from ..shown import named
 from .limits import SplatFileError
 
 
@@ -27,7 +28,7 @@ class MeshFolder:
         """The bytes of the file. Raises SplatFileError."""
         path = self.find(name)
         if path.stat().st_size > MAX_ASSET:
-            raise SplatFileError(f"{path.name} is larger than {MAX_ASSET >> 20} MiB")
+            raise SplatFileError(f"{named(path.name)} is larger than {MAX_ASSET >> 20} MiB")
         return path.read_bytes()
 
     def find(self, name: str) -> Path:

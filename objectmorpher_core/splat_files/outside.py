@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64
+from ..arrays import F64, Mask
+from ..threads import LEAST_ROWS, in_threads
 
 NEIGHBOURS = 6  # whose distance is the width of a cell: with those around it, nothing leaks
 MOST_CELLS = 160  # along the longest side
+PARTS = 16  # pieces for each thread: what one works with is small enough to stay in the cache
 LOOKS = np.arange(1.0, 4.6, 0.25)  # cells from the surface at which a point looks
 
 
@@ -49,13 +51,20 @@ def sides(points: F64, normals: F64) -> Sides:
     border = np.zeros(shape, bool)
     border[0] = True
     free = np.logical_not(marked)
-    outside = np.asarray(binary_propagation(border, mask=free))
+    outside: Mask = np.asarray(binary_propagation(border, mask=free), bool)
 
     def first_open(directions: F64) -> F64:
         found = np.full(len(points), np.inf)
-        for distance in LOOKS[::-1]:
-            is_out = outside[cells(points + distance * cell * directions)]
-            found = np.where(is_out, distance, found)
+
+        def run(first: int, last: int) -> None:
+            waiting = np.arange(first, last)  # that have not seen the outside yet
+            for distance in LOOKS:
+                places = points[waiting] + distance * cell * directions[waiting]
+                is_out = outside[cells(places)]
+                found[waiting[is_out]] = distance
+                waiting = waiting[~is_out]
+
+        in_threads(run, len(points), PARTS, least=LEAST_ROWS)
         return found
 
     return Sides(first_open(normals), first_open(-normals))

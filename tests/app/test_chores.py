@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from app.chores import Chores
-from app.jobs import JobError
+from app.job_error import JobError
 from app.opening import OpeningError
 from objectmorpher_core.progress import Progress
 

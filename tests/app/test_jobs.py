@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from PIL import UnidentifiedImageError
 
-from app.jobs import JobError, Jobs
+from app.job_error import JobError
+from app.jobs import Jobs
 from app.opening import OpeningError
 
 
@@ -107,6 +108,18 @@ def test_only_the_newest_request_of_a_kind_is_answered(worker: Jobs) -> None:
     assert log.cancels == 0
 
 
+def test_a_spare_request_waits_for_those_that_come_later(worker: Jobs) -> None:
+    log = Log()
+    start(worker, log, job_functions.wait, 0.1)
+    for value, is_spare in ((1.0, True), (2.0, False)):
+        worker.start(
+            "Test", job_functions.double, np.array([value]), done=log.answers.append,
+            failed=log.errors.append, kind=f"double {value}", is_spare=is_spare,
+        )  # fmt: skip
+    run_until(worker, lambda: len(log.answers) == 3)
+    assert [np.asarray(answer).item() for answer in log.answers[1:]] == [4.0, 2.0]
+
+
 def test_a_failure_is_a_sentence(worker: Jobs) -> None:
     log = Log()
     start(worker, log, job_functions.fail)
@@ -151,7 +164,7 @@ def test_the_log_tells_the_programs_failures_from_the_requests(
     worker: Jobs, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = Log()
-    with caplog.at_level(logging.INFO, "app.jobs"):
+    with caplog.at_level(logging.INFO, "app.job_error"):
         for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
             start(worker, log, function)
             run_until(worker, lambda: worker.is_idle)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from conftest import open_file, wait_for_jobs
 
+from app.derived import MOST_SHAPES, Derived
 from app.editor import Editor
 from app.shape import Shape, build_shape, rehearse
+from app.view import View
 from objectmorpher_core import edits
 from objectmorpher_core.document import DeformSettings, Document
 from objectmorpher_core.session_file import save_session
@@ -41,6 +44,23 @@ def test_a_session_is_ready_when_it_is_shown(
     open_file(editor, path)
     shape = _shape(editor)
     assert shape.is_rehearsed and _has_deformer(shape)
+
+
+def test_what_many_objects_need_is_remembered_of_all_of_them(ball: Document) -> None:
+    """Each frame asks for each object's shape: had one no room, all would be built in each."""
+    thing = ball.objects[0]
+    assert thing.lifted is not None
+    many = tuple(
+        replace(thing, name=f"Object {k}", lifted=replace(thing.lifted), is_visible=False)
+        for k in range(MOST_SHAPES + 6)
+    )
+    document, shape = replace(ball, objects=many), build_shape(ball.photo.camera, thing)
+    made = [(one, Shape(shape.puppet, shape.texture)) for one in many]
+    derived, view = Derived(), View()
+    derived.adopt(made)
+    for _ in range(2):
+        derived.layers.draw(document, view)
+        assert all(derived.shape(ball.photo, one) is own for one, own in made)
 
 
 def test_a_rehearsal_changes_nothing(ball: Document) -> None:

@@ -14,6 +14,7 @@ from conftest import wait_for_jobs, wait_until
 
 from app.commands import run
 from app.editor import Editor
+from app.tasks import READ, WRITE
 from objectmorpher_core import edits
 from objectmorpher_core.document import Document, Placement
 from objectmorpher_core.image import ImageError, read_picture
@@ -26,27 +27,42 @@ FUNCTIONS = {  # what is asked -> what the worker runs
 }  # fmt: skip
 
 
+def wait_for_answers(editor: Editor) -> None:
+    """As `wait_for_jobs`, but not for what gives way: another process reads the photo again."""
+
+    def is_answered() -> bool:
+        current, waiting = editor.jobs.current, editor.jobs._waiting.values()
+        jobs = [*waiting, *([current] if current else [])]
+        return not editor.poll() and editor.chores.is_idle and all(job.is_spare for job in jobs)
+
+    wait_until(editor, is_answered)
+
+
+def is_running(editor: Editor, what: str) -> bool:
+    """Whether it is what runs in the worker."""
+    job = editor.jobs.current
+    return job is not None and job.function.__name__ == FUNCTIONS[what]
+
+
 def ask(editor: Editor, folder: Path, what: str) -> None:
     """One of the jobs that run in the worker; it is what runs there then."""
-    wait_for_jobs(editor)
+    wait_for_answers(editor)
     if what == "save":
         editor.filing.save_as(folder / "ball.omorph")
     elif what == "export":
         editor.exporting.export_to(folder / "ball.png")
     else:
         run(editor, "fill_again")
-    wait_until(editor, lambda: editor.jobs.current is not None)
-    job = editor.jobs.current
-    assert job is not None and job.function.__name__ == FUNCTIONS[what]
+    wait_until(editor, lambda: is_running(editor, what))
 
 
 def seconds(editor: Editor, folder: Path, what: str) -> float:
     """What the job takes where nobody kills it."""
     ask(editor, folder, what)
     start = time.monotonic()
-    wait_until(editor, lambda: editor.jobs.current is None)
+    wait_until(editor, lambda: not is_running(editor, what))
     took = time.monotonic() - start
-    wait_for_jobs(editor)
+    wait_for_answers(editor)
     assert editor.message is None or not editor.message.details, editor.message
     return took
 
@@ -116,7 +132,7 @@ def killed_at_random(editor: Editor, ball: Document, folder: Path, kills: int) -
         if is_hit:
             print(f"killed {found.total()} times, now: {what}", flush=True)  # seen with -s
         assert moves < 10 * kills + 10, f"{what} is over before it can be killed"
-        wait_for_jobs(editor)
+        wait_for_answers(editor)
         committed = editor.committed
         assert committed is not None and committed.objects[0].placement == placement
         assert_whole(folder)
@@ -143,6 +159,24 @@ def assert_it_goes_on(editor: Editor, folder: Path) -> None:
 def test_killed_in_each_job(editor: Editor, ball: Document, tmp_path: Path) -> None:
     assert killed_at_random(editor, ball, tmp_path, 3) == dict.fromkeys(FUNCTIONS, 1)
     assert_it_goes_on(editor, tmp_path)
+
+
+def test_what_is_asked_for_next_does_not_wait_for_the_photo(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    """The new process has to read it again, which takes seconds; a click would need that."""
+    editor.start(ball)
+    seconds(editor, tmp_path, "save")
+    worker = editor.jobs._worker
+    assert worker is not None
+    worker.process.kill()
+    wait_until(editor, lambda: editor.jobs.is_busy(READ))
+    path = tmp_path / "ball.omorph"
+    editor.filing.save_as(path)
+    wait_until(editor, lambda: not editor.jobs.is_busy(f"{WRITE} {path}"))
+    assert editor.message is None or not editor.message.details, editor.message
+    assert editor.jobs.is_busy(READ), "it is read afterwards"
+    wait_for_jobs(editor)
 
 
 @pytest.mark.slow

@@ -1,8 +1,8 @@
 """The large cases, each through the whole job: `python -m tests.soak.large CASE` (photo, ...).
 
 Works in the editor and its worker, without a window, and prints one line of JSON for each step:
-seconds on the wall, processor seconds of the editor and of its worker, and the most memory that
-either has held until then.
+seconds on the wall, processor seconds of the editor, of its main thread and of its worker, and the
+most memory that either has held until then.
 """
 
 from __future__ import annotations
@@ -59,19 +59,15 @@ class Desk:
     @contextmanager
     def step(self, name: str, **more: object) -> Iterator[None]:
         """Tells what it costs, with all the jobs that it starts."""
-        begun = time.monotonic(), time.process_time(), self._worker_seconds()
+        begun = self._clocks()
         yield
         self.wait(lambda: None)
-        wall, own, worker = (
-            now - then
-            for now, then in zip(
-                (time.monotonic(), time.process_time(), self._worker_seconds()), begun, strict=True
-            )
-        )
+        wall, own, main, worker = np.subtract(self._clocks(), begun)
         told = {
             "step": name, "wall_s": round(wall, 2), "editor_s": round(own, 2),
-            "worker_s": round(worker, 2), "editor_mib": round(_most("self")),
-            "worker_mib": round(_most(self._worker)), "editor_now_mib": round(_resident("self")),
+            "main_s": round(main, 2), "worker_s": round(worker, 2),
+            "editor_mib": round(_most("self")), "worker_mib": round(_most(self._worker)),
+            "editor_now_mib": round(_resident("self")),
         }  # fmt: skip
         print(json.dumps(told | more), flush=True)
 
@@ -132,6 +128,11 @@ class Desk:
         worker = self.editor.jobs._worker
         assert worker is not None
         return str(worker.process.pid)
+
+    def _clocks(self) -> tuple[float, float, float, float]:
+        """s: on the wall, of the editor's process, of its main thread, of its worker."""
+        own = time.monotonic(), time.process_time(), time.thread_time()
+        return (*own, self._worker_seconds())
 
     def _worker_seconds(self) -> float:
         fields = Path(f"/proc/{self._worker}/stat").read_text().rpartition(")")[2].split()
@@ -208,8 +209,12 @@ def gaussians(desk: Desk) -> None:
     spots = np.argwhere(mask)[:, ::-1] + 0.5
     with desk.step("first drag", gaussians=len(lifted.gaussians)):
         desk.drag(0, spots.mean(0), (15.0, 5.0))
+    with desk.step("forty drags, each undone", drag_ms=_drags(desk, [mask])):
+        pass
     with desk.step("move"):
         desk.move(0, 20.0, 5.0)
+    with desk.step("undo"):
+        desk.editor.undo()
     desk.file()
 
 
