@@ -33,6 +33,7 @@ WIDE = 3.0  # cells, over which the light on either side of an edge is told
 SIDES = (0.15, 0.85)  # of what is missing there, that is lit ground, or all in shadow
 FINE = 0.1  # cells, over which a px's light is told
 LEAST_SIDE = np.float32(0.01)  # of the px around: so much its usual light weighs
+MOSTLY = 0.5  # of a cell that is ground
 SURE_EDGE = (0.3, 0.7)  # of the way from lit to shaded: what is between belongs to both
 NOISY = 2.0  # x the ground's, the contrast that is no edge
 LEAST_EPS = 1e-3
@@ -49,6 +50,7 @@ class OldShadow:
     top: float
     pitch: float  # photo px per px of it
     noise: float  # natural logarithm, of the ground
+    free: F32  # (h, w) in [0, 1] where the ground is seen: no object is taken for it
 
     def missing(self, box: Box) -> F32:
         """(h, w) natural logarithm of linear light, at the pixels of a box of the photo."""
@@ -76,7 +78,7 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
     """
     x0, y0, x1, y1 = box
     part = pixels[y0:y1, x0:x1]
-    missing, is_told = _hard_edged(_sharpened(old.missing(box), part, old), part, old)
+    missing, is_told = _hard_edged(_sharpened(old.missing(box), part, old), part, old, box)
     gain = np.exp(missing / np.float32(GAMMA))
     is_changed = gain > 1 + SEEN
     lit = pixels_from_unit(np.minimum(unit_pixels(part) * gain[..., None], 1), pixels.dtype)
@@ -98,7 +100,7 @@ def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
     return np.asarray(np.clip(found, 0, None) * near, np.float32)
 
 
-def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow) -> tuple[F32, Mask]:
+def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple[F32, Mask]:
     """(h, w) the missing light with the photo's own step from lit to shaded, and where it has one.
 
     What was found is on a grid, and blurred: across a hard edge it would lighten what is lit, and
@@ -106,7 +108,8 @@ def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow) -> tuple[F32, Mask
     missing in the shade is what lit ground beside it has more.
     """
     deep = float(missing.max(initial=0))
-    sides = [(missing < SIDES[0] * deep), (missing > SIDES[1] * deep)]
+    is_free = sampled(old.free, (old.left, old.top), old.pitch, box) > MOSTLY
+    sides = [is_free & (missing < SIDES[0] * deep), is_free & (missing > SIDES[1] * deep)]
     if deep < HARD or not all(side.any() for side in sides):
         return missing, np.zeros(missing.shape, bool)
     light = np.log(unit_pixels(pixels) ** np.float32(GAMMA) + np.float32(BLACK)).mean(-1)

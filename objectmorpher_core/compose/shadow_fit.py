@@ -21,6 +21,7 @@ from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
 from .old_shadow import BLACK, OldShadow
+from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
 from .shadow_flat import Flat, lie
 from .shadow_shear import Sheet, stand
@@ -36,14 +37,13 @@ DIRECTIONS = range(0, 360, 20)  # degrees
 LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
 FROM_ABOVE = 75.0  # degrees: from there on a thing hides its own foot
 FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
+# What lies is lifted to a body whose rim stands about so much of that side above the ground.
+FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
 LEAST_FLAT = 0.4  # of the loss without a shadow, that such a one must explain
 SOFTNESS = 0.35
 FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
 SOFTER = 0.2
 FULL = 0.75  # of the light, that a full shadow is taken to leave out
-ROUNDS = 5
-HUBER = 1.3  # x the scale of what is usual
-LEAST_SCALE = 0.02
 LEAST_DARK = 0.25  # natural logarithm of light, that a shadow takes at its darkest
 LEAST_GAIN = 0.04  # of the loss without a shadow
 MOST_NOISE = 0.6  # natural logarithm: on a ground more varied than that nothing is told
@@ -93,10 +93,12 @@ def find_old_shadow(
     depth = _missing(seen, ground, found)
     shadow = _imitated(found)
     if isinstance(seen.standing, Flat):
-        shadow = replace(shadow, ground=90.0)
+        length = min(FLAT_HEIGHT * shadow.length, MOST_SHADOW)
+        shadow = replace(shadow, length=length, ground=90.0)
     elif seen_from is None:
         shadow = replace(shadow, ground=SHEET_GROUND)
-    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale)
+    free = seen.free.astype(np.float32)
+    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
 
 
 def _told(seen: _Seen, lengths: tuple[float, ...]) -> tuple[_Ground, _Found] | None:
@@ -207,31 +209,13 @@ def _ground(seen: _Seen) -> _Ground | None:
     basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
     contact = _taken(seen.standing.contact()).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
-    _, loss, scale = _regressed(basis, brightness, weight)
+    _, loss, scale = regressed(basis, brightness, weight)
     return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
 
 
 def _taken(shadow: F32) -> F32:
     """Natural logarithm of the light that a shadow of opacity (h, w) takes."""
     return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
-
-
-def _regressed(
-    basis: F64, values: F64, weight: F64, scale: float | None = None
-) -> tuple[F64, float, float]:
-    """Coefficients, mean loss and scale of the robust fit of `values` (n,) by a basis (n, k)."""
-    weights, found, used = weight, np.zeros(basis.shape[1]), 0.0
-    rest = values
-    for _ in range(ROUNDS):
-        weighted = basis * weights[:, None]
-        ridge = 1e-6 * len(values) * np.eye(basis.shape[1])
-        found = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ values)
-        rest = values - basis @ found
-        used = 1.4826 * float(np.median(np.abs(rest))) + LEAST_SCALE
-        weights = weight / np.maximum(np.abs(rest) / (HUBER * used), 1)
-    off = np.abs(rest) / (used if scale is None else scale)
-    loss = np.where(off < HUBER, off * off / 2, HUBER * off - HUBER**2 / 2)
-    return np.asarray(found, np.float64), float((weight * loss).sum() / weight.sum()), used
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,10 +238,10 @@ def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     if column.max() < DARKER:
         return None
     basis = np.column_stack([ground.basis, -column, -ground.contact])
-    found, loss, scale = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+    found, loss, scale = regressed(basis, ground.brightness, ground.weight, ground.scale)
     if found[7] < 0:
         basis = basis[:, :7]
-        found, loss, scale = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+        found, loss, scale = regressed(basis, ground.brightness, ground.weight, ground.scale)
         found = np.append(found, 0.0)
     if found[6] <= 0:
         return None
@@ -311,7 +295,7 @@ def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
     column = found.thrown.ravel()[ground.index].astype(np.float64)
     basis = np.column_stack([ground.basis, -column])
     changes = [
-        abs(float(_regressed(basis, channel, ground.weight)[0][6]))
+        abs(float(regressed(basis, channel, ground.weight)[0][6]))
         for channel in seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
     ]
     return max(changes) < MOST_COLOUR * found.dark
@@ -366,7 +350,7 @@ def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
         member = _spread(member, smooth, fitted, max(DARKER, SURE * usual), seen.free)
         weight = ground.weight * (1 - member.ravel()[ground.index])
         if weight.sum() > LEAST_LEFT * ground.weight.sum():
-            coefficients, *_ = _regressed(ground.basis, ground.brightness, weight)
+            coefficients, *_ = regressed(ground.basis, ground.brightness, weight)
     share = max(1 - ground.scale, MEASURED) * np.clip(spread, 0, 1)
     depth = fitted + share * (np.clip(smooth, 0, DEEPEST) - fitted)
     depth = np.clip(depth, 0, np.minimum(_room(seen, ground, member, blur), DEEPEST)) * member
