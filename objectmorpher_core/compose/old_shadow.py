@@ -125,7 +125,10 @@ def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple
     into = (levels[0] - fine) / np.maximum(step, HARD)
     into = np.clip((into - SURE_EDGE[0]) / (SURE_EDGE[1] - SURE_EDGE[0]), 0, 1)
     is_told = (step > HARD) & (missing > 0)
-    return np.where(is_told, into * step, missing).astype(np.float32), is_told
+    # Told of light + BLACK: of the light alone, as it is given back, more is missing.
+    dark = np.maximum(np.exp(levels[1]) - BLACK, BLACK / 2)
+    lacking = np.log(np.maximum(np.exp(levels[0]) - BLACK, dark) / dark)
+    return np.where(is_told, into * lacking, missing).astype(np.float32), is_told
 
 
 def traceless_plate(
