@@ -28,6 +28,7 @@ LOST = 1.1  # natural logarithm of missing light, from which the ground is inven
 SEEN = 1 / 512  # of encoded light: less is no shadow
 BLACK = 0.02  # of linear light, below which a logarithm says little
 REACH = 2.0  # cells of what is missing, over which it is sharpened
+FROM_ABOVE = 90.0  # degrees: the shadow is the outline itself
 HARD = 0.9  # natural logarithm of missing light, from which an edge is looked for in the photo
 WIDE = 3.0  # cells, over which the light on either side of an edge is told
 SIDES = (0.15, 0.85)  # of what is missing there, that is lit ground, or all in shadow
@@ -110,7 +111,8 @@ def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple
     deep = float(missing.max(initial=0))
     is_free = sampled(old.free, (old.left, old.top), old.pitch, box) > MOSTLY
     sides = [is_free & (missing < SIDES[0] * deep), is_free & (missing > SIDES[1] * deep)]
-    if deep < HARD or not all(side.any() for side in sides):
+    is_outline = old.shadow.ground == FROM_ABOVE  # else parts of it are soft, and in other light
+    if deep < HARD or not is_outline or not all(side.any() for side in sides):
         return missing, np.zeros(missing.shape, bool)
     light = np.log(unit_pixels(pixels) ** np.float32(GAMMA) + np.float32(BLACK)).mean(-1)
     levels = []

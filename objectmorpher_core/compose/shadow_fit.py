@@ -20,7 +20,7 @@ from ..arrays import F32, F64, Mask, Pixels
 from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
-from .old_shadow import BLACK, OldShadow
+from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
 from .shadow_flat import Flat, lie
@@ -35,7 +35,7 @@ LOOKED = 6  # px of the photo across each of them are enough
 FREE = 0.02  # of a cell, that the object may cover
 DIRECTIONS = range(0, 360, 20)  # degrees
 LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
-FROM_ABOVE = 75.0  # degrees: from there on a thing hides its own foot
+STEEP = 75.0  # degrees: from there on a thing hides its own foot
 FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
 # What lies is lifted to a body whose rim stands about so much of that side above the ground.
 FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
@@ -80,8 +80,8 @@ def find_old_shadow(
         return None
     slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
     seen = _look(pixels, matte, others, slope)
-    told = _told(seen, LENGTHS) if seen_from is None or seen_from < FROM_ABOVE else None
-    if seen_from is None or seen_from >= FROM_ABOVE:
+    told = _told(seen, LENGTHS) if seen_from is None or seen_from < STEEP else None
+    if seen_from is None or seen_from >= STEEP:
         flat = replace(seen, standing=lie(seen.cover))
         lying = _told(flat, FLAT_LENGTHS)
         least = max(LEAST_FLAT, 0.0 if told is None else told[1].gain)
@@ -94,7 +94,7 @@ def find_old_shadow(
     shadow = _imitated(found)
     if isinstance(seen.standing, Flat):
         length = min(FLAT_HEIGHT * shadow.length, MOST_SHADOW)
-        shadow = replace(shadow, length=length, ground=90.0)
+        shadow = replace(shadow, length=length, ground=FROM_ABOVE)
     elif seen_from is None:
         shadow = replace(shadow, ground=SHEET_GROUND)
     free = seen.free.astype(np.float32)
