@@ -120,7 +120,7 @@ minds texture and outlines more): a smooth blur is near and unlike, a sharp gues
 
 {summary}
 
-Holes in photos that none of the above are of:
+Holes in photos that none of the above are of (PSNR, SSIM, HED):
 
 {others}
 
@@ -225,7 +225,7 @@ def plate_section(filled: dict[str, dict[str, Filled]], taken: list[Taken]) -> s
 
 def _others(filled: dict[str, dict[str, Filled]]) -> str:
     """A table of holes in other photos."""
-    measures = ("psnr", "ssim", "unlike", "hed")
+    measures = ("psnr", "ssim", "hed")
 
     def cell(found: list[Filled]) -> str:
         psnr, *rest = (np.mean([getattr(f, name) for f in found]) for name in measures)
