@@ -370,9 +370,10 @@ def _room(seen: _Seen, ground: _Ground, member: F32, blur: float) -> F32:
     bright = cv2.GaussianBlur(seen.brightness * free, (0, 0), blur) / np.maximum(spread, 1e-3)
     is_lit = member.ravel()[ground.index] < LIT
     if not is_lit.any():
-        return np.full_like(spread, DEEPEST)
+        return np.full(spread.shape, DEEPEST, np.float32)
     most = np.percentile(ground.brightness[is_lit], BRIGHTEST)
-    return np.where(spread > FREE, np.maximum(most - bright, 0), DEEPEST).astype(np.float32)
+    room = np.where(spread > FREE, np.maximum(most - bright, 0), DEEPEST)
+    return np.asarray(room, np.float32)
 
 
 def _spread(member: F32, dark: F32, fitted: F32, least: float, free: Mask) -> F32:
