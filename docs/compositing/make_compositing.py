@@ -1,6 +1,6 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py [places | focus | reflections | plates]
+python docs/compositing/make_compositing.py [places | focus | photos | reflections | plates]
 
 With a section's name only that section is made anew.
 """
@@ -37,7 +37,7 @@ from page import (  # noqa: E402
     plate_section,
     write_page,
 )
-from photos import shadow_pairs  # noqa: E402
+from photos import shadow_pictures  # noqa: E402
 from reflection_page import REFLECTION, reflection_section  # noqa: E402
 from solids import SOLIDS  # noqa: E402
 
@@ -47,7 +47,7 @@ FOCUS_SHOWN = 3.0  # px
 REFLECTIONS_SHOWN = 0.2  # of the light
 GRAINS = ("x 2.2", "x 0.6", "half a pixel")
 QUALITY = 88
-TILE, WIDE = 200, 280  # px
+TILE, WIDE, PHOTO = 200, 280, 400  # px
 
 
 def main() -> None:
@@ -69,6 +69,9 @@ def main() -> None:
         after = rest[rest.index(SHADOW.partition("\n")[0]) :]
         page.write_text(before + focus_section(*_focus()) + after, encoding="utf-8")
         return
+    if sys.argv[1:] == ["photos"]:
+        _write("photos.jpg", shadow_pictures(), PHOTO)
+        return
     if sys.argv[1:] == ["reflections"]:
         page = FOLDER / "README.md"
         text, title = page.read_text(encoding="utf-8"), REFLECTION.partition("\n")[0]
@@ -89,7 +92,7 @@ def main() -> None:
     found = [case for case in shaded if case.is_found][:8]
     rows = [[p[120:440, 96:416] for p in case.pictures] for case in found]
     _write("shadows.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
-    _write("photos.jpg", shadow_pairs(), 420)
+    _write("photos.jpg", shadow_pictures(), PHOTO)
     grained = grains.measured()
     own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
     _write("grains.jpg", [[p[:40, :40] for p in c.pictures] for c in own], WIDE)
@@ -131,6 +134,9 @@ def _plates() -> tuple[dict[str, dict[str, plates.Filled]], list[plate_times.Tak
         pictures.append([photo, cut, *(found.picture for found in filled[name].values())])
         print(name, flush=True)
     _write("plates.jpg", pictures)
+    for name in plates.OTHER_HOLES:
+        *_, filled[name] = plates.measured(name)
+        print(name, flush=True)
     return filled, plate_times.measured()
 
 

@@ -2,34 +2,55 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
+from plates import SAMPLES
 from skimage import data
 
 from objectmorpher_core.arrays import Pixels
 from objectmorpher_core.compose.old_shadow import without_shadow
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
 from objectmorpher_core.image import Picture, encode_picture
-from objectmorpher_core.pipeline import open_photo, select
+from objectmorpher_core.pipeline import open_photo, run_script, select
 from objectmorpher_core.script import EditScript
 from objectmorpher_core.segment.matte import build_matte
 
+
+def _bowl() -> Pixels:
+    picture = cv2.imread(str(SAMPLES / "bowl.jpg"))
+    assert picture is not None
+    return np.ascontiguousarray(picture[..., ::-1])
+
+
 PHOTOS = {
-    "cup": (data.coffee, EditScript(box=(60.0, 20.0, 560.0, 400.0))),
-    "motorcycle": (lambda: data.stereo_motorcycle()[0], EditScript(subject=True)),
+    "cup": (
+        data.coffee,
+        EditScript(box=(60.0, 20.0, 560.0, 400.0), move=(-30.0, -30.0, 0.0), scale=0.75),
+    ),
+    "motorcycle": (
+        lambda: data.stereo_motorcycle()[0],
+        EditScript(subject=True, move=(-60.0, -10.0, 0.0), scale=0.8),
+    ),
+    "bowl": (
+        _bowl,
+        EditScript(box=(200.0, 70.0, 995.0, 676.0), move=(-30.0, 60.0, 0.0), scale=0.6),
+    ),
 }
 MARGIN = 20  # px of the matte
 
 
-def shadow_pairs() -> list[list[Pixels]]:
-    """The photo as it is, and with the ground in full light."""
+def shadow_pictures() -> list[list[Pixels]]:
+    """The photo as it is, with the ground in full light, and with the object moved."""
     rows = []
     for name, (make, script) in PHOTOS.items():
         photo = make()
-        document = select(open_photo(encode_picture(Picture(photo), ".png"), name, None), script)
+        encoded = encode_picture(Picture(photo), ".png")
+        document = select(open_photo(encoded, name, None), script)
         mask = document.objects[0].mask
         assert mask is not None
         old = find_old_shadow(photo, build_matte(photo, mask, MARGIN))
         height, width = mask.shape
         lit = photo if old is None else without_shadow(photo, old, (0, 0, width, height))[0]
-        rows.append([photo, np.where(mask[..., None], photo, lit)])
+        moved = run_script(encoded, name, script).composite.pixels
+        rows.append([photo, np.where(mask[..., None], photo, lit), moved])
     return rows

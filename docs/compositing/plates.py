@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from skimage import data
 from skimage.metrics import structural_similarity
+from sklearn.datasets import load_sample_image
 
 from objectmorpher_core import models
 from objectmorpher_core.arrays import Mask, Pixels
@@ -37,6 +38,12 @@ def _grey(picture: Pixels) -> Pixels:
     return np.repeat(picture[..., None], 3, 2)
 
 
+def _smaller(picture: Pixels) -> Pixels:
+    scale = LONGEST / max(picture.shape[:2])
+    size = round(picture.shape[1] * scale), round(picture.shape[0] * scale)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
 # name -> photo, and the middle and radii of the hole, as shares of its sides: all background
 HOLES: dict[str, tuple[Callable[[], Pixels], tuple[float, float], tuple[float, float]]] = {
     "table": (data.coffee, (0.87, 0.6), (0.09, 0.2)),
@@ -48,6 +55,21 @@ HOLES: dict[str, tuple[Callable[[], Pixels], tuple[float, float], tuple[float, f
     "bricks": (lambda: _grey(data.brick()), (0.5, 0.5), (0.14, 0.18)),
     "gravel": (lambda: _grey(data.gravel()), (0.5, 0.5), (0.14, 0.18)),
 }
+# Likewise, in photos that none of the above are of.
+OTHER_HOLES: dict[str, tuple[Callable[[], Pixels], tuple[float, float], tuple[float, float]]] = {
+    "pavement": (lambda: load_sample_image("china.jpg"), (0.5, 0.93), (0.12, 0.06)),
+    "sky and trees": (lambda: load_sample_image("china.jpg"), (0.15, 0.3), (0.1, 0.14)),
+    "roof": (lambda: load_sample_image("china.jpg"), (0.5, 0.45), (0.07, 0.09)),
+    "fur": (data.chelsea, (0.15, 0.75), (0.1, 0.15)),
+    "lawn": (lambda: _grey(data.camera()), (0.8, 0.8), (0.12, 0.1)),
+    "tower": (lambda: _grey(data.camera()), (0.85, 0.55), (0.08, 0.12)),
+    "grass": (lambda: _grey(data.grass()), (0.5, 0.5), (0.14, 0.18)),
+    "tissue": (data.immunohistochemistry, (0.5, 0.5), (0.14, 0.16)),
+    "retina": (lambda: _smaller(data.retina()), (0.5, 0.35), (0.1, 0.1)),
+    "moon": (lambda: _grey(data.moon()), (0.35, 0.6), (0.12, 0.14)),
+}
+OTHER_WAYS = ("ours", "PatchMatch")
+LONGEST = 1000  # px of a photo
 Filler = Callable[[Pixels, Mask], Pixels]
 
 
@@ -88,7 +110,8 @@ class Filled:
 
 def measured(name: str) -> tuple[Pixels, Pixels, dict[str, Filled]]:
     """What was there, with the hole, and the fills of each way, compiled and loaded before."""
-    make, middle, radii = HOLES[name]
+    make, middle, radii = {**HOLES, **OTHER_HOLES}[name]
+    ways = WAYS if name in HOLES else {way: WAYS[way] for way in OTHER_WAYS}
     photo = make()
     height, width = photo.shape[:2]
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
@@ -102,7 +125,7 @@ def measured(name: str) -> tuple[Pixels, Pixels, dict[str, Filled]]:
     cut = photo.copy()
     cut[hole] = 255
     found = {}
-    for way, fill in WAYS.items():
+    for way, fill in ways.items():
         begun = time.process_time()
         filled = fill(photo * ~hole[..., None], hole)
         found[way] = _scored(photo, filled, hole, around, time.process_time() - begun)

@@ -7,6 +7,9 @@ straight edges that go on behind the hole, what surroundings are like, and the u
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 
 from ..arrays import F32, Mask, Pixels
@@ -22,6 +25,8 @@ from .structure_lines import find_lines
 SEARCH_PIXELS = 100_000  # of the small picture
 MARGIN = 0.6  # x the hole's longer side, the surroundings that are copied from
 MIN_MARGIN = 32  # px
+DOUBT = 0.3  # of the way from what was found to the smooth mean of what is around
+COARSE = 6.0  # px of the small picture, standard deviation: what is finer is not in doubt
 
 
 class PatchMatchInpainter:
@@ -93,7 +98,22 @@ def _completed(
     small, known = shrunk(levels, (~hole).astype(np.float32), size)
     scale = size[0] / width, size[1] / height
     guide = _guide(small, known, tuple(hint.moved(0, 0, scale) for hint in hints))
-    return complete(small, known, guide, seed, progress)
+    completion = complete(small, known, guide, seed, progress)
+    hole = completion.hole
+    guess = smooth(small, (~hole).astype(np.float32))
+    return replace(completion, colors=_drawn_to(completion.colors, guess, hole))
+
+
+def _drawn_to(colors: F32, guess: F32, hole: Mask) -> F32:
+    """Colours (h, w, 3) of a filled hole (h, w), their lowest frequencies nearer to a `guess`.
+
+    What patches say of large areas is one of many answers. Between it and the smooth mean of what
+    is around lies, on average, less of an error than at either; detail and edges stay.
+    """
+    depth = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5)
+    share = np.float32(DOUBT) * np.clip(depth / np.float32(COARSE), 0, 1)[..., None]
+    gap = cv2.GaussianBlur(guess - colors, (0, 0), COARSE)
+    return np.asarray(np.clip(colors + share * gap, 0, 255), np.float32)
 
 
 def _guide(small: F32, known: F32, hints: tuple[Hint, ...]) -> Guide:

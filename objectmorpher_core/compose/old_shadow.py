@@ -28,6 +28,14 @@ LOST = 1.1  # natural logarithm of missing light, from which the ground is inven
 SEEN = 1 / 512  # of encoded light: less is no shadow
 BLACK = 0.02  # of linear light, below which a logarithm says little
 REACH = 2.0  # cells of what is missing, over which it is sharpened
+FROM_ABOVE = 90.0  # degrees: the shadow is the outline itself
+HARD = 0.9  # natural logarithm of missing light, from which an edge is looked for in the photo
+WIDE = 3.0  # cells, over which the light on either side of an edge is told
+SIDES = (0.15, 0.85)  # of what is missing there, that is lit ground, or all in shadow
+FINE = 0.1  # cells, over which a px's light is told
+LEAST_SIDE = np.float32(0.01)  # of the px around: so much its usual light weighs
+MOSTLY = 0.5  # of a cell that is ground
+SURE_EDGE = (0.3, 0.7)  # of the way from lit to shaded: what is between belongs to both
 NOISY = 2.0  # x the ground's, the contrast that is no edge
 LEAST_EPS = 1e-3
 SOFT = 0.05  # natural logarithm of light
@@ -43,6 +51,7 @@ class OldShadow:
     top: float
     pitch: float  # photo px per px of it
     noise: float  # natural logarithm, of the ground
+    free: F32  # (h, w) in [0, 1] where the ground is seen: no object is taken for it
 
     def missing(self, box: Box) -> F32:
         """(h, w) natural logarithm of linear light, at the pixels of a box of the photo."""
@@ -59,13 +68,23 @@ class OldShadow:
 
 def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask]:
     """The pixels (h, w, 3) of a `box` of the photo in full light, and where that is another one."""
+    lit, is_changed, _ = _lifted(pixels, old, box)
+    return lit, is_changed
+
+
+def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mask]:
+    """As `without_shadow`, and where it is so dark that the photo shows little of the ground.
+
+    Where a hard edge tells how dark it is, ground that is darker still shows enough.
+    """
     x0, y0, x1, y1 = box
     part = pixels[y0:y1, x0:x1]
-    missing = _sharpened(old.missing(box), part, old)
+    missing, is_told = _hard_edged(_sharpened(old.missing(box), part, old), part, old, box)
     gain = np.exp(missing / np.float32(GAMMA))
     is_changed = gain > 1 + SEEN
     lit = pixels_from_unit(np.minimum(unit_pixels(part) * gain[..., None], 1), pixels.dtype)
-    return np.where(is_changed[..., None], lit, part), is_changed
+    is_lost = old.lost(box) & ~is_told
+    return np.where(is_changed[..., None], lit, part), is_changed, is_lost
 
 
 def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
@@ -80,6 +99,38 @@ def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
     found = cv2.ximgproc.guidedFilter(light, missing, radius, eps)
     near = np.clip(missing / SOFT, 0, 1)  # nothing is given to what had none
     return np.asarray(np.clip(found, 0, None) * near, np.float32)
+
+
+def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple[F32, Mask]:
+    """(h, w) the missing light with the photo's own step from lit to shaded, and where it has one.
+
+    What was found is on a grid, and blurred: across a hard edge it would lighten what is lit, and
+    leave the shadow's rim. Each px is told by its own light which side it is on, and what is
+    missing in the shade is what lit ground beside it has more.
+    """
+    deep = float(missing.max(initial=0))
+    is_free = sampled(old.free, (old.left, old.top), old.pitch, box) > MOSTLY
+    sides = [is_free & (missing < SIDES[0] * deep), is_free & (missing > SIDES[1] * deep)]
+    is_outline = old.shadow.ground == FROM_ABOVE  # else parts of it are soft, and in other light
+    if deep < HARD or not is_outline or not all(side.any() for side in sides):
+        return missing, np.zeros(missing.shape, bool)
+    light = np.log(unit_pixels(pixels) ** np.float32(GAMMA) + np.float32(BLACK)).mean(-1)
+    levels = []
+    for side in sides:
+        weight = side.astype(np.float32)
+        near = cv2.GaussianBlur(weight, (0, 0), WIDE * old.pitch)
+        total = cv2.GaussianBlur(light * weight, (0, 0), WIDE * old.pitch)
+        usual = np.float32(np.median(light[side]))  # where none of it is near
+        levels.append((total + LEAST_SIDE * usual) / (near + LEAST_SIDE))
+    step = levels[0] - levels[1]
+    fine = cv2.GaussianBlur(light, (0, 0), max(FINE * old.pitch, 0.5))
+    into = (levels[0] - fine) / np.maximum(step, HARD)
+    into = np.clip((into - SURE_EDGE[0]) / (SURE_EDGE[1] - SURE_EDGE[0]), 0, 1)
+    is_told = (step > HARD) & (missing > 0)
+    # Told of light + BLACK: of the light alone, as it is given back, more is missing.
+    dark = np.maximum(np.exp(levels[1]) - BLACK, BLACK / 2)
+    lacking = np.log(np.maximum(np.exp(levels[0]) - BLACK, dark) / dark)
+    return np.where(is_told, into * lacking, missing).astype(np.float32), is_told
 
 
 def traceless_plate(
@@ -104,12 +155,13 @@ def traceless_plate(
     shades = [old.bounds(width, height) for old in traces]
     for old, shade in zip(traces, shades, strict=True):
         part = (slice(shade[1], shade[3]), slice(shade[0], shade[2]))
-        lost[part] |= old.lost(shade)
         if isinstance(old, OldShadow):
-            lit[part], is_other = without_shadow(lit, old, shade)
+            lit[part], is_other, is_lost = _lifted(lit, old, shade)
         else:
+            is_lost = old.lost(shade)
             lit[part], is_other = without_reflection(lit, old, shade)
         is_changed[part] |= is_other
+        lost[part] |= is_lost
     lost &= ~covered
     filled = covered | lost
     filled = covered if filled.all() else filled

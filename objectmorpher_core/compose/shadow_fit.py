@@ -20,27 +20,30 @@ from ..arrays import F32, F64, Mask, Pixels
 from ..document import Matte
 from ..joining import MOST_SHADOW, Shadow
 from ..pixels import unit_pixels
-from .old_shadow import BLACK, OldShadow
+from .old_shadow import BLACK, FROM_ABOVE, OldShadow
+from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
-from .shadow_shear import Sheet, contact_of, stand, thrown
+from .shadow_flat import Flat, lie
+from .shadow_shear import Sheet, stand
 
 SHEET_GROUND = 30.0  # degrees: a silhouette alone is told no ground
 CELLS = 64  # along the object's longer side
 AROUND = 1.0  # x that side, how far around the object one looks
 NEAR = 0.6  # x that side, over which what is seen weighs less
-ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
 LUMA = np.array([0.3, 0.5, 0.2], np.float32)
 LOOKED = 6  # px of the photo across each of them are enough
 FREE = 0.02  # of a cell, that the object may cover
 DIRECTIONS = range(0, 360, 20)  # degrees
 LENGTHS = (0.35, 0.8, 1.6)  # x the object's height
+STEEP = 75.0  # degrees: from there on a thing hides its own foot
+FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
+# What lies is lifted to a body whose rim stands about so much of that side above the ground.
+FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
+LEAST_FLAT = 0.4  # of the loss without a shadow, that such a one must explain
 SOFTNESS = 0.35
 FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
 SOFTER = 0.2
 FULL = 0.75  # of the light, that a full shadow is taken to leave out
-ROUNDS = 5
-HUBER = 1.3  # x the scale of what is usual
-LEAST_SCALE = 0.02
 LEAST_DARK = 0.25  # natural logarithm of light, that a shadow takes at its darkest
 LEAST_GAIN = 0.04  # of the loss without a shadow
 MOST_NOISE = 0.6  # natural logarithm: on a ground more varied than that nothing is told
@@ -57,6 +60,8 @@ REACH = 2.0  # cells beyond that
 SMOOTH = (1.0, 4.0)  # cells, and for each unit of noise: over which the dark is measured
 SURE = 2.5  # x what is usual on lit ground
 CORE = 0.3  # of the darkest that was fitted
+LIT = 0.1  # of a shadow: what is less in it counts as lit
+BRIGHTEST = 90  # percentile of lit ground: what it is at most where a shadow is taken off
 GROWN = 2  # times
 MOST_GROWN = 2.5  # x its area before
 LEAST_LEFT = 0.2  # of the ground, that is lit
@@ -75,15 +80,38 @@ def find_old_shadow(
         return None
     slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
     seen = _look(pixels, matte, others, slope)
-    ground = _ground(seen)
-    if ground is None:
+    told = _told(seen, LENGTHS) if seen_from is None or seen_from < STEEP else None
+    if seen_from is None or seen_from >= STEEP:
+        flat = replace(seen, standing=lie(seen.cover))
+        lying = _told(flat, FLAT_LENGTHS)
+        least = max(LEAST_FLAT, 0.0 if told is None else told[1].gain)
+        if lying is not None and lying[1].gain > least:
+            seen, told = flat, lying
+    if told is None:
         return None
-    found = _searched(seen, ground)
-    if found is None or not _is_sure(seen, ground, found):
-        return None
+    ground, found = told
     depth = _missing(seen, ground, found)
-    shadow = replace(_imitated(found), ground=SHEET_GROUND if seen_from is None else None)
-    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale)
+    shadow = _imitated(found)
+    if isinstance(seen.standing, Flat):
+        length = min(FLAT_HEIGHT * shadow.length, MOST_SHADOW)
+        shadow = replace(shadow, length=length, ground=FROM_ABOVE)
+    elif seen_from is None:
+        shadow = replace(shadow, ground=SHEET_GROUND)
+    free = seen.free.astype(np.float32)
+    return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
+
+
+def _told(seen: _Seen, lengths: tuple[float, ...]) -> tuple[_Ground, _Found] | None:
+    """The ground and the shadow on it; None where none is sure."""
+    ground = _ground(seen)
+    found = None if ground is None else _searched(seen, ground, lengths)
+    if ground is None or found is None:
+        return None
+    if isinstance(seen.standing, Flat):  # a large part of what one sees may lie in its shadow
+        ground = replace(ground, scale=min(ground.scale, found.scale))
+    if not _is_sure(seen, ground, found):
+        return None
+    return ground, found
 
 
 def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
@@ -103,7 +131,7 @@ class _Seen:
     colour: F32  # (h, w, 2) logarithms of ratios
     cover: F32  # (h, w) of the object
     free: Mask  # (h, w) ground, or whatever else is not the object
-    standing: Sheet
+    standing: Sheet | Flat
     left: float
     top: float
     pitch: float
@@ -168,44 +196,26 @@ class _Ground:
 def _ground(seen: _Seen) -> _Ground | None:
     """None where too little of it is seen."""
     rows, columns = seen.cover.shape
-    base, height = float(seen.standing.ground.max()), seen.standing.height
+    base, height = seen.standing.base, seen.standing.height
     y, x = np.mgrid[:rows, :columns]
     x, y = (x + 0.5 - columns / 2) / CELLS, (y + 0.5 - base) / CELLS
     away = cv2.distanceTransform((seen.cover < 0.5).astype(np.uint8), cv2.DIST_L2, 5) / CELLS
-    is_asked = seen.free & (y > -ABOVE * height / CELLS) & (away < AROUND)
+    is_asked = seen.free & (y > -seen.standing.above / CELLS) & (away < AROUND)
     index = np.flatnonzero(is_asked)
     if len(index) < LEAST_CELLS or height < 2:
         return None
     everywhere = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
     weight = np.exp(-((away.ravel()[index] / NEAR) ** 2)).astype(np.float64)
     basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
-    contact = _taken(contact_of(seen.standing)).ravel()[index].astype(np.float64)
+    contact = _taken(seen.standing.contact()).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
-    _, loss, scale = _regressed(basis, brightness, weight)
+    _, loss, scale = regressed(basis, brightness, weight)
     return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
 
 
 def _taken(shadow: F32) -> F32:
     """Natural logarithm of the light that a shadow of opacity (h, w) takes."""
     return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
-
-
-def _regressed(
-    basis: F64, values: F64, weight: F64, scale: float | None = None
-) -> tuple[F64, float, float]:
-    """Coefficients, mean loss and scale of the robust fit of `values` (n,) by a basis (n, k)."""
-    weights, found, used = weight, np.zeros(basis.shape[1]), 0.0
-    rest = values
-    for _ in range(ROUNDS):
-        weighted = basis * weights[:, None]
-        ridge = 1e-6 * len(values) * np.eye(basis.shape[1])
-        found = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ values)
-        rest = values - basis @ found
-        used = 1.4826 * float(np.median(np.abs(rest))) + LEAST_SCALE
-        weights = weight / np.maximum(np.abs(rest) / (HUBER * used), 1)
-    off = np.abs(rest) / (used if scale is None else scale)
-    loss = np.where(off < HUBER, off * off / 2, HUBER * off - HUBER**2 / 2)
-    return np.asarray(found, np.float64), float((weight * loss).sum() / weight.sum()), used
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,30 +228,31 @@ class _Found:
     ground: F64  # (6,)
     dark: float  # how much of it there is
     contact: float
+    scale: float  # of what is not explained
 
 
 def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     """None where it would be no shadow but a light."""
-    taken = _taken(thrown(shadow, seen.standing))
+    taken = _taken(seen.standing.thrown(shadow))
     column = taken.ravel()[ground.index].astype(np.float64)
     if column.max() < DARKER:
         return None
     basis = np.column_stack([ground.basis, -column, -ground.contact])
-    found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+    found, loss, scale = regressed(basis, ground.brightness, ground.weight, ground.scale)
     if found[7] < 0:
         basis = basis[:, :7]
-        found, loss, _ = _regressed(basis, ground.brightness, ground.weight, ground.scale)
+        found, loss, scale = regressed(basis, ground.brightness, ground.weight, ground.scale)
         found = np.append(found, 0.0)
     if found[6] <= 0:
         return None
     gain = 1 - loss / max(ground.loss, 1e-12)
-    return _Found(shadow, gain, taken, found[:6], float(found[6]), float(found[7]))
+    return _Found(shadow, gain, taken, found[:6], float(found[6]), float(found[7]), scale)
 
 
-def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
+def _searched(seen: _Seen, ground: _Ground, lengths: tuple[float, ...]) -> _Found | None:
     """The best of all directions and lengths, then of some that lie around it."""
     best: _Found | None = None
-    for shadow in _coarsely():
+    for shadow in _coarsely(lengths):
         tried = _tried(seen, ground, shadow)
         if tried is not None and (best is None or tried.gain > best.gain):
             best = tried
@@ -255,9 +266,9 @@ def _searched(seen: _Seen, ground: _Ground) -> _Found | None:
     return best
 
 
-def _coarsely() -> Iterator[Shadow]:
+def _coarsely(lengths: tuple[float, ...]) -> Iterator[Shadow]:
     for direction in DIRECTIONS:
-        for length in LENGTHS:
+        for length in lengths:
             yield Shadow(1.0, float(direction), length, SOFTNESS, 0.0)
 
 
@@ -284,7 +295,7 @@ def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
     column = found.thrown.ravel()[ground.index].astype(np.float64)
     basis = np.column_stack([ground.basis, -column])
     changes = [
-        abs(float(_regressed(basis, channel, ground.weight)[0][6]))
+        abs(float(regressed(basis, channel, ground.weight)[0][6]))
         for channel in seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
     ]
     return max(changes) < MOST_COLOUR * found.dark
@@ -313,7 +324,7 @@ def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
 
 def _fitted(seen: _Seen, found: _Found) -> F32:
     """(h, w) natural logarithm of the light that the shadow takes which was found."""
-    contact = _taken(contact_of(seen.standing))
+    contact = _taken(seen.standing.contact())
     return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
 
 
@@ -334,18 +345,35 @@ def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
         measured = (ground.everywhere @ coefficients).astype(np.float32) - seen.brightness
         blurred = cv2.GaussianBlur(measured * free, (0, 0), blur)
         smooth = np.asarray(blurred / np.maximum(spread, 1e-3), np.float32)
-        lit = smooth.ravel()[ground.index][member.ravel()[ground.index] < 0.1]
+        lit = smooth.ravel()[ground.index][member.ravel()[ground.index] < LIT]
         usual = 1.4826 * float(np.median(np.abs(lit))) if len(lit) else 0.0
         member = _spread(member, smooth, fitted, max(DARKER, SURE * usual), seen.free)
         weight = ground.weight * (1 - member.ravel()[ground.index])
         if weight.sum() > LEAST_LEFT * ground.weight.sum():
-            coefficients, *_ = _regressed(ground.basis, ground.brightness, weight)
+            coefficients, *_ = regressed(ground.basis, ground.brightness, weight)
     share = max(1 - ground.scale, MEASURED) * np.clip(spread, 0, 1)
     depth = fitted + share * (np.clip(smooth, 0, DEEPEST) - fitted)
-    depth = np.clip(depth, 0, DEEPEST) * member
+    depth = np.clip(depth, 0, np.minimum(_room(seen, ground, member, blur), DEEPEST)) * member
     depth[[0, -1]] = 0
     depth[:, [0, -1]] = 0
     return np.asarray(depth, np.float32)
+
+
+def _room(seen: _Seen, ground: _Ground, member: F32, blur: float) -> F32:
+    """(h, w) natural logarithm of the light that lacks until a cell is as bright as lit ground.
+
+    Beneath the object, and beyond what is lit, the ground is only continued: it may be told too
+    bright, but no shadow leaves more light than falls beside it.
+    """
+    free = seen.free.astype(np.float32)
+    spread = cv2.GaussianBlur(free, (0, 0), blur)
+    bright = cv2.GaussianBlur(seen.brightness * free, (0, 0), blur) / np.maximum(spread, 1e-3)
+    is_lit = member.ravel()[ground.index] < LIT
+    if not is_lit.any():
+        return np.full(spread.shape, DEEPEST, np.float32)
+    most = np.percentile(ground.brightness[is_lit], BRIGHTEST)
+    room = np.where(spread > FREE, np.maximum(most - bright, 0), DEEPEST)
+    return np.asarray(room, np.float32)
 
 
 def _spread(member: F32, dark: F32, fitted: F32, least: float, free: Mask) -> F32:

@@ -30,6 +30,7 @@ from .shadow import (
 )
 
 LIFT = 0.4  # x height: a lower edge that is farther above the lowest does not stand on the ground
+ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
 LEVEL = 0.03  # x width, over which the ground's line is smooth
 SOLID = 0.5  # alpha from which on a pixel belongs to the object
 
@@ -43,6 +44,26 @@ class Sheet:
     share: F32  # (w,) 1 where it touches the ground there, 0 where it hangs above it
     height: float
     slope: float  # a length on the ground, towards the viewer, looks so much shorter
+
+    @property
+    def base(self) -> float:
+        """The row of its lower end."""
+        return float(self.ground.max())
+
+    @property
+    def above(self) -> float:
+        """How far above its base what one sees is still ground."""
+        return ABOVE * self.height
+
+    def thrown(self, shadow: Shadow) -> F32:
+        """(h, w) on the silhouette's own grid: what of the light its shadow takes, in [0, 1]."""
+        far, left, top = _thrown(shadow, self)
+        return _moved(far, left, top, self.alpha.shape)
+
+    def contact(self) -> F32:
+        """(h, w) likewise of the dark band right below it."""
+        near = _contact(self)
+        return _moved(near, 0, round(BAND_DROP * self.height), near.shape)
 
 
 def stand(alpha: F32, slope: float) -> Sheet:
@@ -86,18 +107,6 @@ def _contact(standing: Sheet) -> F32:
     touching = np.asarray(standing.alpha * band * standing.share, np.float32)
     near = smooth(touching, BAND_BLUR * standing.height)
     return near / max(float(near.max()), 1e-6)
-
-
-def thrown(shadow: Shadow, standing: Sheet) -> F32:
-    """(h, w) on the silhouette's own grid: what of the light its shadow takes, in [0, 1]."""
-    far, left, top = _thrown(shadow, standing)
-    return _moved(far, left, top, standing.alpha.shape)
-
-
-def contact_of(standing: Sheet) -> F32:
-    """(h, w) likewise of the dark band right below it."""
-    near = _contact(standing)
-    return _moved(near, 0, round(BAND_DROP * standing.height), near.shape)
 
 
 def _moved(part: F32, left: int, top: int, shape: tuple[int, ...]) -> F32:
