@@ -28,7 +28,6 @@ FINER = 2  # x the reduced photo: the scale of the window that is cut into finer
 FINE_SIDE = 5.0  # px of that scale, of a finer piece
 MARGIN = 0.5  # x larger side of what the coarse pieces say: the window reaches so far beyond it
 LEAST_MARGIN = 16  # px of the reduced photo
-WIDER = 3  # times that a window is widened, each by half its side
 RIM = 4  # px of the reduced photo: what comes so near to a window's side is cut off by it
 
 
@@ -55,9 +54,9 @@ class _Window:
 
     @property
     def is_small(self) -> bool:
-        """Whether there is time to cut it into finer pieces."""
+        """Whether there is time to cut it into finer pieces: a tenth of a second."""
         area = (self.right - self.left) * (self.bottom - self.top)
-        return area * FINER**2 <= WORK_AREA
+        return area * FINER**2 <= WORK_AREA / 2
 
 
 def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
@@ -84,13 +83,12 @@ def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
     deep, window = depth(rough)[row, column] / pieces.side, _around(rough & differs)
     if deep < NARROW and window.is_small:
         return Wrong(_finer(ground, image, before, prompt, window), others)
+    if deep < DEEP and window.is_small:
+        return Wrong(_finer(ground, image, before, prompt, window, rough & differs), others)
     changed = choice.pieces
     if not ground.is_of_large:  # votes made it worse there: IoU 0.79 to 0.63 of the distant tower
         changed = _voted(ground, before, prompt, choice)
-    found = pieces.paint(changed) & differs
-    if deep < DEEP and window.is_small:
-        found = _finer(ground, image, before, prompt, window, found)
-    return Wrong(found, others)
+    return Wrong(pieces.paint(changed) & differs, others)
 
 
 def said(pieces: Pieces, prompt: Prompt, is_foreground: bool) -> tuple[int, ...]:
@@ -143,16 +141,13 @@ def _finer(
 ) -> Mask:
     """(h, w) what the last click says is wrong about a mask, by finer pieces of a window.
 
-    The window is widened while it cuts off what is found. `guess` (h, w): see `_meant`.
+    The window is widened, once, where it cuts off what is found. `guess` (h, w): see `_meant`.
     """
     found = _within(ground, image, before, prompt, window, guess)
-    for _ in range(WIDER):
-        wider = _widened(window, found)
-        if wider == window or not wider.is_small:
-            break
-        window = wider
-        found = _within(ground, image, before, prompt, window, guess)
-    return found
+    wider = _widened(window, found)
+    if wider == window or not wider.is_small:
+        return found
+    return _within(ground, image, before, prompt, wider, guess)
 
 
 def _within(

@@ -14,7 +14,7 @@ OFF_CENTRE = 0.05  # least that counts for being in the middle
 
 def centred(pieces: Pieces, mask: Mask, click: Click) -> float:
     """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
-    deep = depth(pieces.paint(mask)[::2, ::2])
+    deep = depth(pieces.paint_sparsely(mask))
     column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
     near = deep[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
     here = near.max() if near.size else 0.0
@@ -23,7 +23,7 @@ def centred(pieces: Pieces, mask: Mask, click: Click) -> float:
 
 def depth(mask: Mask) -> F32:
     """(h, w) px to the edge of a mask; the frame is one."""
-    framed = np.pad(mask, 1).astype(np.uint8)
+    framed = cv2.copyMakeBorder(mask.view(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
 
 
