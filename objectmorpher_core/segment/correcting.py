@@ -1,8 +1,10 @@
 """What a click on a wrong place of a mask changes: the piece that belongs to it, and no more.
 
-Pieces of the photo say it where the click is deep in what it may mean. Where it lies less than a
-piece deep in that, a thing there is as narrow as the pieces, which then hold some of what was right
-too: it is decided anew in finer pieces of a window around, in which a walk goes as far as before.
+Pieces of the photo say it where the click is deep in what it may mean. Where it lies less than two
+pieces deep in that, it is decided anew in finer pieces of a window around, in which a walk goes as
+far as before: what the coarser pieces say is then one of the things that may be meant. Less than
+one deep, a thing there is as narrow as the pieces, which hold some of what was right too, and are
+not asked. A window that cuts off what is found in it is widened.
 """
 
 from __future__ import annotations
@@ -14,16 +16,19 @@ import numpy as np
 
 from ..arrays import RGB, Mask
 from ..document import Prompt
-from .piece_choice import Choice, Ground, Region, correct, depth
+from .piece_choice import Choice, Ground, Region, correct
 from .piece_features import crop_tokens
+from .piece_places import depth
 from .pieces import PIECES, WORK_AREA, Pieces
 from .relabel import relabel, touching
 
-DEEP = 1.0  # x side of a piece: a click that is less deep in what it means needs finer pieces
+DEEP = 2.0  # x side of a piece: a click that is less deep in what it means needs finer pieces
+NARROW = 1.0  # the same: less deep, the coarser pieces are not heard
 FINER = 2  # x the reduced photo: the scale of the window that is cut into finer pieces
 FINE_SIDE = 5.0  # px of that scale, of a finer piece
 MARGIN = 0.5  # x larger side of what the coarse pieces say: the window reaches so far beyond it
 LEAST_MARGIN = 16  # px of the reduced photo
+RIM = 4  # px of the reduced photo: what comes so near to a window's side is cut off by it
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +54,9 @@ class _Window:
 
     @property
     def is_small(self) -> bool:
-        """Whether there is time to cut it into finer pieces."""
+        """Whether there is time to cut it into finer pieces: a tenth of a second."""
         area = (self.right - self.left) * (self.bottom - self.top)
-        return area * FINER**2 <= WORK_AREA
+        return area * FINER**2 <= WORK_AREA / 2
 
 
 def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
@@ -74,10 +79,12 @@ def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
         Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
         for r in choice.relative
     )
-    rough = pieces.paint(choice.pieces) & differs
-    window = _around(rough)
-    if depth(pieces.paint(choice.pieces))[row, column] < DEEP * pieces.side and window.is_small:
+    rough = pieces.paint(choice.pieces)
+    deep, window = depth(rough)[row, column] / pieces.side, _around(rough & differs)
+    if deep < NARROW and window.is_small:
         return Wrong(_finer(ground, image, before, prompt, window), others)
+    if deep < DEEP and window.is_small:
+        return Wrong(_finer(ground, image, before, prompt, window, rough & differs), others)
     changed = choice.pieces
     if not ground.is_of_large:  # votes made it worse there: IoU 0.79 to 0.63 of the distant tower
         changed = _voted(ground, before, prompt, choice)
@@ -96,11 +103,21 @@ def _flippable(ground: Ground, before: Mask, prompt: Prompt) -> Mask:
     return (ground.pieces.mean(differs) > 0.5) & ground.inside(prompt)
 
 
-def _meant(ground: Ground, before: Mask, prompt: Prompt, reach: float = 0.0) -> Choice:
-    """The pieces that the last click means of those that it may change."""
+def _meant(
+    ground: Ground,
+    before: Mask,
+    prompt: Prompt,
+    reach: float = 0.0,
+    guess: Mask | None = None,
+) -> Choice:
+    """The pieces that the last click means of those that it may change.
+
+    `guess` (h, w): what coarser pieces say, which is heard as one thing more that may be meant.
+    """
     click = prompt.clicks[-1]
     walls = said(ground.pieces, prompt, not click.is_foreground)
-    return correct(ground, click, _flippable(ground, before, prompt), walls, reach)
+    guessed = None if guess is None else ground.pieces.mean(guess) > 0.5
+    return correct(ground, click, _flippable(ground, before, prompt), walls, reach, guessed)
 
 
 def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask:
@@ -114,14 +131,41 @@ def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask
     return touching(pieces, is_like & _flippable(ground, before, prompt), choice.pieces)
 
 
-def _finer(ground: Ground, image: RGB, before: Mask, prompt: Prompt, window: _Window) -> Mask:
-    """(h, w) what the last click says is wrong about a mask, by finer pieces of a window."""
+def _finer(
+    ground: Ground,
+    image: RGB,
+    before: Mask,
+    prompt: Prompt,
+    window: _Window,
+    guess: Mask | None = None,
+) -> Mask:
+    """(h, w) what the last click says is wrong about a mask, by finer pieces of a window.
+
+    The window is widened, once, where it cuts off what is found. `guess` (h, w): see `_meant`.
+    """
+    found = _within(ground, image, before, prompt, window, guess)
+    wider = _widened(window, found)
+    if wider == window or not wider.is_small:
+        return found
+    return _within(ground, image, before, prompt, wider, guess)
+
+
+def _within(
+    ground: Ground,
+    image: RGB,
+    before: Mask,
+    prompt: Prompt,
+    window: _Window,
+    guess: Mask | None,
+) -> Mask:
+    """(h, w) the same, as far as the window reaches."""
     click = prompt.clicks[-1]
     fine = _look_closer(ground, image, window)
     moved = _moved(ground.pieces, prompt, window)
     own = _enlarged(before[window.inside])
     reach = float(np.count_nonzero(before != click.is_foreground)) * FINER**2
-    choice = _meant(fine, own, moved, reach)
+    coarse = None if guess is None else _enlarged(guess[window.inside])
+    choice = _meant(fine, own, moved, reach, coarse)
     changed = fine.pieces.paint(_voted(fine, own, moved, choice)) & (own != click.is_foreground)
     share = changed.reshape(own.shape[0] // FINER, FINER, -1, FINER).mean((1, 3))
     found = np.zeros_like(before)
@@ -129,6 +173,19 @@ def _finer(ground: Ground, image: RGB, before: Mask, prompt: Prompt, window: _Wi
     column, row = ground.pieces.pixel(click.x, click.y)
     found[row, column] = True
     return found
+
+
+def _widened(window: _Window, found: Mask) -> _Window:
+    """The window, half its side larger wherever it cuts off what was found (h, w)."""
+    height, width = found.shape
+    inside = found[window.inside]
+    down, across = (window.bottom - window.top) // 2, (window.right - window.left) // 2
+    return _Window(
+        max(window.left - across, 0) if inside[:, :RIM].any() else window.left,
+        max(window.top - down, 0) if inside[:RIM].any() else window.top,
+        min(window.right + across, width) if inside[:, -RIM:].any() else window.right,
+        min(window.bottom + down, height) if inside[-RIM:].any() else window.bottom,
+    )
 
 
 def _around(mask: Mask) -> _Window:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import F32, F64, Mask
 from ..document import Click, Prompt
+from .piece_places import centred, depth, extent, only
 from .pieces import Pieces
 from .relabel import islands, touching
 from .selection import SelectionError, box_mask
@@ -28,10 +29,11 @@ SMALLEST_PART = 0.01  # x object's area; less is texture
 SMALLEST_PIECES = 2  # the same in pieces
 MINOR_CORRECTION = 0.4  # how much a correction is meant to leave something
 LARGER_CORRECTION = 0.05  # exponent: how much a larger correction is preferred
+MINOR_FINE = 0.2  # the same two of a correction in finer pieces: one clicks the largest error,
+LARGER_FINE = 0.3  # and there are many small things in a window that stand out
 SHARP_WHOLE = 6.0  # exponent: how much more a better region is likely to be meant than another
 SHARP_PART = 20.0
 SHARP_CORRECTION = 6.0
-OFF_CENTRE = 0.05  # least that counts for being in the middle
 TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
 KNOWN = 1e4  # the same of a click: a walk that comes there ends
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
@@ -122,17 +124,26 @@ def choose(ground: Ground, prompt: Prompt) -> Choice:
 
 
 def correct(
-    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], reach: float = 0.0
+    ground: Ground,
+    click: Click,
+    allowed: Mask,
+    walls: tuple[int, ...],
+    reach: float = 0.0,
+    guess: Mask | None = None,
 ) -> Choice:
     """The part of the pieces `allowed` (n,) that a click on a wrong place means.
 
     It holds none of `walls`, the pieces of clicks that say the contrary. `reach`: px of all that
-    it could mean, where the pieces are a part of that only.
+    it could mean, where the pieces are a part of that only. `guess` (n,): what it may mean, too.
     """
-    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION, reach)
+    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    if reach:
+        taste = _Taste(MINOR_FINE, LARGER_FINE, reach)
     regions = _parts(ground, click, allowed, walls, taste)
     regions += _left_over(ground, click, allowed, walls, taste)
     regions += _reached(ground, click, allowed, walls, taste)
+    if guess is not None:
+        regions.append(_guessed(ground, click, allowed, walls, guess, taste))
     regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
     return Choice(regions[0].pieces, tuple(regions))
 
@@ -147,7 +158,7 @@ def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
         subject = subject * inside
         masks.append(subject > 0.5)
     regions = [
-        Region(mask, _score(ground, mask, subject) * _centred(pieces, mask, click) ** CENTRED_WHOLE)
+        Region(mask, _score(ground, mask, subject) * centred(pieces, mask, click) ** CENTRED_WHOLE)
         for mask in masks
         if mask[piece] and not mask.all()
     ]
@@ -178,7 +189,7 @@ def _parts(
 ) -> list[Region]:
     """The parts of `allowed` (n,) around a click."""
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    allowed = allowed | _only(pieces, piece)
+    allowed = allowed | only(pieces, piece)
     growth = pieces.grow(piece, allowed, tuple(w for w in walls if w != piece))
     masks = [pieces.region(growth, k) for k in growth.peaks()]
     return [_rated(ground, click, allowed, mask, taste) for mask in masks]
@@ -189,15 +200,15 @@ def _left_over(
 ) -> list[Region]:
     """What is left of `allowed` (n,) around a click by each part of it around one of `walls`."""
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    only = _only(pieces, piece)
-    allowed = allowed | only
+    alone = only(pieces, piece)
+    allowed = allowed | alone
     regions = []
     for wall in walls:
         if wall == piece or not allowed[wall]:
             continue
         growth = pieces.grow(wall, allowed, (piece,))
         for k in growth.peaks():
-            rest = touching(pieces, allowed & ~pieces.region(growth, k), only)
+            rest = touching(pieces, allowed & ~pieces.region(growth, k), alone)
             if not rest[[w for w in walls if w != piece]].any():
                 regions.append(_rated(ground, click, allowed, rest, taste))
     return regions
@@ -211,16 +222,33 @@ def _reached(
     What is not allowed is, but for what a box leaves out, already what the click says: it draws.
     """
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    only = _only(pieces, piece)
-    allowed = allowed | only
+    alone = only(pieces, piece)
+    allowed = allowed | alone
     regions = []
     for trust in TRUST:
         wrong, right = np.where(allowed, 1e-9, trust), np.where(allowed, trust, 1e-9)
         right[[w for w in walls if w != piece]] = KNOWN
         wrong[piece], right[piece] = KNOWN, 1e-9
-        found = (pieces.walk_home(wrong, right) > 0.5) & allowed
-        regions.append(_rated(ground, click, allowed, touching(pieces, found | only, only), taste))
+        found = ((pieces.walk_home(wrong, right) > 0.5) & allowed) | alone
+        regions.append(_rated(ground, click, allowed, touching(pieces, found, alone), taste))
     return regions
+
+
+def _guessed(
+    ground: Ground,
+    click: Click,
+    allowed: Mask,
+    walls: tuple[int, ...],
+    guess: Mask,
+    taste: _Taste,
+) -> Region:
+    """What of a guess (n,) hangs together with a click and is `allowed` (n,)."""
+    pieces = ground.pieces
+    alone = only(pieces, pieces.at(click.x, click.y))
+    free = guess & allowed
+    free[list(walls)] = False
+    mask = touching(pieces, free | alone, alone)
+    return _rated(ground, click, allowed | alone, mask, taste)
 
 
 def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Taste) -> Region:
@@ -232,8 +260,8 @@ def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Tast
     if cut.any():
         contrast = (pieces.gap * pieces.length)[cut].sum() / pieces.length[cut].sum()
         left = max(1 - share, 1e-3)
-    centred = _centred(pieces, mask, click) ** CENTRED_PART
-    return Region(mask, float(contrast * centred * share**taste.larger * left**taste.minor))
+    near = centred(pieces, mask, click) ** CENTRED_PART
+    return Region(mask, float(contrast * near * share**taste.larger * left**taste.minor))
 
 
 def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:
@@ -297,7 +325,7 @@ def _in_box(ground: Ground, inside: Mask) -> Choice:
     pieces = ground.pieces
     if not inside.any():
         raise SelectionError("the box is too small to hold an object: draw a larger one")
-    box = _extent(pieces, inside)
+    box = extent(pieces, inside)
     subject = None if ground.salience is None else pieces.mean(ground.salience) * inside
     candidates: list[tuple[float, Mask]] = []  # leak, pieces
     smallest = SMALLEST_IN_BOX * pieces.share(inside)
@@ -308,7 +336,7 @@ def _in_box(ground: Ground, inside: Mask) -> Choice:
     for across, down in SEEDS_IN_BOX:
         place = box[0] + across * (box[2] - box[0]), box[1] + down * (box[3] - box[1])
         seed = int(pieces.labels[int(place[1]), int(place[0])])
-        for growth in (pieces.grow(seed), pieces.grow(seed, inside | _only(pieces, seed))):
+        for growth in (pieces.grow(seed), pieces.grow(seed, inside | only(pieces, seed))):
             for k in growth.peaks():
                 region = pieces.region(growth, k)
                 within = region & inside
@@ -317,7 +345,7 @@ def _in_box(ground: Ground, inside: Mask) -> Choice:
                     candidates.append((leak, within))
 
     def score(leak: float, mask: Mask) -> float:
-        left, top, right, bottom = _extent(pieces, mask)
+        left, top, right, bottom = extent(pieces, mask)
         reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
         return (1 - leak) * reach**0.5 * _score(ground, mask, subject, is_boxed=True)
 
@@ -370,31 +398,3 @@ def _subject_around(ground: Ground, piece: int) -> F64 | None:
     fringe = cv2.dilate(own, np.ones((9, 9), np.uint8)) > 0
     other = (labels > 0) & (own == 0)
     return pieces.mean(np.where(fringe & ~other, salience, np.where(other, 0, salience * 0.5)))
-
-
-def _centred(pieces: Pieces, mask: Mask, click: Click) -> float:
-    """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
-    deep = depth(pieces.paint(mask)[::2, ::2])
-    column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
-    near = deep[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-    here = near.max() if near.size else 0.0
-    return max(float(here / max(deep.max(), 1e-6)), OFF_CENTRE)
-
-
-def depth(mask: Mask) -> F32:
-    """(h, w) px to the edge of a mask; the frame is one."""
-    framed = np.pad(mask, 1).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
-
-
-def _only(pieces: Pieces, piece: int) -> Mask:
-    alone = np.zeros(pieces.count, bool)
-    alone[piece] = True
-    return alone
-
-
-def _extent(pieces: Pieces, mask: Mask) -> tuple[int, int, int, int]:
-    """left, top, right, bottom px of the reduced photo that pieces (n,) reach."""
-    painted = pieces.paint(mask)
-    rows, columns = np.flatnonzero(painted.any(1)), np.flatnonzero(painted.any(0))
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1

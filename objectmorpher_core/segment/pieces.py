@@ -71,6 +71,7 @@ class Pieces:
             cv2.cvtColor(image.astype(np.float32) / 255, cv2.COLOR_RGB2LAB), np.float32
         )
         self.labels = _superpixels(image, count)  # (h, w) int32
+        self._sparse = np.ascontiguousarray(self.labels[::2, ::2])
         self.count = int(self.labels.max()) + 1
         self.area = np.bincount(self.labels.ravel(), minlength=self.count).astype(np.float64)
         self.colors = np.stack([self.mean(lab[..., c]) for c in range(3)], 1)  # (n, 3) CIELAB
@@ -141,6 +142,10 @@ class Pieces:
         """(h, w) the pixels of the pieces (n,) in `mask`."""
         return mask[self.labels]
 
+    def paint_sparsely(self, mask: Mask) -> Mask:
+        """(h / 2, w / 2), rounded up: every second pixel of every second row of `paint`."""
+        return mask[self._sparse]
+
     def share(self, mask: Mask) -> float:
         """Of the photo, in [0, 1]."""
         return float(self.area[mask].sum() / self.area.sum())
@@ -184,11 +189,11 @@ class Pieces:
         """
         degrees = np.asarray(self._links.sum(1)).ravel()
         system = (sparse.diags(degrees + to_object + to_ground) - self._links).tocsc()
-        return splu(system).solve(to_object)
+        return _factored(system).solve(to_object)
 
     def _open(self) -> Any:
         if self._solver is None:
-            self._solver = splu(_restarting(self._links, self._stamina))
+            self._solver = _factored(_restarting(self._links, self._stamina))
         return self._solver
 
     def _visits_within(self, start: F64, allowed: Mask, walls: tuple[int, ...]) -> tuple[F64, Mask]:
@@ -198,7 +203,7 @@ class Pieces:
         is_free = ~np.isin(chosen, walls)
         system, free = _restarting(links, self._stamina)[is_free][:, is_free], chosen[is_free]
         visits = np.zeros(self.count)
-        visits[free] = splu(system.tocsc()).solve(start[free])
+        visits[free] = _factored(system.tocsc()).solve(start[free])
         _, islands = connected_components(links[is_free][:, is_free])
         reached = np.zeros(self.count, bool)
         reached[free] = islands == islands[start[free].argmax()]
@@ -254,6 +259,16 @@ def _superpixels(image: RGB, count: int) -> np.ndarray:
     slic.enforceLabelConnectivity(20)
     _, labels = np.unique(slic.getLabels(), return_inverse=True)
     return labels.reshape(height, width).astype(np.int32)
+
+
+def _factored(system: Any) -> Any:
+    """A symmetric matrix in which every diagonal outweighs its row: no pivots are looked for.
+
+    Twice as fast as SuperLU's general way, of which the elimination orders are for any matrix.
+    """
+    return splu(
+        system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
 
 def _restarting(links: Sparse, stamina: float) -> Sparse:

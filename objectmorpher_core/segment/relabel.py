@@ -55,17 +55,18 @@ def votes(pieces: Pieces, mask: Mask, heard: F64) -> F64:
     """
     size = float(np.sqrt(pieces.area[mask].sum()))
     places = _places(pieces, NEAR * size)
+    squares = np.square(places).sum(1)
     total = 1e-6 * heard + 1e-9  # what no other is like stays what it is, unless it is doubted
     inside = 1e-6 * heard * mask + 0.5e-9
     for label in (True, False):
         voters = np.flatnonzero(mask == label)
         step = max(1, -(-len(voters) // VOTERS))
         voters = voters[::step]
-        gap = np.square(places).sum(1)[:, None] + np.square(places[voters]).sum(1)
-        gap -= 2 * places @ places[voters].T
-        weight = np.exp(-np.maximum(gap, 0)) * (step * (heard * pieces.area)[voters]).astype(
-            np.float32
-        )
+        weight = 2 * places @ places[voters].T  # less the squares of both: - the squared distance
+        weight -= squares[:, None]
+        weight -= squares[voters]
+        np.exp(np.minimum(weight, 0, out=weight), out=weight)
+        weight *= (step * (heard * pieces.area)[voters]).astype(np.float32)
         weight[voters, np.arange(len(voters))] = 0  # none votes for itself
         total += weight.sum(1)
         inside += label * weight.sum(1)

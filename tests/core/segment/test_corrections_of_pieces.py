@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.segment import correcting
 from objectmorpher_core.segment.answers import Answer, add_click
 from objectmorpher_core.segment.piece_choice import Ground, correct
 from objectmorpher_core.segment.pieces import Pieces
@@ -99,3 +100,37 @@ def test_a_strip_narrower_than_the_pieces_goes_without_what_it_runs_along(width:
     found = add_click(Ground(Pieces(image, None), None), image, Answer(mask, ()), prompt).mask
     assert found[strip].mean() < 0.5
     assert found[body].mean() > 0.98
+
+
+def test_a_window_that_cuts_off_what_a_click_means_is_widened():
+    """What coarse pieces say of a long strip is short, and so is the first window around it."""
+    body, strip = (slice(40, 120), slice(80, 140)), (slice(40, 120), slice(140, 144))
+    image = picture((FACE, *body), (COAT, *strip))
+    mask = np.zeros(image.shape[:2], bool)
+    mask[body] = mask[strip] = True
+    prompt = Prompt((Click(110, 80), Click(142, 80, False)))
+    short = np.zeros_like(mask)
+    short[76:84, 140:144] = True
+    ground = Ground(Pieces(image, None), None)
+    window = correcting._around(short)
+    assert window.bottom - window.top < 50
+    found = correcting._finer(ground, image, mask, prompt, window)
+    assert found[strip].mean() > 0.8
+    assert found[body].mean() < 0.02
+
+
+def test_what_coarser_pieces_say_is_heard_and_holds_no_denied_piece():
+    """A thing of two colours that a walk from one of them does not leave; no edge parts the two."""
+    upper, lower = (slice(40, 90), slice(60, 180)), (slice(90, 140), slice(60, 180))
+    image = picture((FACE, *upper), (COAT, *lower))
+    pieces = Pieces(image, None)
+    ground, click = Ground(pieces, None), Click(120, 65)
+    whole = np.zeros(image.shape[:2])
+    whole[upper] = whole[lower] = 1
+    guess = pieces.mean(whole) > 0.5
+    everything = np.ones(pieces.count, bool)
+    wall = pieces.at(120, 115)
+    heard = correct(ground, click, everything, (), 0.0, guess)
+    assert any((region.pieces == guess).all() for region in heard.others)
+    walled = correct(ground, click, everything, (wall,), 0.0, guess)
+    assert not any(region.pieces[wall] for region in walled.others)
