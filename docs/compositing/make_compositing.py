@@ -1,6 +1,6 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py [places | focus | photos | reflections | plates]
+python docs/compositing/make_compositing.py [places|focus|shadows|photos|reflections|plates]
 
 With a section's name only that section is made anew.
 """
@@ -35,6 +35,7 @@ from page import (  # noqa: E402
     focus_section,
     place_section,
     plate_section,
+    shadow_section,
     write_page,
 )
 from photos import shadow_pictures  # noqa: E402
@@ -69,6 +70,13 @@ def main() -> None:
         after = rest[rest.index(SHADOW.partition("\n")[0]) :]
         page.write_text(before + focus_section(*_focus()) + after, encoding="utf-8")
         return
+    if sys.argv[1:] == ["shadows"]:
+        page = FOLDER / "README.md"
+        before, _, rest = page.read_text(encoding="utf-8").partition(SHADOW.partition("\n")[0])
+        after = rest[rest.index(REFLECTION.partition("\n")[0]) :]
+        shaded = _shaded(fetched())
+        page.write_text(f"{before}{shadow_section(shaded)}\n{after}", encoding="utf-8")
+        return
     if sys.argv[1:] == ["photos"]:
         _write("photos.jpg", shadow_pictures(), PHOTO)
         return
@@ -82,16 +90,10 @@ def main() -> None:
         )
         return
     meshes = fetched()
-    turned, shaded = [], []
-    for number, name in enumerate(SOLIDS):
-        turned += lights.measured(name, meshes)
-        shaded += shadows.measured(name, number, meshes)
-        print(name, flush=True)
+    turned = [case for name in SOLIDS for case in lights.measured(name, meshes)]
     shown = [case for case in turned if (case.name, case.lamp, case.turn) in SHOWN]
     _write("lights.jpg", [[_bytes(p)[110:400, 110:400] for p in case.pictures] for case in shown])
-    found = [case for case in shaded if case.is_found][:8]
-    rows = [[p[120:440, 96:416] for p in case.pictures] for case in found]
-    _write("shadows.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
+    shaded = _shaded(meshes)
     _write("photos.jpg", shadow_pictures(), PHOTO)
     grained = grains.measured()
     own = [c for c in grained if c.noise == next(iter(grains.NOISES)) and c.place in GRAINS]
@@ -107,6 +109,19 @@ def main() -> None:
         *_plates(),
     )
     (FOLDER / "README.md").write_text(write_page(measures), encoding="utf-8")
+
+
+def _shaded(meshes: Path) -> list[shadows.Shaded]:
+    """Solids with shadows, eight drawn to shadows.jpg."""
+    cases = [
+        case
+        for number, name in enumerate(SOLIDS)
+        for case in shadows.measured(name, number, meshes)
+    ]
+    found = [case for case in cases if case.is_found][:8]
+    rows = [[p[120:440, 96:416] for p in case.pictures] for case in found]
+    _write("shadows.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
+    return cases
 
 
 def _focus() -> tuple[list[focus.Focussed], list[focus.Sharp]]:

@@ -163,7 +163,7 @@ class Measures:
 
 
 def write_page(measures: Measures) -> str:
-    turned, shaded = measures.turned, measures.shaded
+    turned = measures.turned
     return "\n".join(
         [
             HEAD,
@@ -171,7 +171,7 @@ def write_page(measures: Measures) -> str:
             place_section(measures.moved),
             GRAIN.format(table=_grain_table(measures.grained), found=_found_table(measures.found)),
             focus_section(measures.focussed, measures.sharp).rstrip("\n") + "\n",
-            SHADOW.format(summary=_shadow_summary(shaded), table=_shadow_table(shaded)),
+            shadow_section(measures.shaded),
             measures.reflections.rstrip("\n") + "\n",
             plate_section(measures.filled, measures.taken),
         ]
@@ -180,6 +180,10 @@ def write_page(measures: Measures) -> str:
 
 def place_section(moved: list[Moved]) -> str:
     return PLACE.format(summary=_place_summary(moved), table=_place_table(moved))
+
+
+def shadow_section(shaded: list[Shaded]) -> str:
+    return SHADOW.format(summary=_shadow_summary(shaded), table=_shadow_table(shaded))
 
 
 def focus_section(focussed: list[Focussed], sharp: list[Sharp]) -> str:
@@ -227,12 +231,12 @@ def _others(filled: dict[str, dict[str, Filled]]) -> str:
     """A table of holes in other photos."""
     measures = ("psnr", "ssim", "hed")
 
-    def cell(found: list[Filled]) -> str:
+    def cell(found: list[Filled], digits: int = 1) -> str:
         psnr, *rest = (np.mean([getattr(f, name) for f in found]) for name in measures)
-        return ", ".join([f"{psnr:.1f}", *(f"{value:.3f}" for value in rest)])
+        return ", ".join([f"{psnr:.{digits}f}", *(f"{value:.3f}" for value in rest)])
 
     rows = [[name, *(cell([own[way]]) for way in OTHER_WAYS)] for name, own in filled.items()]
-    mean = [cell([own[way] for own in filled.values()]) for way in OTHER_WAYS]
+    mean = [cell([own[way] for own in filled.values()], 2) for way in OTHER_WAYS]
     return _table(["other photos", *OTHER_WAYS], [*rows, ["**mean**", *mean]])
 
 
