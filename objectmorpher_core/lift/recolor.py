@@ -32,6 +32,7 @@ REACH = 0.28  # object units, beyond which less than 1/2000 of it is left: nothi
 TELLING = 20_000  # Gaussians that are asked at most: the difference is smooth
 NEAREST = 12  # Gaussians that it is the mean of
 GRID = 8  # cells in REACH
+MOST_CELLS = 128  # along what is known: fewer are in REACH where that is far apart
 PIECE = 1 << 16  # Gaussians that are looked up at once: some 40 MB
 
 
@@ -109,11 +110,11 @@ def _carried_on(points: F64, known: F64, rest: F64) -> F64:
 
 
 def _may_reach(points: F64, known: F64) -> Mask:
-    """(N,) False where no `known` point (n, 3) is within REACH, by a grid of REACH / GRID."""
-    cell = REACH / GRID
+    """(N,) False where no `known` point (n, 3) is within REACH, by a grid."""
+    cell = max(REACH / GRID, float(np.ptp(known, axis=0).max()) / MOST_CELLS)
     low = known.min(0) - 2 * REACH
     marked = np.zeros(((np.ptp(known, axis=0) + 4 * REACH) / cell).astype(int) + 1, bool)
     marked[tuple(((known - low) / cell).astype(int).T)] = True
     apart = np.asarray(distance_transform_edt(~marked))  # between the cells' centres, in cells
     own = ((points - low) / cell).clip(0, np.array(marked.shape) - 1).astype(int)
-    return np.asarray(apart[tuple(own.T)] <= GRID + np.sqrt(3))
+    return np.asarray(apart[tuple(own.T)] <= REACH / cell + np.sqrt(3))

@@ -81,3 +81,16 @@ def test_what_is_left_of_the_difference_is_carried_on_as_its_formula_says():
         assert np.abs(colors[k] - expected).max() < LEVEL
     beside = ~is_seen & (points[:, 2] < 0)
     assert np.ptp(colors[beside]) > 0.05, "the stripes go on"
+
+
+def test_what_flies_far_from_the_object_costs_no_memory():
+    """Floaters a thousand units away: a grid as fine as the object needs would not fit in any."""
+    points = _ball(3_000)
+    points[:4] = [[300, 300, 1000], [-300, 300, 1000], [300, -300, 1000], [-300, -300, 1000]]
+    lifted, matte = _grey(points)
+    seen = (lifted.gaussians.means[:, 2] < -0.1).astype(np.float32)
+    seen[:4] = 1
+    flown = recolored(lifted, seen, matte, CAMERA)
+    lifted, matte = _grey(points[4:])
+    alone = recolored(lifted, seen[4:], matte, CAMERA)
+    assert np.abs(flown[4:] - alone).max() < 2 * LEVEL
