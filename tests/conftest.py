@@ -1,6 +1,6 @@
 """Fixtures for every test: the real photos, as (H, W, 3) u8 RGB arrays.
 
-`--note FILE` adds the names of what passed to a file, `--without FILE` leaves those out: a later
+`--note=FILE` adds the names of what passed to a file, `--without=FILE` leaves those out: a later
 stage, for which more is installed, does not do again what passed without it.
 """
 
