@@ -90,9 +90,7 @@ class Tasks:
         """Lets the worker look at a photo that was opened, before the first click."""
         self._read(lambda: None, is_quiet)
 
-    def _read(
-        self, cancelled: Callable[[], None], is_quiet: bool, is_spare: bool = False
-    ) -> None:  # fmt: skip
+    def _read(self, cancelled: Callable[[], None], is_quiet: bool, is_spare: bool = False) -> None:
         editor, document = self._editor, self._editor.document
         if document is None:
             return

@@ -7,11 +7,11 @@ from pathlib import Path
 import hands
 import pytest
 from hands import Hands, opened
+from keyboard import Keys
 
 pytestmark = pytest.mark.window
 
 SIZE = (1440, 900)  # px of the screen: 720 x 450 points
-MOST = 60  # presses of Tab: twice around
 
 
 @pytest.fixture
@@ -36,11 +36,7 @@ def test_preferences_and_dialogs_are_reached_to_their_ends(
         user.press("ctrl+comma")
         user.area("200 %")
         assert "Server" not in user.places()  # below the end of what is seen
-        for _ in range(MOST):
-            if "Focus: Server" in (before := user.places()):
-                break
-            user.press("Tab")
-            user.wait(lambda before=before: user.places() != before, "moving the ring")
+        Keys(user).reach("Server")
         x0, y0, x1, y1 = user.area("Focus: Server")
         assert 0 <= x0 < x1 <= SIZE[0]
         assert 0 <= y0 < y1 <= SIZE[1]
