@@ -4,7 +4,8 @@ Each level of a pyramid alternates between looking for the nearest patches and l
 (`patch_search`). Beside colours the patches carry how rough the picture is, measured at full size
 and only then made coarse: without that the coarse levels cannot tell gravel from a grey wall
 (Newson et al. 2014, "Video Inpainting of Complex Scenes"). Beside the finest steps two coarser
-bands are measured, which tell gravel from finer or blurred gravel farther off.
+bands are measured, which tell gravel from finer or blurred gravel farther off, and which way a
+grain slants: a mirror image slants the other way, and would lie across it.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ ROUGHNESS_WINDOW = 5  # px
 ROUGHNESS_BANDS = (2.0, 4.0)  # px, the finer standard deviation of each band
 BAND_WINDOW = 3.0  # x the band's, standard deviation of what its roughness is a mean of
 BAND_GAIN = 2.0  # x, of a band's contrast, to count about as much as the finest steps
+SLANT_SIGMAS = (0.0, 1.5)  # px, blur before steps are taken that slant
+SLANT_GAIN = 2.0  # x a slant's mean, which is signed and partly cancels
+SLANT_WINDOW = 6.0  # px or x sigma, of that mean: over less, grass seems to have a direction
+SLANTS = slice(-len(SLANT_SIGMAS), None)  # of the channels: they change sign in a mirror image
 # A patch that matches nothing well costs least where it is smooth: by the variance of the texture.
 # Roughness must cost as much, and is less than a third of a texture's deviation in levels.
 ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
@@ -123,14 +128,15 @@ def sources_like(filled: F32, hole: Mask, seed: int, progress: Progress) -> I32:
 
 
 def _roughness(rgb: F32, known: F32) -> F32:
-    """(h, w, 4) around each pixel: steps of brightness to the side and down, two coarser bands."""
+    """(h, w, 6) around each pixel: steps to the side and down, two coarser bands, two slants."""
     grey = rgb.mean(-1)
     inner = cv2.erode((known >= 1).astype(np.float32), np.ones((3, 3)), borderValue=1)
     window = (ROUGHNESS_WINDOW, ROUGHNESS_WINDOW)
     count = np.maximum(cv2.blur(inner, window), 1e-6)
     steps = [np.abs(cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1)) for d in ((1, 0), (0, 1))]
     found = [cv2.blur(s * inner, window) / count for s in steps]
-    return np.dstack(found + [_band(grey, known, sigma) for sigma in ROUGHNESS_BANDS])
+    found += [_band(grey, known, sigma) for sigma in ROUGHNESS_BANDS]
+    return np.dstack(found + [_slant(grey, known, sigma) for sigma in SLANT_SIGMAS])
 
 
 def _band(grey: F32, known: F32, sigma: float) -> F32:
@@ -138,6 +144,19 @@ def _band(grey: F32, known: F32, sigma: float) -> F32:
     contrast = np.abs(_blurred(grey, known, sigma) - _blurred(grey, known, 2 * sigma))
     share = np.where(known > 0, cv2.GaussianBlur(known, (0, 0), 2 * sigma), np.float32(0))
     return BAND_GAIN * _blurred(contrast, share, BAND_WINDOW * sigma)
+
+
+def _slant(grey: F32, known: F32, sigma: float) -> F32:
+    """(h, w) mean steps of `grey` (h, w) on a diagonal: > 0 where both go up, < 0 where one does.
+
+    The structure tensor's mixed term, in levels: 2 x y / (|x| + |y|) of the steps x and y.
+    """
+    if sigma > 0:
+        grey = _blurred(grey, known, sigma)
+    inner = cv2.erode((known >= 1).astype(np.float32), np.ones((3, 3)), borderValue=1)
+    x, y = (cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1) for d in ((1, 0), (0, 1)))
+    mixed = 2 * x * y / np.maximum(np.abs(x) + np.abs(y), 1e-6)
+    return SLANT_GAIN * _blurred(mixed, inner, SLANT_WINDOW * max(sigma, 1.0))
 
 
 def _blurred(values: F32, weights: F32, sigma: float) -> F32:
@@ -189,7 +208,9 @@ class _Filling:
         size = (2 * self._radius + 1,) * 2
         self._touched = cv2.dilate(self.hole.astype(np.uint8), np.ones(size, np.uint8)) > 0
         self._targets = np.argwhere(self._touched).astype(np.int32)
-        self._layers = np.stack([self._rimmed(v) for v in (self.values, self.values[:, ::-1])])
+        mirrored = self.values[:, ::-1].copy()
+        mirrored[..., SLANTS] *= -1
+        self._layers = np.stack([self._rimmed(v) for v in (self.values, mirrored)])
         self._barred = np.where(self._usable, self._guidance.unlikely, patch_search.NEVER)
         weights = np.full(level.values.shape[2], ROUGHNESS_WEIGHT, np.float32)
         weights[:3] = 1
