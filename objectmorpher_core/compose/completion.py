@@ -153,9 +153,10 @@ def _slant(grey: F32, known: F32, sigma: float) -> F32:
     """
     if sigma > 0:
         grey = _blurred(grey, known, sigma)
-    inner = cv2.erode((known >= 1).astype(np.float32), np.ones((3, 3)), borderValue=1)
+    known = np.asarray(known >= 1, np.float32)
+    inner = np.asarray(cv2.erode(known, np.ones((3, 3)), borderValue=1), np.float32)
     x, y = (cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1) for d in ((1, 0), (0, 1)))
-    mixed = 2 * x * y / np.maximum(np.abs(x) + np.abs(y), 1e-6)
+    mixed = np.asarray(2 * x * y / np.maximum(np.abs(x) + np.abs(y), 1e-6), np.float32)
     return SLANT_GAIN * _blurred(mixed, inner, SLANT_WINDOW * max(sigma, 1.0))
 
 
