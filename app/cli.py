@@ -232,7 +232,8 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("deform", "render"), help="which part of the program")
+    parser.add_argument("what", choices=("deform", "render", "pipeline"),
+        help="which part of the program; pipeline: the whole edit")  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="write there, not to stdout")
     parser.add_argument("--quick", action="store_true", help="few repetitions, one size")
 

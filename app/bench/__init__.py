@@ -19,6 +19,10 @@ def run_bench(what: str, is_quick: bool) -> dict[str, Any]:
         from .render import bench_render
 
         rows, gl_renderer = bench_render(is_quick)
+    elif what == "pipeline":
+        from .pipeline import bench_pipeline
+
+        rows = bench_pipeline(is_quick)
     else:
         rows = {"deform": bench_deform}[what](is_quick)
     machine = {"cpu": cpu_name(), "cores": os.cpu_count(), "gl_renderer": gl_renderer}

@@ -249,9 +249,7 @@ class _Filling:
     def search(self, rounds: int) -> None:
         """Looks for better sources."""
         guidance = self._guidance
-        pictures = (
-            frozen(self._rimmed(self.values)), frozen(self._weight), frozen(self._layers)
-        )  # fmt: skip
+        pictures = _rows(self._rimmed(self.values)), _rows(self._weight), _rows(self._layers)
         wanted, offered = frozen(guidance.wanted), frozen(guidance.offered)
         barred, targets = frozen(self._barred, np.float32), frozen(self._targets)
         patch_search.search(
@@ -310,6 +308,12 @@ class _Filling:
     def _rimmed(self, values: F32) -> F32:
         rim = (self._radius, self._radius)
         return np.pad(values, (rim, rim, (0, 0)), mode="edge")
+
+
+def _rows(values: F32) -> F32:
+    """(..., h, w * C) of values (..., h, w, C), as `patch_search` compares them."""
+    values = frozen(values)
+    return values.reshape(*values.shape[:-2], -1)
 
 
 def _usable(hole: Mask) -> tuple[int, Mask]:

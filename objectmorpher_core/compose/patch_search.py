@@ -27,16 +27,20 @@ HINT_COST = 20_000.0  # squared levels of 255, for a source that a hint does not
 def patch_cost(target, weight, layers, place, source, size, limit):
     """Weighted sum of squares of the patches at `place` and `source`; stops beyond `limit`.
 
-    `target` and `weight` are (h, w, C), `layers` (L, h, w, C), all float32 with their rim.
+    `target` and `weight` are (h, w * C), `layers` (L, h, w * C), all float32 with their rim: the
+    channels of a row of a patch lie in one piece, which is added up several numbers at a time.
+    `place` is a row, a column and C.
     """
     total = np.float32(0.0)
-    row, column = place
+    row, column, channels = place
     layer, i, j = source
-    for a in range(size):
-        for b in range(size):
-            for c in range(target.shape[2]):
-                gap = target[row + a, column + b, c] - layers[layer, i + a, j + b, c]
-                total += weight[row + a, column + b, c] * gap * gap
+    # Unsigned: numba asks of every other index whether it counts from the end.
+    layer, row, i = np.uintp(layer), np.uintp(row), np.uintp(i)
+    here, there = np.uintp(column * channels), np.uintp(j * channels)
+    for a in range(np.uintp(size)):
+        for b in range(np.uintp(size * channels)):
+            gap = target[row + a, here + b] - layers[layer, i + a, there + b]
+            total += weight[row + a, here + b] * gap * gap
         if total >= limit:
             break
     return total
@@ -57,6 +61,28 @@ def _penalty(wanted, offered, barred, source):
 
 
 @numba.njit(cache=True, fastmath=True)
+def _begin(pictures, wanted, offered, barred, targets, sources, costs):
+    """Fills `costs` at the targets with what their sources cost; (T,) the weights of the patches.
+
+    Also the size of a patch and the number of channels.
+    """
+    target, weight, layers = pictures
+    height, width = costs.shape
+    size = target.shape[0] - height + 1
+    channels = target.shape[1] // (width + size - 1)
+    weights = np.empty(len(targets), np.float32)
+    for n in range(len(targets)):
+        row, column = targets[n]
+        first, end = column * channels, (column + size) * channels
+        weights[n] = weight[row : row + size, first:end:channels].sum()
+        source = (sources[row, column, 0], sources[row, column, 1], sources[row, column, 2])
+        costs[row, column] = weights[n] * _penalty(wanted[row, column], offered, barred, source)
+        place = (row, column, channels)
+        costs[row, column] += patch_cost(target, weight, layers, place, source, size, NEVER)
+    return weights, size, channels
+
+
+@numba.njit(cache=True, fastmath=True)
 def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, random):
     """PatchMatch rounds over the `targets` (T, 2): neighbours' sources, then random places.
 
@@ -66,14 +92,7 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
     """
     target, weight, layers = pictures
     height, width = costs.shape
-    size = target.shape[0] - height + 1
-    weights = np.empty(len(targets), np.float32)
-    for n in range(len(targets)):
-        row, column = targets[n]
-        weights[n] = weight[row : row + size, column : column + size, 0].sum()
-        source = (sources[row, column, 0], sources[row, column, 1], sources[row, column, 2])
-        costs[row, column] = weights[n] * _penalty(wanted[row, column], offered, barred, source)
-        costs[row, column] += patch_cost(target, weight, layers, (row, column), source, size, NEVER)
+    weights, size, channels = _begin(pictures, wanted, offered, barred, targets, sources, costs)
     for turn in range(rounds):
         step = 1 if turn % 2 == 0 else -1
         for m in range(len(targets)):
@@ -98,11 +117,15 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
                 attempt += 1
                 if not (0 <= i < height and 0 <= j < width):
                     continue
+                own = sources[row, column]
+                if k == own[0] and i == own[1] and j == own[2]:
+                    continue  # near the end most of what neighbours say is what it has
                 source = (k, i, j)
                 cost = weights[n] * _penalty(wanted[row, column], offered, barred, source)
                 if cost >= best:
                     continue
-                cost += patch_cost(target, weight, layers, (row, column), source, size, best - cost)
+                place = (row, column, channels)
+                cost += patch_cost(target, weight, layers, place, source, size, best - cost)
                 if cost < best:
                     best = cost
                     sources[row, column, 0] = k

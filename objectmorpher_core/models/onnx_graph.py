@@ -33,8 +33,8 @@ def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
         ]
         body.append(bytes_field(INPUT, bytes_field(1, images.encode()) + bytes_field(2, tensor)))
         body += [bytes_field(OUTPUT, bytes_field(1, name.encode())) for name in outputs]
-        parts.append(bytes_field(GRAPH, b"".join(body)))
-    return b"".join(parts)
+        parts += [_head(GRAPH, sum(map(len, body))), *body]
+    return b"".join(parts)  # the weights are copied here, once
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, int, int]]:
@@ -70,7 +70,12 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
 
 def bytes_field(number: int, payload: bytes) -> bytes:
     """A field of bytes, text or another message."""
-    return as_varint(number << 3 | BYTES) + as_varint(len(payload)) + payload
+    return _head(number, len(payload)) + payload
+
+
+def _head(number: int, size: int) -> bytes:
+    """What stands before so many bytes of a field."""
+    return as_varint(number << 3 | BYTES) + as_varint(size)
 
 
 def as_varint(value: int) -> bytes:

@@ -168,9 +168,10 @@ def test_a_patch_costs_nothing_where_it_is_from():
     random = np.random.default_rng(5)
     layers = frozen(random.random((1, 20, 20, 5)), np.float32)
     weight = frozen(np.ones_like(layers[0]))
-    assert patch_cost(layers[0], weight, layers, (3, 4), (0, 3, 4), 7, 1e9) == 0
+    rows = [values.reshape(*values.shape[:-2], -1) for values in (layers[0], weight, layers)]
+    assert patch_cost(*rows, (3, 4, 5), (0, 3, 4), 7, 1e9) == 0
     gap = layers[0, 3:10, 4:11] - layers[0, 8:15, 9:16]
-    cost = patch_cost(layers[0], weight, layers, (3, 4), (0, 8, 9), 7, 1e9)
+    cost = patch_cost(*rows, (3, 4, 5), (0, 8, 9), 7, 1e9)
     np.testing.assert_allclose(cost, (gap**2).sum(), rtol=1e-5)
 
 
