@@ -9,6 +9,7 @@ import argparse
 import re
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -312,13 +313,29 @@ def _command(
     return Subcommand(name, help, add_options, run)
 
 
+def _on_photo(
+    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
+) -> Subcommand:
+    """A command that looks for an object in a photo first of all."""
+    command = _command(name, help, add_options)
+
+    def run(options: argparse.Namespace) -> None:
+        from .early_network import open_early
+
+        open_early(options.photo, options.segment)
+        assert command.run is not None
+        command.run(options)
+
+    return replace(command, run=run)
+
+
 SUBCOMMANDS = (
-    _command("edit", "edit a photo without a window", _add_edit),
+    _on_photo("edit", "edit a photo without a window", _add_edit),
     Subcommand(
         "batch", "run many edit scripts, whatever becomes of each", _add_batch,
         lazily("cli_batch", "run_batch"),
     ),
-    _command("select", "write the mask of the chosen object", _add_select),
+    _on_photo("select", "write the mask of the chosen object", _add_select),
     _command("replay", "render a saved session again", _add_replay),
     _command("info", "what a session holds", _add_info),
     _command("convert", "turn splat and mesh files into each other", _add_convert),

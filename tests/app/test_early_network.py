@@ -1,0 +1,53 @@
+"""DINOv2 is opened while modules are imported, where that gains anything."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.early_network import open_early
+from objectmorpher_core import models
+from objectmorpher_core.segment import dino_tokens
+
+ROOT = Path(__file__).parents[2]
+PHOTO = ROOT / "assets/samples/coffee.jpg"
+TOLD = """
+import sys
+from pathlib import Path
+from app.early_network import open_early
+opening = open_early(Path(sys.argv[1]), sys.argv[2] or None)
+if opening is None:
+    print("nothing")
+else:
+    opening.join()
+    from objectmorpher_core.segment import dino_tokens
+    print("opened", dino_tokens._opened.cache_info().currsize)
+    print(any(name in sys.modules for name in ("objectmorpher_core.pipeline", "app.cli_commands")))
+"""
+
+
+def told(photo: Path, segmenter: str) -> str:
+    command = [sys.executable, "-c", TOLD, str(photo), segmenter]
+    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+def test_it_is_opened_once_and_before_the_stages_are_imported() -> None:
+    if models.path(dino_tokens.WEIGHT) is None:
+        pytest.skip("the weights of DINOv2 are not here")
+    assert told(PHOTO, "").split() == ["opened", "1", "False"]
+
+
+@pytest.mark.parametrize(
+    ("photo", "segmenter"), [(PHOTO, "grabcut"), (ROOT / "assets/none.jpg", "")]
+)
+def test_nothing_is_opened_that_is_not_needed(photo: Path, segmenter: str) -> None:
+    assert told(photo, segmenter).strip() == "nothing"
+
+
+def test_nothing_is_gained_once_everything_is_imported() -> None:
+    import objectmorpher_core.pipeline  # noqa: F401
+
+    assert open_early(PHOTO, None) is None
