@@ -11,9 +11,12 @@ import mmap
 import os
 import socket
 import sys
-from multiprocessing.connection import Connection as Pipe
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection as Pipe
 
 LEAST = 1 << 25  # bytes: smaller ones would use up the open files that a process may have
 PIECE = 1 << 30  # bytes that one write takes
@@ -32,7 +35,11 @@ class Block(mmap.mmap):
 
 def pipe_of(connection: object) -> Pipe | None:
     """The connection where blocks go through it."""
-    return connection if sys.platform == "linux" and isinstance(connection, Pipe) else None
+    if sys.platform != "linux":
+        return None
+    from multiprocessing.connection import Connection
+
+    return connection if isinstance(connection, Connection) else None
 
 
 def block_of(buffer: memoryview) -> Block | None:
@@ -52,6 +59,8 @@ def shared(buffer: memoryview) -> Block | None:
     """
     if (block := block_of(buffer)) is not None:
         return block
+    if sys.platform != "linux":
+        return None
     try:
         descriptor = os.memfd_create("objectmorpher", os.MFD_CLOEXEC)
     except OSError:
@@ -68,12 +77,14 @@ def shared(buffer: memoryview) -> Block | None:
 
 def send(pipe: Pipe, block: Block) -> None:
     """To whoever calls `receive` on the other side."""
+    assert sys.platform == "linux"
     with _socket(pipe) as line:
         socket.send_fds(line, [b"\0"], [block.descriptor])
 
 
 def receive(pipe: Pipe, size: int) -> Block:
     """The block of `size` bytes that was sent. Raises EOFError, OSError."""
+    assert sys.platform == "linux"
     with _socket(pipe) as line:
         _, found, _, _ = socket.recv_fds(line, 1, 1, socket.MSG_CMSG_CLOEXEC)
     if not found:
