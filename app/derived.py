@@ -141,8 +141,12 @@ class Derived:
         """Takes over shapes of the document's objects that were made elsewhere."""
         self.make_room(len(shapes))
         for thing, shape in shapes:
-            self._shapes(lambda shape=shape: shape, thing.lifted, thing.deform, thing.rig)
-            self._latest = (thing.lifted, thing.deform, shape)
+            self.remember(thing, shape)
+
+    def remember(self, thing: EditObject, shape: Shape) -> None:
+        """Takes over an object's shape that was made in a thread."""
+        self._shapes(lambda: shape, thing.lifted, thing.deform, thing.rig)
+        self._latest = (thing.lifted, thing.deform, shape)
 
     def make_room(self, objects: int) -> None:
         """Remembers what so many objects need in each frame."""

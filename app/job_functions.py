@@ -17,7 +17,6 @@ from objectmorpher_core.arrays import RGB, U8, Mask, Pixels, Selection
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     Document,
-    EditObject,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -28,7 +27,7 @@ from objectmorpher_core.hint import Hint
 from objectmorpher_core.progress import Progress, part
 
 from .layers import Rendered, Request, render
-from .shape import build_shape, rehearse
+from .shape import rehearse_lift
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.refine import Refiner
@@ -134,8 +133,7 @@ def lift(
         cut.pixels, cut.camera, cut.mask, choice.backend, shape, stage, choice.seed
     )
     progress(0.95, "getting ready to pose")
-    # What is compiled for the first drag is on the disk for the window: seconds, once.
-    rehearse(build_shape(cut.camera, EditObject("", matte=matte, lifted=lifted)), cut.camera)
+    rehearse_lift(matte, lifted, cut.camera)  # seconds, once
     return matte, lifted
 
 
@@ -323,13 +321,10 @@ def refine(edit: CoarseEdit, how: Refining, progress: Progress) -> Refined:
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:
     """Saves the document as an .omorph file."""
-    from objectmorpher_core.files import write_all
-    from objectmorpher_core.session_file import encode_session
+    from objectmorpher_core.session_file import save_session
 
     progress(0.1, "packing")
-    data = encode_session(document)
-    progress(0.9, "writing")
-    write_all({path: data})
+    save_session(document, path)
 
 
 def look_at_stages(progress: Progress) -> tuple[Stage, ...]:

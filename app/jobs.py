@@ -314,7 +314,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
         note_crashes(crashes)
     for module in warm:
         importlib.import_module(module)
-    reader, writer = Reader(connection), Writer(connection)
+    reader, writer = Reader(connection), Writer(connection, kept=0)
     while True:
         try:
             number, function, arguments = reader.read()
@@ -334,6 +334,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
             os._exit(0)
         except Exception as error:  # such as an answer that cannot be sent
             writer.write(("failed", number, JobError.of(error, function.__name__)))
+        del arguments, answer  # gigabytes, maybe, that would wait here for the next request
 
 
 def _lower_priority() -> None:

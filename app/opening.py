@@ -42,12 +42,15 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
             f"{path.name} is a 3D object: open a photo, select what it stands for, then drop it"
         )
     try:
+        _check(path)
+        with path.open("rb") as file:
+            if file.read(len(ZIP_MAGIC)) == ZIP_MAGIC:
+                from objectmorpher_core.session_file import read_session
+
+                progress(0.1, "")
+                return Opened(read_session(file), is_session=True)
         data = _read(path, progress)
         progress(0.35, "")
-        if data[:4] == ZIP_MAGIC:
-            from objectmorpher_core.session_file import decode_session
-
-            return Opened(decode_session(data), is_session=True)
         from objectmorpher_core.pipeline import open_photo
 
         return Opened(open_photo(data, path.name, fov=fov, seed=seed), is_session=False)
@@ -60,8 +63,8 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
         raise OpeningError(f"{path.name} cannot be opened: {error}") from error
 
 
-def _read(path: Path, progress: Progress) -> bytes:
-    """The file's bytes, as long as it is one that ends."""
+def _check(path: Path) -> None:
+    """It is a file that ends, and not too large. Raises OpeningError, OSError."""
     size = path.stat().st_size
     if not path.is_file():
         raise OpeningError(f"{path.name} is no file")
@@ -70,7 +73,11 @@ def _read(path: Path, progress: Progress) -> bytes:
             f"{path.name} is {size / (1 << 30):.1f} GiB, more than the {MAX_BYTES >> 30} GiB "
             "that can be opened"
         )
-    parts = []
+
+
+def _read(path: Path, progress: Progress) -> bytes:
+    """The file's bytes."""
+    size, parts = path.stat().st_size, []
     with path.open("rb") as file:
         while block := file.read(BLOCK):
             parts.append(block)

@@ -12,7 +12,14 @@ import numpy as np
 
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, EditObject, Handle, LiftedObject, Placement
+from objectmorpher_core.document import (
+    Document,
+    EditObject,
+    Handle,
+    LiftedObject,
+    Matte,
+    Placement,
+)
 from objectmorpher_core.rig import Rig
 
 from .memo import Memo
@@ -26,6 +33,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 SMALL = (0, 0, 32, 32)  # px, of the picture that is drawn for practice
+AROUND = 64  # px of the texture, to each side of the point that is dragged for practice
 REACH = 0.01  # object units that a point is moved for practice
 
 
@@ -78,21 +86,42 @@ def build_shape(camera: Camera, thing: EditObject) -> Shape:
     return Shape(puppet_of(thing, camera), object_texture(thing.matte))
 
 
+def build_ready_shape(camera: Camera, thing: EditObject) -> Shape:
+    """One that is rehearsed, too; some seconds, in a thread."""
+    shape = build_shape(camera, thing)
+    shape.is_rehearsed = True
+    try:
+        rehearse(shape, camera, thing.placement)
+    except Exception:  # it is shown all the same; whoever drags it is told
+        log.exception("%s could not be made ready to be dragged", thing.name)
+    return shape
+
+
+def rehearse_lift(matte: Matte, lifted: LiftedObject, camera: Camera) -> None:
+    """What a drag of a fresh lift compiles is on the disk then, for the process that will drag it.
+
+    Without the object's texture, which may take gigabytes: a little of it does.
+    """
+    x, y = camera.project(lifted.world_points(lifted.control_points[0])).astype(int)
+    height, width = matte.alpha.shape
+    left, top = (
+        int(np.clip(at - AROUND, 0, max(size - 2 * AROUND, 0)))
+        for at, size in ((x - matte.left, width), (y - matte.top, height))
+    )
+    part = slice(top, top + 2 * AROUND), slice(left, left + 2 * AROUND)
+    small = Matte(matte.left + left, matte.top + top, matte.alpha[part], matte.foreground[part])
+    rehearse(build_shape(camera, EditObject("", matte=small, lifted=lifted)), camera)
+
+
 def build_ready(document: Document) -> Shapes:
     """The shapes of all lifted objects, rehearsed; copies share one."""
     camera, built = document.photo.camera, Memo(len(document.objects))
 
-    def build(thing: EditObject) -> Shape:
-        shape = build_shape(camera, thing)
-        shape.is_rehearsed = True
-        try:
-            rehearse(shape, camera, thing.placement)
-        except Exception:  # it opens all the same; whoever drags it is told
-            log.exception("%s could not be made ready to be dragged", thing.name)
-        return shape
+    def shape(thing: EditObject) -> Shape:
+        parts = thing.lifted, thing.deform, thing.rig
+        return built(lambda: build_ready_shape(camera, thing), *parts)
 
-    lifted = [thing for thing in document.objects if thing.lifted is not None]
-    return [(o, built(lambda o=o: build(o), o.lifted, o.deform, o.rig)) for o in lifted]
+    return [(thing, shape(thing)) for thing in document.objects if thing.lifted is not None]
 
 
 def rehearse(shape: Shape, camera: Camera, placement: Placement | None = None) -> None:

@@ -33,7 +33,7 @@ from .job_error import JobError
 from .job_functions import Choice, Cut
 from .layers import Rendered, Request
 from .memo import same
-from .shape import rehearse
+from .shape import Shape, build_ready_shape, rehearse
 from .texts import t
 from .view import ToolName
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from .editor import Editor
 
-REHEARSE = "rehearse"  # kind of what runs in a thread
+REHEARSE, READY = "rehearse", "ready"  # kinds of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
 FRONT = "front"
 
@@ -154,23 +154,69 @@ class Tasks:
         photo, settings, mask = document.photo, editor.settings, thing.mask
         wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
 
-        def accept(answer: tuple[Matte, LiftedObject]) -> None:
-            current = editor.document
-            if current is None or k >= len(current.objects) or current.objects[k].mask is not mask:
-                return
+        def changed(current: Document, answer: tuple[Matte, LiftedObject]) -> Document | None:
+            if k >= len(current.objects) or current.objects[k].mask is not mask:
+                return None
             if shape is None:
-                self._take_lift(edits.set_lifted(current, k, *answer, wanted), k)
-            elif not editor.hand.is_busy:
-                changed = edits.reshape(current, k, *answer, wanted)
-                editor.posing.select(None)
-                editor.apply(label, editor.derived.solved(changed, k, None))
+                return edits.set_lifted(current, k, *answer, wanted)
+            return edits.reshape(current, k, *answer, wanted)
 
+        def accept(answer: tuple[Matte, LiftedObject]) -> None:
+            self.make_ready(k, lambda current: changed(current, answer), title, show)
+
+        def show(document: Document) -> None:
+            if shape is None:
+                self._take_lift(document, k)
+            elif not editor.hand.is_busy:
+                editor.posing.select(None)
+                editor.apply(label, editor.derived.solved(document, k, None))
+
+        title = t("Lifting the object")
         editor.jobs.start(
-            t("Lifting the object"), job_functions.lift,
+            title, job_functions.lift,
             Cut(photo.pixels, photo.camera, thing.selection),
             Choice(settings.backends.lift, document.seed), wanted,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
+
+    def make_ready(
+        self,
+        k: int,
+        change: Callable[[Document], Document | None],
+        title: str,
+        show: Callable[[Document], None],
+    ) -> None:
+        """Shows a document in which object `k` is another one, when that can be drawn at once.
+
+        What drawing and dragging it take is made in a thread, under `title`. `change` is asked for
+        the document now and again then: much may have happened, and None means that it is too late.
+        """
+        editor, before = self._editor, self._editor.document
+        changed = None if before is None else change(before)
+        if before is None or changed is None:
+            return
+        camera, thing = changed.photo.camera, changed.objects[k]
+
+        def accept(shape: Shape) -> None:
+            now = editor.document
+            changed = None if now is None else change(now)
+            if now is None or changed is None:
+                return
+            if now.objects[k] is before.objects[k]:
+                editor.derived.remember(changed.objects[k], shape)
+            show(changed)
+
+        editor.chores.start(
+            title, lambda progress: build_ready_shape(camera, thing),
+            kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
+        )  # fmt: skip
+
+    @property
+    def is_lifting(self) -> bool:
+        """Whether the current object is on its way."""
+        editor = self._editor
+        is_asked = editor.jobs.is_busy(LIFT)
+        return is_asked or editor.chores.is_busy(f"{READY} {editor.current}")
 
     def _take_lift(self, changed: Document, k: int) -> None:
         editor, lifted = self._editor, changed.objects[k].lifted

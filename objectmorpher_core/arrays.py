@@ -19,6 +19,9 @@ RGB = npt.NDArray[np.uint8]  # (H, W, 3)
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]  # (H, W, 3), the photo's own bit depth
 
 
+AT_A_TIME = 1 << 20  # numbers that are looked at together
+
+
 def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
     """A contiguous, read-only view of `array`: a slip that would change the document raises.
 
@@ -28,6 +31,13 @@ def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
     array = np.ascontiguousarray(array, dtype=dtype).view()
     array.setflags(write=False)
     return array
+
+
+def all_finite(array: np.ndarray) -> bool:
+    """Whether none of the numbers is infinite or none at all; a photo's worth takes no memory."""
+    flat = array.ravel(order="K")  # no copy of what is contiguous
+    pieces = range(0, flat.size, AT_A_TIME)
+    return all(bool(np.isfinite(flat[k : k + AT_A_TIME]).all()) for k in pieces)
 
 
 def frozen_rows(matrix: Sparse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 UNFINISHED = ".unfinished"  # ending of what is being written
@@ -20,15 +20,17 @@ STALE = 3600.0  # s; an unfinished file older than this belongs to a process tha
 PIECE = 1 << 24  # bytes that one write takes
 NAMED = 50  # characters of a file's name that the temporary one has, too
 
-Parts = Sequence[bytes | memoryview]
+Parts = Iterable[bytes | memoryview]
 
 
 class OutputError(OSError):
     """An output cannot be written; one sentence. Nothing was changed."""
 
 
-def write_all(outputs: Mapping[Path, bytes]) -> None:
+def write_all(outputs: Mapping[Path, bytes | Parts]) -> None:
     """Writes every output, or none: existing files stay as they are where one cannot be written.
+
+    What is large may come in parts.
 
     Each goes to a temporary file in its own folder, down to the disk, and all are renamed at the
     end. An existing file's permissions are kept, and a link is followed rather than replaced.
@@ -40,11 +42,12 @@ def write_all(outputs: Mapping[Path, bytes]) -> None:
             try:
                 target = _checked_target(path)
                 _remove_stale(target)
-                written.append((_write_beside(target, [data]), target))
+                parts = [data] if isinstance(data, bytes) else data
+                written.append((_write_beside(target, parts), target))
             except OutputError:
                 raise
             except (OSError, ValueError) as error:  # ValueError: a name with a zero in it
-                raise OutputError(f"{path} cannot be written: {_reason(error)}") from error
+                raise OutputError(f"{path} cannot be written: {reason_of(error)}") from error
         if written:
             _rename_all(written)
     finally:
@@ -166,7 +169,7 @@ def _rename_all(written: list[tuple[Path, Path]]) -> None:
             os.replace(temporary, target)
             renamed.append(target)
     except OSError as error:
-        told = f"{target} cannot be written: {_reason(error)}"
+        told = f"{target} cannot be written: {reason_of(error)}"
         for changed, old in _bring_back(renamed, olds):
             told += f"; {changed} has changed already"
             told += f", what it was is in {old.name}" if old is not None else ""
@@ -209,5 +212,6 @@ def _umask() -> int:
     return mask
 
 
-def _reason(error: OSError | ValueError) -> str:
+def reason_of(error: OSError | ValueError) -> str:
+    """Why, as the end of a sentence."""
     return (getattr(error, "strerror", None) or str(error)).lower()

@@ -22,11 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import all_finite
 from .document import Document, Photo
 from .files import UNFINISHED, make_folder, sync_folder, write_all, write_new
 from .image import MAX_PIXELS, Picture, encode_picture
+from .limits import SESSION_UNPACKED as MAX_BYTES
 from .npy import ArrayError, read_npy
-from .session_file import MAX_BYTES, build_document
+from .session_file import build_document
 from .session_tree import SessionError, Writer
 
 FORMAT = "objectmorpher recovery"
@@ -181,7 +183,7 @@ def _unpacked(data: bytes) -> bytes:
 
 def _is_numbers(array: np.ndarray) -> bool:
     if array.dtype.kind == "f":
-        return bool(np.isfinite(array).all())
+        return all_finite(array)
     return array.dtype.kind in "iub"
 
 

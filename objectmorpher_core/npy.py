@@ -7,6 +7,9 @@ import math
 
 import numpy as np
 
+from .arrays import all_finite
+
+HEADER = 1 << 17  # bytes, more than any header has
 KINDS = "fiub"  # floating point, whole numbers, truths; never objects
 
 
@@ -14,12 +17,12 @@ class ArrayError(ValueError):
     """The bytes are no array that can be taken; what they are, as the end of a sentence."""
 
 
-def read_npy(data: bytes) -> np.ndarray:
+def read_npy(data: bytes | bytearray) -> np.ndarray:
     """The array in a .npy file's bytes, a view of them. Raises ArrayError.
 
     The header is compared with the bytes before anything is allocated.
     """
-    file = io.BytesIO(data)
+    file = io.BytesIO(bytes(memoryview(data)[:HEADER]))
     try:
         version = np.lib.format.read_magic(file)
         if version == (1, 0):
@@ -38,6 +41,6 @@ def read_npy(data: bytes) -> np.ndarray:
         raise ArrayError("no array")  # an empty one that claims memory which nothing backs
     flat = np.frombuffer(data, dtype, math.prod(shape), file.tell())
     array = flat.reshape(shape, order="F" if is_fortran else "C")
-    if dtype.kind == "f" and not np.isfinite(array).all():
+    if dtype.kind == "f" and not all_finite(array):
         raise ArrayError("an array with values that are not finite")
     return array

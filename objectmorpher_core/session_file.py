@@ -12,48 +12,60 @@ but a default, which is what older sessions get. The same document gives the sam
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
-import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from .camera import Camera
 from .document import SELECTED, Document, EditObject, Photo
-from .files import write_all
+from .files import OutputError, reason_of, write_all
 from .image import ImageError, encode_picture, read_picture
 from .joining import LEAST_FEATHER, MOST_FEATHER
 from .limits import SESSION_OBJECTS
-from .limits import SESSION_UNPACKED as MAX_BYTES
 from .npy import ArrayError, read_npy
 from .session_tree import Reader, SessionError, Writer
+from .session_zip import Member, Npy, Pieces, Zip, digest, scratch_file, write_zip
 from .shown import named, shown
 
-__all__ = ["SessionError", "decode_session", "encode_session", "save_session"]
+__all__ = ["SessionError", "decode_session", "encode_session", "read_session", "save_session"]
 
 VERSION = 1
 FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
-LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the zip format's first day: no clock in the bytes
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
-PACKED_ENDINGS = (".png", ".npz", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".avif")
 
 
 def save_session(document: Document, path: Path) -> None:
-    """Writes the session file, whole or not at all. Raises OutputError."""
-    write_all({path: encode_session(document)})
+    """Writes the session file, whole or not at all. Raises OutputError, SessionError."""
+    try:
+        with scratch_file(path.parent) as file:
+            write_session(document, file, path.parent)
+            write_all({path: Pieces(file)})
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {reason_of(error)}") from error
 
 
 def encode_session(document: Document) -> bytes:
     """The bytes of the document's session file. Raises SessionError for values beyond numbers."""
+    file = io.BytesIO()
+    write_session(document, file)
+    return file.getvalue()
+
+
+def write_session(document: Document, file: IO[bytes], folder: Path | None = None) -> None:
+    """The same into an open file; where it is large, `folder` has room for as much again.
+
+    Raises SessionError, OSError.
+    """
     from .splat_files.ply import encode_ply
 
-    members: dict[str, bytes] = {}
+    members: dict[str, Member] = {}
     photo = document.photo
     ending = PurePosixPath(photo.name).suffix.lower()
     source = f"photo/photo{ending if ending.isascii() and ending[1:].isalnum() else ''}"
@@ -69,15 +81,17 @@ def encode_session(document: Document) -> bytes:
     for k, item in enumerate(document.objects):
         if item.lifted is not None:
             members[f"objects/{k}/gaussians.ply"] = encode_ply(item.lifted.gaussians)
-    members[ARRAYS] = _zip({f"{path}.npy": _npy(a) for path, a in writer.arrays.items()}, 1)
-    head = {
-        "format": FORMAT,
-        "version": VERSION,
-        "document": tree,
-        "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
-    }
-    text = json.dumps(head, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    return _zip({DOCUMENT: text.encode()} | members, 1)
+    with scratch_file(folder) as arrays:
+        write_zip(arrays, {f"{path}.npy": Npy(a) for path, a in writer.arrays.items()})
+        members[ARRAYS] = Pieces(arrays)
+        head = {
+            "format": FORMAT,
+            "version": VERSION,
+            "document": tree,
+            "sha256": {name: digest(member) for name, member in members.items()},
+        }
+        text = json.dumps(head, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+        write_zip(file, {DOCUMENT: text.encode()} | members)
 
 
 def decode_session(data: bytes) -> Document:
@@ -85,18 +99,28 @@ def decode_session(data: bytes) -> Document:
 
     Raises SessionError: one sentence.
     """
-    members = _unzip(data, "session")
-    head = _head(members)
-    hashes = head.get("sha256")
-    if not isinstance(hashes, dict):
-        raise SessionError("the session's document.json is damaged: sha256 is missing")
-    for name, expected in hashes.items():
-        if name not in members:
-            raise SessionError(f"the session is incomplete: {named(name)} is missing")
-        if hashlib.sha256(members[name]).hexdigest() != expected:
-            raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
-    trusted = {name: members[name] for name in hashes}
-    return build_document(head.get("document"), trusted, _arrays(trusted))
+    return read_session(io.BytesIO(data))
+
+
+def read_session(file: IO[bytes]) -> Document:
+    """The same of a file that is open; its arrays are unpacked one by one."""
+    with Zip(file, "session") as archive:
+        members = {name: archive.read(name) for name in archive.names if name != ARRAYS}
+        head = _head(members)
+        hashes = head.get("sha256")
+        if not isinstance(hashes, dict):
+            raise SessionError("the session's document.json is damaged: sha256 is missing")
+        for name, expected in hashes.items():
+            if name not in archive.names:
+                raise SessionError(f"the session is incomplete: {named(name)} is missing")
+            own = members[name] if name in members else archive.pieces(name)
+            if digest(own) != expected:
+                raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
+        trusted = {name: members[name] for name in hashes if name in members}
+        if ARRAYS not in hashes:
+            raise SessionError(f"the session is incomplete: {ARRAYS} is missing")
+        arrays = _arrays(archive)
+    return build_document(head.get("document"), trusted, arrays)
 
 
 def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.ndarray]) -> Document:
@@ -154,58 +178,19 @@ def _photo(tree: object, members: dict[str, bytes], reader: Reader) -> Photo:
     return Photo(picture, camera, source, name)
 
 
-def _arrays(members: dict[str, bytes]) -> dict[str, np.ndarray]:
+def _arrays(archive: Zip) -> dict[str, np.ndarray]:
     """The arrays of arrays.npz by path; never a pickle, never a value beyond numbers."""
     arrays = {}
-    for name, data in _unzip(members.get(ARRAYS, b""), ARRAYS).items():
-        try:
-            arrays[name.removesuffix(".npy")] = read_npy(data)
-        except ArrayError as error:
-            raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
+    with archive.inner(ARRAYS) as inner:
+        for name in inner.names:
+            data = bytearray()
+            for piece in inner.pieces(name):
+                data += piece
+            try:
+                arrays[name.removesuffix(".npy")] = read_npy(data)
+            except ArrayError as error:
+                raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
     return arrays
-
-
-def _npy(array: np.ndarray) -> bytes:
-    out = io.BytesIO()
-    np.lib.format.write_array(out, np.ascontiguousarray(array), allow_pickle=False)
-    return out.getvalue()
-
-
-def _zip(members: dict[str, bytes], level: int) -> bytes:
-    """Zip file whose bytes depend on nothing but the members; packed ones are not packed again."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, data in members.items():
-            info = zipfile.ZipInfo(name, LONG_AGO)
-            info.create_system, info.external_attr = 3, 0o644 << 16  # as on Linux, everywhere
-            is_packed = name.endswith(PACKED_ENDINGS)
-            info.compress_type = zipfile.ZIP_STORED if is_packed else zipfile.ZIP_DEFLATED
-            archive.writestr(info, data, compresslevel=level)
-    return out.getvalue()
-
-
-def _unzip(data: bytes, what: str) -> dict[str, bytes]:
-    """The members of a zip file by name, within bounds."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            infos = archive.infolist()
-            names = [info.filename for info in infos]
-            for name in names:
-                if name.startswith("/") or "\\" in name or ".." in name.split("/"):
-                    raise SessionError(
-                        f"the {what} holds a member with a forbidden name: {shown(name)}"
-                    )
-            if len(set(names)) < len(names):
-                raise SessionError(f"the {what} holds two members of the same name")
-            if sum(info.file_size for info in infos) > MAX_BYTES:
-                raise SessionError(f"the {what} would unpack to more than {MAX_BYTES >> 30} GiB")
-            return {info.filename: archive.read(info) for info in infos}
-    except SessionError:
-        raise
-    except (zipfile.BadZipFile, EOFError, OSError, ValueError, RuntimeError) as error:
-        raise SessionError(f"the {what} is not a zip file, is damaged or ends early") from error
-    except (NotImplementedError, zlib.error) as error:
-        raise SessionError(f"the {what} is damaged") from error
 
 
 def _with_copies(document: Document) -> Document:

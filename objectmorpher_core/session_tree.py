@@ -12,7 +12,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from .arrays import frozen
+from .arrays import all_finite, frozen
 from .image import ImageError, Picture, encode_mask, encode_picture, read_picture
 
 
@@ -52,7 +52,7 @@ class Writer:
         return float(value)
 
     def _array(self, array: np.ndarray, path: str) -> dict[str, str]:
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
+        if array.dtype.kind == "f" and not all_finite(array):
             raise SessionError(f"{path} holds values that are not finite and cannot be saved")
         is_mask = array.dtype == np.bool_ and array.ndim == 2
         is_pixels = array.dtype in (np.uint8, np.uint16) and array.shape[2:] == (3,)

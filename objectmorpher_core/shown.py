@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 LONGEST = 60  # characters
+DIGITS = 10_000  # binary ones, beyond which Python does not write a number
 REASON = 200  # characters of a sentence that quotes what a file says
 
 
@@ -21,6 +22,11 @@ def named(text: str) -> str:
     """A name without quotation marks, as `shown`."""
     text = "".join(c if c.isprintable() else "?" for c in text)  # lone surrogates are not
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 13]}...{text[-10:]}"
+
+
+def counted(count: int) -> str:
+    """A number that a file declares, which may have thousands of digits."""
+    return named(f"{count:,}") if count.bit_length() < DIGITS else "too many"
 
 
 def reason(error: BaseException) -> str:

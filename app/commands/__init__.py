@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..editor import Editor
-from ..tasks import LIFT, SELECT
+from ..tasks import SELECT
 from ..texts import t
 from ..view import ToolName
 from . import compose, edit, files, look, objects, place, pose, select, window
@@ -67,7 +67,7 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
     """What the primary button says, and the command behind it (None: it only says it)."""
     if editor.document is None:
         return t("Open a photo…"), "open"
-    if editor.jobs.is_busy(LIFT):
+    if editor.tasks.is_lifting:
         return t("Lifting…"), None
     if editor.mask is None:
         is_busy = editor.jobs.is_busy(SELECT)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..editor import Editor
 from ..filing import Dialog
-from ..tasks import LIFT, SELECT
+from ..tasks import SELECT
 from ..texts import t
 
 Reason = Callable[[Editor], str | None]
@@ -44,7 +44,7 @@ def no_handle(editor: Editor) -> str | None:
 
 
 def cannot_lift(editor: Editor) -> str | None:
-    if editor.jobs.is_busy(LIFT):
+    if editor.tasks.is_lifting:
         return t("The object is being lifted")
     if editor.jobs.is_busy(SELECT):
         return t("The selection is not ready yet")

@@ -19,6 +19,7 @@ from objectmorpher_core.brush import Brush, Stroke
 from objectmorpher_core.camera import Camera
 from objectmorpher_core.document import (
     AS_SEEN,
+    Document,
     LiftedObject,
     LiftSettings,
     Matte,
@@ -310,18 +311,27 @@ class Shaping:
     def _take_import(
         self, k: int, fitting: Fitting, matte: Matte, lifted: LiftedObject, label: str
     ) -> None:
-        editor, document = self._editor, self._editor.committed
-        if document is None or k >= len(document.objects) or editor.hand.is_busy:
-            return
-        if document.objects[k].mask is not fitting.mask:
-            return
-        try:
-            changed = edits.set_camera(document, fitting.chosen.camera, k)
-        except ValueError as error:
-            editor.complain(str(error))
-            return
-        changed = edits.set_lifted(changed, k, matte, lifted)
-        changed = edits.set_placement(changed, k, Placement())
+        editor = self._editor
+
+        def change(document: Document) -> Document | None:
+            if k >= len(document.objects) or document.objects[k].mask is not fitting.mask:
+                return None
+            try:
+                changed = edits.set_camera(document, fitting.chosen.camera, k)
+            except ValueError as error:
+                editor.complain(str(error))
+                return None
+            changed = edits.set_lifted(changed, k, matte, lifted)
+            return edits.set_placement(changed, k, Placement())
+
+        def show(changed: Document) -> None:
+            if not editor.hand.is_busy:
+                self._show_import(fitting, changed, label)
+
+        editor.tasks.make_ready(k, change, t("Placing the object"), show)
+
+    def _show_import(self, fitting: Fitting, changed: Document, label: str) -> None:
+        editor = self._editor
         editor.posing.select(None)
         editor.apply(label, changed)
         self._fitting = fitting

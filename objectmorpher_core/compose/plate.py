@@ -44,7 +44,10 @@ def plate_cover(document: Document) -> Mask:
     covered = np.zeros((height, width), bool)
     for item in document.objects:
         if item.matte is not None:
-            covered |= crop(item.matte.alpha, item.matte.box, (0, 0, width, height)) > 0
+            shared = overlap(item.matte.box, (0, 0, width, height))
+            if shared is not None:
+                own = cut(item.matte.alpha, item.matte.box, shared)
+                cut(covered, (0, 0, width, height), shared)[own > 0] = True
         elif item.mask is not None:
             covered |= item.mask
     return covered
@@ -84,16 +87,20 @@ def build_plate(
     progress(0.9, "joining it to the photo")
     inner = (slice(y0, y1), slice(x0, x1))
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
-    away = away[inner]
-    weight = np.clip((SEAM * margin - away) / (0.6 * SEAM * margin), 0, 1)  # of the fill
+    weight = away[inner]  # of the fill; in place, as all that is as large as the photo
+    np.subtract(SEAM * margin, weight, out=weight)
+    weight /= 0.6 * SEAM * margin
+    np.clip(weight, 0, 1, out=weight)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
     difference = np.zeros(photo.shape, np.float32)
     strips = [slice(first, first + STRIP) for first in range(0, len(photo), STRIP)]
     for strip in strips:
         difference[strip] = unit_pixels(photo[strip]) - unit_pixels(fill[strip])
-    change, joined = correction(difference, ring, margin), np.empty_like(photo)
+        difference[strip] *= ring[strip, :, None]
+    small = _coarse_correction(difference, ring, margin)
     del difference
+    change, joined = _enlarged(small, ring.shape), np.empty_like(photo)
     for strip in strips:
         true, new = unit_pixels(photo[strip]), unit_pixels(fill[strip])
         mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
@@ -103,17 +110,22 @@ def build_plate(
 
 
 def correction(difference: F32, ring: Mask, margin: float) -> F32:
-    """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards.
+    """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards."""
+    return _enlarged(_coarse_correction(difference * ring[..., None], ring, margin), ring.shape)
 
-    Shepard's interpolation with a heavy-tailed kernel, on a grid as coarse as the margin allows.
+
+def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
+    """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows.
+
+    Shepard's interpolation with a heavy-tailed kernel.
     """
     height, width = ring.shape
     if not ring.any():
-        return np.zeros_like(difference)
+        return np.zeros((1, 1, 3), np.float32)
     scale = min(COARSE / margin, 1.0)
     size = (max(round(width * scale), 1), max(round(height * scale), 1))
     known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    values = cv2.resize(difference * ring[..., None], size, interpolation=cv2.INTER_AREA)
+    values = cv2.resize(difference, size, interpolation=cv2.INTER_AREA)
     total, mean = np.zeros_like(known), np.zeros_like(values)
     for n, sigma in enumerate(SIGMAS):
         share = 100.0**-n
@@ -122,7 +134,12 @@ def correction(difference: F32, ring: Mask, margin: float) -> F32:
     mean /= np.maximum(total, 1e-12)[..., None]
     away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
     mean *= np.exp(-away / (REACH * margin * scale))[..., None]
-    return np.asarray(cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+    return np.asarray(mean, np.float32)
+
+
+def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
+    size = (shape[1], shape[0])
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None:

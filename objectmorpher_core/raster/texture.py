@@ -13,6 +13,7 @@ from ..arrays import F32, frozen
 
 LEAST_LEVEL = 4  # px, shorter side of a picture that is halved again
 MOST_LEVELS = 8
+STRIP = 128  # rows that are made at a time: a border around all of a photo is a photo more
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +50,18 @@ def build_levels(foreground: F32, alpha: F32, left: float, top: float) -> Textur
     colours = np.ascontiguousarray(foreground, np.float32), np.ascontiguousarray(alpha, np.float32)
     cv2.mixChannels(list(colours), [levels[0]], [0, 0, 1, 1, 2, 2, 3, 3])
     for fine, coarse in pairwise(levels):
-        odd = fine.shape[0] % 2, fine.shape[1] % 2
-        if any(odd):
-            fine = cv2.copyMakeBorder(fine, 0, odd[0], 0, odd[1], cv2.BORDER_REPLICATE)
-        size = (coarse.shape[1], coarse.shape[0])
-        cv2.resize(fine, size, dst=coarse, interpolation=cv2.INTER_AREA)
+        for first in range(0, len(coarse), STRIP):
+            _halve(fine[2 * first : 2 * (first + STRIP)], coarse[first : first + STRIP])
     return TextureLevels(frozen(texels), frozen(shapes), left, top)
+
+
+def _halve(fine: F32, coarse: F32) -> None:
+    """Means of 2 x 2 pixels; an odd last row or column counts twice."""
+    odd = fine.shape[0] % 2, fine.shape[1] % 2
+    if any(odd):
+        fine = cv2.copyMakeBorder(fine, 0, odd[0], 0, odd[1], cv2.BORDER_REPLICATE)
+    size = (coarse.shape[1], coarse.shape[0])
+    cv2.resize(fine, size, dst=coarse, interpolation=cv2.INTER_AREA)
 
 
 def sample_texture(texture: TextureLevels, look: np.ndarray, lod: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from ..limits import MESH_NODES as MAX_NODES
 from ..limits import MESH_TRIANGLES as MAX_TRIANGLES
 from ..limits import MESH_VERTICES as MAX_VERTICES
 from ..limits import TEXTURE_SIDE as MAX_SIDE
-from ..shown import shown
+from ..shown import counted, shown
 from .limits import SplatFileError
 from .mesh_folder import MeshFolder
 
@@ -125,8 +125,8 @@ def _accessor_counts(tree: Json, views: list[int]) -> list[int]:
         size = ITEM_BYTES[accessor["componentType"]] * ITEMS[accessor["type"]]
         if count > MAX_VERTICES:
             raise SplatFileError(
-                f"the glTF file declares {count:,} vertices, more than the {MAX_VERTICES:,} that "
-                "can be read"
+                f"the glTF file declares {counted(count)} vertices, more than the "
+                f"{MAX_VERTICES:,} that can be read"
             )
         if "bufferView" in accessor:
             index = _whole(accessor["bufferView"])

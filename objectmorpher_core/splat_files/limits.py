@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import F32
 from ..gaussians import Gaussians
 from ..limits import GAUSSIANS as MAX_GAUSSIANS
+from ..shown import counted
 
 LEAST_SCALE = 1e-12  # trainers leave logarithms of -inf; its square is still a float32
 GREATEST = 1e9  # position or scale: beyond it products of squares leave float32
@@ -20,7 +21,8 @@ def check_count(count: int, what: str = "Gaussians") -> None:
     """Raises SplatFileError where a file declares more than can be held."""
     if count > MAX_GAUSSIANS:
         raise SplatFileError(
-            f"the file declares {count:,} {what}, more than the {MAX_GAUSSIANS:,} that can be read"
+            f"the file declares {counted(count)} {what}, more than the {MAX_GAUSSIANS:,} that can "
+            "be read"
         )
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import gc
+import os
+import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import Pipe
@@ -10,7 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app import blocks, wire
 from app.wire import KEPT, LARGE, Reader, Writer
+from objectmorpher_core.arrays import frozen
 
 
 class Line:
@@ -82,3 +88,79 @@ def test_one_message_may_hold_more_than_is_remembered(line: Line) -> None:
     for _ in range(2):
         arrived = line.sent(values)
         assert [int(a[0]) for a in arrived] == list(range(KEPT + 3))
+
+
+def huge(value: int) -> np.ndarray:
+    array = np.full((2, blocks.LEAST // 8), float(value))
+    array.setflags(write=False)
+    return array
+
+
+needs_blocks = pytest.mark.skipif(sys.platform != "linux", reason="shared memory of Linux")
+
+
+@needs_blocks
+def test_what_is_shared_goes_back_as_the_same_memory(line: Line) -> None:
+    first = line.sent([huge(1), "small"])
+    there = frozen(first[0])  # as the document holds it
+    assert blocks.block_of(there.data) is not None
+    back = Line()
+    again = back.sent({"image": there})["image"]
+    np.testing.assert_array_equal(again, huge(1))
+    one, other = (blocks.block_of(a.data) for a in (there, again))
+    assert one is not None and other is not None
+    assert os.fstat(one.descriptor).st_ino == os.fstat(other.descriptor).st_ino
+    assert not again.flags.writeable
+    back.close()
+
+
+@needs_blocks
+def test_a_part_of_shared_memory_is_sent_as_the_part_that_it_is(line: Line) -> None:
+    whole = line.sent(np.arange(blocks.LEAST / 4).reshape(2, -1))
+    for part in (whole[1], whole[:, :-1], np.asfortranarray(whole), whole.T):
+        np.testing.assert_array_equal(line.sent(part), part)
+
+
+@needs_blocks
+def test_no_open_files_are_left(line: Line) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for k in range(20):
+        assert line.sent(huge(k))[0, 0] == k
+    assert len(os.listdir("/proc/self/fd")) <= before + 3 * KEPT  # what both sides remember
+    line.close()
+    line._writer._kept.clear()
+    line._reader._kept.clear()
+    gc.collect()
+    assert len(os.listdir("/proc/self/fd")) <= before
+
+
+@needs_blocks
+def test_without_shared_memory_it_goes_through_the_pipe(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_memory(name: str, flags: int) -> int:
+        raise OSError(errno.ENOMEM, "no memory")
+
+    monkeypatch.setattr(os, "memfd_create", no_memory)
+    np.testing.assert_array_equal(line.sent(huge(4)), huge(4))
+
+
+def test_what_is_remembered_has_a_limit_in_bytes(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wire, "KEPT_BYTES", 2 * LARGE)
+    values = [large(k) for k in range(3)]
+    arrived = [line.sent(value) for value in values]
+    assert line.sent(values[2]) is arrived[2]
+    assert line.sent(values[0]) is not arrived[0]
+
+
+def test_who_remembers_nothing_is_heard_all_the_same() -> None:
+    ends = Pipe()
+    writer, reader = Writer(ends[0], kept=0), Reader(ends[1])
+    for k in range(3):
+        thread = threading.Thread(target=writer.write, args=([large(k), large(k)],))
+        thread.start()
+        assert [int(a[0]) for a in reader.read()] == [k, k]
+        thread.join()
+    assert not writer._kept

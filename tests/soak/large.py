@@ -1,8 +1,10 @@
 """The large cases, each through the whole job: `python -m tests.soak.large CASE` (photo, ...).
 
 Works in the editor and its worker, without a window, and prints one line of JSON for each step:
-seconds on the wall, processor seconds of the editor, of its main thread and of its worker, and the
-most memory that either has held until then.
+seconds on the wall, processor seconds of the editor, of its main thread and of its worker, the
+longest that the main thread was at work without a frame (of the processor and on the wall), and the
+most memory that each and both have held in it, what they share counted once. Frames are drawn
+with OpenGL where there is some.
 """
 
 from __future__ import annotations
@@ -20,10 +22,12 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import cv2
+import moderngl
 import numpy as np
 
 from app.commands import run
 from app.editor import Editor
+from app.gui.scenes import build_scene
 from app.settings import Settings
 from app.tools.pointer import Pointer
 from app.tools.pose_tool import PoseTool
@@ -35,7 +39,8 @@ from objectmorpher_core.pose import Pose
 from objectmorpher_core.splat_files import encode
 from tests import photos
 
-from .session import SIZE, _resident
+from .session import SIZE, _renderer
+from .watching import Watch, share
 
 SIDE = 10_000  # px of the large photo's
 OBJECTS = 20
@@ -55,26 +60,58 @@ class Desk:
         self.editor.view.resize(SIZE, 1.0, None)
         self._tool = PoseTool()
         self.wait(lambda: None)
+        self._watch = Watch(lambda: self._worker)
+        self._stall = self._stall_wall = 0.0  # s, of a step's longest turn of the loop
+        try:
+            self._gl = moderngl.create_standalone_context(require=330, backend="egl")
+            self._renderer = _renderer(self._gl)
+        except Exception as error:
+            print(f"nothing is drawn: {error}", file=sys.stderr)
+            self._renderer = None
 
     @contextmanager
     def step(self, name: str, **more: object) -> Iterator[None]:
         """Tells what it costs, with all the jobs that it starts."""
+        self._watch.most()
+        self._stall = self._stall_wall = 0.0
         begun = self._clocks()
         yield
         self.wait(lambda: None)
         wall, own, main, worker = np.subtract(self._clocks(), begun)
+        most = self._watch.most()
         told = {
             "step": name, "wall_s": round(wall, 2), "editor_s": round(own, 2),
             "main_s": round(main, 2), "worker_s": round(worker, 2),
-            "editor_mib": round(_most("self")), "worker_mib": round(_most(self._worker)),
-            "editor_now_mib": round(_resident("self")),
+            "stall_s": round(self._stall, 2), "stall_wall_s": round(self._stall_wall, 2),
+            "editor_mib": round(most[0]), "worker_mib": round(most[1]), "both_mib": round(most[2]),
+            "editor_now_mib": round(share("self")), "worker_now_mib": round(share(self._worker)),
         }  # fmt: skip
         print(json.dumps(told | more), flush=True)
+
+    def draw(self) -> None:
+        """A frame, as the window draws it."""
+        if self._renderer is not None:
+            scene = build_scene(self.editor, "gl")
+            self._renderer.begin((0.0, 0.0, 0.0), SIZE)
+            self._renderer.draw(scene, self.editor.view, (0, 0, *SIZE))
+            self._gl.finish()
+
+    def close(self) -> None:
+        self._watch.close()
+        self.editor.shut_down()
+
+    def _poll(self) -> bool:
+        begun = time.thread_time(), time.monotonic()
+        is_changed = self.editor.poll()
+        spent = time.thread_time() - begun[0], time.monotonic() - begun[1]
+        self._stall = max(self._stall, spent[0])
+        self._stall_wall = max(self._stall_wall, spent[1])
+        return is_changed
 
     def wait(self, then: Callable[[], object]) -> None:
         """As the window's loop does, until nothing runs."""
         editor, end = self.editor, time.monotonic() + PATIENCE
-        while editor.poll() or not editor.jobs.is_idle or not editor.chores.is_idle:
+        while self._poll() or not editor.jobs.is_idle or not editor.chores.is_idle:
             assert time.monotonic() < end, f"nothing came in time: {editor.message}"
             time.sleep(0.005)
         message = editor.message
@@ -122,6 +159,7 @@ class Desk:
         with self.step("open the session", mib=sizes):
             self.open(self.folder / "large.omorph")
         assert self.document is not before and len(self.document.objects) == len(before.objects)
+        _frames(self)
 
     @property
     def _worker(self) -> str:
@@ -155,6 +193,7 @@ def photo(desk: Desk) -> None:
     with desk.step("lift, fill in the background"):
         run(desk.editor, "lift")
     assert desk.document.plate is not None
+    _frames(desk)
     with desk.step("drag"):
         desk.drag(0, np.array([x, y]), (25.0, 10.0))
     with desk.step("move"):
@@ -206,6 +245,7 @@ def gaussians(desk: Desk) -> None:
         desk.editor.shaping.open_file(path)
     lifted = desk.document.objects[0].lifted
     assert lifted is not None, desk.editor.message
+    _frames(desk)
     spots = np.argwhere(mask)[:, ::-1] + 0.5
     with desk.step("first drag", gaussians=len(lifted.gaussians)):
         desk.drag(0, spots.mean(0), (15.0, 5.0))
@@ -252,6 +292,13 @@ def steps(desk: Desk) -> None:
 
 
 # ---- what they are made of ------------------------------------------------------------------
+
+
+def _frames(desk: Desk) -> None:
+    with desk.step("first frame"):
+        desk.draw()
+    with desk.step("second frame"):
+        desk.draw()
 
 
 def _drags(desk: Desk, masks: list[np.ndarray]) -> float:
@@ -303,12 +350,6 @@ def _silent() -> Iterator[None]:
     yield
 
 
-def _most(process: str) -> float:
-    """MiB that a process has held at most."""
-    status = Path(f"/proc/{process}/status").read_text()
-    return int(status.split("VmHWM:")[1].split()[0]) / 1024
-
-
 CASES = {case.__name__: case for case in (photo, objects, gaussians, steps)}
 
 
@@ -322,7 +363,7 @@ def main() -> int:
         try:
             CASES[sys.argv[1]](desk)
         finally:
-            desk.editor.shut_down()
+            desk.close()
     return 0
 
 
