@@ -13,6 +13,7 @@ from .compose import refine
 from .evaluation.measures import trunk_files
 from .evaluation.metrics import METRICS
 from .lift import depth_look, worker_file
+from .lift.trellis import weights
 from .models import device
 from .threads import core_count
 
@@ -105,6 +106,16 @@ def _device() -> str:
     return name if free is None else f"{name}, {free / 2**30:.1f} GB free"
 
 
+def _has_gpu() -> bool:
+    """Whether PyTorch is there and would use one."""
+    if not device.has_torch():
+        return False
+    try:
+        return device.devices()[0] != "cpu"
+    except models.ModelError:
+        return False
+
+
 def _selecting() -> Stage:
     absent = backends.absent(segment.BACKENDS)
     chosen = segment.load("auto")
@@ -113,9 +124,10 @@ def _selecting() -> Stage:
         why, better = "it goes by colour alone, and needs no model", "`objectmorpher models get`"
         return Stage("select", uses, why, absent, better)
     if uses == "dino":
-        why = "DINOv2 is here, and no SAM that is quick enough"
-        better = "" if "sam2" not in names else "`objectmorpher models get sam2.1-tiny`"
-        if better and not device.has_torch():
+        slow = [name for name in segment.BACKENDS if "sam" in name and name not in names]
+        told = f"{', '.join(slow)} would take minutes a photo" if slow else "no SAM is"
+        why, better = f"DINOv2 is here, and {told}", "`objectmorpher models get sam2.1-tiny`"
+        if not device.has_torch():
             better = f"`{models.EXTRA}`, then {better}"
         if "subject" in names:
             better = "`objectmorpher models get u2netp`"
@@ -145,6 +157,11 @@ def _lifting() -> Stage:
         better += f" after `{models.EXTRA}`, or `objectmorpher models add depth FILE.onnx`"
     if not has_shape:
         better = "`objectmorpher models get dinov2-vits14`, for our shape network"
+    if _has_gpu() and "trellis" in dict(absent):
+        better += "; " if better else ""
+        better += "to make up what the photo does not show: " + " and ".join(
+            f"`objectmorpher models get {id}`" for id in (weights.TRELLIS, weights.ENCODER)
+        )
     workers = _workers()
     absent += tuple((n, told) for n, told, is_there in workers if not is_there)
     also = tuple((n, told) for n, told, is_there in workers if is_there)
@@ -171,7 +188,7 @@ def _filling() -> Stage:
     chosen = compose.load("auto").name
     if chosen != "patchmatch":
         better = ""
-        if chosen in ("lama", "migan") and device.has_torch() and device.devices()[0] != "cpu":
+        if chosen in ("lama", "migan") and _has_gpu():
             better = "`objectmorpher models get pixelhacker`, for this GPU"
         return Stage(
             "background", chosen, "the first of its stage that can run here", absent, better
@@ -192,7 +209,10 @@ def _harmonising() -> Stage:
     )
     if better and not device.has_torch():
         better = f"`{models.EXTRA}`, then {better}"
-    return Stage("refine", "none", f"what is asked for: {', '.join(others)}", absent, better)
+    if better and not _has_gpu():  # hours a picture without one
+        better = f"a GPU of 12 GB, here or in a server (docs/serve.md): {better}"
+    why = f"unless it is asked for by its name: {', '.join(others)}"
+    return Stage("refine", "none", why, absent, better)
 
 
 def _evaluating() -> Stage:

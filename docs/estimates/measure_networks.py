@@ -3,9 +3,11 @@
 `python docs/estimates/measure_networks.py [NAME ...]` needs the extra `models`, no weights and no
 network; without names it does what fits the device. Every name is measured in a process of its own,
 so that its peak memory is its own: on a GPU what PyTorch took, on the CPU what the process grew by.
-A flow is followed for as many steps as published on a GPU, and for one step on the CPU. The figures
-are kept in measured.json, by device, and the table of docs/models.md is written from it. A step of
-training is measured by `objectmorpher train lora --measure`.
+A flow is followed for as many steps as published on a GPU, and for one step on the CPU. There the
+processor's own seconds are told, too, about the same on a machine that has other work; those of
+the wall are left out where less than HAD of the cores could be had. The figures are kept in
+measured.json, by device, and the table of docs/models.md is written from it. A step of training
+is measured by `objectmorpher train lora --measure`.
 """
 
 from __future__ import annotations
@@ -39,10 +41,14 @@ from objectmorpher_core.training.composition import edit_models
 HERE = Path(__file__).parent
 KEPT, PAGE = HERE / "measured.json", HERE.parent / "models.md"
 START, END = "<!-- measured -->\n", "<!-- end of measured -->\n"
-HEAD = ("network", "how", "number", "parameters", "seconds", "peak memory")
+HEAD = ("network", "how", "number", "parameters", "seconds", "of a processor", "peak memory")
 RUNS = 3  # the median of them, after one that is not counted
+LONG = 20.0  # s of a processor: a run that takes longer is done once
+HAD = 0.8  # x the cores
 GRID, RADIUS, THICKNESS = 64, 22.2, 1.74  # cells; a shell stands for an object
-LARGE = ("klein", "qwen")  # not on the CPU unless they are named
+FILL = "pixelhacker, whole"
+REFINERS = ("klein", "qwen")
+LARGE = (FILL, *REFINERS)  # not on the CPU unless they are named
 SIDE = 1024  # px of what a refiner is shown
 TRELLIS = Sampling(steps=12, guidance=7.5, interval=(0.5, 0.95), rescale_t=3.0)
 WORDS = 1374  # tokens of a picture of 518 px: DINOv2's with four registers
@@ -56,8 +62,9 @@ class Figure:
     how: str
     number: str
     parameters: int
-    seconds: float  # the median
+    seconds: float | None  # the median; None: the machine was too busy to tell
     peak: int  # bytes, weights and work
+    processor: float | None = None  # s of all cores together, on a CPU
 
 
 @dataclass(frozen=True)
@@ -102,7 +109,7 @@ def tables(kept: Mapping[str, list[dict[str, Any]]]) -> str:
     """In Markdown."""
     lines = []
     for device, figures in kept.items():
-        lines += [f"{device}:", "", _line(HEAD), _line(["---"] * 3 + ["---:"] * 3)]
+        lines += [f"{device}:", "", _line(HEAD), _line(["---"] * 3 + ["---:"] * 4)]
         lines += [_line(_cells(Figure(**figure))) for figure in figures]
         lines.append("")
     return "\n".join(lines)
@@ -113,11 +120,16 @@ def _line(cells: Any) -> str:
 
 
 def _cells(figure: Figure) -> tuple[str, ...]:
-    seconds = f"{figure.seconds:.1f}" if figure.seconds >= 1 else f"{figure.seconds:.2g}"
     return (
         f"`{figure.name}`", figure.how, figure.number, f"{figure.parameters / 1e6:,.0f} M",
-        seconds, f"{figure.peak / 1e9:.1f} GB",
+        _told(figure.seconds), _told(figure.processor), f"{figure.peak / 1e9:.1f} GB",
     )  # fmt: skip
+
+
+def _told(seconds: float | None) -> str:
+    if seconds is None:
+        return "–"
+    return f"{seconds:.1f}" if seconds >= 1 else f"{seconds:.2g}"
 
 
 def _figure(name: str, device: str) -> Figure:
@@ -126,17 +138,33 @@ def _figure(name: str, device: str) -> Figure:
     before = _resident()
     with torch.inference_mode():
         job = _makers()[name](device, number)
-        seconds = []
-        for _ in range(1 + RUNS):
-            began = time.perf_counter()
-            job.run()
-            if device == "cuda":
-                torch.cuda.synchronize()
-            seconds.append(time.perf_counter() - began)
-    took = statistics.median(seconds[1:])
+        took = [_run(job, device)]
+        if device == "cuda" or took[0].processor < LONG:
+            took = [_run(job, device) for _ in range(RUNS)]
+    wall = statistics.median(run.wall for run in took)
     peak = torch.cuda.max_memory_allocated() if device == "cuda" else _peak() - before
     told = str(number).removeprefix("torch.")
-    return Figure(name, job.how, told, job.parameters, took, peak)
+    if device == "cuda":
+        return Figure(name, job.how, told, job.parameters, wall, peak)
+    processor = statistics.median(run.processor for run in took)
+    is_told = processor > HAD * torch.get_num_threads() * wall
+    return Figure(name, job.how, told, job.parameters, wall if is_told else None, peak, processor)
+
+
+@dataclass(frozen=True)
+class Took:
+    """Seconds of a run."""
+
+    wall: float
+    processor: float  # of all cores together
+
+
+def _run(job: Job, device: str) -> Took:
+    wall, processor = time.perf_counter(), time.process_time()
+    job.run()
+    if device == "cuda":
+        torch.cuda.synchronize()
+    return Took(time.perf_counter() - wall, time.process_time() - processor)
 
 
 def _makers() -> dict[str, Maker]:
@@ -147,7 +175,8 @@ def _makers() -> dict[str, Maker]:
         found[f"trellis {part.split('_dit')[0].split('_conv')[0].split('_swin')[0]}"] = partial(
             _trellis_part, part
         )
-    return found | {"pixelhacker": _pixelhacker} | {n: partial(_refiner, n) for n in LARGE}
+    found |= {"pixelhacker": _pixelhacker_step, FILL: _pixelhacker}
+    return found | {name: partial(_refiner, name) for name in REFINERS}
 
 
 def _network(name: str, device: str, number: torch.dtype) -> Any:
@@ -209,20 +238,24 @@ def _shell(device: str) -> Voxels:
     return Voxels.of(torch.from_numpy(np.abs(away - RADIUS) < THICKNESS / 2).to(device))
 
 
+def _pixelhacker_step(device: str, number: torch.dtype) -> Job:
+    """Both the step with what is asked for and the one without, as they are run: together."""
+    network: Any = build("pixelhacker", device).to(number)
+    ids = torch.arange(pixelhacker.IDS, device=device).view(2, -1)
+    latents = torch.randn(2, 9, 64, 64, device=device, dtype=number)
+    time_now = torch.tensor(1, device=device)
+    return Job(lambda: network(latents, time_now, ids), "a step of 20, 512 px", parameters(network))
+
+
 def _pixelhacker(device: str, number: torch.dtype) -> Job:
     network: Any = build("pixelhacker", device).to(number)
     codec: Any = build("pixelhacker-vae", device)
-    count = parameters(network) + parameters(codec)
-    if device == "cpu":
-        ids = torch.arange(pixelhacker.IDS).view(2, -1)
-        latents = torch.randn(2, 9, 64, 64)
-        return Job(lambda: network(latents, torch.tensor(1), ids), "a step of 20, 512 px", count)
     picture = np.random.default_rng(0).random((512, 512, 3), np.float32)
     hole = np.zeros((512, 512), bool)
     hole[128:384, 128:384] = True
     return Job(
         lambda: pixelhacker.sample(network, codec, picture, hole, silent, 0),
-        f"{pixelhacker.STEPS} steps, 512 px", count,
+        f"a fill of {pixelhacker.STEPS} steps, 512 px", parameters(network) + parameters(codec),
     )  # fmt: skip
 
 

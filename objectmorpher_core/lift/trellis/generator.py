@@ -146,7 +146,7 @@ class Generator:
         self, seen: Tensor, noise: torch.Generator, how: Sampling, progress: Progress
     ) -> Tensor:
         """(1, C, r, r, r) the latents of where the object is."""
-        flow, nothing = self.part(FLOW), torch.zeros_like(seen)
+        flow, nothing = self.part(FLOW), unseen(seen)
         shape = (1, flow.form.in_channels, *[flow.form.resolution] * 3)
         start = torch.randn(shape, generator=noise).to(self.device)
 
@@ -172,7 +172,7 @@ class Generator:
         progress: Progress,
     ) -> Tensor:
         """(1, N, C) what it is like there."""
-        flow, (seen, extras), nothing = self.part(LATENT), told, torch.zeros_like(told[0])
+        flow, (seen, extras), nothing = self.part(LATENT), told, unseen(told[0])
         start = torch.randn((len(voxels), flow.form.out_channels), generator=noise)
 
         def velocity(x: Tensor, time: Tensor, is_shown: bool) -> Tensor:
@@ -199,6 +199,15 @@ class Generator:
         if mean.shape != latents.shape[-1:] or std.shape != mean.shape:
             raise LiftError(f"pipeline.json tells the scale of {len(mean)} channels, not of these")
         return latents * std + mean
+
+
+def unseen(seen: Tensor) -> Tensor:
+    """(1, 1, D) what a flow is told in place of `seen` (1, M, D) where no picture is shown.
+
+    The networks were trained with M tokens of zeros. Attention to tokens that are all the same is
+    attention to one of them: the same answer, without the work on the others.
+    """
+    return torch.zeros_like(seen[:, :1])
 
 
 def occupied(logits: Tensor) -> Voxels:

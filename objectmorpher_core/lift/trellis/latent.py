@@ -29,7 +29,9 @@ class Kernel(nn.Module):
         kernels = self.weight.flatten(1, 3).unbind(1)  # 27 of (D, C)
         out = self.bias.float().repeat(x.shape[0], len(voxels), 1)  # sums in single precision
         for kernel, (rows, columns) in zip(kernels, voxels.neighbours, strict=True):
-            out[:, rows] += (x[:, columns] @ kernel.T).float()
+            # Whole rows are copied, which indexing does not know; a row comes once, so that the
+            # order in which a GPU adds does not matter.
+            out.index_add_(1, rows, (x.index_select(1, columns) @ kernel.T).float())
         return out.to(x.dtype)
 
 

@@ -8,14 +8,14 @@ import re
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.models import HubModel
+from objectmorpher_core.models import HubModel, registry
 
 COMMIT = "a" * 40
 
@@ -157,8 +157,17 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def offering(
     monkeypatch: pytest.MonkeyPatch, files: Mapping[str, bytes], free: HubModel, *gated: HubModel
 ) -> Iterator[Hub]:
-    """The server, with these files of each model; huggingface_hub asks it, or the test skips."""
+    """The server, with these files of each model; huggingface_hub asks it, or the test skips.
+
+    Their commits and hashes in the registry are those of the real files: here none are known.
+    """
     pytest.importorskip("huggingface_hub")
+    offered = {model.id for model in (free, *gated)}
+    known = tuple(
+        replace(model, revision="", sha256={}) if model.id in offered else model
+        for model in registry.hub_models()
+    )
+    monkeypatch.setattr(registry, "hub_models", lambda: known)
     with serving() as hub:
         monkeypatch.setenv("HF_ENDPOINT", hub.url)
         hub.repositories = {model.repository: dict(files) for model in (free, *gated)}

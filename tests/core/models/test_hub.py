@@ -181,9 +181,8 @@ def test_stars_mean_the_files_of_the_repository(
         "config.json": CONFIG, "unet/a-1.safetensors": WEIGHTS, "unet/a-2.safetensors": WEIGHTS,
         "old.bin": b"no",
     }  # fmt: skip
-    parts = replace(
-        FREE, id="parts", repository="some/parts", files=("config.json", "unet/*.safetensors")
-    )
+    names = ("config.json", "unet/*.safetensors")
+    parts = replace(FREE, id="parts", repository="some/parts", revision="", sha256={}, files=names)
     known = registry.hub_models()
     monkeypatch.setattr(registry, "hub_models", lambda: (*known, parts))
     at = models.get("parts")

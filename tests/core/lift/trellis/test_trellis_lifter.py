@@ -19,13 +19,15 @@ from objectmorpher_core import lift
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis import generator as generators
 from objectmorpher_core.lift.trellis import weights
-from objectmorpher_core.lift.trellis.generator import Generator
+from objectmorpher_core.lift.trellis.generator import Generator, unseen
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
+from objectmorpher_core.lift.trellis.parts import build
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.progress import Cancelled, silent
 from objectmorpher_core.segment.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
 
+F32 = 1e-5
 ARRAYS = ("means", "quats", "scales", "opacities", "colors")
 
 
@@ -65,6 +67,17 @@ def test_the_same_seed_makes_the_same_object(generator, picture):
     one, same_again, other = (generator.make(picture, seed=s).gaussians for s in (1, 1, 2))
     assert same(one, same_again)
     assert len(one) != len(other) or not same(one, other)
+
+
+def test_one_token_of_nothing_tells_a_flow_what_all_of_them_do():
+    torch.manual_seed(0)
+    flow = build(tiny_trellis.description("sparse_structure_flow_model")).eval()
+    noise, seen = torch.randn(1, 8, 4, 4, 4), torch.randn(1, 20, tiny_trellis.WIDTH)
+    time = torch.full((1,), 500.0)
+    with torch.inference_mode():
+        all_of_them = flow(noise, time, torch.zeros_like(seen))
+        assert torch.allclose(flow(noise, time, unseen(seen)), all_of_them, atol=F32)
+        assert not torch.allclose(flow(noise, time, seen), all_of_them, atol=100 * F32)
 
 
 def test_what_is_made_lies_in_its_cube(generator, picture):
