@@ -19,7 +19,8 @@ from ..gaussians import Gaussians
 from ..progress import Progress, part, silent
 from ..threads import core_count, in_threads
 from . import LiftError
-from .placement_refine import Fit, refine
+from .placement_matches import Matches
+from .placement_refine import Fit, refine, support
 from .placement_search import angles, search
 from .placement_view import Stance, Target, agreement, sketched
 from .sketch import Surfels, even_surfels, own_frame
@@ -51,7 +52,7 @@ class Proposal:
     camera: Camera  # the photo's; its focal length is the one with which the pose was found
     iou: float  # of the silhouettes, inside the photo
     colour_error: float  # RMS sRGB where they overlap, light and exposure taken out
-    score: float  # IoU less colour error
+    score: float  # IoU less colour error, and the support of matches if there are any
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
@@ -77,6 +78,7 @@ class Hints:
     is_focal_free: bool = False  # whether the camera's focal length is only a guess
     up: tuple[float, float, float] | None = None  # of the object; poses that tie: upright first
     start: F64 | None = None  # (4, 4) world from object: a pose that is to be beaten, or kept
+    matches: Matches | None = None  # points of the object that the photo shows, its own frame
 
 
 def register(
@@ -91,13 +93,16 @@ def register(
     Raises LiftError where the object or the mask is too small to tell.
     """
     progress(0.0, "Looking at the object")
-    return Registrar(gaussians, target, seed).propose(hints or Hints(), progress)
+    hints = hints or Hints()
+    return Registrar(gaussians, target, seed, hints.matches).propose(hints, progress)
 
 
 class Registrar:
     """An object and a mask to which it is registered. Costly to make, cheap to ask."""
 
-    def __init__(self, gaussians: Gaussians, target: Target, seed: int = 0) -> None:
+    def __init__(
+        self, gaussians: Gaussians, target: Target, seed: int = 0, matches: Matches | None = None
+    ) -> None:
         self.target = target
         try:
             self._frame = own_frame(gaussians)
@@ -106,6 +111,7 @@ class Registrar:
         except ValueError as error:
             raise LiftError(f"the object cannot be registered: {error}") from error
         self._views = tuple(target.view(level.size) for level in LEVELS)
+        self._matches = None if matches is None else matches.moved(self._frame)
 
     def rated(self, world_from_object: F64, focal: float | None = None) -> Proposal:
         """A pose that was chosen by hand, and how well it agrees: some milliseconds."""
@@ -123,7 +129,7 @@ class Registrar:
 
     def propose(self, hints: Hints, progress: Progress = silent) -> Registration:
         """See `register`."""
-        fits = self._searched(hints, part(progress, 0.0, 0.4))
+        fits = [*self._matched(), *self._searched(hints, part(progress, 0.0, 0.4))]
         for k, level in enumerate(LEVELS):
             span = part(progress, 0.4 + 0.2 * k, 0.4 + 0.2 * (k + 1))
             fits = self._all_refined(fits[: level.kept], k, hints.is_focal_free, span)
@@ -148,6 +154,12 @@ class Registrar:
         found = search(self._surfels[0], self._views[0], self.target, focals, progress)
         return [self._rated(f.stance, 0) for f in found[: LEVELS[0].kept]]
 
+    def _matched(self) -> list[Fit]:
+        """The pose on which most matches agree."""
+        camera = self.target.camera
+        found = None if self._matches is None else self._matches.pose(camera)
+        return [] if found is None else [self._rated(Stance.of(found, camera), 0)]
+
     def _all_refined(self, fits: list[Fit], k: int, is_free: bool, progress: Progress) -> list[Fit]:
         """All of them refined at level `k`; of those that end as one pose the best."""
         refined: list[Fit] = list(fits)
@@ -165,12 +177,16 @@ class Registrar:
 
     def _refined(self, fit: Fit, k: int, is_free: bool) -> Fit:
         camera, level = self.target.camera, LEVELS[k]
-        return refine(self._surfels[k], fit.stance, self._views[k], camera, is_free, level.steps)
+        return refine(
+            self._surfels[k], fit.stance, self._views[k], camera, is_free, level.steps,
+            self._matches,
+        )  # fmt: skip
 
     def _rated(self, stance: Stance, k: int = -1) -> Fit:
         view = self._views[k]
         picture = sketched(self._surfels[k], stance, view, self.target.camera)
-        return Fit(stance, agreement(picture, view))
+        own = support(self._matches, stance, self.target.camera)
+        return Fit(stance, agreement(picture, view, own))
 
     def _stance(self, world_from_object: F64, focal: float | None = None) -> Stance:
         camera = replace(self.target.camera, focal=focal or self.target.camera.focal)

@@ -7,13 +7,14 @@ each step and held while the pose moves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from ..arrays import F32, F64
 from ..camera import Camera
+from .placement_matches import NEAR, Matches
 from .placement_view import Agreement, Stance, View, agreement, fitted_light, lit, sketched
 from .sketch import COVERAGE, Surfels
 
@@ -22,6 +23,7 @@ COLOUR = 1.4  # weight of a difference of colour beside one of coverage
 ROBUST = 0.25  # sRGB: a larger difference is no longer believed in full
 STEP = np.array([0.5, 0.5, 0.5, 0.4, 0.4, 0.5, 0.06])  # of the derivative: px, but for log focal
 FOCAL_PRIOR = 0.002  # x the mask's area: what one natural logarithm of the focal length costs
+OUTLINE = 2.0  # x the object's size: px^2 of coverage that change where it is a px aside
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 3e-2, 1e-4, 1e3
 ENOUGH = 0.02  # px: a smaller step is the last one
 
@@ -35,13 +37,19 @@ class Fit:
 
 
 def refine(
-    surfels: Surfels, start: Stance, view: View, photo: Camera, is_focal_free: bool, steps: int
+    surfels: Surfels,
+    start: Stance,
+    view: View,
+    photo: Camera,
+    is_focal_free: bool,
+    steps: int,
+    matches: Matches | None = None,
 ) -> Fit:
     """The stance near `start` that agrees best with the view; never one that scores less."""
-    problem = _Problem(surfels, view, photo, is_focal_free)
+    problem = _Problem(surfels, view, photo, is_focal_free, matches)
     picture = problem.picture(start)
     stance, damping = start, FIRST_DAMPING
-    best = Fit(start, agreement(picture, view))
+    best = Fit(start, agreement(picture, view, support(matches, start, photo)))
     for _ in range(steps):
         light = problem.light(picture)
         step, damping = problem.descent(stance, picture, light, damping)
@@ -49,7 +57,7 @@ def refine(
             break
         stance = stance.moved(step, problem.radius(stance))
         picture = problem.picture(stance)
-        found = agreement(picture, view)
+        found = agreement(picture, view, support(matches, stance, photo))
         if found.score > best.agreement.score:
             best = Fit(stance, found)
         if np.abs(step[:6]).max() < ENOUGH / problem.zoom:
@@ -57,11 +65,25 @@ def refine(
     return best
 
 
+def support(matches: Matches | None, stance: Stance, photo: Camera) -> float:
+    """Share of the matches, in the surfels' frame, that agree with a stance; 0 without any."""
+    if matches is None:
+        return 0.0
+    return matches.support(stance.matrix(photo), replace(photo, focal=stance.focal))
+
+
 class _Problem:
     """Residuals and their derivative. A step is in photo px, but for the logarithm of the focal."""
 
-    def __init__(self, surfels: Surfels, view: View, photo: Camera, is_focal_free: bool) -> None:
-        self.surfels, self.view, self.photo = surfels, view, photo
+    def __init__(
+        self,
+        surfels: Surfels,
+        view: View,
+        photo: Camera,
+        is_focal_free: bool,
+        matches: Matches | None,
+    ) -> None:
+        self.surfels, self.view, self.photo, self.matches = surfels, view, photo, matches
         self.zoom = view.camera.focal / photo.focal  # px of the view per px of the photo
         self.count = 7 if is_focal_free else 6
         self.area = float(view.mask.sum())
@@ -111,7 +133,19 @@ class _Problem:
         stack = np.dstack([coverage - view.mask, COLOUR / np.sqrt(3) * both[..., None] * rest])
         stack = cv2.GaussianBlur(stack, (0, 0), BLUR)
         prior = np.log(stance.focal / self.photo.focal) * np.sqrt(FOCAL_PRIOR * self.area)
-        return np.append(stack.ravel().astype(np.float64), prior)
+        pull = [] if self.matches is None else self.pull(self.matches, stance)
+        return np.concatenate([stack.ravel().astype(np.float64), pull, [prior]])
+
+    def pull(self, matches: Matches, stance: Stance) -> F64:
+        """(2 n,) residuals of the matches.
+
+        All of them a view's px aside cost what it costs the outline to be so; far off ones nothing
+        more (Geman & McClure 1985).
+        """
+        gaps = matches.gaps(stance.matrix(self.photo), replace(self.photo, focal=stance.focal))
+        gaps /= np.sqrt(1 + (gaps * gaps).sum(1, keepdims=True))
+        size = np.sqrt(self.area)  # px of the view
+        return (gaps * (NEAR * size) * np.sqrt(OUTLINE * size / matches.reliable)).ravel()
 
     def energy(self, stance: Stance, picture: F32, light: F32) -> float:
         residual = self.residual(stance, picture, light)

@@ -150,10 +150,10 @@ class Agreement:
 
     iou: float  # of the silhouettes
     colour_error: float  # RMS sRGB where they overlap, under the light that explains it best
-    score: float
+    score: float  # IoU less colour error, and the support of matches where there are any
 
 
-def agreement(picture: F32, view: View) -> Agreement:
+def agreement(picture: F32, view: View, support: float = 0.0) -> Agreement:
     """See `Agreement`; what would be beyond the photo's frame does not count."""
     coverage, mask = sharpened(picture[..., COVERAGE]) * view.within, sharpened(view.mask)
     both = np.minimum(coverage, mask)
@@ -161,7 +161,7 @@ def agreement(picture: F32, view: View) -> Agreement:
     rest = lit(picture, fitted_light(picture, view, both)) - view.pixels
     total = max(float(both.sum()), 1e-9)
     error = float(np.sqrt((both[..., None] * rest**2).sum() / (3 * total)))
-    return Agreement(iou, error, iou - error)
+    return Agreement(iou, error, iou - error + support)
 
 
 def sharpened(coverage: F32) -> F32:

@@ -24,12 +24,16 @@ def write_made_pairs(
         name = f"made-{seed}-{k:05d}"
         if (folder / f"{name}-a{MASK}.png").exists():
             continue
-        low, high = TURNS
-        turn = low + (high - low) * (0.5 + 0.5 * (-1) ** k * (k * 0.618 % 1))
-        views = make_views(seed * 1_000_000 + k, (0.0, turn), side, FAMILIES)
+        views = make_views(seed * 1_000_000 + k, (0.0, turn_of(k)), side, FAMILIES)
         outputs: dict[Path, bytes] = {}
         for letter, view in zip("ba", views, strict=True):
             at = folder / f"{name}-{letter}.png"
             outputs[at] = encode_picture(Picture(view.rgb), ".png")
             outputs[at.with_name(at.stem + MASK + ".png")] = encode_mask(view.mask)
         write_all(outputs)
+
+
+def turn_of(k: int) -> float:
+    """Degrees by which the camera of pair `k` goes around its object."""
+    low, high = TURNS
+    return low + (high - low) * (0.5 + 0.5 * (-1) ** k * (k * 0.618 % 1))

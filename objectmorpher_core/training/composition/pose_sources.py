@@ -2,8 +2,9 @@
 
 A source tells a motion, the world of A from the world of B (`camera.py`: each is its camera's own
 frame); the registration improves it. A source that tells none has every turn searched. `own` only
-carries B's pose over to A's mask as a start. `cupid` asks CUPID about both pictures. Any other name
-is a worker's (docs/workers.md): a command that runs, for instance, pi^3, in its own environment.
+carries B's pose over to A's mask as a start; details that both pictures show (`matched`) tell more.
+`cupid` asks CUPID about both pictures. Any other name is a worker's (docs/workers.md): a command
+that runs, for instance, pi^3, in its own environment.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ...arrays import F64
+from ...arrays import F32, F64, frozen
 from ...document import LiftedObject
 from ...lift import LiftError, Subject
 from ...lift.external import write_job
+from ...lift.placement_matches import Matches, alike
 from ...lift.placement_view import towards
 from ...lift.worker_answer import WRONG, check_similarity, read_told
 from ...lift.worker_file import Worker, read_worker, worker_names
@@ -148,6 +150,18 @@ class WorkerPoses:
         except WRONG as error:
             raise LiftError(f"the pose of the worker {self.name} is of no use: {error}") from error
         return matrix, depth
+
+
+def matched(two: Two, depth: F32) -> Matches:
+    """Points of the object that both pictures show; `depth` (h, w) is that of it in B, world."""
+    b, a = two.b, two.a
+    at, seen = alike((b.pixels, b.mask), (a.pixels, a.mask))
+    height, width = depth.shape
+    column, row = np.clip(at.astype(int), 0, [width - 1, height - 1]).T
+    found = np.isfinite(depth[row, column])
+    world = b.camera.unproject(at[found], depth[row, column][found])
+    points = frozen(two.lifted.object_points(world), np.float64)
+    return Matches(points, frozen(seen[found], np.float64), float(np.sqrt(a.mask.sum())))
 
 
 def carried(two: Two) -> F64:

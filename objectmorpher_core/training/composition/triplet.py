@@ -35,7 +35,7 @@ from ...raster.reference_layers import Picture3D
 from ...segment import SelectionError
 from . import TrainingError, pose_sources
 from .pictures import Picture
-from .pose_sources import Two, carried
+from .pose_sources import Two, carried, matched
 from .sources import Pair
 
 VERSION = 1  # of what is written of a triplet
@@ -198,12 +198,13 @@ def registered(two: Two, how: How, progress: Progress = silent) -> tuple[tuple[P
     motion = source.motion(two, part(progress, 0.0, 0.5), how.seed)
     target = Target(two.a.pixels, two.a.mask, two.a.camera)
     rest = part(progress, 0.5, 1.0)
+    matches = matched(two, drawn_in(two, np.eye(4), two.b.camera).depth)
     if motion is None:
-        hints = Hints(start=carried(two) @ lifted.world_from_object)
+        hints = Hints(start=carried(two) @ lifted.world_from_object, matches=matches)
         found = register(lifted.body, target, hints, rest, how.seed)
         return (found.best,), found.reason
     rest(0.0, "Fitting the object")
-    registrar = Registrar(lifted.body, target, how.seed)
+    registrar = Registrar(lifted.body, target, how.seed, matches)
     known = registrar.rated(motion @ lifted.world_from_object)
     return (known, registrar.improved(known)), ""
 

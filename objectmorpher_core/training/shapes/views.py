@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import RGB, Mask
+from ...arrays import F64, RGB, Mask
 from ...camera import DEFAULT_FOV
 from .distance import lowest, trace
 from .families import FAMILIES
@@ -34,6 +34,7 @@ class View:
 
     rgb: RGB  # (s, s, 3)
     mask: Mask  # (s, s)
+    axes: F64  # (3, 3) rows: the camera's x right, y down, z forward in the object's world
 
 
 def make_views(
@@ -69,7 +70,8 @@ def _try(
         trace(rays, eye.at, solid, lamps, scene.ground, 0, side * side, out)
         own, backdrop = np.random.default_rng(look), _backdrop(rng, side)
         picture = _picture(own, scene, eye, rays, lamps, out, side, backdrop)
-        views.append(View(_developed(rng, picture), (out[:, 0] > 0).reshape(side, side)))
+        mask = (out[:, 0] > 0).reshape(side, side)
+        views.append(View(_developed(rng, picture), mask, eye.axes))
     return tuple(views)
 
 

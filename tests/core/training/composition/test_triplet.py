@@ -6,6 +6,7 @@ import json
 import sys
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -13,8 +14,8 @@ from objectmorpher_core.camera import Camera
 from objectmorpher_core.lift import LiftError, Subject
 from objectmorpher_core.lift.worker_file import FOLDER
 from objectmorpher_core.training.composition import TrainingError, pose_sources
-from objectmorpher_core.training.composition.made_pairs import write_made_pairs
-from objectmorpher_core.training.composition.pose_sources import Two, carried
+from objectmorpher_core.training.composition.made_pairs import turn_of, write_made_pairs
+from objectmorpher_core.training.composition.pose_sources import Two, carried, matched
 from objectmorpher_core.training.composition.sources import Looking, find_pairs
 from objectmorpher_core.training.composition.triplet import (
     How,
@@ -141,6 +142,25 @@ def test_the_start_of_the_search_keeps_the_object_as_it_is_seen():
     assert abs(moved[0] - 20) < 3 and abs(moved[1]) < 3
 
 
+def test_details_that_both_pictures_show_are_points_of_the_object():
+    scene = shapes.scene("ellipse")
+    rng = np.random.default_rng(0)
+    spots = cv2.GaussianBlur(rng.random((*scene.mask.shape, 3)), (0, 0), 1.5)
+    spotted = np.rint(255 * (0.5 + 3 * (spots - 0.5)).clip(0, 1)).astype(np.uint8)
+    darker = np.rint(0.6 * np.roll(spotted, 20, axis=1)).astype(np.uint8)
+    b = Subject(spotted, scene.camera, scene.mask, scene.matte)
+    a = Subject(darker, scene.camera, np.roll(scene.mask, 20, axis=1), scene.matte)
+    two = Two(b, a, scene.lifted)
+    depth = np.full(scene.mask.shape, np.float32(scene.lifted.centre[2]))
+    depth[: len(depth) // 2] = np.inf  # where nothing was lifted
+    matches = matched(two, depth)
+    assert len(matches) >= 8
+    at = scene.camera.project(scene.lifted.world_points(matches.points))
+    gaps = np.linalg.norm(at + [20, 0] - matches.seen, axis=1)
+    assert np.median(gaps) < 0.5
+    assert (at[:, 1] >= len(depth) // 2).all()
+
+
 def test_unknown_sources_and_those_that_cannot_run_are_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(tmp_path))
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path))
@@ -163,3 +183,12 @@ def test_a_made_up_object_is_found_again_from_another_side(tmp_path):
     assert made.facts["iou"] > 0.85 and made.facts["seen"] > 0.6
     assert 3 < made.facts["turn"] < 80
     assert made.coarse.shape == made.a.shape == (160, 160, 3)
+
+
+@pytest.mark.slow
+def test_a_jar_is_turned_by_what_is_on_it(tmp_path):
+    write_made_pairs(tmp_path, 3, 320)
+    pair = find_pairs(tmp_path)[4]
+    assert pair.name.startswith("made-0-00002")
+    made = make_triplet(pair, HOW)  # its outline is the same from all sides
+    assert abs(made.facts["turn"] - turn_of(2)) < 8
