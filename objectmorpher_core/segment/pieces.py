@@ -13,10 +13,10 @@ from typing import Any
 import cv2
 import numpy as np
 import scipy.sparse as sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from ..arrays import F32, F64, RGB, Mask, Sparse
+from ..arrays import F32, F64, RGB, Mask
+from . import piece_graph
 from .piece_features import BorderLine, Likeness, border_lines, cell_size, sample_tokens
 
 WORK_AREA = 280_000  # px of the reduced photo that is cut into pieces
@@ -46,11 +46,8 @@ class Growth:
         size = np.log(self.area)
         low = np.searchsorted(size, size - np.log(SPAN))
         high = np.searchsorted(size, size + np.log(SPAN), side="right")
-        return [
-            k
-            for k, (a, b) in enumerate(zip(low, high, strict=True))
-            if self.contrast[k] >= self.contrast[a:b].max() - 1e-12
-        ]
+        highest = piece_graph.highest(self.contrast, low, high)
+        return [int(k) for k in np.flatnonzero(self.contrast >= highest - 1e-12)]
 
 
 class Pieces:
@@ -117,6 +114,9 @@ class Pieces:
         weights = ease * np.sqrt(self.length / self.area.mean() ** 0.5) + 1e-9
         half = sparse.coo_matrix((weights, (self.left, self.right)), (self.count, self.count))
         self._links = (half + half.T).tocsr()
+        self._links.sort_indices()
+        self._degrees = np.asarray(self._links.sum(1)).ravel()
+        self._systems = piece_graph.Diagonals(self._links)
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_solver": None}  # a factorisation cannot be pickled
@@ -187,27 +187,30 @@ class Pieces:
 
         Both as the ease with which it passes on to a neighbour: at most about 1.
         """
-        degrees = np.asarray(self._links.sum(1)).ravel()
-        system = (sparse.diags(degrees + to_object + to_ground) - self._links).tocsc()
+        system = self._systems.system(self._degrees + to_object + to_ground)
         return _factored(system).solve(to_object)
+
+    def reached(self, allowed: Mask, start: Mask) -> Mask:
+        """(n,) the connected sets of pieces in `allowed` (n,) that hold one of `start` (n,)."""
+        return piece_graph.reached(self._links, allowed, start)
 
     def _open(self) -> Any:
         if self._solver is None:
-            self._solver = _factored(_restarting(self._links, self._stamina))
+            everywhere = np.ones(self.count, bool)
+            links, stamina = self._links, self._stamina
+            self._solver = _factored(
+                piece_graph.restarting(links, everywhere, everywhere, stamina)
+            )
         return self._solver
 
     def _visits_within(self, start: F64, allowed: Mask, walls: tuple[int, ...]) -> tuple[F64, Mask]:
         """(n,) how often each allowed piece is visited by a walk that ends at a wall; reached."""
-        chosen = np.flatnonzero(allowed)
-        links = self._links[chosen][:, chosen]
-        is_free = ~np.isin(chosen, walls)
-        system, free = _restarting(links, self._stamina)[is_free][:, is_free], chosen[is_free]
+        is_free = allowed.copy()
+        is_free[list(walls)] = False
+        system = piece_graph.restarting(self._links, allowed, is_free, self._stamina)
         visits = np.zeros(self.count)
-        visits[free] = _factored(system.tocsc()).solve(start[free])
-        _, islands = connected_components(links[is_free][:, is_free])
-        reached = np.zeros(self.count, bool)
-        reached[free] = islands == islands[start[free].argmax()]
-        return visits, reached
+        visits[is_free] = _factored(system).solve(start[is_free])
+        return visits, self.reached(is_free, start > 0)
 
     def _growth(self, order: np.ndarray, allowed: Mask) -> Growth:
         rank = np.full(self.count, len(order))
@@ -269,11 +272,6 @@ def _factored(system: Any) -> Any:
     return splu(
         system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-
-
-def _restarting(links: Sparse, stamina: float) -> Sparse:
-    degrees = np.asarray(links.sum(1)).ravel() + 1e-9
-    return (sparse.diags(degrees) - stamina * links).tocsc()
 
 
 def _cosine_gap(a: F32, b: F32) -> F64:

@@ -95,19 +95,13 @@ def _places(pieces: Pieces, near: float) -> F32:
 
 def touching(pieces: Pieces, mask: Mask, start: Mask) -> Mask:
     """(n,) the connected sets of pieces in `mask` (n,) that hold one of `start` (n,)."""
-    labels = _linked(pieces, mask)
-    return mask & np.isin(labels, labels[start & mask])
+    return pieces.reached(mask, start)
 
 
 def islands(pieces: Pieces, mask: Mask) -> list[Mask]:
     """The connected sets (n,) of pieces in a mask (n,)."""
-    labels = _linked(pieces, mask)
-    return [(labels == k) & mask for k in np.unique(labels[mask])]
-
-
-def _linked(pieces: Pieces, mask: Mask) -> np.ndarray:
-    """(n,) a number that pieces in a mask (n,) have in common where they hang together."""
     linked = mask[pieces.left] & mask[pieces.right]
     ends = (pieces.left[linked], pieces.right[linked])
     graph = sparse.coo_array((np.ones(int(linked.sum())), ends), (pieces.count, pieces.count))
-    return connected_components(graph, directed=False)[1]
+    _, labels = connected_components(graph, directed=False)
+    return [(labels == k) & mask for k in np.unique(labels[mask])]
