@@ -56,6 +56,18 @@ OpenGL: {gl}.{gsplat}
 
 """
 
+EDITS = """
+## The whole edit: `objectmorpher bench pipeline`
+
+With the embedded defaults: {backends}. Each photo is
+edited in a process of its own. Its *first* run opens the networks and loads the kernels in the
+stages that need them; what the process took to start is told apart. *Again* are the medians of
+three more, as in the window. *sample* is the cup of the first start, *enlarged* the same photo with
+1.06 megapixels, *made* the photo of the frames below, half of which is its object. Seconds; the
+most memory that the process had used by then.
+
+"""
+
 SOLVES = """
 ## Solver and skinning: `objectmorpher bench deform`
 
@@ -80,23 +92,25 @@ def machine() -> str:
 
 def write_page() -> str:
     """Measures, for some minutes, and tells."""
+    edits = run_bench("pipeline", False)["rows"]
     render, deform = run_bench("render", False), run_bench("deform", False)
     gl = render["machine"]["gl_renderer"] or "not to be had"
     has_gsplat = any(r["renderer"] == "gsplat-torch" for r in render["rows"])
     gsplat = "" if has_gsplat else " gsplat and torch were not installed: no rows of theirs."
     frames = FRAMES.format(gl=gl, gsplat=gsplat) + _frames(render["rows"])
-    budgets = _budgets(_budgets_of(render["rows"], deform["rows"]))
+    budgets = _budgets(_budgets_of(edits, render["rows"], deform["rows"]))
     head = HEAD.format(machine=machine())
-    return head + budgets + frames + SOLVES + _solves(deform["rows"])
+    whole = EDITS.format(backends=_backends(edits[0])) + _edits(edits)
+    return head + budgets + whole + frames + SOLVES + _solves(deform["rows"])
 
 
-def _budgets_of(frames: list[Row], solves: list[Row]) -> list[Budget]:
+def _budgets_of(edits: list[Row], frames: list[Row], solves: list[Row]) -> list[Budget]:
     paper = next(r for r in solves if r["mode"] == "faithful")
     ours = next(r for r in solves if (r["mode"], r["nodes"]) == ("default", 512))
     lift = _frame(frames, "lift", None)
     cloud = _frame(frames, "cloud", 100_000)
     many = _frame(frames, "cloud", 300_000)
-    edit, edit_of_large, large = _edit_report()["seconds"], _large_edit_report(), _export_report()
+    edit_of_large, large = _large_edit_report(), _export_report()
     export, memory = large["composite_s"] + large["encode_s"], large["peak_mb"] / 1000
     gap, solve = max(100 * ours["energy_gap"], 0.0), ours["solve_ms"]
     return [
@@ -112,8 +126,8 @@ def _budgets_of(frames: list[Row], solves: list[Row]) -> list[Budget]:
         _dragged("drag to pixels, 100k plainly coloured Gaussians", cloud, "≤ 35 ms", 35),
         Budget("the same on a real GPU", "≤ 4 ms", "no GPU here", None),
         _clicked(),
-        _timed("lift, 1 MP photo", edit["lift"], 1.5),
-        _timed("whole `edit`, 1 MP photo, GrabCut, relief, PatchMatch", edit["total"], 8),
+        _timed("lift, 1 MP photo", edits, "lift", 1.5),
+        _timed(f"whole `edit`, 1 MP photo, {_backends(edits[0])}", edits, "total", 8),
         Budget("export of a 24 MP photo", "≤ 10 s, < 2 GB",
                f"{export:.1f} s, {memory:.1f} GB", export <= 10 and memory < 2),
         Budget("the whole edit of it, object on half of the photo", "–",
@@ -143,8 +157,12 @@ def _dragged(what: str, frame: Row, asked: str, limit: float) -> Budget:
     return Budget(f"{what}, 1024²", asked, measured, total <= limit)
 
 
-def _timed(what: str, taken: float, limit: float) -> Budget:
-    return Budget(what, f"≤ {limit:g} s", f"{taken:.1f} s", taken <= limit)
+def _timed(what: str, edits: list[Row], stage: str, limit: float) -> Budget:
+    """Of the first edits of both photos of a megapixel; the slower one counts."""
+    first = [r for r in edits if r["run"] == "first" and r["photo"] != "sample"]
+    told = ", ".join(f"{r['seconds'][stage]:.1f} s {r['photo']}" for r in first)
+    slowest = max(r["seconds"][stage] for r in first)
+    return Budget(what, f"≤ {limit:g} s", told, slowest <= limit)
 
 
 def _clicked() -> Budget:
@@ -162,13 +180,6 @@ def _clicked() -> Budget:
         slowest = max(slowest, taken)
         told.append(f"{taken:.2f} s {name}")
     return Budget("click to mask, 1 MP", "≤ 0.3 s", ", ".join(told), slowest <= 0.3)
-
-
-def _edit_report() -> Row:
-    """The whole edit of a photo of 1 MP, from a click."""
-    pixels = made_photo(PHOTO, made_mask(PHOTO))
-    return _run(pixels, None, "--click", "512,512", "--segment", "grabcut", "--handle",
-                "512,100:612,120", "--pin", "512,900")  # fmt: skip
 
 
 def _export_report() -> Row:
@@ -204,6 +215,22 @@ def _budgets(budgets: list[Budget]) -> str:
     lines = [row(["What", "Asked", "Measured", "Met"]), "|---|---|---|---|"]
     words = {True: "yes", False: "**no**", None: "–"}
     lines += [row([b.what, b.asked, b.measured, words[b.is_met]]) for b in budgets]
+    return "\n".join(lines) + "\n"
+
+
+def _backends(edit: Row) -> str:
+    return ", ".join(edit[stage] for stage in ("segment", "lift", "inpaint"))
+
+
+def _edits(rows: list[Row]) -> str:
+    stages = ["load", "segment", "lift", "inpaint", "render", "save", "total"]
+    heads = ["Photo", "px", "Run", "Start", *(stage.capitalize() for stage in stages), "MB"]
+    lines = [row(heads), "|---|---|---" + "|---:" * (len(heads) - 3) + "|"]
+    for r in rows:
+        start = f"{r['start_s']:.1f}" if "start_s" in r else ""
+        seconds = [f"{r['seconds'][stage]:.2f}" for stage in stages]
+        size, memory = f"{r['width']} × {r['height']}", f"{r['peak_memory_mb']:,.0f}"
+        lines.append(row([r["photo"], size, r["run"], start, *seconds, memory]))
     return "\n".join(lines) + "\n"
 
 
