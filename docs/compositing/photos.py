@@ -12,7 +12,7 @@ from objectmorpher_core.compose.old_shadow import without_shadow
 from objectmorpher_core.compose.shadow_fit import find_old_shadow
 from objectmorpher_core.image import Picture, encode_picture
 from objectmorpher_core.pipeline import open_photo, run_script, select
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.script import EditScript, FillFrom
 from objectmorpher_core.segment.matte import build_matte
 
 
@@ -22,10 +22,16 @@ def _bowl() -> Pixels:
     return np.ascontiguousarray(picture[..., ::-1])
 
 
+TABLE = (  # the grain to the right of the saucer, not the lamp's gleam to the left
+    FillFrom((525.0, 325.0), (140.0, 330.0), 75.0),
+    FillFrom((525.0, 325.0), (250.0, 345.0), 75.0),
+)
 PHOTOS = {
     "cup": (
         data.coffee,
-        EditScript(box=(60.0, 20.0, 560.0, 400.0), move=(-30.0, -30.0, 0.0), scale=0.75),
+        EditScript(
+            box=(60.0, 20.0, 560.0, 400.0), move=(-30.0, -30.0, 0.0), scale=0.75, fill_from=TABLE
+        ),
     ),
     "motorcycle": (
         lambda: data.stereo_motorcycle()[0],

@@ -18,9 +18,9 @@ from ..hint import Hint
 from ..joining import Shadow
 from ..pixels import crop, pixels_from_unit, unit_pixels
 from ..progress import Progress, silent
-from . import Inpainter
+from . import Inpainter, shadow_edge
 from .old_reflection import OldReflection, without_reflection
-from .plate import Box, build_plate, cut, hole_margin
+from .plate import Box, build_plate, cut, hole_margin, overlap
 from .shadow import GAMMA
 from .silhouette import cells_bounds, sampled
 
@@ -77,31 +77,55 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
 
     Where a hard edge tells how dark it is, ground that is darker still shows enough.
     """
+    height, width = pixels.shape[:2]
+    around = _grown(old.bounds(width, height), shadow_edge.LOOKS * old.pitch, width, height)
+    part = pixels[around[1] : around[3], around[0] : around[2]]
+    free = sampled(old.free, (old.left, old.top), old.pitch, around) > MOSTLY
+    colours = np.log(unit_pixels(part) ** np.float32(GAMMA) + np.float32(BLACK))
+    light = np.asarray(colours.mean(-1), np.float32)  # natural logarithm of linear light
+    missing, is_told = _hard_edged(_sharpened(old.missing(around), light, old), light, old, free)
+    usual = shadow_edge.usual_light(light, missing, free, old.pitch)
+    bounded = shadow_edge.bounded(missing, light, usual, old.pitch)
+    missing = np.asarray(np.where(is_told, missing, bounded), np.float32)
+    dim, black = (
+        old.lost(around) & shadow_edge.is_dim(light, old.pitch),
+        shadow_edge.too_dark(missing, light, usual, old.pitch),
+    )
+    is_lost = np.where(is_told, False, dim | black)
+    tint = shadow_edge.tinted(colours, missing, free & ~is_lost, old.pitch)
+    lit = unit_pixels(part) * np.exp(missing[..., None] * (tint / np.float32(GAMMA)))
+    lit = shadow_edge.evened(lit, missing, free & ~is_lost, old.pitch)
+    is_changed = np.abs(lit - unit_pixels(part)).max(-1) > SEEN / 2
+    result = np.where(is_changed[..., None], pixels_from_unit(lit, pixels.dtype), part)
+    inner = overlap(around, box)
+    changed, lost = (crop(found, around, box) for found in (is_changed, is_lost))
+    shown = pixels[box[1] : box[3], box[0] : box[2]].copy()
+    if inner is not None:
+        cut(shown, box, inner)[:] = cut(result, around, inner)
+    return shown, changed, lost
+
+
+def _grown(box: Box, reach: float, width: int, height: int) -> Box:
+    """A box with so many px around it, within a photo of that size."""
     x0, y0, x1, y1 = box
-    part = pixels[y0:y1, x0:x1]
-    missing, is_told = _hard_edged(_sharpened(old.missing(box), part, old), part, old, box)
-    gain = np.exp(missing / np.float32(GAMMA))
-    is_changed = gain > 1 + SEEN
-    lit = pixels_from_unit(np.minimum(unit_pixels(part) * gain[..., None], 1), pixels.dtype)
-    is_lost = old.lost(box) & ~is_told
-    return np.where(is_changed[..., None], lit, part), is_changed, is_lost
+    far = round(reach)
+    return max(x0 - far, 0), max(y0 - far, 0), min(x1 + far, width), min(y1 + far, height)
 
 
-def _sharpened(missing: F32, pixels: Pixels, old: OldShadow) -> F32:
+def _sharpened(missing: F32, light: F32, old: OldShadow) -> F32:
     """(h, w) the missing light with the edges that the photo has there (He et al. 2013).
 
     The more texture the ground has, the less is taken for an edge.
     """
     if not missing.any():
         return missing
-    light = np.log(unit_pixels(pixels) ** np.float32(GAMMA) + np.float32(BLACK)).mean(-1)
     radius, eps = max(round(REACH * old.pitch), 1), (NOISY * old.noise) ** 2 + LEAST_EPS
     found = cv2.ximgproc.guidedFilter(light, missing, radius, eps)
     near = np.clip(missing / SOFT, 0, 1)  # nothing is given to what had none
     return np.asarray(np.clip(found, 0, None) * near, np.float32)
 
 
-def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple[F32, Mask]:
+def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tuple[F32, Mask]:
     """(h, w) the missing light with the photo's own step from lit to shaded, and where it has one.
 
     What was found is on a grid, and blurred: across a hard edge it would lighten what is lit, and
@@ -109,21 +133,19 @@ def _hard_edged(missing: F32, pixels: Pixels, old: OldShadow, box: Box) -> tuple
     missing in the shade is what lit ground beside it has more.
     """
     deep = float(missing.max(initial=0))
-    is_free = sampled(old.free, (old.left, old.top), old.pitch, box) > MOSTLY
     sides = [is_free & (missing < SIDES[0] * deep), is_free & (missing > SIDES[1] * deep)]
     is_outline = old.shadow.ground == FROM_ABOVE  # else parts of it are soft, and in other light
     if deep < HARD or not is_outline or not all(side.any() for side in sides):
         return missing, np.zeros(missing.shape, bool)
-    light = np.log(unit_pixels(pixels) ** np.float32(GAMMA) + np.float32(BLACK)).mean(-1)
     levels = []
     for side in sides:
         weight = side.astype(np.float32)
-        near = cv2.GaussianBlur(weight, (0, 0), WIDE * old.pitch)
-        total = cv2.GaussianBlur(light * weight, (0, 0), WIDE * old.pitch)
+        near = shadow_edge.widely_blurred(weight, WIDE * old.pitch)
+        total = shadow_edge.widely_blurred(light * weight, WIDE * old.pitch)
         usual = np.float32(np.median(light[side]))  # where none of it is near
         levels.append((total + LEAST_SIDE * usual) / (near + LEAST_SIDE))
     step = levels[0] - levels[1]
-    fine = cv2.GaussianBlur(light, (0, 0), max(FINE * old.pitch, 0.5))
+    fine = shadow_edge.widely_blurred(light, max(FINE * old.pitch, 0.5))
     into = (levels[0] - fine) / np.maximum(step, HARD)
     into = np.clip((into - SURE_EDGE[0]) / (SURE_EDGE[1] - SURE_EDGE[0]), 0, 1)
     is_told = (step > HARD) & (missing > 0)
