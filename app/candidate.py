@@ -1,7 +1,8 @@
 """What a click under the pointer would select, found while the pointer rests.
 
 The worker is asked only while it has nothing else to do, and any request of the user ends it. A
-click on what is shown uses the answer that is there.
+click on what is shown uses the answer that is there. One that was found at a glance is looked at
+more closely while the pointer goes on resting: what that costs the click need not wait for.
 """
 
 from __future__ import annotations
@@ -17,14 +18,16 @@ from objectmorpher_core.document import Click, Photo, Prompt
 from objectmorpher_core.segment import Found
 
 from . import job_functions
+from .closer_look import choice_of
 from .job_error import JobError
-from .job_functions import Choice
+from .jobs import RELUCTANCE
 from .tasks import SELECT, Question
 
 if TYPE_CHECKING:
     from .editor import Editor
 
 CANDIDATE = "candidate"  # kind of job
+CLOSER = "closer candidate"  # kind of job, of one that is shown
 REST = 0.06  # s that the pointer rests before the worker is asked
 SAME_PLACE = 2.0  # points: a hand moves so much when it presses
 TOO_SLOW = 2.5  # s; after such an answer the photo is not asked about again
@@ -83,7 +86,8 @@ class Candidates:
         if shown is not None and is_here and self._is_same(shown.prompt, question.prompt):
             editor.jobs.cancel(CANDIDATE)
             self.shown = self._asked = None
-            editor.selection.take(question, shown.found)
+            # A closer look goes on: the step's own then finds that it was taken.
+            editor.selection.take(question, shown.found, shown.prompt)
             return True
         asked = self._asked is not None and self._is_same(self._asked, question.prompt)
         if not asked or not editor.jobs.promote(CANDIDATE, SELECT):
@@ -94,7 +98,8 @@ class Candidates:
     def _is_free(self) -> bool:
         """Whether the worker does nothing, or nothing but look for an older candidate."""
         jobs = self._editor.jobs
-        return jobs.is_idle or (jobs.current is not None and jobs.current.kind == CANDIDATE)
+        current = jobs.current
+        return jobs.is_idle or (current is not None and current.kind in (CANDIDATE, CLOSER))
 
     def _is_wished(self) -> bool:
         """Whether the user may want to know what a click here would select."""
@@ -127,6 +132,7 @@ class Candidates:
         assert document is not None
         photo = document.photo
         self._asked = prompt
+        editor.jobs.cancel(CLOSER, RELUCTANCE)
 
         def accept(answer: Found | str) -> None:
             wanted = self._pop_wanted()
@@ -140,19 +146,35 @@ class Candidates:
                 if wanted is not None:
                     editor.complain(answer)
             elif wanted is not None:
-                editor.selection.take(wanted, answer)
+                editor.selection.take(wanted, answer, prompt)
             elif self._is_wished():
                 self.shown = Candidate(photo, prompt, answer)
+                self._look_closer(self.shown)
 
         def fail(error: JobError) -> None:
             if self._pop_wanted() is not None:
                 editor.complain_of(error)
 
-        choice = Choice(editor.settings.backends.segment, document.seed)
         editor.jobs.start(
-            "Selecting", job_functions.candidate, photo.pixels, prompt, choice,
+            "Selecting", job_functions.candidate, photo.pixels, prompt, choice_of(editor),
             done=accept, failed=fail, cancelled=self._drop, kind=CANDIDATE, is_quiet=True,
             is_spare=True,
+        )  # fmt: skip
+
+    def _look_closer(self, shown: Candidate) -> None:
+        """The candidate told better, where it can be."""
+        if shown.found.is_final:
+            return
+
+        def accept(answer: Found) -> None:
+            if self.shown is shown:
+                self.shown = Candidate(shown.photo, shown.prompt, answer)
+
+        editor = self._editor
+        editor.jobs.start(
+            "Looking closer", job_functions.closer_look, shown.photo.pixels, shown.prompt,
+            choice_of(editor), done=accept, failed=lambda error: None, kind=CLOSER,
+            is_quiet=True, is_spare=True,
         )  # fmt: skip
 
     def _drop(self) -> None:

@@ -21,6 +21,7 @@ from objectmorpher_core.document import Document, EditObject
 from .autosave import Autosave
 from .candidate import Candidates
 from .chores import Chores
+from .closer_look import CloserLook
 from .derived import Derived
 from .editing.composing import Composing
 from .editing.computing import Computing
@@ -76,6 +77,7 @@ class Editor:
         self.methods, self.computing = Methods(self), Computing(self)
         self.hinting, self.refining = Hinting(self), Refining(self)
         self.candidates = Candidates(self)
+        self.closer_look = CloserLook(self)
         self.derived = self._nothing_derived()
         self.history: History | None = None
         self.preview: Document | None = None  # of the stroke in progress
@@ -295,6 +297,7 @@ class Editor:
         is_changed = self.refining.deliver() or is_changed
         self.autosave.poll()
         self.candidates.poll(time.monotonic())
+        is_changed = self.closer_look.poll() or is_changed
         return is_changed
 
     def shut_down(self) -> None:

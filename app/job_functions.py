@@ -117,7 +117,21 @@ def forget_segmenter(progress: Progress) -> None:
 
 
 def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
-    """The mask of what the prompt means, by which backend, and how sure that is."""
+    """The mask of what the prompt means, by which backend, and how sure that is.
+
+    At a glance, where the backend can tell better by a `closer_look`.
+    """
+    from objectmorpher_core.segment import Quick
+
+    reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
+    rest, segmenter = part(progress, 0.6, 1.0), reading.segmenter
+    if isinstance(segmenter, Quick):
+        return segmenter.glance(reading.rgb, prompt, reading.embedding, rest)
+    return reading.segment(prompt, rest, choice.seed)
+
+
+def closer_look(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+    """As `segment`, whatever time it takes."""
     reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 

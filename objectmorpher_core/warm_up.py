@@ -38,10 +38,12 @@ def _edited() -> Document:
     from .script import EditScript, HandleMove
     from .segment.closed_form import affine, applied
     from .segment.halving import halved_pixels
+    from .segment.pieces import Pieces
 
     rgb, alpha = np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)
     applied(affine(rgb, alpha), rgb, alpha == 0, alpha)  # of large photos only
     halved_pixels(rgb.astype(np.uint16))
+    Pieces(np.zeros((SIZE, SIZE, 3), np.uint8), np.ones((2, 2, 4), np.float32)).rehearse()
 
     rng = np.random.default_rng(0)
     pixels = cv2.GaussianBlur(rng.integers(0, 255, (SIZE, SIZE, 3), np.uint8), (0, 0), 2)

@@ -9,6 +9,7 @@ import numpy as np
 
 from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask
+from objectmorpher_core.arrays import Selection as SelectionMask
 from objectmorpher_core.document import LEVELS, Click, Document, Prompt
 from objectmorpher_core.segment import Found, mask_edit
 
@@ -135,30 +136,42 @@ class Selection:
 
     # Answers
 
-    def take(self, question: Question, found: Found) -> None:
-        """The answer of a question is the next step."""
+    def take(self, question: Question, found: Found, asked: Prompt | None = None) -> None:
+        """The answer of a question is the next step; `asked`: what was answered, if another."""
         editor, document = self._editor, self._editor.document
         if document is None or question.k > len(document.objects):
             return
-        before = editor.mask
+        before, k = editor.mask, question.k
+        base = document.objects[k].selection if k < len(document.objects) else None
         self._apply(question, found.mask, document.with_backend("segment", found.backend))
-        if editor.mask is not before and question.combine in (Combine.ANEW, Combine.REFINED):
+        if editor.mask is before:
+            return
+        if question.combine in (Combine.ANEW, Combine.REFINED):
+            self._told = editor.mask, found.confidence
+        if not found.is_final:
+            editor.closer_look.begin(question, base, asked or question.prompt)
+
+    def improve(self, question: Question, base: SelectionMask | None, found: Found) -> None:
+        """A better answer takes the place of the one that is shown, in the same step.
+
+        `base` (H, W): what was selected before the step.
+        """
+        editor = self._editor
+        assert editor.history is not None
+        try:
+            document = _changed(editor.history.document, question, found.mask, base)
+        except ValueError:  # such as all of the photo: then the first answer stays
+            return
+        editor.history.amend(document)
+        if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
 
     def _apply(self, question: Question, mask: Mask, document: Document) -> None:
         editor, k = self._editor, question.k
         if k == len(document.objects):
             document = edits.add_object(document)
-        selection = document.objects[k].selection
         try:
-            if question.combine is Combine.ADDED:
-                changed = edits.change_mask(document, k, mask_edit.united(selection, mask))
-            elif question.combine is Combine.REMOVED:
-                changed = edits.change_mask(document, k, mask_edit.without(selection, mask))
-            elif question.combine is Combine.REFINED:
-                changed = edits.answer_prompt(document, k, mask, question.prompt)
-            else:
-                changed = edits.set_mask(document, k, mask, question.prompt)
+            changed = _changed(document, question, mask, document.objects[k].selection)
         except ValueError as error:
             editor.complain(str(error))
             return
@@ -194,6 +207,23 @@ class Selection:
         last, view = before.clicks[0], self._editor.view
         gap = float(np.hypot(click.x - last.x, click.y - last.y)) * view.zoom
         return last.is_foreground and gap <= SAME_PLACE * view.scale
+
+
+def _changed(
+    document: Document, question: Question, mask: Mask, base: SelectionMask | None
+) -> Document:
+    """The document in which a question has that answer (H, W). Raises ValueError.
+
+    `base` (H, W): what was selected of the object before, for an answer that is put to it.
+    """
+    k = question.k
+    if question.combine is Combine.ADDED:
+        return edits.change_mask(document, k, mask_edit.united(base, mask))
+    if question.combine is Combine.REMOVED:
+        return edits.change_mask(document, k, mask_edit.without(base, mask))
+    if question.combine is Combine.REFINED:
+        return edits.answer_prompt(document, k, mask, question.prompt)
+    return edits.set_mask(document, k, mask, question.prompt)
 
 
 def _label(combine: Combine) -> str:

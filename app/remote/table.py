@@ -72,6 +72,7 @@ def table() -> Table:
     rows = (
         Served(job_functions.read_photo, "segment", (Pixels, str), None, _check_photo),
         Served(job_functions.segment, "segment", asking, Found, _check_photo),
+        Served(job_functions.closer_look, "segment", asking, Found, _check_photo),
         Served(job_functions.candidate, "segment", asking, Found | str, _check_photo),
         Served(
             job_functions.lift, "lift", (Cut, Choice, LiftSettings), tuple[Matte, LiftedObject],

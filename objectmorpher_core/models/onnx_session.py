@@ -10,10 +10,14 @@ https://github.com/microsoft/onnxruntime/blob/main/docs/Privacy.md
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 TELEMETRY_OFF = "ORT_DISABLE_TELEMETRY"
+WATCH_EVERY = 0.02  # s
 
 
 def open_session(network: Path | bytes, threads: int = 0, is_foreign: bool = False) -> Any:
@@ -29,6 +33,30 @@ def open_session(network: Path | bytes, threads: int = 0, is_foreign: bool = Fal
         options.log_severity_level = 3
     model = network if isinstance(network, bytes) else str(network)
     return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+
+
+def run_session(
+    session: Any, outputs: list[str], inputs: dict[str, Any], watch: Callable[[], None]
+) -> list[Any]:
+    """The outputs (names) of one run. `watch` is called again and again meanwhile.
+
+    What it raises is raised, and the run is over within one step of the network.
+    """
+    options = _runtime().RunOptions()
+    running = _runner().submit(session.run, outputs, inputs, options)
+    try:
+        while not wait((running,), WATCH_EVERY).done:
+            watch()
+    except BaseException:
+        options.terminate = True
+        wait((running,))
+        raise
+    return running.result()
+
+
+@cache
+def _runner() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(thread_name_prefix="network")
 
 
 def _runtime() -> Any:

@@ -7,7 +7,7 @@ A backend a file; `load()` imports the chosen one. `encode` is costly and runs o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from .. import backends
 from ..arrays import RGB, Mask
@@ -15,7 +15,16 @@ from ..document import Prompt
 from ..progress import Progress
 from .selection import SelectionError
 
-__all__ = ["BACKENDS", "UNSURE", "Found", "Segmenter", "SelectionError", "is_known", "load"]
+__all__ = [
+    "BACKENDS",
+    "UNSURE",
+    "Found",
+    "Quick",
+    "Segmenter",
+    "SelectionError",
+    "is_known",
+    "load",
+]
 
 # Confidence below which a person is told how to help. Of the answers in docs/selection.md 3 of the
 # 4 with an IoU below 0.75 are below it, and 8 of the 49 better ones.
@@ -29,6 +38,7 @@ class Found:
     mask: Mask  # (H, W)
     backend: str  # the segmenter's name
     confidence: float | None  # the overlap (IoU) with what is meant that is to be expected
+    is_final: bool = True  # otherwise found at a glance: a closer look may tell better
 
 
 class Segmenter(Protocol):
@@ -58,6 +68,15 @@ class Segmenter(Protocol):
 
         In [0, 1]; None where the backend cannot tell. Cheap after `segment` of the same.
         """
+        ...
+
+
+@runtime_checkable
+class Quick(Protocol):
+    """A segmenter that answers at a glance where its whole answer takes longer than a moment."""
+
+    def glance(self, rgb: RGB, prompt: Prompt, embedding: Any, progress: Progress) -> Found:
+        """As `segment`, in a fraction of a second; not final where that can tell better."""
         ...
 
 

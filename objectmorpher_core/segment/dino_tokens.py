@@ -10,7 +10,8 @@ import numpy as np
 
 from .. import models
 from ..arrays import F32, RGB
-from ..models.onnx_session import open_session
+from ..models.onnx_session import open_session, run_session
+from ..progress import Progress, silent
 from .subject import DEVIATION, MEAN
 
 WEIGHT = "dinov2-vits14"
@@ -35,20 +36,21 @@ class TokenNet:
         graph = with_interface(path.read_bytes(), IMAGES, TOKENS, *INNER)
         self._session: Any = open_session(graph, threads)
 
-    def tokens(self, rgb: RGB) -> F32:
-        """(h, w, 384) of a picture of h x w patches."""
-        return self._run(rgb, TOKENS)[0]
+    def tokens(self, rgb: RGB, progress: Progress = silent) -> F32:
+        """(h, w, 384) of a picture of h x w patches. What `progress` raises ends it soon."""
+        return self._run(rgb, progress, TOKENS)[0]
 
     def inner_tokens(self, rgb: RGB) -> F32:
         """(h, w, 768) of two inner layers, each token of mean 0 and deviation 1."""
-        layers = self._run(rgb, *INNER)
+        layers = self._run(rgb, silent, *INNER)
         centred = [layer - layer.mean(-1, keepdims=True) for layer in layers]
         return np.concatenate([c / (c.std(-1, keepdims=True) + 1e-6) for c in centred], -1)
 
-    def _run(self, rgb: RGB, *outputs: str) -> list[F32]:
+    def _run(self, rgb: RGB, progress: Progress, *outputs: str) -> list[F32]:
         height, width = (n // PATCH for n in rgb.shape[:2])
         pixels = ((rgb.astype(np.float32) / 255 - MEAN) / DEVIATION).transpose(2, 0, 1)[None]
-        found = self._session.run(list(outputs), {IMAGES: pixels})
+        watched = lambda: progress(0.5, "recognising its parts")  # noqa: E731
+        found = run_session(self._session, list(outputs), {IMAGES: pixels}, watched)
         return [np.asarray(f[0, 1:].reshape(height, width, -1), np.float32) for f in found]
 
 

@@ -6,6 +6,8 @@ it; the subject map, where its weights are here, says how far a whole object ext
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -13,12 +15,16 @@ from .. import models
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
 from ..progress import Progress, part, silent
+from . import Found
 from .dino_tokens import PATCH, WEIGHT, shared
+from .edges import rehearse
 from .piece_features import main_directions
 from .pieces import Pieces
 from .selection import SelectionError, box_mask, check_mask, check_prompt
 from .subject import SubjectNet
-from .view import PhotoView, Tokens
+from .view import PhotoView, Seen, Tokens
+
+Look = Callable[[PhotoView, Prompt, Progress], Seen]
 
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
 TILE_PATCHES = 900  # of a tile of a large photo
@@ -46,11 +52,13 @@ class DinoWalk:
         if reason is not None:
             raise SelectionError(reason)
         progress(0.0, "recognising its parts")
-        tokens = self._tokens(rgb)
+        tokens = self._tokens(rgb, PATCHES, part(progress, 0.0, 0.75))
         progress(0.75, "looking for the subject")
         salience = self._subject.salience(rgb) if self._subject.missing() is None else None
         progress(0.95, "cutting the photo into pieces")
         pieces = Pieces(rgb, tokens)
+        pieces.rehearse()
+        rehearse()
         progress(1.0, "read the photo")
         return Tokens(tokens, salience, pieces)
 
@@ -63,30 +71,43 @@ class DinoWalk:
         seed: int = 0,
     ) -> Mask:
         """(H, W) bool: the object that clicks, box or subject mean. Nothing here is random."""
+        return self._found(rgb, prompt, embedding, progress, PhotoView.find)[0]
+
+    def glance(self, rgb: RGB, prompt: Prompt, embedding: Tokens, progress: Progress) -> Found:
+        """The same, by what is encoded already; a closer look at a small thing is left out."""
+        mask, seen = self._found(rgb, prompt, embedding, progress, PhotoView.glance)
+        return Found(mask, self.name, seen.sureness, seen.is_final)
+
+    def confidence(self, rgb: RGB, prompt: Prompt, embedding: Tokens) -> float:
+        """The overlap of `segment`'s mask with what is meant that is to be expected, in [0, 1]."""
+        return self._view_of(rgb, embedding).find(prompt, silent).sureness
+
+    def _found(
+        self, rgb: RGB, prompt: Prompt, embedding: Tokens | None, progress: Progress, look: Look
+    ) -> tuple[Mask, Seen]:
         check_prompt(rgb, prompt)
         if embedding is None:
             embedding = self.encode(rgb, part(progress, 0.0, 0.7))
         if prompt.is_subject and embedding.salience is None:
             raise SelectionError(f"the subject cannot be found: {self._subject.missing()}")
         progress(0.7, "walking from the clicks")
-        mask, _ = self._view_of(rgb, embedding).find(prompt, part(progress, 0.7, 1.0))
-        mask = mask & box_mask(rgb.shape, prompt)
+        seen = look(self._view_of(rgb, embedding), prompt, part(progress, 0.7, 1.0))
+        mask = seen.mask.copy() if prompt.box is None else seen.mask & box_mask(rgb.shape, prompt)
         for click in prompt.clicks:
             mask[int(click.y), int(click.x)] = click.is_foreground
         progress(1.0, "cut out the object")
-        return check_mask(mask)
-
-    def confidence(self, rgb: RGB, prompt: Prompt, embedding: Tokens) -> float:
-        """The overlap of `segment`'s mask with what is meant that is to be expected, in [0, 1]."""
-        return self._view_of(rgb, embedding).find(prompt, silent)[1]
+        return check_mask(mask), seen
 
     def _view_of(self, rgb: RGB, embedding: Tokens) -> PhotoView:
         """The photo in pieces: the same for every click on it."""
         if self._view is None or self._view.embedding is not embedding:
-            self._view = PhotoView(rgb, embedding, lambda crop: self._tokens(crop, TILE_PATCHES))
+            self._view = PhotoView(rgb, embedding, self._tile_tokens)
         return self._view
 
-    def _tokens(self, rgb: RGB, patches: int = PATCHES) -> F32:
+    def _tile_tokens(self, rgb: RGB, progress: Progress) -> F32:
+        return self._tokens(rgb, TILE_PATCHES, progress)
+
+    def _tokens(self, rgb: RGB, patches: int, progress: Progress) -> F32:
         """(h, w, 64) for a photo (H, W, 3)."""
         height, width = rgb.shape[:2]
         scale = min((patches / (height * width)) ** 0.5, 1 / SMALLEST_PATCH)
@@ -97,4 +118,4 @@ class DinoWalk:
             (w * PATCH, h * PATCH),
             interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC,
         )
-        return main_directions(shared().tokens(np.asarray(small, np.uint8)))
+        return main_directions(shared().tokens(np.asarray(small, np.uint8), progress))

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sparse
 
-from ..arrays import F32, F64
+from ..arrays import F32, F64, frozen
+from ..kernel_files import numba
+from ..threads import in_threads
 
 KEPT = 64  # dimensions of the tokens; the others of 384 hardly matter within one photo
 REACH = 0.7  # cells, standard deviation of how far a token counts
 LIKE_COLOR = 15.0  # CIELAB units within which a cell's token is trusted for a piece
 DISTRUST = 0.02  # weight of a cell of another colour
+LEAST_PLACES = 500  # for which a second thread is woken
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,26 +74,44 @@ def sample_tokens(
     With `like`, cells of the place's own colour count most: the coarse tokens' outlines
     then follow the picture's (joint bilateral upsampling, Kopf et al. 2007).
     """
-    rows, columns, depth = tokens.shape
+    rows, columns, _ = tokens.shape
     height, width = shape
     x = np.clip(places[0] * columns / width - 0.5, 0, columns - 1)
     y = np.clip(places[1] * rows / height - 0.5, 0, rows - 1)
-    index, weight = [], []
-    for dy in (-1, 0, 1, 2):
-        for dx in (-1, 0, 1, 2):
-            i, j = np.floor(y).astype(int) + dy, np.floor(x).astype(int) + dx
-            is_inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-            cell = np.clip(i, 0, rows - 1) * columns + np.clip(j, 0, columns - 1)
-            near = np.exp(-((i - y) ** 2 + (j - x) ** 2) / (2 * REACH**2)) * is_inside
-            if like is not None:
-                apart = np.square(like.colors - like.cells.reshape(-1, 3)[cell]).sum(1)
-                near *= np.exp(-apart / (2 * LIKE_COLOR**2)) + DISTRUST
-            index.append(cell)
-            weight.append(near)
-    places_of = np.tile(np.arange(len(x)), len(index))
-    entries = (np.concatenate(weight), (places_of, np.concatenate(index)))
-    mixing = sparse.csr_matrix(entries, (len(x), rows * columns)).astype(np.float32)
-    return _unit(np.asarray(mixing @ tokens.reshape(-1, depth), np.float32))
+    colors, cells = np.zeros((0, 3)), np.zeros((rows, columns, 3))
+    if like is not None:
+        colors, cells = like.colors, like.cells.astype(np.float64)
+    mixed = np.zeros((len(x), tokens.shape[2]), np.float32)
+    own, places = frozen(tokens), (frozen(x), frozen(y))
+    trust = frozen(colors), frozen(cells)
+
+    def run(first: int, last: int) -> None:
+        _mix(own, *places, *trust, mixed, first, last)
+
+    in_threads(run, len(x), least=LEAST_PLACES)
+    return _unit(mixed)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _mix(
+    tokens: F32, x: F64, y: F64, colors: F64, cells: F64, mixed: F32, first: int, last: int
+) -> None:
+    """Adds up the 4 x 4 cells around each place, `mixed` (n, d); no `colors`: all are trusted."""
+    rows, columns, depth = tokens.shape
+    for n in range(first, last):
+        top, left = int(np.floor(y[n])) - 1, int(np.floor(x[n])) - 1
+        for i in range(max(top, 0), min(top + 4, rows)):
+            for j in range(max(left, 0), min(left + 4, columns)):
+                far = (i - y[n]) ** 2 + (j - x[n]) ** 2
+                weight = np.exp(-far / (2 * REACH**2))
+                if len(colors):
+                    apart = 0.0
+                    for c in range(3):
+                        apart += (colors[n, c] - cells[i, j, c]) ** 2
+                    weight *= np.exp(-apart / (2 * LIKE_COLOR**2)) + DISTRUST
+                single = np.float32(weight)
+                for d in range(depth):
+                    mixed[n, d] += single * tokens[i, j, d]
 
 
 def crop_tokens(tokens: F32, photo: tuple[int, int], box: tuple[int, int, int, int]) -> F32:

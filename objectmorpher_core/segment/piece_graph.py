@@ -11,19 +11,20 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sparse
 
-from ..arrays import F64, Mask, Sparse
+from ..arrays import F64, Mask, Sparse, frozen, frozen_rows
 from ..kernel_files import numba
 
 
 def reached(links: Sparse, allowed: Mask, start: Mask) -> Mask:
     """(n,) the pieces that can be reached from those of `start` (n,) within `allowed` (n,)."""
-    return _flood(links.indptr, links.indices, allowed, start)
+    indptr, indices, _ = frozen_rows(links)
+    return _flood(indptr, indices, frozen(allowed), frozen(start))
 
 
 def highest(values: F64, low: np.ndarray, high: np.ndarray) -> F64:
     """(n,) the largest of values[low[k] : high[k]], for bounds (n,) that never fall."""
     largest = np.empty(len(values))
-    _slide(values, low, high, largest)
+    _slide(frozen(values), frozen(low, np.int64), frozen(high, np.int64), largest)
     return largest
 
 
@@ -32,7 +33,7 @@ def restarting(links: Sparse, allowed: Mask, free: Mask, stamina: float) -> Spar
 
     It goes nowhere that is not `allowed` (n,); all that is free is.
     """
-    inner = links.indptr, links.indices, links.data, allowed, free
+    inner = *frozen_rows(links), frozen(allowed), frozen(free)
     count = int(np.count_nonzero(free))
     room = int(np.diff(links.indptr)[free].sum()) + count
     indptr, indices = np.empty(count + 1, np.int32), np.empty(room, np.int32)

@@ -121,6 +121,12 @@ class Pieces:
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_solver": None}  # a factorisation cannot be pickled
 
+    def rehearse(self) -> None:
+        """Gets ready what all clicks need, so that the first one does not wait for it."""
+        self.grow(0).peaks()
+        everywhere = np.ones(self.count, bool)
+        self.reached(everywhere, everywhere)
+
     # Between photo and pieces
 
     def at(self, x: float, y: float) -> int:
@@ -198,9 +204,7 @@ class Pieces:
         if self._solver is None:
             everywhere = np.ones(self.count, bool)
             links, stamina = self._links, self._stamina
-            self._solver = _factored(
-                piece_graph.restarting(links, everywhere, everywhere, stamina)
-            )
+            self._solver = _factored(piece_graph.restarting(links, everywhere, everywhere, stamina))
         return self._solver
 
     def _visits_within(self, start: F64, allowed: Mask, walls: tuple[int, ...]) -> tuple[F64, Mask]:

@@ -19,6 +19,7 @@ from .piece_features import crop_tokens
 from .pieces import PIECES, Pieces, reduced
 
 REMEMBERED = 8  # answers of a photo
+MASKS = 3  # of its own size
 LOOK_AGAIN = 0.8  # confidence: a small whole less sure is recognised anew, in a second or so
 DETAILS = 4  # closer looks that are kept
 DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
@@ -32,7 +33,7 @@ FITS = 0.8  # x side of a tile: a thing that is no larger is looked at in it
 CUT = 0.04  # of the frame of a closer look: a thing that touches more of it is not small
 
 Box = tuple[int, int, int, int]  # left, top, right, bottom px
-Encode = Callable[[RGB], F32]  # picture -> (h, w, d) tokens
+Encode = Callable[[RGB, Progress], F32]  # picture -> (h, w, d) tokens
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +114,15 @@ class View:
         return confidence(self.ground, answer, prompt.clicks)
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a prompt was found to mean."""
+
+    mask: Mask  # (H, W)
+    sureness: float  # in [0, 1]
+    is_final: bool = True  # otherwise a closer look may tell better
+
+
 class PhotoView:
     """A whole photo, and closer looks at what is small in it; `encode` looks at a tile of it."""
 
@@ -121,65 +131,91 @@ class PhotoView:
         self._rgb, self._encode = rgb, encode
         self._whole = View(rgb, embedding, is_of_large=self._is_large)
         self._details: dict[tuple[Box, bool], View] = {}
-        self._last: tuple[Prompt, Mask, float] | None = None  # found, and how sure it was
+        self._found: dict[Prompt, Seen] = {}
 
-    def find(self, prompt: Prompt, progress: Progress) -> tuple[Mask, float]:
-        """(H, W) what a prompt means, and how sure that is, in [0, 1]; the last one at once."""
-        if self._last is None or self._last[0] != prompt:
-            mask, sureness = self._find(prompt, progress)
-            self._last = prompt, frozen(mask), sureness
-        return self._last[1:]
+    def find(self, prompt: Prompt, progress: Progress) -> Seen:
+        """What a prompt means; what was found before at once."""
+        return self._seen(prompt, False, progress)
 
-    def _find(self, prompt: Prompt, progress: Progress) -> tuple[Mask, float]:
+    def glance(self, prompt: Prompt, progress: Progress) -> Seen:
+        """The same, as far as what is encoded already tells: in a fraction of a second."""
+        return self._seen(prompt, True, progress)
+
+    def _seen(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:
+        known = self._found.pop(prompt, None)
+        if known is None or not (known.is_final or at_once):
+            known = self._look(prompt, at_once, progress)
+            known = replace(known, mask=frozen(known.mask))
+        _remember(self._found, prompt, known, MASKS)
+        return known
+
+    def _look(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:
         steps = steps_of(prompt)
-        whole = None
-        if prompt.level != "object" and any(c.is_foreground for c in prompt.clicks):
-            whole, _ = self._find(replace(steps[0], level="object"), part(progress, 0.0, 0.3))
-        mask, sureness = self._find_within(steps, whole, part(progress, 0.3, 1.0))
-        if whole is not None and len(steps) == 1:  # at the photo's size, too
-            nested = mask & whole if prompt.level == "part" else mask | whole
-            mask = nested if nested.any() and not nested.all() else whole
-        return mask, sureness
+        if prompt.level == "object" or not any(c.is_foreground for c in prompt.clicks):
+            return self._look_within(steps, None, at_once, progress)
+        around = replace(steps[0], level="object")
+        whole = self._seen(around, at_once, part(progress, 0.0, 0.3))
+        seen = self._look_within(steps, whole.mask, at_once, part(progress, 0.3, 1.0))
+        mask = seen.mask
+        if len(steps) == 1:  # at the photo's size, too
+            nested = mask & whole.mask if prompt.level == "part" else mask | whole.mask
+            mask = nested if nested.any() and not nested.all() else whole.mask
+        return Seen(mask, seen.sureness, seen.is_final and whole.is_final)
 
-    def _find_within(
-        self, steps: list[Prompt], whole: Mask | None, progress: Progress
-    ) -> tuple[Mask, float]:
+    def _look_within(
+        self, steps: list[Prompt], whole: Mask | None, at_once: bool, progress: Progress
+    ) -> Seen:
         prompt = steps[-1]
         choice = self._whole.choice(steps[0])
         box = self._closer(choice, steps[0])
-        looked = None if box is None else self._look_closer(box, steps, whole, progress)
-        if looked is None:
+        seen, count = None, 0
+        if box is not None:
+            seen, count = self._look_closer(box, steps, whole, at_once, progress)
+        if seen is None:
             answer = self._whole.answer(prompt, whole, progress)
-            return self._whole.mask(answer), self._whole.confidence(prompt, answer)
-        mask, sureness, count = looked
-        if count == len(steps):
-            return mask, sureness
-        # A click elsewhere says that the thing is larger.
-        answer = self._whole.adopt(mask, steps[count:])
-        return self._whole.mask(answer), self._whole.confidence(prompt, answer)
+        elif count == len(steps):
+            return seen
+        else:  # a click elsewhere says that the thing is larger
+            answer = self._whole.adopt(seen.mask, steps[count:])
+        sureness = self._whole.confidence(prompt, answer)
+        return Seen(self._whole.mask(answer), sureness, seen is None or seen.is_final)
 
     def _look_closer(
-        self, box: Box, steps: list[Prompt], whole: Mask | None, progress: Progress
-    ) -> tuple[Mask, float, int] | None:
-        """(H, W) the answer in a box, how sure it is, and to how many steps; None if it is cut."""
+        self, box: Box, steps: list[Prompt], whole: Mask | None, at_once: bool, progress: Progress
+    ) -> tuple[Seen | None, int]:
+        """The answer in a box, and to how many steps; None if it is cut."""
         progress(0.1, "looking closer")
         inside = None if whole is None else whole[box[1] : box[3], box[0] : box[2]]
         moved = [_moved(step, box) for step in steps]
-        detail = self._detail(box, self._is_large)
-        first = detail.answer(moved[0], inside, part(progress, 0.3, 0.6))
-        is_unsure = detail.confidence(moved[0], first) < LOOK_AGAIN
-        if is_unsure and steps[0].level == "object" and not self._is_large:
-            detail = self._detail(box, is_anew=True)
-            first = detail.answer(moved[0], inside, part(progress, 0.3, 0.6))
+        is_final, rest = True, part(progress, 0.3, 0.6)
+        if self._is_large:
+            is_final = not at_once or (box, True) in self._details
+            detail = self._detail(box, is_final, progress)
+            first = detail.answer(moved[0], inside, rest)
+        else:
+            detail = self._detail(box, False, progress)
+            first = detail.answer(moved[0], inside, rest)
+            is_unsure = detail.confidence(moved[0], first) < LOOK_AGAIN
+            if is_unsure and steps[0].level == "object":
+                is_final = not at_once or (box, True) in self._details
+                if is_final:
+                    detail = self._detail(box, True, progress)
+                    first = detail.answer(moved[0], inside, rest)
         if _frame_share(first.mask) > CUT:
-            return None
+            return (None, 0) if is_final else (self._owed(steps, whole, progress), len(steps))
         beyond = [any(c.is_foreground and not _is_in(box, c) for c in s.clicks) for s in steps]
         count = beyond.index(True) if any(beyond) else len(steps)
         last = moved[count - 1]
         answer = detail.answer(last, inside, part(progress, 0.6, 1.0))
         mask = np.zeros(self._rgb.shape[:2], bool)
         mask[box[1] : box[3], box[0] : box[2]] = detail.mask(answer)
-        return mask, detail.confidence(last, answer), count
+        return Seen(mask, detail.confidence(last, answer), is_final), count
+
+    def _owed(self, steps: list[Prompt], whole: Mask | None, progress: Progress) -> Seen:
+        """What the whole photo says of what a closer look may tell better."""
+        answer = self._whole.answer(steps[-1], whole, progress)
+        sureness = self._whole.confidence(steps[-1], answer)
+        return Seen(self._whole.mask(answer), sureness, is_final=False)
 
     def _closer(self, choice: Choice, prompt: Prompt) -> Box | None:
         """Where to look closer at what a prompt's first click may mean; None where it is large."""
@@ -221,14 +257,14 @@ class PhotoView:
     def _is_large(self) -> bool:
         return self._rgb.shape[0] * self._rgb.shape[1] > LARGE
 
-    def _detail(self, box: Box, is_anew: bool) -> View:
+    def _detail(self, box: Box, is_anew: bool, progress: Progress) -> View:
         """What a box shows, recognised anew at its size, or by how the whole photo shows it."""
         if (box, is_anew) not in self._details:
             left, top, right, bottom = box
             crop = np.ascontiguousarray(self._rgb[top:bottom, left:right])
             photo, salience = self._rgb.shape[:2], self.embedding.salience
             if is_anew:
-                tokens = self._encode(crop)
+                tokens = self._encode(crop, part(progress, 0.1, 0.3))
             else:
                 tokens = crop_tokens(self.embedding.tokens, photo, box)
             if salience is not None:

@@ -63,6 +63,7 @@ def test_every_served_function_answers_as_here(desk: Desk, fill: tuple) -> None:
     calls = {
         "read_photo": (ball, "grabcut"),
         "segment": (ball, click, job_functions.Choice("grabcut")),
+        "closer_look": (ball, click, job_functions.Choice("grabcut")),
         "candidate": (ball, Prompt(), job_functions.Choice("grabcut")),
         "lift": (job_functions.Cut(ball, camera, hole), job_functions.Choice("auto"),
                  LiftSettings(1000)),

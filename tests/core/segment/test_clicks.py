@@ -14,7 +14,7 @@ import pytest
 from objectmorpher_core import segment
 from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.pipeline import Reading
-from objectmorpher_core.progress import silent
+from objectmorpher_core.progress import Cancelled, silent
 from tests.core.segment.simulated_user import Step, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
@@ -282,3 +282,38 @@ def test_a_small_thing_in_a_large_photo_is_found_in_its_tile():
     found = use(lambda prompt: dino().segment(large, prompt, known, silent), mask, 3, False)
     assert found[-1].iou > 0.6
     assert found[-1].iou > found[0].iou
+
+
+@pytest.mark.slow
+def test_a_glance_is_told_better_by_a_closer_look_and_then_is_the_same():
+    backend, rgb = segment.load("dino"), photo("camera")
+    assert isinstance(backend, segment.Quick)
+    known, asked = embedding("camera"), Prompt((Click(*inmost(truth_mask("tower"))),))
+    start = time.process_time()
+    first = backend.glance(rgb, asked, known, silent)
+    glance = time.process_time() - start
+    assert not first.is_final
+
+    def stop(fraction: float, note: str) -> None:
+        if note == "recognising its parts":
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        backend.segment(rgb, asked, known, stop)
+    assert not backend.glance(rgb, asked, known, silent).is_final
+    start = time.process_time()
+    best = backend.segment(rgb, asked, known, silent)
+    assert glance < LATENCY * (time.process_time() - start)
+    assert overlap(best, truth_mask("tower")) > overlap(first.mask, truth_mask("tower"))
+    again = backend.glance(rgb, asked, known, silent)
+    assert again.is_final
+    np.testing.assert_array_equal(again.mask, best)
+
+
+def test_a_glance_at_what_is_large_is_all_there_is_to_see():
+    backend, asked = dino(), Prompt((Click(*inmost(truth_mask("coffee"))),))
+    assert isinstance(backend, segment.Quick)
+    found = backend.glance(photo("coffee"), asked, embedding("coffee"), silent)
+    assert found.is_final
+    whole = backend.segment(photo("coffee"), asked, embedding("coffee"), silent)
+    np.testing.assert_array_equal(found.mask, whole)
