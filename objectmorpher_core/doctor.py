@@ -121,7 +121,8 @@ def _selecting() -> Stage:
     chosen = segment.load("auto")
     uses, names = chosen.name, [name for name, _ in absent]
     if uses == "grabcut":
-        why, better = "it goes by colour alone, and needs no model", "`objectmorpher models get`"
+        why = "it goes by colour alone, and needs no model"
+        better = "`objectmorpher models get`: a click is then a whole object"
         return Stage("select", uses, why, absent, better)
     if uses == "dino":
         slow = [name for name in segment.BACKENDS if "sam" in name and name not in names]

@@ -46,7 +46,8 @@ class DiffusionRefiner:
     def missing(self) -> str | None:
         """See `Refiner`."""
         if absent := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
-            return f"{', '.join(absent)} is not installed: {models.EXTRA}"
+            are = "is" if len(absent) == 1 else "are"
+            return f"{' and '.join(absent)} {are} not installed: {models.EXTRA}"
         if self.model() is None:
             best = self.choices()[0]
             size = f"{best.size / 1e9:.0f} GB, {best.licence}"

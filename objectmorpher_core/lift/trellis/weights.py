@@ -23,7 +23,8 @@ def weights_folder(id: str) -> Path:
 def missing(*ids: str) -> str | None:
     """What has to be installed before the models `ids` can run, as one sentence."""
     if absent := [name for name in PACKAGES if find_spec(name) is None]:
-        return f"{', '.join(absent)} is not installed: {models.EXTRA}"
+        are = "is" if len(absent) == 1 else "are"
+        return f"{' and '.join(absent)} {are} not installed: {models.EXTRA}"
     for id in ids:
         state = models.look_hub(id)
         if state.state == "damaged":
