@@ -19,7 +19,7 @@ from . import InpaintError
 from .completion import Completion, complete, shrunk, smooth
 from .patch_detail import with_detail
 from .source_guide import Guide
-from .source_prior import slanting, unlikely
+from .source_prior import unlikely
 from .structure_lines import find_lines
 
 SEARCH_PIXELS = 100_000  # of the small picture
@@ -120,4 +120,4 @@ def _guide(small: F32, known: F32, hints: tuple[Hint, ...]) -> Guide:
     """What guides the filling of a picture (h, w, 3) that is `known` (h, w) in [0, 1]."""
     hole = known < min(0.5, float(known.max()))
     guess = smooth(small, (~hole).astype(np.float32))
-    return Guide(unlikely(guess, hole), find_lines(guess, hole), hints, slanting(guess))
+    return Guide(unlikely(guess, hole), find_lines(guess, hole), hints)

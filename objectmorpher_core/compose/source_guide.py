@@ -25,7 +25,6 @@ class Guide:
     unlikely: F32  # (h, w) squared levels of 255 that taking a pixel costs
     lines: tuple[Line, ...] = ()
     hints: tuple[Hint, ...] = ()  # the last ones win
-    mirrored: F32 | None = None  # (h, w) squared levels that its mirror image costs besides
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +51,8 @@ def guidance(guide: Guide, hole: Mask) -> Guidance:
                 numbers[inside & hole, 2] = 1 << k
             else:
                 numbers[inside, 2] += 1 << k
-    unlikely, turned = (
-        np.asarray(cv2.resize(cost, (width, height), interpolation=cv2.INTER_AREA), np.float32)
-        for cost in (guide.unlikely, _of_mirrored(guide))
-    )
+    resized = cv2.resize(guide.unlikely, (width, height), interpolation=cv2.INTER_AREA)
+    unlikely = np.asarray(resized, np.float32)
     mirrored = offered[:, ::-1].copy()
     mirrored[..., :2] = 0  # no line goes on mirrored
-    return Guidance(wanted, np.stack([offered, mirrored]), np.stack([unlikely, turned[:, ::-1]]))
-
-
-def _of_mirrored(guide: Guide) -> F32:
-    """(h, w) what a source costs where it is taken from the mirror image."""
-    return guide.unlikely if guide.mirrored is None else guide.unlikely + guide.mirrored
+    return Guidance(wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]]))

@@ -22,10 +22,6 @@ SUBJECT_COST = 6000.0  # squared levels of 255 that a source on the subject cost
 MOST_SUBJECT = 0.5  # share of what is around the hole: more, and the hole is amid the subject
 BINS = 12  # of each channel of CIE Lab
 RARE = 0.002  # share of what is around the hole that a colour must have, or it is none of it
-MIRROR_COST = 6000.0  # squared levels of 255 that a slanting grain costs in the mirror image
-GRAIN = 6.0  # px, standard deviation: over so much a texture's direction is told
-FLAT = 4.0  # squared levels per px of a gradient that tells none
-SLANT = (0.25, 0.5)  # share of a texture's gradients that would lean the other way
 SMOOTHING = 2.0  # px, over which a source's colour is taken
 
 
@@ -72,17 +68,3 @@ def strange(picture: RGB, around: Mask) -> F32:
     near = cv2.dilate(near, np.ones((1, 3))).ravel()
     found = np.exp(-near / RARE).astype(np.float32)[number]
     return np.where(around, np.float32(0), found)
-
-
-def slanting(rgb: F32) -> F32:
-    """(h, w) squared levels of 255 that taking each pixel from the mirror image should cost.
-
-    Upright and level lines are the same there, and gravel is; a grain that slants would meet its
-    mirror image in a herringbone. Told by the structure tensor (Bigun and Granlund 1987).
-    """
-    grey = cv2.GaussianBlur(rgb.mean(-1), (0, 0), 1.0)
-    x, y = (cv2.Sobel(grey, cv2.CV_32F, *way, scale=1 / 8) for way in ((1, 0), (0, 1)))
-    both, across, down = (cv2.GaussianBlur(part, (0, 0), GRAIN) for part in (x * y, x * x, y * y))
-    share = 2 * np.abs(both) / (across + down + np.float32(FLAT))
-    low, high = SLANT
-    return np.asarray(MIRROR_COST * np.clip((share - low) / (high - low), 0, 1), np.float32)
