@@ -34,7 +34,8 @@ with other lamps and another backdrop. It is lifted out of one photo (**B**), it
 depths guessed, and registered to the other (**A**); each pair both ways. *error*: the turn between
 the pose found and the true one, degrees. *outline and colours*: the search alone; *details*: with
 matches of SIFT (`objectmorpher_core/lift/placement_matches.py`), which is what `--poses own` does.
-*score* is that of the pose as the registration with details rates it. No constant was chosen on these pairs.
+*score* is that of the pose as the registration with details rates it. No constant was chosen on
+these pairs.
 
 |  | median error | within 5 degrees | within 10 | called ambiguous |
 | --- | ---: | ---: | ---: | ---: |

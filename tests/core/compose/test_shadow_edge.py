@@ -1,13 +1,11 @@
-"""The line where a shadow ended, and a grain's mirror image: neither is left."""
+"""The line where a shadow ended is not left."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from skimage import data
 
 from objectmorpher_core.compose.shadow_edge import evened, tinted
-from objectmorpher_core.compose.source_prior import MIRROR_COST, slanting
 
 SIDE = 240
 PITCH = 4.0  # px per cell
@@ -48,16 +46,3 @@ def test_the_light_that_is_left_has_its_colour():
     colours = -1 - missing[..., None] * share
     found = tinted(colours.astype(np.float32), missing, np.ones((SIDE, SIDE), bool), PITCH)
     assert found == pytest.approx(share, abs=0.05)
-
-
-@pytest.mark.parametrize(("across", "down", "is_barred"), [(1, 1, True), (1, 0, False)])
-def test_a_slanting_grain_is_not_mirrored(across, down, is_barred):
-    y, x = np.mgrid[:SIDE, :SIDE]
-    wood = 128 + 40 * np.sin((across * x + down * y) * 0.8)
-    cost = slanting(np.repeat(wood[..., None], 3, 2).astype(np.float32))[20:-20, 20:-20]
-    assert np.all(cost == (MIRROR_COST if is_barred else 0))
-
-
-def test_gravel_may_be_mirrored():
-    gravel = np.repeat(data.gravel()[..., None].astype(np.float32), 3, 2)
-    assert slanting(gravel).mean() < 0.3 * MIRROR_COST
