@@ -51,10 +51,10 @@ which takes {encoding_seconds():.1f} s and happens once per photo (beside other 
 a core's own time, too).
 {machine}.
 
-A closer look that encodes anew takes a second or two of a core. The editor does not wait for it: it
-answers at a glance, by what is encoded already, and puts the better mask into the same step a
-moment later, if the user has not gone on. A rested pointer has the closer look taken before the click. All
-figures here are of the whole answer, as the command line gives it.
+A closer look that encodes anew takes a second or two of a core. The editor does not wait for it:
+it answers at a glance, by what is encoded already, and puts the better mask into the same step a
+moment later, if the user has not gone on. A rested pointer has the closer look taken before the
+click. All figures here are of the whole answer, as the command line gives it.
 
 `make evidence PAGES=selection` makes this page anew.
 """
