@@ -132,8 +132,8 @@ many answers: the colours of these are drawn a third of the way to the smooth me
 around, edges and detail stay. It does not understand what it copies:
 variants, the brush, and *Take from here* (Shift+B, or `--fill-from`) are for that. PatchMatch is
 nearer mostly in *flag and wall* and *garage*, with a piece of the suit and a brown smear that
-happen to be as bright as what was there. Mirror images of a grain that slants, which showed
-as a herringbone (*table*), are left out. Its settings
+happen to be as bright as what was there. Patches carry which way a grain slants: its mirror image,
+which showed as a herringbone (*table*), slants the other way. Its settings
 were chosen on 49 other holes in the same photos and five more; how much the subject counts was
 seen on *flag and wall* and *launch tower*, too, and how far colours are drawn (of two strengths and
 two widths the best on the eight; any was better on the ten) on both tables. A wider margin of
