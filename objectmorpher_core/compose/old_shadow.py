@@ -39,6 +39,7 @@ SURE_EDGE = (0.3, 0.7)  # of the way from lit to shaded: what is between belongs
 NOISY = 2.0  # x the ground's, the contrast that is no edge
 LEAST_EPS = 1e-3
 SOFT = 0.05  # natural logarithm of light
+THIRDS = np.full((1, 3), 1 / 3, np.float32)  # the mean of three colours, as cv2.transform wants it
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +62,6 @@ class OldShadow:
         """x0, y0, x1, y1 px around it, within a photo of that size."""
         return cells_bounds(self.depth, (self.left, self.top), self.pitch, (width, height))
 
-    def lost(self, box: Box) -> Mask:
-        """(h, w) where it is so dark that the photo shows little of the ground."""
-        return self.missing(box) > LOST
-
 
 def without_shadow(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask]:
     """The pixels (h, w, 3) of a `box` of the photo in full light, and where that is another one."""
@@ -82,23 +79,26 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
     part = pixels[around[1] : around[3], around[0] : around[2]]
     free = sampled(old.free, (old.left, old.top), old.pitch, around) > MOSTLY
     colours = np.log(unit_pixels(part) ** np.float32(GAMMA) + np.float32(BLACK))
-    light = np.asarray(colours.mean(-1), np.float32)  # natural logarithm of linear light
-    missing, is_told = _hard_edged(_sharpened(old.missing(around), light, old), light, old, free)
+    # Natural logarithm of linear light.
+    light = np.asarray(cv2.transform(colours, THIRDS), np.float32)
+    found = old.missing(around)
+    missing, is_told = _hard_edged(_sharpened(found, light, old), light, old, free)
     usual = shadow_edge.usual_light(light, missing, free, old.pitch)
     bounded = shadow_edge.bounded(missing, light, usual, old.pitch)
     missing = np.asarray(np.where(is_told, missing, bounded), np.float32)
     dim, black = (
-        old.lost(around) & shadow_edge.is_dim(light, old.pitch),
+        (found > LOST) & shadow_edge.is_dim(light, old.pitch),
         shadow_edge.too_dark(missing, light, usual, old.pitch),
     )
     is_lost = np.where(is_told, False, dim | black)
     tint = shadow_edge.tinted(colours, missing, free & ~is_lost, old.pitch)
     lit = unit_pixels(part) * np.exp(missing[..., None] * (tint / np.float32(GAMMA)))
     lit = shadow_edge.evened(lit, missing, free & ~is_lost, old.pitch)
-    is_changed = np.abs(lit - unit_pixels(part)).max(-1) > SEEN / 2
+    change = cv2.absdiff(lit, unit_pixels(part))
+    is_changed = np.maximum(np.maximum(change[..., 0], change[..., 1]), change[..., 2]) > SEEN / 2
     result = np.where(is_changed[..., None], pixels_from_unit(lit, pixels.dtype), part)
     inner = overlap(around, box)
-    changed, lost = (crop(found, around, box) for found in (is_changed, is_lost))
+    changed, lost = (crop(each, around, box) for each in (is_changed, is_lost))
     shown = pixels[box[1] : box[3], box[0] : box[2]].copy()
     if inner is not None:
         cut(shown, box, inner)[:] = cut(result, around, inner)

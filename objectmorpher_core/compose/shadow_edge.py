@@ -55,7 +55,7 @@ def usual_light(light: F32, missing: F32, free: Mask, pitch: float) -> F32:
 
 
 def widely_blurred(picture: F32, sigma: float) -> F32:
-    """(h, w) blurred by `sigma` px; where that is much, by way of a smaller picture."""
+    """(h, w) or (h, w, 3) blurred by `sigma` px; where that is much, by way of a smaller one."""
     scale = min(SMALL / sigma, 1.0)
     blurred = cv2.GaussianBlur(_shrunk(picture, scale), (0, 0), sigma * scale)
     return np.asarray(cv2.resize(blurred, picture.shape[1::-1]), np.float32)
@@ -146,7 +146,7 @@ def _factor(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
         weight = np.where(free, share, 0).astype(np.float32)
         if not weight.any():
             continue
-        known = cv2.GaussianBlur(weight, (0, 0), sigma)
+        known = widely_blurred(weight, sigma)
         sure = known / (known + LEAST) * _trust(lit, usual, beyond, (high - low) / 2, sigma)
         ratio = usual / np.maximum(_mean(lit, weight, sigma), 1e-3)
         factor += (share * sure)[..., None] * (np.clip(ratio, 1 / MOST, MOST) - 1)
@@ -168,8 +168,11 @@ def _trust(lit: F32, usual: F32, beyond: Mask, width: float, sigma: float) -> fl
 
 def _from_edge(missing: F32, pitch: float) -> F32:
     """(h, w) px from the edge, less than 0 in the shadow; all 0 where there is none."""
-    side = 2 * round(NEAR_BY * pitch) + 1
-    deepest = cv2.dilate(missing, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+    height, width = missing.shape
+    scale = min(FEW / pitch, 1.0)
+    side = 2 * round(NEAR_BY * pitch * scale) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    deepest = cv2.resize(cv2.dilate(_shrunk(missing, scale), kernel), (width, height))
     is_shade = missing > np.maximum(HALF * deepest, SEEN)
     if not is_shade.any() or is_shade.all():
         return np.zeros_like(missing)
@@ -191,6 +194,6 @@ def _stops(far: float) -> list[float]:
 
 def _mean(picture: F32, weight: F32, sigma: float) -> F32:
     """(h, w, 3) the mean of what has a weight (h, w) around each px."""
-    share = cv2.GaussianBlur(weight, (0, 0), sigma)
-    total = cv2.GaussianBlur(picture * weight[..., None], (0, 0), sigma)
+    share = widely_blurred(weight, sigma)
+    total = widely_blurred(picture * weight[..., None], sigma)
     return np.asarray(total / np.maximum(share, 1e-6)[..., None], np.float32)
