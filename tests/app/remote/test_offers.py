@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from desk import TOKEN, Desk
+from hands import PATIENCE
 
 from app.editor import Editor
 from app.remote.client import hello
@@ -37,7 +38,7 @@ def test_the_servers_backends_are_offered_and_those_here_when_it_is_gone(
     computing, methods = alone.computing, alone.methods
 
     def wait(is_there: Any) -> None:
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE
         while not is_there():
             assert time.monotonic() < end
             alone.poll()
