@@ -97,7 +97,8 @@ and beside it, where nothing should change.
 
 ![The photo, without the shadow it was found to have, and as it truly is](shadows.jpg)
 
-What is not found stays, and can be painted out of the background (B). A ground with marks of its
+Two of the constants by which the light at a shadow's edge is evened were settled with these cases in
+view. What is not found stays, and can be painted out of the background (B). A ground with marks of its
 own as large as a shadow hides it; so does an outline that stands nowhere.
 
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
