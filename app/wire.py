@@ -3,8 +3,8 @@
 A message is a pickle (protocol 5). Arrays and bytes above `LARGE` are sent once, under a key, and
 stay the *same object* on the other side, so that a backend can remember what it computed for a
 photo by the photo's identity. All other array buffers are sent beside the pickle and arrive
-read-only, as documents need them. The largest are memory that both processes share (`blocks.py`),
-where the system can. Both ends are our own processes: nothing foreign is unpickled.
+read-only, as documents need them. The largest are memory that both processes share
+(`shared_memory.py`), where the system can. Both ends are our own processes: nothing foreign is unpickled.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from . import blocks
+from . import shared_memory
 
 LARGE = 1 << 20  # bytes
 KEPT = 12  # large values remembered on both sides; least recently used first out
 KEPT_BYTES = 1 << 30  # that they may have in all
 
 
-Buffer: TypeAlias = bytes | blocks.Block
+Buffer: TypeAlias = bytes | shared_memory.Block
 
 
 class Connection(Protocol):
@@ -70,7 +70,7 @@ class Writer:
     def __init__(self, connection: Connection, kept: int = KEPT) -> None:
         """`kept`: large values that are remembered after a message; 0 where none comes again."""
         self._connection, self._limit = connection, kept
-        self._pipe = blocks.pipe_of(connection)
+        self._pipe = shared_memory.pipe_of(connection)
         self._kept: OrderedDict[int, Any] = OrderedDict()  # id -> value, held so ids stay unique
 
     def key(self, value: Any) -> int | None:
@@ -107,13 +107,13 @@ class Writer:
         self, what: str, key: int | None, data: bytes, buffers: list[pickle.PickleBuffer]
     ) -> None:
         raws, pipe = [buffer.raw() for buffer in buffers], self._pipe
-        shared = [blocks.shared(raw) if pipe and raw.nbytes >= blocks.LEAST else None
+        shared = [shared_memory.shared(raw) if pipe and raw.nbytes >= shared_memory.LEAST else None
                   for raw in raws]  # fmt: skip
         self._connection.send((what, key, [len(block) if block else 0 for block in shared]))
         self._connection.send_bytes(data)
         for raw, block in zip(raws, shared, strict=True):
             if pipe is not None and block is not None:
-                blocks.send(pipe, block)
+                shared_memory.send(pipe, block)
             else:
                 self._connection.send_bytes(raw)
 
@@ -122,7 +122,7 @@ class Reader:
     """The receiving end."""
 
     def __init__(self, connection: Connection) -> None:
-        self._connection, self._pipe = connection, blocks.pipe_of(connection)
+        self._connection, self._pipe = connection, shared_memory.pipe_of(connection)
         self._kept: dict[int, Any] = {}
 
     def read(self) -> Any:
@@ -141,5 +141,5 @@ class Reader:
     def _buffer(self, size: int) -> Buffer:
         """The next buffer: a block of so many bytes, or, at 0, what is in the pipe."""
         if size and self._pipe is not None:
-            return blocks.receive(self._pipe, size)
+            return shared_memory.receive(self._pipe, size)
         return self._connection.recv_bytes()

@@ -97,9 +97,9 @@ and beside it, where nothing should change.
 
 ![The photo, without the shadow it was found to have, and as it truly is](shadows.jpg)
 
-Two of the constants by which the light at a shadow's edge is evened were settled with these cases in
-view. What is not found stays, and can be painted out of the background (B). A ground with marks of its
-own as large as a shadow hides it; so does an outline that stands nowhere.
+Two of the constants by which the light at a shadow's edge is evened were settled with these cases
+in view. What is not found stays, and can be painted out of the background (B). A ground with marks
+of its own as large as a shadow hides it; so does an outline that stands nowhere.
 
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
 shadow is its outline, beside itself; where its hard edge is, and how dark it is, the photo tells px

@@ -130,13 +130,14 @@ def sources_like(filled: F32, hole: Mask, seed: int, progress: Progress) -> I32:
 def _roughness(rgb: F32, known: F32) -> F32:
     """(h, w, 6) around each pixel: steps to the side and down, two coarser bands, two slants."""
     grey = rgb.mean(-1)
-    inner = cv2.erode((known >= 1).astype(np.float32), np.ones((3, 3)), borderValue=1)
+    whole = np.asarray(known >= 1, np.float32)
+    inner = np.asarray(cv2.erode(whole, np.ones((3, 3)), borderValue=1), np.float32)
     window = (ROUGHNESS_WINDOW, ROUGHNESS_WINDOW)
     count = np.maximum(cv2.blur(inner, window), 1e-6)
     steps = [np.abs(cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1)) for d in ((1, 0), (0, 1))]
     found = [cv2.blur(s * inner, window) / count for s in steps]
     found += [_band(grey, known, sigma) for sigma in ROUGHNESS_BANDS]
-    return np.dstack(found + [_slant(grey, known, sigma) for sigma in SLANT_SIGMAS])
+    return np.dstack(found + [_slant(grey, known, inner, sigma) for sigma in SLANT_SIGMAS])
 
 
 def _band(grey: F32, known: F32, sigma: float) -> F32:
@@ -146,15 +147,14 @@ def _band(grey: F32, known: F32, sigma: float) -> F32:
     return BAND_GAIN * _blurred(contrast, share, BAND_WINDOW * sigma)
 
 
-def _slant(grey: F32, known: F32, sigma: float) -> F32:
+def _slant(grey: F32, known: F32, inner: F32, sigma: float) -> F32:
     """(h, w) mean steps of `grey` (h, w) on a diagonal: > 0 where both go up, < 0 where one does.
 
-    The structure tensor's mixed term, in levels: 2 x y / (|x| + |y|) of the steps x and y.
+    `inner` (h, w) is 1 where the px around are known, too. The structure tensor's mixed term, in
+    levels: 2 x y / (|x| + |y|) of the steps x and y.
     """
     if sigma > 0:
         grey = _blurred(grey, known, sigma)
-    known = np.asarray(known >= 1, np.float32)
-    inner = np.asarray(cv2.erode(known, np.ones((3, 3)), borderValue=1), np.float32)
     x, y = (cv2.Sobel(grey, cv2.CV_32F, *d, ksize=1) for d in ((1, 0), (0, 1)))
     mixed = np.asarray(2 * x * y / np.maximum(np.abs(x) + np.abs(y), 1e-6), np.float32)
     return SLANT_GAIN * _blurred(mixed, inner, SLANT_WINDOW * max(sigma, 1.0))

@@ -46,9 +46,8 @@ class Matches:
     def gaps(self, matrix: F64, camera: Camera) -> F64:
         """(n, 2) by how much each is beside where it is seen, x `NEAR` of the size."""
         world = self.points @ matrix[:3, :3].T + matrix[:3, 3]
-        depth = np.maximum(world[:, 2:], 1e-6)
-        px = camera.focal * world[:, :2] / depth + [camera.cx, camera.cy]
-        return (px - self.seen) / (NEAR * self.size)
+        world[:, 2] = np.maximum(world[:, 2], 1e-6)
+        return (camera.project(world) - self.seen) / (NEAR * self.size)
 
     def support(self, matrix: F64, camera: Camera) -> float:
         """How many agree with a pose, the nearer, the more, x `reliable` beyond all: in [0, 1)."""

@@ -13,7 +13,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -39,6 +39,14 @@ from .weight_folder import (
 
 EXTRA = installation.extra("models")
 PARTIAL = ".partial-"
+
+
+def not_installed(packages: Sequence[str]) -> str | None:
+    """Which of the packages are missing, and what installs them, as one sentence; None: none."""
+    absent = [name for name in packages if importlib.util.find_spec(name) is None]
+    if not absent:
+        return None
+    return f"{' and '.join(absent)} {'is' if len(absent) == 1 else 'are'} not installed: {EXTRA}"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from pathlib import Path
 from typing import Any
@@ -45,9 +44,8 @@ class DiffusionRefiner:
 
     def missing(self) -> str | None:
         """See `Refiner`."""
-        if absent := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
-            are = "is" if len(absent) == 1 else "are"
-            return f"{' and '.join(absent)} {are} not installed: {models.EXTRA}"
+        if reason := models.not_installed(PACKAGES):
+            return reason
         if self.model() is None:
             best = self.choices()[0]
             size = f"{best.size / 1e9:.0f} GB, {best.licence}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from ... import models
@@ -22,9 +21,8 @@ def weights_folder(id: str) -> Path:
 
 def missing(*ids: str) -> str | None:
     """What has to be installed before the models `ids` can run, as one sentence."""
-    if absent := [name for name in PACKAGES if find_spec(name) is None]:
-        are = "is" if len(absent) == 1 else "are"
-        return f"{' and '.join(absent)} {are} not installed: {models.EXTRA}"
+    if reason := models.not_installed(PACKAGES):
+        return reason
     for id in ids:
         state = models.look_hub(id)
         if state.state == "damaged":
