@@ -4,7 +4,8 @@ A message is a pickle (protocol 5). Arrays and bytes above `LARGE` are sent once
 stay the *same object* on the other side, so that a backend can remember what it computed for a
 photo by the photo's identity. All other array buffers are sent beside the pickle and arrive
 read-only, as documents need them. The largest are memory that both processes share
-(`shared_memory.py`), where the system can. Both ends are our own processes: nothing foreign is unpickled.
+(`shared_memory.py`), where the system can. Both ends are our own processes: nothing foreign is
+unpickled.
 """
 
 from __future__ import annotations
