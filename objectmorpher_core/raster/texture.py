@@ -59,7 +59,8 @@ def _halve(fine: F32, coarse: F32) -> None:
     """Means of 2 x 2 pixels; an odd last row or column counts twice."""
     odd = fine.shape[0] % 2, fine.shape[1] % 2
     if any(odd):
-        fine = cv2.copyMakeBorder(fine, 0, odd[0], 0, odd[1], cv2.BORDER_REPLICATE)
+        rim = cv2.copyMakeBorder(fine, 0, odd[0], 0, odd[1], cv2.BORDER_REPLICATE)
+        fine = np.asarray(rim, np.float32)
     size = (coarse.shape[1], coarse.shape[0])
     cv2.resize(fine, size, dst=coarse, interpolation=cv2.INTER_AREA)
 
