@@ -74,7 +74,7 @@ def guess(
     choices = [_around_click(ground, cell) for cell in wanted]
     if prompt.is_subject:
         choices += _subjects(ground)
-    elif not wanted:
+    elif prompt.box is not None:  # of which the clicks are parts, or which they add to
         choices.append(_in_box(ground, strict))
     wholes = [_settle(strict, choice) for choice in choices]
     if prompt.level == "group":

@@ -31,11 +31,6 @@ def check_prompt(rgb: RGB, prompt: Prompt) -> None:
         if not (x0 < x1 and y0 < y1 and x1 > 0 and y1 > 0 and x0 < width and y0 < height):
             corners = f"the box {x0:g}, {y0:g}, {x1:g}, {y1:g}"
             raise SelectionError(f"{corners} holds nothing of the photo of {width} x {height} px")
-        clicks = [c for c in prompt.clicks if c.is_foreground]
-        outside = [c for c in clicks if not (x0 <= c.x <= x1 and y0 <= c.y <= y1)]
-        if outside:
-            at = f"the click at {outside[0].x:g}, {outside[0].y:g}"
-            raise SelectionError(f"{at} is outside the box {x0:g}, {y0:g}, {x1:g}, {y1:g}")
     elif not prompt.is_subject and not any(c.is_foreground for c in prompt.clicks):
         raise SelectionError("every click says what is not the object: click the object too")
     _check_contradiction(prompt)
@@ -52,12 +47,17 @@ def _check_contradiction(prompt: Prompt) -> None:
 
 
 def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
-    """(H, W) True inside the prompt's box, or everywhere where there is none."""
-    inside = np.ones(shape[:2], bool)
-    if prompt.box is not None:
-        x0, y0, x1, y1 = prompt.box
-        inside[:] = False
-        inside[max(int(y0), 0) : int(np.ceil(y1)), max(int(x0), 0) : int(np.ceil(x1))] = True
+    """(H, W) True inside the prompt's box; everywhere where none limits what is meant.
+
+    A click on the object beside the box says that the box was drawn too small.
+    """
+    if prompt.box is None:
+        return np.ones(shape[:2], bool)
+    x0, y0, x1, y1 = prompt.box
+    if not all(x0 <= c.x <= x1 and y0 <= c.y <= y1 for c in prompt.clicks if c.is_foreground):
+        return np.ones(shape[:2], bool)
+    inside = np.zeros(shape[:2], bool)
+    inside[max(int(y0), 0) : int(np.ceil(y1)), max(int(x0), 0) : int(np.ceil(x1))] = True
     return inside
 
 

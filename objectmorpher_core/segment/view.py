@@ -24,6 +24,7 @@ LOOK_AGAIN = 0.8  # confidence: a small whole less sure is recognised anew, in a
 DETAILS = 4  # closer looks that are kept
 DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
 SMALL = 0.03  # x photo's area: such a thing is looked at more closely
+SMALL_BOX = 0.3  # the same of a box: it says where, and is larger than what it is around
 AS_GOOD = 0.7  # x best score: a small region as likely as that is worth a closer look
 MARGIN = 0.5  # x larger side of a thing: what is looked at around it
 LEAST_MARGIN = 0.1  # x larger side of the photo
@@ -151,7 +152,7 @@ class PhotoView:
 
     def _look(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:
         steps = steps_of(prompt)
-        if prompt.level == "object" or not any(c.is_foreground for c in prompt.clicks):
+        if prompt.level == "object" or not steps[0].clicks:
             return self._look_within(steps, None, at_once, progress)
         around = replace(steps[0], level="object")
         whole = self._seen(around, at_once, part(progress, 0.0, 0.3))
@@ -187,9 +188,12 @@ class PhotoView:
         progress(0.1, "looking closer")
         inside = None if whole is None else whole[box[1] : box[3], box[0] : box[2]]
         moved = [_moved(step, box) for step in steps]
+        is_boxed = steps[0].box is not None
         is_final, rest = True, part(progress, 0.3, 0.6)
-        if self._is_large:
+        if self._is_large or is_boxed:
             is_final = not at_once or (box, True) in self._details
+            if is_boxed and not (is_final or self._is_large):
+                return self._owed(steps, whole, progress), len(steps)
             detail = self._detail(box, is_final, progress)
             first = detail.answer(moved[0], inside, rest)
         else:
@@ -220,7 +224,11 @@ class PhotoView:
     def _closer(self, choice: Choice, prompt: Prompt) -> Box | None:
         """Where to look closer at what a prompt's first click may mean; None where it is large."""
         pieces = self.embedding.pieces
-        if prompt.is_subject or prompt.box is not None or prompt.level == "group":
+        if prompt.is_subject:
+            return None
+        if prompt.box is not None:
+            return self._around_box(prompt.box)
+        if prompt.level == "group":
             return None
         regions = choice.others
         best = max(region.score for region in regions)
@@ -239,6 +247,20 @@ class PhotoView:
         rows, columns = np.flatnonzero(painted.any(1)), np.flatnonzero(painted.any(0))
         left, right = columns[0] * wide / width, (columns[-1] + 1) * wide / width
         top, bottom = rows[0] * tall / height, (rows[-1] + 1) * tall / height
+        return self._crop_around(left, top, right, bottom)
+
+    def _around_box(self, box: tuple[float, float, float, float]) -> Box | None:
+        """The crop to look at around a box that the user drew; None where it is large."""
+        tall, wide = self._rgb.shape[:2]
+        left, right = np.clip([box[0], box[2]], 0, wide)
+        top, bottom = np.clip([box[1], box[3]], 0, tall)
+        if (right - left) * (bottom - top) >= SMALL_BOX * tall * wide:
+            return None
+        return self._crop_around(float(left), float(top), float(right), float(bottom))
+
+    def _crop_around(self, left: float, top: float, right: float, bottom: float) -> Box | None:
+        """The crop to look at around a thing in these px; None where it does not fit a tile."""
+        tall, wide = self._rgb.shape[:2]
         if tall * wide > LARGE:
             side = TILE * wide, TILE * tall
             if right - left > FITS * side[0] or bottom - top > FITS * side[1]:
@@ -279,10 +301,13 @@ class PhotoView:
 
 
 def steps_of(prompt: Prompt) -> list[Prompt]:
-    """The prompt as it was built up: what the first answer needs, then click by click."""
+    """The prompt as it was built up: what the first answer needs, then click by click.
+
+    A box and the subject need no click: clicks correct what they mean.
+    """
     clicks = list(prompt.clicks)
     begun: list[Click] = []
-    if not prompt.is_subject:
+    if not prompt.is_subject and prompt.box is None:
         first = next((c for c in clicks if c.is_foreground), None)
         if first is not None:
             clicks.remove(first)
@@ -309,9 +334,13 @@ def _is_in(box: Box, click: Click) -> bool:
 
 
 def _moved(prompt: Prompt, box: Box) -> Prompt:
-    """The prompt, its clicks in px of a box; those outside are left out."""
-    clicks = [replace(c, x=c.x - box[0], y=c.y - box[1]) for c in prompt.clicks if _is_in(box, c)]
-    return replace(prompt, clicks=tuple(clicks))
+    """The prompt in px of a box; clicks outside are left out."""
+    left, top = box[:2]
+    clicks = tuple(replace(c, x=c.x - left, y=c.y - top) for c in prompt.clicks if _is_in(box, c))
+    if prompt.box is None:
+        return replace(prompt, clicks=clicks)
+    x0, y0, x1, y1 = prompt.box
+    return replace(prompt, clicks=clicks, box=(x0 - left, y0 - top, x1 - left, y1 - top))
 
 
 def _frame_share(mask: Mask) -> float:

@@ -196,13 +196,49 @@ def test_a_click_anywhere_selects_what_it_is_on_part_in_object_in_group():
 
 def test_nothing_outside_a_box_is_chosen_and_a_box_is_enough():
     mask = truth_mask("dahlia")
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    box = float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
+    box = around(mask)
     found = dino().segment(photo("flower"), Prompt(box=box), embedding("flower"), silent)
+    left, top, right, bottom = (int(v) for v in box)
     outside = np.ones_like(found)
-    outside[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = False
+    outside[top:bottom, left:right] = False
     assert not (found & outside).any()
     assert overlap(found, mask) > 0.85
+
+
+def around(mask: np.ndarray) -> tuple[float, float, float, float]:
+    """The box that just holds a mask (H, W)."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
+
+
+@pytest.mark.parametrize("name", ["spoon", "helmet", "cat"])
+def test_clicks_correct_what_a_box_means_and_do_not_begin_anew(name):
+    photo_name, mask = truth(name).photo, truth_mask(name)
+    box = around(mask)
+
+    def boxed(*clicks: Click) -> np.ndarray:
+        asked = Prompt(clicks, box=box)
+        return dino().segment(photo(photo_name), asked, embedding(photo_name), silent)
+
+    first = boxed()
+    x, y = inmost(first & mask)
+    np.testing.assert_array_equal(boxed(Click(x, y)), first)
+    x, y = inmost(mask & ~first)
+    more = boxed(Click(x, y))
+    assert more[int(y), int(x)]
+    assert (first & mask & ~more).sum() < 0.01 * mask.sum()
+    assert overlap(more, mask) > overlap(first, mask) - HELPS
+
+
+def test_a_box_around_a_small_thing_is_looked_at_more_closely():
+    """The whole photo's patches alone take a fifth of the face for something else."""
+    mask = truth_mask("face")
+    asked = Prompt(box=around(mask))
+    backend, known = segment.load("dino"), embedding("astronaut")
+    first = backend.glance(photo("astronaut"), asked, known, silent)
+    assert not first.is_final
+    found = backend.segment(photo("astronaut"), asked, known, silent)
+    assert overlap(found, mask) > max(0.92, overlap(first.mask, mask))
 
 
 def test_a_thin_thing_is_not_lost_at_its_edges():
