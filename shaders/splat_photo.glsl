@@ -1,7 +1,7 @@
 // The photo, looked up (raster/texture.py: sample_texture).
 
 uniform sampler2D photo;  // straight colour and alpha on the object's crop, halved copies below;
-                          // the first with a border, of the same colours without alpha
+                          // the photo's own size with a border, of the same colours without alpha
 uniform ivec2 sizes[8];   // px of each level without the border; the texture's own are larger
 uniform int levels;
 uniform float finest;     // level of the photo that the texture's first one is
@@ -56,8 +56,9 @@ vec4 sample_photo(vec2 look, float magnified) {
     float between = lod - float(lower);
     int upper = between > 0.0 ? lower + 1 : lower;
     vec4 value = vec4(0.0);
-    if (lower == 0) value = (1.0 - between) * cubic(at);
-    for (int level = max(lower, 1); level <= upper; ++level)
+    bool is_own = lower == 0 && finest == 0.0;
+    if (is_own) value = (1.0 - between) * cubic(at);
+    for (int level = is_own ? 1 : lower; level <= upper; ++level)
         value += (level == lower ? 1.0 - between : between) * bilinear(at, level);
     return value;
 }

@@ -66,6 +66,7 @@ class LayeredPass:
         photo = self._uploads(
             "photo", texture, lambda: PhotoLevels(self._context, texture, self._limit)
         )
+        photo.reach(_magnified(splats, *cameras))
         for top in range(0, camera.height, rows):
             values = {
                 **_uniforms(splats), **photo.uniforms, **_looks(texture, *cameras, top),
@@ -204,6 +205,12 @@ def _uniforms(splats: PosedSplats) -> Uniforms:
         "gaps": tuple(max(gap, LEAST_GAP) ** -2 for gap in (splats.gap, splats.texture_gap)),
         "depth_range": (float(splats.world_from_object[2, 3]), size),
     }
+
+
+def _magnified(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> float:
+    """Pixels of the photo that one of the view shows, of the object as a whole."""
+    there, here = splats.rest.world_from_object[2, 3], splats.world_from_object[2, 3]
+    return photo_camera.focal / camera.focal * float(here / there) / splats.scale
 
 
 def _looks(texture: TextureLevels, camera: Camera, photo_camera: Camera, top: int) -> Uniforms:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -15,14 +15,25 @@ from objectmorpher_core import segment
 from objectmorpher_core.arrays import RGB, Mask
 from objectmorpher_core.document import Prompt
 from objectmorpher_core.progress import silent
-from objectmorpher_core.segment import Segmenter, SelectionError
-from tests.core.segment.simulated_user import Step, boundary_f, overlap, use
+from objectmorpher_core.segment import Found, Quick, Segmenter, SelectionError
+from tests.core.segment.simulated_user import Step, boundary_f, overlap, use, worst_click
 from tests.core.segment.truth_masks import LATER, TRUTHS, Truth, truth, truth_mask
 from tests.photos import photo
 
 CLICKS = 3
+BOX_CLICKS = 2  # after a box
 LARGE_SIDE = 8  # x: the camera photo of 512 x 512 px becomes one of 17 megapixels
 LARGE_NAME = "tower"
+
+
+@dataclass(frozen=True)
+class Glance:
+    """What is answered at once, before a closer look."""
+
+    seconds: float  # of a core
+    iou: float
+    is_final: bool  # a closer look would tell no better
+    then: float  # IoU of the whole answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +44,7 @@ class Clicked:
     steps: list[Step]  # CLICKS
     confidences: list[float]  # of the steps; empty where the segmenter tells none
     seconds: list[float]  # of a busy core, of every click
+    glances: list[Glance]  # of every click; empty where the segmenter has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +54,8 @@ class Row:
     ours: Clicked
     colors: Clicked  # GrabCut alone
     subject: float  # IoU of the photo's subject, no click
-    box: float  # IoU of the object's box, ours
-    color_box: float
+    box: list[float]  # IoU of the object's box, ours, and after each of BOX_CLICKS
+    color_box: list[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +118,19 @@ def _row(each: Truth) -> Row:
     subject = _ask("subject", each.photo, Prompt(is_subject=True))
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     box = float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
-    boxed = [_ask(name, each.photo, Prompt(box=box)) for name in ("dino", "grabcut")]
-    return Row(ours, colors, overlap(subject, mask), *(overlap(found, mask) for found in boxed))
+    boxed = [_boxed(name, each, box) for name in ("dino", "grabcut")]
+    return Row(ours, colors, overlap(subject, mask), *boxed)
+
+
+def _boxed(name: str, each: Truth, box: tuple[float, float, float, float]) -> list[float]:
+    """IoU of a box, and after each of BOX_CLICKS on the largest error."""
+    mask, prompt, values = truth_mask(each.name), Prompt(box=box), []
+    for _ in range(BOX_CLICKS + 1):
+        found = _ask(name, each.photo, prompt)
+        values.append(overlap(found, mask))
+        if values[-1] < 1:
+            prompt = replace(prompt, clicks=(*prompt.clicks, worst_click(found, mask)))
+    return values
 
 
 def _ask(name: str, picture: str, prompt: Prompt) -> Mask:
@@ -117,18 +140,34 @@ def _ask(name: str, picture: str, prompt: Prompt) -> Mask:
 
 def _click(backend: Segmenter, rgb: RGB, embedding: Any, each: Truth, mask: Mask) -> Clicked:
     seconds: list[float] = []
+    glances: list[Glance] = []
 
     def timed(prompt: Prompt) -> Mask:
         start = time.process_time()
+        first = _glance(backend, rgb, embedding, prompt)
+        middle = time.process_time()
         found = _segment(backend, rgb, embedding, prompt)
         seconds.append(time.process_time() - start)
+        if first is not None:
+            ious = overlap(first.mask, mask), overlap(found, mask)
+            glances.append(Glance(middle - start, ious[0], first.is_final, ious[1]))
         return found
 
     steps = use(timed, mask, CLICKS, each.kind == "part")
     steps += steps[-1:] * (CLICKS - len(steps))
     confidences = [backend.confidence(rgb, step.prompt, embedding) for step in steps]
     told = [value for value in confidences if value is not None]
-    return Clicked(each, steps, told, seconds)
+    return Clicked(each, steps, told, seconds, glances)
+
+
+def _glance(backend: Segmenter, rgb: RGB, embedding: Any, prompt: Prompt) -> Found | None:
+    """None, where the segmenter refuses, or answers at once anyway."""
+    if not isinstance(backend, Quick):
+        return None
+    try:
+        return backend.glance(rgb, prompt, embedding, silent)
+    except SelectionError:
+        return None
 
 
 def _segment(backend: Segmenter, rgb: RGB, embedding: Any, prompt: Prompt) -> Mask:

@@ -58,11 +58,13 @@ def guess(
     prompt: Prompt,
     salience: F32 | None,
     least: float = 0.0,
+    boxed: F32 | None = None,
 ) -> F32:
     """(SIDE, SIDE) guess in [0, 1] that a place of the photo (H, W, 3) belongs to the object.
 
     The first of `walks` crosses from part to part of an object, the second stops at the borders of
-    parts too. What a click is on covers more than `least` of the photo.
+    parts too. What a click is on covers more than `least` of the photo. `boxed` (SIDE, SIDE): the
+    guess of a box without clicks, which they add to and take from.
     """
     walk, strict = walks
     inside = _to_cells(box_mask(rgb.shape, prompt).astype(np.float32), walk.shape) > 0.5
@@ -74,7 +76,7 @@ def guess(
     choices = [_around_click(ground, cell) for cell in wanted]
     if prompt.is_subject:
         choices += _subjects(ground)
-    elif prompt.box is not None:  # of which the clicks are parts, or which they add to
+    elif boxed is None and not wanted:
         choices.append(_in_box(ground, strict))
     wholes = [_settle(strict, choice) for choice in choices]
     if prompt.level == "group":
@@ -83,10 +85,14 @@ def guess(
         levelled = [_clicked_part(strict, *each) for each in zip(wanted, wholes, strict=False)]
     else:
         levelled = wholes[: len(wanted)]
-    cells = np.any([*levelled, *wholes[len(wanted) :]], axis=0)
+    nothing = np.zeros(walk.shape, bool)
+    cells = np.any([nothing, *levelled, *wholes[len(wanted) :]], axis=0)
     is_finer = prompt.level != "part" or not wanted  # the subject map knows wholes, not parts
     subjects = [choice.subject for choice in choices if choice.subject is not None and is_finer]
     soft = _sharpen(cells, np.max(subjects, axis=0) if subjects else None)
+    if boxed is not None:
+        soft = np.maximum(soft, boxed)
+        cells = cells | inside
     kept = inside.copy()
     for cell in unwanted:
         kept &= ~_part(strict, cell, wanted, cells)

@@ -160,9 +160,13 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
     Where the matte (Levin et al. 2008) that its inside and outside leave open is half. With
     `near` (H, W), only there.
     """
-    inner, outer = _core(mask, band), _core(~mask, band)
+    around = _around_outline(mask, (THIN + 1) * band + 2)
+    if around is None:
+        return mask
+    own = mask[around]
+    inner, outer = _core(own, band), _core(~own, band)
     if near is not None:
-        inner, outer = inner | (mask & ~near), outer | (~mask & ~near)
+        inner, outer = inner | (own & ~near[around]), outer | (~own & ~near[around])
     unknown = ~(inner | outer)
     if not unknown.any():
         return mask
@@ -171,13 +175,27 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
         max(rows[0] - 2, 0) : rows[-1] + 3,
         max(columns[0] - 2, 0) : columns[-1] + 3,
     ]
-    picture = np.asarray(rgb[crop], np.float32) / np.float32(255)
-    start = mask[crop].astype(np.float32)
+    picture = np.asarray(rgb[around][crop], np.float32) / np.float32(255)
+    start = own[crop].astype(np.float32)
     expected = Expected(start, np.full(start.shape, PRIOR, np.float32))
     alpha = solve_alpha(picture, unknown[crop], expected, start, BAND_ROUNDS)
     sharp = mask.copy()
-    sharp[crop] = alpha > 0.5
+    sharp[around][crop] = alpha > 0.5
     return sharp
+
+
+def _around_outline(mask: Mask, margin: int) -> tuple[slice, slice] | None:
+    """The rectangle of a mask (H, W) that holds its outline; None where it has none."""
+    down, across = mask[1:] != mask[:-1], mask[:, 1:] != mask[:, :-1]
+    rows = np.flatnonzero(across.any(1)), np.flatnonzero(down.any(1))
+    columns = np.flatnonzero(across.any(0)), np.flatnonzero(down.any(0))
+    if not any(map(len, rows)):
+        return None
+    (top, bottom), (left, right) = (
+        (min(int(k[0]) for k in found if len(k)), max(int(k[-1]) for k in found if len(k)) + 2)
+        for found in (rows, columns)
+    )
+    return np.s_[max(top - margin, 0) : bottom + margin, max(left - margin, 0) : right + margin]
 
 
 def rehearse() -> None:

@@ -64,10 +64,12 @@ class GrabCut:
 
         def find(meant: Prompt) -> Mask:
             progress(0.4, "looking for its outline")
+            boxed = None if meant.box is None else _box_guess(rgb, meant)
             if walks is None:
-                return cut(rgb, _box_guess(rgb, meant), meant, seed)
+                assert boxed is not None, "a prompt without clicks and subject has a box"
+                return cut(rgb, boxed, meant, seed)
             try:
-                return cut(rgb, guess(walks, rgb, meant, salience), meant, seed)
+                return cut(rgb, guess(walks, rgb, meant, salience, boxed=boxed), meant, seed)
             except SelectionError:
                 if not any(click.is_foreground for click in meant.clicks):
                     raise

@@ -192,9 +192,9 @@ class PhotoView:
         is_final, rest = True, part(progress, 0.3, 0.6)
         if self._is_large or is_boxed:
             is_final = not at_once or (box, True) in self._details
-            if is_boxed and not (is_final or self._is_large):
+            if not is_final:
                 return self._owed(steps, whole, progress), len(steps)
-            detail = self._detail(box, is_final, progress)
+            detail = self._detail(box, True, progress)
             first = detail.answer(moved[0], inside, rest)
         else:
             detail = self._detail(box, False, progress)

@@ -219,6 +219,32 @@ def test_a_photo_too_large_for_the_driver_is_halved(context, caplog):
     assert "1/2 of the photo's detail" in caplog.text
 
 
+def test_only_what_is_looked_at_is_uploaded_and_the_picture_is_the_same(context):
+    from app.render.splat_pass import SplatPass
+
+    scene = shapes.scene("ellipse", 2000)
+    splats = scene.puppet.posed(None, Placement((10.0, 5.0), turn=(20.0, 0.0, 0.0)))
+    whole, small = scene.camera, scene.camera.windowed(0, 0, 20, 15, 0.125)
+    full, sparing = SplatPass(context), SplatPass(context)
+    rendered(full, splats, scene.texture, whole, scene.camera)
+    photo = [full.uploads("photo", scene.texture, _never)]
+    pictures = [rendered(each, splats, scene.texture, small, scene.camera)
+                for each in (full, sparing)]  # fmt: skip
+    photo.append(sparing.uploads("photo", scene.texture, _never))
+    assert [each.uniforms["finest"] for each in photo] == [0.0, 2.0]
+    np.testing.assert_allclose(*pictures, atol=1e-3)
+    enlarged = scene.puppet.posed(None, Placement(scale=8.0))
+    for view, posed in ((whole, splats), (small, enlarged)):  # looked at closely, and enlarged
+        pictures = [rendered(each, posed, scene.texture, view, scene.camera)
+                    for each in (full, sparing)]  # fmt: skip
+        np.testing.assert_allclose(*pictures, atol=1e-3)
+        assert sparing.uploads("photo", scene.texture, _never).uniforms["finest"] == 0.0
+
+
+def _never() -> None:
+    raise AssertionError("it is not there")
+
+
 DRAW = """
 import sys
 import moderngl, numpy as np
