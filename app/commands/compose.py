@@ -92,6 +92,8 @@ def _cannot_refine(editor: Editor) -> str | None:
         return t("Move the object first")
     if (trouble := editor.composing.trouble) is not None:
         return trouble
+    if not editor.methods.is_known:
+        return t("Looking at what can run here")
     reason = editor.methods.why_not("refine")
     return None if reason is None else sentence(reason)
 

@@ -48,12 +48,19 @@ class Methods:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self._stages: dict[str, Stage] = {}  # empty until looked at
-        self._is_asked = False
+        self._is_asked = self._is_told = False
         self._served: tuple[Server, Offers] | None = None  # with no offers until it answers
 
     def forget(self) -> None:
         """A model came or went: what can run is looked at again, when it is wanted."""
-        self._stages, self._is_asked, self._served = {}, False, None
+        self._stages, self._served = {}, None
+        self._is_asked = self._is_told = False
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it was looked at what can run here."""
+        self._look()
+        return self._is_told
 
     def of(self, stage: str) -> tuple[Method, ...]:
         """All of a stage, "auto" first; until it was looked at all seem able to run."""
@@ -134,11 +141,16 @@ class Methods:
         self._is_asked = True
         self._editor.jobs.start(
             "Looking at what can run here", job_functions.look_at_stages,
-            done=self._take, failed=lambda error: None, kind=LOOK, is_quiet=True,
+            done=self._take, failed=lambda error: self._give_up(), cancelled=self._give_up,
+            kind=LOOK, is_quiet=True,
         )  # fmt: skip
 
     def _take(self, stages: tuple[Stage, ...]) -> None:
-        self._stages = by_stage(stages)
+        self._stages, self._is_told = by_stage(stages), True
+
+    def _give_up(self) -> None:
+        """All seem able to run: who is asked for it says what is missing."""
+        self._is_told = True
 
     def _take_offers(self, server: Server, offers: Offers) -> None:
         self._served = server, offers

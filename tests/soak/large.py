@@ -193,9 +193,9 @@ def photo(desk: Desk) -> None:
     with desk.step("lift, fill in the background"):
         run(desk.editor, "lift")
     assert desk.document.plate is not None
-    _frames(desk)
     with desk.step("drag"):
         desk.drag(0, np.array([x, y]), (25.0, 10.0))
+    _frames(desk)
     with desk.step("move"):
         desk.move(0, 300.0, 100.0)
     for n in range(30):
@@ -245,10 +245,10 @@ def gaussians(desk: Desk) -> None:
         desk.editor.shaping.open_file(path)
     lifted = desk.document.objects[0].lifted
     assert lifted is not None, desk.editor.message
-    _frames(desk)
     spots = np.argwhere(mask)[:, ::-1] + 0.5
     with desk.step("first drag", gaussians=len(lifted.gaussians)):
         desk.drag(0, spots.mean(0), (15.0, 5.0))
+    _frames(desk)
     with desk.step("forty drags, each undone", drag_ms=_drags(desk, [mask])):
         pass
     with desk.step("move"):
@@ -295,6 +295,7 @@ def steps(desk: Desk) -> None:
 
 
 def _frames(desk: Desk) -> None:
+    """Of an edit: what did not move is not drawn."""
     with desk.step("first frame"):
         desk.draw()
     with desk.step("second frame"):
