@@ -4,7 +4,7 @@ Works in the editor and its worker, without a window, and prints one line of JSO
 seconds on the wall, processor seconds of the editor, of its main thread and of its worker, the
 longest that the main thread was at work without a frame (of the processor and on the wall), and the
 most memory that each and both have held in it, what they share counted once. Frames are drawn
-with OpenGL where there is some.
+as the window does: with OpenGL, or by the processor where that is emulated.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from objectmorpher_core.pose import Pose
 from objectmorpher_core.splat_files import encode
 from tests import photos
 
-from .session import SIZE, _renderer
+from .session import SIZE, window_renderer
 from .watching import Watch, share
 
 SIDE = 10_000  # px of the large photo's
@@ -64,7 +64,7 @@ class Desk:
         self._watch = Watch(lambda: self._worker)
         try:
             self._gl = moderngl.create_standalone_context(require=330, backend="egl")
-            self._renderer = _renderer(self._gl)
+            self._renderer = window_renderer(self._gl, "auto")
         except Exception as error:
             print(f"nothing is drawn: {error}", file=sys.stderr)
             self._renderer = None
@@ -91,7 +91,7 @@ class Desk:
     def draw(self) -> None:
         """A frame, as the window draws it."""
         if self._renderer is not None:
-            scene = build_scene(self.editor, "gl")
+            scene = build_scene(self.editor, self._renderer.kind)
             self._renderer.begin((0.0, 0.0, 0.0), SIZE)
             self._renderer.draw(scene, self.editor.view, (0, 0, *SIZE))
             self._gl.finish()

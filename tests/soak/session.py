@@ -87,7 +87,7 @@ class Session:
             self._gl = moderngl.create_standalone_context(require=330, backend="egl")
         except Exception as error:
             raise RuntimeError(f"no OpenGL without a window here: {error}") from error
-        self._renderer = _renderer(self._gl)
+        self._renderer = window_renderer(self._gl, "gl")
         self._tool, self._chance = PoseTool(), random.Random(seed)
         self._folder, self._begun = folder, time.monotonic()
         self._drags: deque[float] = deque(maxlen=DRAGS)
@@ -290,12 +290,12 @@ def _resident(process: str) -> float:
     return int(status.split("VmRSS:")[1].split()[0]) / 1024
 
 
-def _renderer(context: Any) -> Renderer:
+def window_renderer(context: Any, wanted: str) -> Renderer:
     """One whose window is a framebuffer."""
     context._screen = context.framebuffer([context.texture(SIZE, 4)])
     usual: Callable[..., Any] = moderngl.create_context
     moderngl.create_context = lambda **_: context
     try:
-        return Renderer("gl")
+        return Renderer(wanted)
     finally:
         moderngl.create_context = usual
