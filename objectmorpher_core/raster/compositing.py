@@ -19,14 +19,43 @@ LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def composite_layer(
-    s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
+    s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top,
     rules, kind,
 ):  # fmt: skip
-    """Puts the layer behind what is there already.
+    """Puts the layer behind what is there already, on the rows first..last of the tile.
 
     Returns the first row, and the last + 1, in which a further layer may be seen.
     """
-    for k in range(m.ALL):
+    for strip in range(m.STRIPS):
+        _settle(s, *m.strip_pixels(strip, first, last))
+    look_up(s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top)
+    visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
+    for strip in range(m.STRIPS):
+        start, end = m.strip_pixels(strip, first, last)
+        if kind.is_surface:
+            _cover(s, start, end, m.TOTAL, m.GX, m.GY, m.CLEAR, rules)
+            _cover(s, start, end, m.BODIED, m.BGX, m.BGY, m.BODY_CLEAR, rules)
+        if layer == 0:
+            _put_first(s, start, end, visible, opaque)
+        else:
+            _put_behind(s, start, end, rules)
+    least = np.float32(rules.least_front)
+    begin, end = last, first
+    for y in range(first, last):
+        more = ZERO
+        for strip in range(m.STRIPS):
+            at = m.pixel_index(strip * m.STRIP, y)
+            for k in range(at, at + np.uint64(m.STRIP)):
+                more += ONE if s[m.OPEN + k] * s[m.LEFT + k] >= least else ZERO
+        if more > ZERO:
+            begin, end = min(begin, y), y + 1
+    return begin, end
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _settle(s, start, end):
+    """What the sums say of the photo, for a share of the layer that is 1."""
+    for k in range(start, end):
         total = s[m.TOTAL + k]
         shown = max(total - s[m.BODIED + k], ZERO)
         is_photo = shown > LEAST_PHOTO * total
@@ -39,40 +68,20 @@ def composite_layer(
         s[m.MATTES + k] = max(ONE - s[m.MATTES + k] * inverse, ZERO)  # not below 0 by rounding
         s[m.SOLIDS + k] *= inverse
         s[m.SEES + k] = max(ONE - s[m.SEES + k] * inverse, ZERO)
-    look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top)
-    if kind.is_surface:
-        _cover(s, m.TOTAL, m.GX, m.GY, m.CLEAR, rules)
-        _cover(s, m.BODIED, m.BGX, m.BGY, m.BODY_CLEAR, rules)
-    visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
-    if layer == 0:
-        _put_first(s, visible, opaque)
-    else:
-        _put_behind(s, rules)
-    least = np.float32(rules.least_front)
-    begin, end = rows, 0
-    for y in range(rows):
-        more = ZERO
-        for strip in range(m.STRIPS):
-            at = m.pixel_index(strip * m.STRIP, y)
-            for k in range(at, at + np.uint64(m.STRIP)):
-                more += ONE if s[m.OPEN + k] * s[m.LEFT + k] >= least else ZERO
-        if more > ZERO:
-            begin, end = min(begin, y), y + 1
-    return begin, end
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _cover(s, total, across, down, clear, rules):
+def _cover(s, start, end, total, across, down, clear, rules):
     """1 - coverage, see `rules.coverage`, into the row `clear`."""
-    for k in range(m.ALL):
+    for k in range(start, end):
         gx, gy = s[across + k], s[down + k]
         s[clear + k] = ONE - coverage(s[total + k], math.sqrt(gx * gx + gy * gy), rules)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _put_first(s, visible, opaque):
+def _put_first(s, start, end, visible, opaque):
     """The first layer: nothing is in front of it."""
-    for k in range(m.ALL):
+    for k in range(start, end):
         total, body, is_photo = s[m.TOTAL + k], s[m.BODIED + k], s[m.IS_PHOTO + k]
         photo = max(total - body, ZERO) * is_photo
         matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
@@ -99,42 +108,44 @@ def _put_first(s, visible, opaque):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _put_behind(s, rules):
-    """A later layer."""
+def _put_behind(s, start, end, rules):
+    """A later layer. Where it does not show, 0 is added: stores on a condition are slow."""
     near, far = np.float32(rules.same_point), np.float32(rules.apart)
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
-    for lane in range(int(m.ALL)):
-        k = np.uint64(lane)
-        total, body, is_open = s[m.TOTAL + k], s[m.BODIED + k], s[m.OPEN + k]
-        if not total * is_open > ZERO:
-            continue
-        is_photo = s[m.IS_PHOTO + k]
-        photo = max(total - body, ZERO) * is_photo
+    for k in range(start, end):
+        total, body, is_photo = s[m.TOTAL + k], s[m.BODIED + k], s[m.IS_PHOTO + k]
+        shows = ONE if total * s[m.OPEN + k] > ZERO else ZERO
+        photo, total = max(total - body, ZERO) * is_photo, max(total, TINY)
         matte = (s[m.T_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]) * is_photo
         whole, solid = ONE - s[m.CLEAR + k], ONE - s[m.BODY_CLEAR + k]
-        alpha = matte * whole + (ONE - matte) * solid
+        alpha = shows * (matte * whole + (ONE - matte) * solid)
         x, y = s[m.SHX + k], s[m.SHY + k]
         ex, ey = x - s[m.LAST_X + k], y - s[m.LAST_Y + k]
-        share = photo / total
-        same = ramp(math.sqrt(ex * ex + ey * ey), far, near) * share * s[m.LAST_SHARE + k]
-        clear = ONE - s[m.O_A + k]
-        apart, last_whole = clear * alpha, s[m.LAST_WHOLE + k]
-        split = s[m.LAST_THROUGH + k] * (ONE - last_whole) * alpha
-        through = min(apart + same * (split - apart), clear)
-        s[m.LAST_THROUGH + k] = clear + same * (s[m.LAST_THROUGH + k] - clear)
-        s[m.LAST_WHOLE + k] = ONE - (ONE - same * last_whole) * (ONE - whole)
-        s[m.LAST_X + k], s[m.LAST_Y + k], s[m.LAST_SHARE + k] = x, y, share
+        share, last_share = photo / total, s[m.LAST_SHARE + k]
+        same = np.float32(ramp(math.sqrt(ex * ex + ey * ey), far, near)) * share * last_share
+        before, last_whole, last_through = s[m.O_A + k], s[m.LAST_WHOLE + k], s[m.LAST_THROUGH + k]
+        clear = ONE - before
+        apart = clear * alpha
+        split = last_through * (ONE - last_whole) * alpha
+        through = shows * min(apart + same * (split - apart), clear)
+        s[m.LAST_THROUGH + k] += shows * (ONE - same) * (clear - last_through)
+        both = ONE - (ONE - same * last_whole) * (ONE - whole)
+        s[m.LAST_WHOLE + k] += shows * (both - last_whole)
+        s[m.LAST_X + k] += shows * ex
+        s[m.LAST_Y + k] += shows * ey
+        s[m.LAST_SHARE + k] += shows * (share - last_share)
         shown = photo * matte
         scale = through / max(shown + body, TINY)
-        before = s[m.O_A + k]
-        is_first = alpha > visible and s[m.O_DEPTH + k] == INFINITE
-        if is_first or (before < HALF and before + through >= HALF):
+        is_first = (alpha > visible) & (s[m.O_DEPTH + k] == INFINITE)
+        is_seen = is_first | ((before < HALF) & (before + through >= HALF))
+        seen = ONE if is_seen else ZERO
+        if is_seen:  # 0 times infinite is no number
             s[m.O_DEPTH + k] = s[m.DEPTH + k] / total
-            s[m.O_X + k], s[m.O_Y + k] = x, y
+        s[m.O_X + k] += seen * (x - s[m.O_X + k])
+        s[m.O_Y + k] += seen * (y - s[m.O_Y + k])
         s[m.O_R + k] += scale * (shown * s[m.T_R + k] + s[m.R + k])
         s[m.O_G + k] += scale * (shown * s[m.T_G + k] + s[m.G + k])
         s[m.O_B + k] += scale * (shown * s[m.T_B + k] + s[m.B + k])
         s[m.O_PHOTO + k] += scale * shown * s[m.SEES + k] * s[m.WITHIN + k]
-        s[m.O_A + k] += through
-        if s[m.O_A + k] > opaque:
-            s[m.OPEN + k] = ZERO
+        s[m.O_A + k] = before + through
+        s[m.OPEN + k] *= ONE if before + through <= opaque else ZERO

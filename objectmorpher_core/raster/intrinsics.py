@@ -120,6 +120,21 @@ def _bytes_over(typing_context, over, alpha, under, rest):
     return signature, generate
 
 
+def _lesser(typing_context, a, b):
+    """The lesser of two numbers, neither of them none: f32.
+
+    What min() gives is stored only where it is less, if it is put back where one of them came
+    from; such stores are slow.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(F32, [F32, F32])
+        least = builder.module.declare_intrinsic("llvm.minnum.f32", fnty=kind)
+        return builder.call(least, arguments, fastmath=("nnan", "nsz"))
+
+    return types.float32(types.float32, types.float32), generate
+
+
 def _fetch(typing_context, texels, at):
     """Asks for the line of memory around `texels[at]`, without waiting for it."""
 
@@ -140,6 +155,7 @@ sixteen_texels: Any = intrinsic(_sixteen_texels)  # called without the typing co
 four_texels: Any = intrinsic(_four_texels)
 between: Any = intrinsic(_between)
 bytes_over: Any = intrinsic(_bytes_over)
+lesser: Any = intrinsic(_lesser)
 fetch: Any = intrinsic(_fetch)
 
 

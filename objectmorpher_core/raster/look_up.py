@@ -22,10 +22,12 @@ HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top):
-    """Fills the rows T_R to T_A and WITHIN where IS_PHOTO is 1; 0 elsewhere.
+def look_up(
+    s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top
+):  # fmt: skip
+    """Fills T_R to T_A and WITHIN where IS_PHOTO is 1, 0 elsewhere; on the rows first..last.
 
-    The tile's first pixel is (left, top) of the view; it has so many columns and rows.
+    The tile's first pixel is (left, top) of the view; it has so many columns.
     """
     ratio = photo[0] / view[0]
     x0 = (left + 0.5 - view[1]) * ratio + photo[1]  # of the photo
@@ -33,13 +35,15 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
     # where the crop's pixel indices are counted from: near the tile, so that 32 bits suffice
     near_x, near_y = math.floor(x0 - crop_left - 0.5), math.floor(y0 - crop_top - 0.5)
     photo_x, photo_y = crop_left + near_x + 0.5, crop_top + near_y + 0.5
-    _prepare(
-        s, np.float32(x0 - photo_x), np.float32(y0 - photo_y), np.float32(ratio),
-        np.float32(photo_x), np.float32(photo_y), np.float32(photo[3]), np.float32(photo[4]),
-    )  # fmt: skip
+    for strip in range(m.STRIPS):
+        start, end = m.strip_pixels(strip, first, last)
+        _prepare(
+            s, start, end, np.float32(x0 - photo_x), np.float32(y0 - photo_y), np.float32(ratio),
+            np.float32(photo_x), np.float32(photo_y), np.float32(photo[3]), np.float32(photo[4]),
+        )  # fmt: skip
     height, width = shapes[0, 0], shapes[0, 1]
     stride = np.uint64(4 * width)
-    for y in range(rows):
+    for y in range(first, last):
         for x in range(columns):
             k = m.pixel_index(x, y)
             if s[m.IS_PHOTO + k] == ZERO:
@@ -62,12 +66,12 @@ def look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left,
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=EXACT)
-def _prepare(s, x0, y0, ratio, photo_x, photo_y, width, height):
+def _prepare(s, start, end, x0, y0, ratio, photo_x, photo_y, width, height):
     """Pixel index, place within the pixel and weights of the four texels on either axis.
 
     `x0`, `y0`: the first pixel's own place; `photo_x`, `photo_y`: photo px where that is 0.
     """
-    for k in range(m.ALL):
+    for k in range(start, end):
         x = x0 + ratio * s[m.STEP_X + k] + s[m.SHX + k]
         y = y0 + ratio * s[m.STEP_Y + k] + s[m.SHY + k]
         x, y = min(max(x, -HIGHEST), HIGHEST), min(max(y, -HIGHEST), HIGHEST)

@@ -22,8 +22,8 @@ from .singles import HALF, ONE, ZERO
 STEP = 2  # px between nodes
 SIDE = TILE // STEP + 1  # nodes
 NODES = np.uint64(-(-SIDE * SIDE // 8) * 8)  # and a few more that nobody reads
-TOTAL, DEPTH, X, Y, NODE_X, NODE_Y = (np.uint64(row) * NODES for row in range(6))
-NODE_ROWS = 6
+TOTAL, DEPTH, X, Y, NODE_X, NODE_Y, UPPER, LOWER = (np.uint64(row) * NODES for row in range(8))
+NODE_ROWS = 8
 NARROWEST = np.float32(2.5)  # px, standard deviation: finer sums need every pixel
 LEAST_TOTAL = np.float32(1.0)  # kernel sum that is nowhere near a surface's edge
 STEEPEST = np.float32(0.5)  # of the kernel sum, per px: so is what is no steeper
@@ -73,7 +73,7 @@ def draw_smooth(
     _spread(nodes, DEPTH, s, m.O_DEPTH)
     for k in range(m.ALL):
         s[m.IS_PHOTO + k] = s[m.MAG + k] = ONE
-    look_up(s, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top)
+    look_up(s, left, top, columns, 0, rows, view, photo, texels, shapes, crop_left, crop_top)
     for k in range(m.ALL):
         alpha = s[m.T_A + k]
         s[m.O_R + k], s[m.O_G + k] = alpha * s[m.T_R + k], alpha * s[m.T_G + k]
@@ -141,19 +141,18 @@ def _is_whole(nodes):
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _spread(nodes, source, s, target):
     """A row of the grid's memory, interpolated to a row of the tile's."""
-    upper, lower = np.empty(16, np.float32), np.empty(16, np.float32)
     for y in range(np.uint64(SIDE - 1)):
         at = source + y * np.uint64(SIDE)
         for i in range(np.uint64(SIDE)):
             a, b = nodes[at + i], nodes[at + np.uint64(SIDE) + i]
-            upper[i] = THREE_QUARTERS * a + QUARTER * b
-            lower[i] = QUARTER * a + THREE_QUARTERS * b
-        for i in range(SIDE - 1):
-            k = target + m.pixel_index(2 * i, 2 * int(y))
+            nodes[UPPER + i] = THREE_QUARTERS * a + QUARTER * b
+            nodes[LOWER + i] = QUARTER * a + THREE_QUARTERS * b
+        for column in range(SIDE - 1):
+            i, k = np.uint64(column), target + m.pixel_index(2 * column, 2 * int(y))
             below = k + np.uint64(m.STRIP)
-            a, b = upper[i], upper[i + 1]
+            a, b = nodes[UPPER + i], nodes[UPPER + i + np.uint64(1)]
             s[k] = THREE_QUARTERS * a + QUARTER * b
             s[k + np.uint64(1)] = QUARTER * a + THREE_QUARTERS * b
-            a, b = lower[i], lower[i + 1]
+            a, b = nodes[LOWER + i], nodes[LOWER + i + np.uint64(1)]
             s[below] = THREE_QUARTERS * a + QUARTER * b
             s[below + np.uint64(1)] = QUARTER * a + THREE_QUARTERS * b

@@ -18,11 +18,11 @@ from . import tile_memory as m
 from .bell import bell, strip_rows
 from .binning import TILE
 from .compositing import composite_layer
+from .fronts import FAR, first_front, next_front
 from .rules import LAYERS
 from .singles import HALF, INFINITE, ONE, THREE, TWO, ZERO
 from .smooth import draw_smooth, is_plain, new_nodes
 
-FAR = np.float32(3e38)  # a depth that nothing has
 MIDDLE = np.float32(TILE / 2)
 
 
@@ -42,6 +42,7 @@ def draw_layers(
     m.number_pixels(s, m.STEP_X, m.STEP_Y, m.PIXELS)
     packed = np.empty(m.PIXELS if len(rgba) > 0 else 0, np.uint32)
     nodes = new_nodes()
+    room = np.empty(_fullest(starts[first : last + 1]), np.uint32)
     gaps = ONE / np.float32(gap * gap), ONE / np.float32(texture_gap * texture_gap)
     for tile in range(first, last):
         begin, end = starts[tile], starts[tile + 1]
@@ -62,8 +63,8 @@ def draw_layers(
             )  # fmt: skip
         if not is_done:
             _draw_tile(
-                s, projected, own, is_one, left + column, top + row, columns, rows, gaps, view,
-                photo, texels, shapes, crop_left, crop_top, rules, kind,
+                s, room, projected, own, is_one, left + column, top + row, columns, rows, gaps,
+                view, photo, texels, shapes, crop_left, crop_top, rules, kind,
             )  # fmt: skip
         if len(rgba) > 0:
             m.write_rgba(s, m.O_R, packed, rgba, column, row, columns, rows)
@@ -77,34 +78,57 @@ def draw_layers(
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw_tile(
-    s, projected, members, is_one, left, top, columns, rows, gaps, view, photo, texels, shapes,
-    crop_left, crop_top, rules, kind,
+    s, room, projected, members, is_one, left, top, columns, rows, gaps, view, photo, texels,
+    shapes, crop_left, crop_top, rules, kind,
 ):  # fmt: skip
-    """Layer by layer, until nothing is left that could be seen."""
+    """Layer by layer, until nothing is left that could be seen.
+
+    Most Gaussians belong to the first layer with all that they are: later ones need not ask them.
+    """
     _clear(s, m.O_R, m.OPEN, ZERO)
     _clear(s, m.O_DEPTH, m.O_DEPTH + m.ALL, INFINITE)
     _clear(s, m.LAST_THROUGH, m.LAST_THROUGH + m.ALL, ONE)
     _clear(s, m.OPEN, m.OPEN + m.ALL, ONE)
     x0, y0 = np.float32(left), np.float32(top)
     first, last = 0, rows  # that are not finished
+    count = len(members)
+    for n in range(count):
+        room[n] = members[n]
     for layer in range(LAYERS):
         _clear(s, m.TOTAL, m.CLEAR, ZERO)
         _clear(s, m.CLEAR, m.BODY_CLEAR + m.ALL, ONE)
         if not is_one:
             _clear(s, m.F_DEPTH, m.F_DEPTH + m.ALL, FAR)
-            for i in members:
+            _clear(s, m.F_X, m.FRONT, ZERO)
+            for i in room[:count]:
                 _draw(s, projected[i], x0, y0, first, last, layer, False, gaps, rules, kind, True)
-        for i in members:
-            _draw(s, projected[i], x0, y0, first, last, layer, is_one, gaps, rules, kind, False)
+        kept = 0
+        for i in room[:count]:
+            rest = _draw(
+                s, projected[i], x0, y0, first, last, layer, is_one, gaps, rules, kind, False
+            )
+            if rest > ZERO:
+                room[kept] = i
+                kept += 1
+        count = kept
         first, last = composite_layer(
-            s, layer, left, top, columns, rows, view, photo, texels, shapes, crop_left, crop_top,
-            rules, kind,
+            s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left,
+            crop_top, rules, kind,
         )  # fmt: skip
         if is_one or first >= last:
             return
         if layer < LAYERS - 1:
             for k in range(m.FRONT):
                 s[np.uint64(layer + 1) * m.FRONT + k] = s[k]
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _fullest(starts):
+    """How many Gaussians touch the tile that most of them touch."""
+    most = 0
+    for tile in range(len(starts) - 1):
+        most = max(most, starts[tile + 1] - starts[tile])
+    return most
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -162,11 +186,12 @@ def _is_one_layer(projected, members, x0, y0, gaps):
 def _draw(s, g, x0, y0, first, last, layer, is_one, gaps, rules, kind, is_front):
     """One Gaussian onto the tile at x0, y0: as a layer's front, or into the layer's sums.
 
-    On the rows first..last of the tile.
+    On the rows first..last of the tile. Gives what of it belongs to later layers, summed up.
     """
+    rest = ZERO
     cut = g[p.FRONT] if is_front and layer == 0 else g[p.CUT]
     if cut <= ZERO:
-        return
+        return rest
     dx, dy = x0 + HALF - g[p.CX], y0 + HALF - g[p.CY]  # of the tile's first pixel
     for strip in range(m.STRIPS):
         start, end = strip_rows(g, cut, dx, dy, strip, last)
@@ -175,28 +200,30 @@ def _draw(s, g, x0, y0, first, last, layer, is_one, gaps, rules, kind, is_front)
             continue
         at = np.uint64(strip * m.STRIP * TILE + start * m.STRIP)
         count = np.uint64((end - start) * m.STRIP)
-        _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_front)
+        rest += _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_front)
+    return rest
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_front):
     """The same on `count` pixels from `at` on: some rows of a strip."""
+    rest = ZERO
     if is_one:
         _add_all(s, at, count, g, dx, dy, kind)
     elif layer == 0:
         if is_front:
-            _first_front(s, at, count, g, dx, dy)
-            return
-        _add(s, at, count, g, dx, dy, layer, gaps, rules, kind)
+            first_front(s, at, count, g, dx, dy)
+            return rest
+        rest = _add(s, at, count, g, dx, dy, layer, gaps, rules, kind)
     else:
         for k in range(count):
             s[m.SHARE + at + k] = s[m.OPEN + at + k]
         for before in range(layer):
             _take(s, at, count, g, dx, dy, before, gaps, rules)
         if is_front:
-            _next_front(s, at, count, g, dx, dy, rules, kind)
-            return
-        _add(s, at, count, g, dx, dy, layer, gaps, rules, kind)
+            next_front(s, at, count, g, dx, dy, rules, kind)
+            return rest
+        rest = _add(s, at, count, g, dx, dy, layer, gaps, rules, kind)
     if g[p.PHOTO] > ZERO:
         is_changed = (g[p.MATTED] < ONE) | (g[p.SEEN] < ONE)
         if is_changed or g[p.MAGNIFIED] > np.float32(rules.sharp):
@@ -205,56 +232,7 @@ def _draw_strip(s, at, count, g, dx, dy, layer, is_one, gaps, rules, kind, is_fr
         _add_body(s, at, count, g)
     if not kind.is_surface:
         _multiply(s, at, count, g)
-
-
-@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _first_front(s, at, count, g, dx0, dy0):
-    """The nearest sample of each pixel so far."""
-    z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
-    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
-    qxx, tilt, ryy, limit = g[p.QXX], g[p.TILT], g[p.RYY], g[p.FRONT]
-    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
-    for k in range(count):
-        dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
-        e = dx + tilt * dy
-        depth = z + zx * dx + zy * dy
-        is_front = qxx * e * e + ryy * dy * dy <= limit
-        nearer = is_front & (depth < s[m.F_DEPTH + at + k])
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        _choose_front(s, at + k, nearer, depth, x, y, is_photo)
-
-
-@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _next_front(s, at, count, g, dx0, dy0, rules, kind):
-    """The same among what the layers before have left, m.SHARE."""
-    z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
-    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
-    qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
-    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
-    weight, both = g[p.WEIGHT], g[p.PHOTO] + g[p.BODY]
-    tail, most, least = np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least)
-    least_front = np.float32(rules.least_front)
-    for k in range(count):
-        dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
-        e = dx + tilt * dy
-        depth = z + zx * dx + zy * dy
-        alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
-        is_enough = (alpha >= least) & (s[m.SHARE + at + k] * alpha * both >= least_front)
-        nearer = is_enough & (depth < s[m.F_DEPTH + at + k])
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        _choose_front(s, at + k, nearer, depth, x, y, is_photo)
-
-
-@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _choose_front(s, k, nearer, depth, x, y, is_photo):
-    """Makes a sample the front of pixel k, where it is nearer.
-
-    What is chosen is added, not stored: stores that depend on a condition are slow.
-    """
-    s[m.F_DEPTH + k] = min(s[m.F_DEPTH + k], depth if nearer else FAR)
-    s[m.F_X + k] += x - s[m.F_X + k] if nearer else ZERO
-    s[m.F_Y + k] += y - s[m.F_Y + k] if nearer else ZERO
-    s[m.F_PHOTO + k] += is_photo - s[m.F_PHOTO + k] if nearer else ZERO
+    return rest
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -285,7 +263,11 @@ def _take(s, at, count, g, dx0, dy0, before, gaps, rules):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _add(s, at, count, g, dx0, dy0, layer, gaps, rules, kind):
-    """Adds a Gaussian to the sums of the layer, as far as it belongs there."""
+    """Adds a Gaussian to the sums of the layer, as far as it belongs there.
+
+    Gives what belongs to later layers, summed up.
+    """
+    rest = ZERO
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
@@ -314,7 +296,9 @@ def _add(s, at, count, g, dx0, dy0, layer, gaps, rules, kind):
         share = max(s[m.SHARE + at + k], is_first)
         member = share * max(member, is_last)
         member = member if front < FAR else ZERO
-        s[m.LEFT + at + k] += (share - member) * alpha * both
+        later = (share - member) * alpha * both
+        rest += later
+        s[m.LEFT + at + k] += later
         alpha, b = member * alpha, member * b
         gx, gy = b * qxx * e, b * (qxy * e + ryy * dy)
         s[m.ALPHA + at + k] = alpha
@@ -326,6 +310,7 @@ def _add(s, at, count, g, dx0, dy0, layer, gaps, rules, kind):
         s[m.DEPTH + at + k] += alpha * both * depth
         s[m.SHX + at + k] += alpha * photo * x
         s[m.SHY + at + k] += alpha * photo * y
+    return rest
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

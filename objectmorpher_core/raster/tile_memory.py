@@ -67,6 +67,13 @@ def pixel_index(x, y, tall=TILE):
 
 
 @numba.njit(nogil=True)
+def strip_pixels(strip, first, last):
+    """The pixels of the rows first..last of a strip: the first and the last + 1."""
+    start = strip * (STRIP * TILE)
+    return np.uint64(start + first * STRIP), np.uint64(start + last * STRIP)
+
+
+@numba.njit(nogil=True)
 def number_pixels(s, step_x, step_y, pixels, tall=TILE):
     """Writes the column and the row of each pixel of the tile to two rows of the memory."""
     for k in range(np.uint64(pixels)):
