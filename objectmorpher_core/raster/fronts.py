@@ -16,39 +16,41 @@ FAR = np.float32(3e38)  # a depth that nothing has
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def first_front(s, at, count, g, dx0, dy0):
+def first_front(s, spans, g, dx0, dy0):
     """The nearest sample of each pixel so far."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy, limit = g[p.QXX], g[p.TILT], g[p.RYY], g[p.FRONT]
     is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
-    for k in range(count):
-        dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
-        e = dx + tilt * dy
-        depth = z + zx * dx + zy * dy
-        is_front = qxx * e * e + ryy * dy * dy <= limit
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        _choose_front(s, at + k, is_front, depth, x, y, is_photo)
+    for at, count in spans:
+        for k in range(count):
+            dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+            e = dx + tilt * dy
+            depth = z + zx * dx + zy * dy
+            is_front = qxx * e * e + ryy * dy * dy <= limit
+            x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+            _choose_front(s, at + k, is_front, depth, x, y, is_photo)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def next_front(s, at, count, g, dx0, dy0, rules, kind):
+def next_front(s, spans, g, dx0, dy0, limits):
     """The same among what the layers before have left, m.SHARE."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
     is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
     weight, both = g[p.WEIGHT], g[p.PHOTO] + g[p.BODY]
-    tail, most, least = np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least)
-    least_front = np.float32(rules.least_front)
-    for k in range(count):
-        dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
-        e = dx + tilt * dy
-        depth = z + zx * dx + zy * dy
-        alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
-        is_enough = (alpha >= least) & (s[m.SHARE + at + k] * alpha * both >= least_front)
-        x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-        _choose_front(s, at + k, is_enough, depth, x, y, is_photo)
+    tail, most, least = limits.tail, limits.most, limits.least
+    least_front = limits.least_front
+    for at, count in spans:
+        for k in range(count):
+            dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+            e = dx + tilt * dy
+            depth = z + zx * dx + zy * dy
+            alpha = min(weight * (bell(qxx * e * e + ryy * dy * dy) - tail), most)
+            is_enough = (alpha >= least) & (s[m.SHARE + at + k] * alpha * both >= least_front)
+            x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+            _choose_front(s, at + k, is_enough, depth, x, y, is_photo)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -100,6 +100,36 @@ class Rules(NamedTuple):
 RULES = Rules()
 
 
+class Limits(NamedTuple):
+    """What the loops over a tile's pixels need of all that: a few numbers of 32 bits.
+
+    They are handed on with each Gaussian, where all rules would take longer than its pixels.
+    """
+
+    tail: np.float32  # of alpha, see `Splatting`
+    most: np.float32
+    least: np.float32
+    least_front: np.float32
+    sharp: np.float32
+    per_gap: np.float32  # 1 / the gap's square, in depth, ...
+    per_texture_gap: np.float32  # ... and in the photo
+    end: np.float32  # so many squared gaps from its front a layer ends, ...
+    fall: np.float32  # ... so steeply
+    is_surface: bool
+
+
+@numba.njit(nogil=True)
+def limits_of(rules, kind, gap, texture_gap):
+    """`gap` world units, `texture_gap` px of the photo."""
+    end = rules.fade * rules.fade
+    return Limits(
+        np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least),
+        np.float32(rules.least_front), np.float32(rules.sharp), np.float32(1.0 / (gap * gap)),
+        np.float32(1.0 / (texture_gap * texture_gap)), np.float32(end),
+        np.float32(1.0 / (end - 1.0)), kind.is_surface,
+    )  # fmt: skip
+
+
 @numba.njit(nogil=True)
 def ramp(value, zero, one):
     """0 at `zero`, 1 at `one`, smooth between and constant beyond (either may be larger)."""

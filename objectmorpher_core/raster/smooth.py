@@ -28,6 +28,8 @@ NARROWEST = np.float32(2.5)  # px, standard deviation: finer sums need every pix
 LEAST_TOTAL = np.float32(1.0)  # kernel sum that is nowhere near a surface's edge
 STEEPEST = np.float32(0.5)  # of the kernel sum, per px: so is what is no steeper
 LINE, LINES = np.uint64(16), np.uint64(6)  # numbers in a line of memory; lines across a tile
+LAST_ROW = np.float32(SIDE - 1)
+ALMOST = np.float32(0.999)  # of a row: to begin with the next one, however it is rounded
 QUARTER, THREE_QUARTERS = np.float32(0.25), np.float32(0.75)
 
 
@@ -111,7 +113,12 @@ def _add(nodes, g, left, top, tail):
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy, weight = g[p.QXX], g[p.TILT], g[p.RYY], g[p.WEIGHT]
-    for k in range(NODES):
+    # the rows that its box touches, and a few nodes more: nothing is left of it there
+    first = np.int64(min(max(HALF * (-g[p.EY] - dy0) + ALMOST, ZERO), LAST_ROW))
+    last = np.int64(min(max(HALF * (g[p.EY] - dy0), ZERO), LAST_ROW))
+    start, eights = np.uint64(first * SIDE), np.uint64(((last - first + 1) * SIDE + 7) // 8)
+    for n in range(eights * np.uint64(8)):
+        k = start + n
         dx, dy = dx0 + nodes[NODE_X + k], dy0 + nodes[NODE_Y + k]
         e = dx + tilt * dy
         alpha = weight * max(bell(qxx * e * e + ryy * dy * dy) - tail, ZERO)

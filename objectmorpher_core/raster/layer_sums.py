@@ -1,0 +1,177 @@
+"""What the Gaussians of a layer add up to, pixel by pixel; step 4 of `reference`, compiled.
+
+Each function takes one of them. `spans`: where the pixels that it touches begin in each of the
+tile's strips, and how many they are; `dx`, `dy`: the way from its centre to the first pixel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernel_files import numba
+from ..threads import FAST
+from . import columns as p
+from . import tile_memory as m
+from .bell import bell
+from .fronts import FAR
+from .rules import LAYERS
+from .singles import ONE, THREE, TWO, ZERO
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _member(depth, x, y, is_alike, limits):
+    """How much a sample belongs to the layer of a front, from which it is so far: see `rules`."""
+    looks = is_alike * (x * x + y * y) * limits.per_texture_gap
+    away = max(depth * depth * limits.per_gap, looks)
+    t = min(max((limits.end - away) * limits.fall, ZERO), ONE)
+    return t * t * (THREE - TWO * t)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def take(s, spans, g, dx, dy, layer, limits):
+    """Fills m.SHARE with what no layer before has taken of a Gaussian, where it can be seen."""
+    for at, count in spans:
+        for k in range(count):
+            s[m.SHARE + at + k] = s[m.OPEN + at + k]
+        for before in range(layer):
+            _take_layer(s, at, count, g, dx, dy, before, limits)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _take_layer(s, at, count, g, dx0, dy0, before, limits):
+    """Takes from m.SHARE what belongs to the layer `before`, on some rows of a strip."""
+    z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
+    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
+    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
+    row = np.uint64(before + 1) * m.FRONT + at
+    for k in range(count):
+        dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+        depth = z + zx * dx + zy * dy - s[row + k]
+        x = sx + axx * dx + axy * dy - s[row + m.F_X + k]
+        y = sy + ayx * dx + ayy * dy - s[row + m.F_Y + k]
+        member = _member(depth, x, y, is_photo * s[row + m.F_PHOTO + k], limits)
+        s[m.SHARE + at + k] = s[m.SHARE + at + k] * (ONE - member)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def add(s, spans, g, dx0, dy0, layer, limits):
+    """Adds a Gaussian to the sums of the layer, as far as it belongs there.
+
+    Gives what belongs to later layers, summed up.
+    """
+    rest = ZERO
+    z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
+    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
+    qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
+    qxy = qxx * tilt
+    weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
+    tail, most, least = limits.tail, limits.most, limits.least
+    is_photo = ONE if photo > ZERO else ZERO
+    is_first = ONE if layer == 0 else ZERO
+    is_last = ONE if layer == LAYERS - 1 else ZERO
+    for at, count in spans:
+        for k in range(count):
+            dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+            e = dx + tilt * dy
+            depth = z + zx * dx + zy * dy
+            x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+            b = weight * bell(qxx * e * e + ryy * dy * dy)
+            alpha = min(b - weight * tail, most)
+            is_there = (alpha >= least) & (alpha > ZERO)
+            alpha = alpha if is_there else ZERO
+            b = b if is_there else ZERO
+            front = s[m.F_DEPTH + at + k]
+            member = _member(
+                depth - front, x - s[m.F_X + at + k], y - s[m.F_Y + at + k],
+                is_photo * s[m.F_PHOTO + at + k], limits,
+            )  # fmt: skip
+            share = max(s[m.SHARE + at + k], is_first)
+            member = share * max(member, is_last)
+            member = member if front < FAR else ZERO
+            later = (share - member) * alpha * both
+            rest += later
+            s[m.LEFT + at + k] += later
+            alpha, b = member * alpha, member * b
+            gx, gy = b * qxx * e, b * (qxy * e + ryy * dy)
+            s[m.ALPHA + at + k] = alpha
+            s[m.SLOPE_X + at + k] = gx
+            s[m.SLOPE_Y + at + k] = gy
+            s[m.TOTAL + at + k] += alpha * both
+            s[m.GX + at + k] -= gx * both
+            s[m.GY + at + k] -= gy * both
+            s[m.DEPTH + at + k] += alpha * both * depth
+            s[m.SHX + at + k] += alpha * photo * x
+            s[m.SHY + at + k] += alpha * photo * y
+    return rest
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def add_all(s, spans, g, dx0, dy0, limits):
+    """The same where all belongs to one layer."""
+    z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
+    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
+    qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
+    qxy = qxx * tilt
+    weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
+    tail, most, least = limits.tail, limits.most, limits.least
+    for at, count in spans:
+        for k in range(count):
+            dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+            e = dx + tilt * dy
+            b = weight * bell(qxx * e * e + ryy * dy * dy)
+            alpha = min(b - weight * tail, most)
+            is_there = (alpha >= least) & (alpha > ZERO)
+            alpha = alpha if is_there else ZERO
+            b = b if is_there else ZERO
+            gx, gy = b * qxx * e, b * (qxy * e + ryy * dy)
+            s[m.ALPHA + at + k] = alpha
+            s[m.SLOPE_X + at + k] = gx
+            s[m.SLOPE_Y + at + k] = gy
+            s[m.TOTAL + at + k] += alpha * both
+            s[m.GX + at + k] -= gx * both
+            s[m.GY + at + k] -= gy * both
+            s[m.DEPTH + at + k] += alpha * both * (z + zx * dx + zy * dy)
+            s[m.SHX + at + k] += alpha * photo * (sx + axx * dx + axy * dy)
+            s[m.SHY + at + k] += alpha * photo * (sy + ayx * dx + ayy * dy)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def add_more(s, spans, g, limits):
+    """What is 0 for a part of the photo that is carried along as it was."""
+    photo, unseen = g[p.PHOTO], (ONE - g[p.SEEN]) * g[p.PHOTO]
+    magnified = max(g[p.MAGNIFIED] / limits.sharp - ONE, ZERO) * photo
+    unmatted, solid = (ONE - g[p.MATTED]) * photo, (ONE - g[p.MATTED]) * g[p.SOLID] * photo
+    for at, count in spans:
+        for k in range(count):
+            alpha = s[m.ALPHA + at + k]
+            s[m.MAG + at + k] += alpha * magnified
+            s[m.MATTES + at + k] += alpha * unmatted
+            s[m.SOLIDS + at + k] += alpha * solid
+            s[m.SEES + at + k] += alpha * unseen
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def add_body(s, spans, g):
+    """What shows its own colour."""
+    body = g[p.BODY]
+    red, green, blue = body * g[p.RED], body * g[p.GREEN], body * g[p.BLUE]
+    for at, count in spans:
+        for k in range(count):
+            alpha = s[m.ALPHA + at + k]
+            s[m.BODIED + at + k] += alpha * body
+            s[m.BGX + at + k] -= s[m.SLOPE_X + at + k] * body
+            s[m.BGY + at + k] -= s[m.SLOPE_Y + at + k] * body
+            s[m.R + at + k] += alpha * red
+            s[m.G + at + k] += alpha * green
+            s[m.B + at + k] += alpha * blue
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def multiply(s, spans, g):
+    """What shines through, for assets whose coverage is 1 - prod(1 - alpha)."""
+    body, both = g[p.BODY], g[p.PHOTO] + g[p.BODY]
+    for at, count in spans:
+        for k in range(count):
+            alpha = s[m.ALPHA + at + k]
+            s[m.CLEAR + at + k] *= max(ONE - alpha * both, ZERO)
+            s[m.BODY_CLEAR + at + k] *= max(ONE - alpha * body, ZERO)
