@@ -24,14 +24,22 @@ AT_A_TIME = 1 << 20  # numbers that are looked at together
 
 
 def frozen(array: np.ndarray, dtype: npt.DTypeLike | None = None) -> np.ndarray:
-    """A contiguous, read-only view of `array`: a slip that would change the document raises.
+    """`array` or a view, contiguous and read-only: a slip that would change the document raises.
 
     Compiled kernels take only frozen arrays, too: numba compiles anew for each mixture of
     writable and read-only arguments, and that costs seconds.
     """
+    if _is_frozen(array) and (dtype is None or array.dtype == dtype):
+        return array  # a solve asks for it thousands of times
     array = np.ascontiguousarray(array, dtype=dtype).view()
     array.setflags(write=False)
     return array
+
+
+def _is_frozen(array: np.ndarray) -> bool:
+    if type(array) is not np.ndarray or array.ndim == 0:
+        return False
+    return array.flags.c_contiguous and not array.flags.writeable
 
 
 def all_finite(array: np.ndarray) -> bool:

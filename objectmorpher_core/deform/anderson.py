@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import F64, frozen
 from ..kernel_files import numba
 from ..threads import FAST
+from .elimination import solve_small
 
 WINDOW = 12  # previous steps that are combined
 RIDGE = 1e-12  # on the normalised Gram matrix of the steps: float64 squared leaves no more
@@ -45,7 +46,7 @@ class Anderson:
         size = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
         gram /= size[:, None] * size
         gram.flat[:: self._count + 1] += RIDGE
-        shares = np.linalg.solve(gram, _products(steps, flat_residual) / size) / size
+        shares = solve_small(gram, _products(steps, flat_residual) / size) / size
         mixed = np.empty(flat_value.size)
         _less(frozen(flat_value), frozen(self._values), shares, mixed)
         return mixed.reshape(value.shape)

@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import F64, I32, Sparse
 from .anderson import Anderson
 from .bodies import Bodies, Pivot
-from .constraints import Constraints, HeldResponse, Patch, Targets
+from .constraints import Constraints, HeldResponse, Patch, Targets, followed
+from .elimination import solve_small
 from .links import Links, in_single
 from .response import build_response, product
 
@@ -150,10 +151,8 @@ class ArapSolver:
         """
         blended = self._constraints.blended  # the others have none
         excess = self._constraints.excess(bends, turned, positions)[blended]
-        size = excess.size
-        system = np.einsum("hkab,hkg->hagb", bends[blended], self._parting).reshape(size, size)
-        system.flat[:: size + 1] += 1.0
-        excess = np.linalg.solve(system, excess.ravel()).reshape(-1, 3)
+        system = followed(bends[blended], self._parting)
+        excess = solve_small(system, excess.ravel()).reshape(-1, 3)
         positions -= product(self._follow, excess)
 
     def _fit_bodies(self, positions: F64, rotations: F64) -> tuple[Pivot, ...]:

@@ -58,12 +58,19 @@ class Constraints:
         return np.flatnonzero(self.arms.any((1, 2))).astype(np.int32)
 
     @cached_property
+    def _linear(self) -> F64:
+        """(H, K, 3, 3) w_j times the identity."""
+        return self.weights[..., None, None] * np.eye(3)
+
+    @cached_property
     def _binding(self) -> Binding:
         return Binding(self.nodes, self.weights, np.zeros((*self.nodes.shape, 3)))
 
     def turned_arms(self, rotations: F64) -> F64:
         """R_j (x0 - p_j), (H, K, 3)."""
-        return (rotations[self.nodes] @ self.arms[..., None])[..., 0]
+        out = np.empty(self.arms.shape)
+        _turn(frozen(self.nodes), frozen(self.arms), frozen(rotations), out)
+        return out
 
     def mean(self, values: F64) -> F64:
         """sum_j w_j of (H, K, 3): (H, 3)."""
@@ -75,15 +82,16 @@ class Constraints:
         Skinning blends rotations (`skinning.skin`): x' = x + sum_j A_j u_j, where a linear blend
         has w_j for A_j. Their sums over j are the same.
         """
-        return coupling(self._binding, rotations) - self.weights[..., None, None] * np.eye(3)
+        return coupling(self._binding, rotations) - self._linear
 
     def excess(self, bends: F64, turned: F64, positions: F64) -> F64:
         """How far (H, 3) the surface points are from where a linear blend would put them.
 
         `turned` are `turned_arms`, (H, K, 3).
         """
-        near = turned + positions[self.nodes] - positions[self.nodes[:, :1]]
-        return (bends @ near[..., None])[..., 0].sum(1)
+        out = np.zeros((len(self.nodes), 3))
+        _bend(frozen(self.nodes), frozen(bends), frozen(turned), frozen(positions), out)
+        return out
 
     def placed(self, positions: F64, rotations: F64) -> F64:
         """Where the surface points are (H, 3)."""
@@ -195,6 +203,53 @@ def _hold(starts, nodes, values, own, targets, inverse, answers, unknowns):
         unknowns[i, 0] -= x
         unknowns[i, 1] -= y
         unknowns[i, 2] -= z
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _turn(nodes, arms, rotations, out):
+    for h in range(nodes.shape[0]):
+        for k in range(nodes.shape[1]):
+            j = nodes[h, k]
+            x, y, z = arms[h, k, 0], arms[h, k, 1], arms[h, k, 2]
+            for a in range(3):
+                r = rotations[j, a]
+                out[h, k, a] = r[0] * x + r[1] * y + r[2] * z
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _bend(nodes, bends, turned, positions, out):
+    near = np.empty(3)
+    for h in range(nodes.shape[0]):
+        for k in range(nodes.shape[1]):
+            for a in range(3):
+                near[a] = turned[h, k, a] + positions[nodes[h, k], a] - positions[nodes[h, 0], a]
+            for a in range(3):
+                b = bends[h, k, a]
+                out[h, a] += b[0] * near[0] + b[1] * near[1] + b[2] * near[2]
+
+
+def followed(bends: F64, parting: F64) -> F64:
+    """(3 B, 3 B) how the excess (B, 3) of all changes when it is taken from the targets.
+
+    `bends` (B, K, 3, 3); `parting` (B, K, B) how a point's control points part when a target moves.
+    """
+    count = 3 * len(bends)
+    out = np.empty((count, count))
+    _follow(frozen(bends), frozen(parting), out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _follow(bends, parting, out):
+    count, width = bends.shape[:2]
+    for h in range(count):
+        for g in range(count):
+            for a in range(3):
+                for b in range(3):
+                    total = 1.0 if h == g and a == b else 0.0
+                    for k in range(width):
+                        total += bends[h, k, a, b] * parting[h, k, g]
+                    out[3 * h + a, 3 * g + b] = total
 
 
 def _selection(nodes: np.ndarray, width: int) -> Sparse:

@@ -62,7 +62,7 @@ class DenseResponse:
         return out.T
 
     def columns(self, nodes: np.ndarray) -> F64:
-        return self._inverse[:, nodes]
+        return self._inverse[nodes].T  # symmetric, and rows are read in order
 
 
 class SparseResponse:
