@@ -14,7 +14,7 @@ FEW = 48  # unknowns up to which it is quicker
 def solve_small(matrix: F64, right: F64) -> F64:
     """x (n,) of matrix (n, n) x = right (n,), by elimination with the largest pivot of a column."""
     if len(right) > FEW:
-        return np.linalg.solve(matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right), np.float64)
     x = right.copy()
     _eliminate(frozen(matrix), x)
     return x
