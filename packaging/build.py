@@ -31,6 +31,7 @@ from app import __version__  # noqa: E402
 from objectmorpher_core.installation import BUILD, build_name  # noqa: E402
 
 KINDS = {"deb": linux_packages.build_deb, "appimage": linux_packages.build_appimage}
+NEEDED = {"deb": ("dpkg-deb", "dpkg"), "appimage": ("mksquashfs", "squashfs-tools")}
 
 
 def build_folder(out: Path) -> Path:
@@ -79,6 +80,9 @@ def main() -> None:
     parser.add_argument("kinds", nargs="+", choices=("folder", *KINDS))
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
     options = parser.parse_args()
+    for program, package in (NEEDED[kind] for kind in options.kinds if kind in NEEDED):
+        if shutil.which(program) is None:
+            parser.error(f"{program} is missing: sudo apt-get install {package}")
     out = options.out.resolve()
     os.umask(0o022)
     folder = out / "objectmorpher"
