@@ -119,7 +119,9 @@ def test_a_server_that_is_gone_is_said_once_and_the_work_is_done_here(
 def test_a_server_that_ends_in_the_middle_of_a_job_changes_nothing_but_the_time(
     desk: Desk, fill: tuple
 ) -> None:
-    desk.ask(job_functions.fill_variants, fill[0], fill[1], job_functions.Choice("auto"), 2)
+    pixels, hole = np.tile(fill[0], (6, 6, 1)), np.zeros((540, 720), bool)
+    hole[150:400, 200:500] = True  # seconds of work, so that it cannot be done before the end
+    desk.ask(job_functions.fill_variants, pixels, hole, job_functions.Choice("auto"), 3)
     end = time.monotonic() + 60
     while desk.jobs.current is None or desk.jobs.current.fraction < 0.1:
         assert time.monotonic() < end
@@ -128,7 +130,7 @@ def test_a_server_that_ends_in_the_middle_of_a_job_changes_nothing_but_the_time(
     desk.front.close()
     desk.wait()
     assert len(desk.said) == 1
-    assert len(desk.answers[0]) == 2
+    assert len(desk.answers[0]) == 3
     assert desk.errors == []
 
 
