@@ -30,6 +30,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
     parser.add_argument("--scenarios", default="", help="names, separated by commas")
     parser.add_argument("--quick", action="store_true", help="the most different faults only")
+    parser.add_argument(
+        "--most", type=int, help="operations of a scenario at which each fault comes"
+    )
     parser.add_argument("--power", action="store_true", help="power cuts")
     parser.add_argument("--states", type=int, default=200, help="after each operation, at most")
     options = parser.parse_args()
@@ -46,7 +49,7 @@ def main() -> int:
         if options.power:
             result = cut_power(scenario, options.states)
         else:
-            result = inject(scenario, list(QUICK if options.quick else FAULTS))
+            result = inject(scenario, list(QUICK if options.quick else FAULTS), options.most)
         is_wrong = is_wrong or bool(result.wrong)
         print(json.dumps(dataclasses.asdict(result)), flush=True)
     return int(is_wrong)

@@ -85,8 +85,8 @@ class Result:
     wrong: list[str] = field(default_factory=list)
 
 
-def inject(scenario: Scenario, faults: list[str]) -> Result:
-    """Every fault at every operation of a scenario."""
+def inject(scenario: Scenario, faults: list[str], most: int | None = None) -> Result:
+    """Every fault at every operation of a scenario; of a long one at `most` so many, evenly."""
     result = Result(scenario.name)
     with tempfile.TemporaryDirectory() as scratch:
         bench = _Bench(scenario, Path(scratch))
@@ -95,8 +95,11 @@ def inject(scenario: Scenario, faults: list[str]) -> Result:
         if clean.error or bench.state() != NEW:
             result.wrong.append(f"without a fault: {clean.error or bench.state()}\n{clean.trace}")
             return result
-        for fault in faults:
+        step = max(-(-result.operations // most), 1) if most else 1
+        for phase, fault in enumerate(faults):
             for n, op in enumerate(clean.operations, 1):
+                if (n + phase) % step:  # of the next fault other operations
+                    continue
                 if fault in WRITES and not (op.name == "write" and len(op.data) > 1):
                     continue
                 outcome = bench.run(FAULTS[fault](n))

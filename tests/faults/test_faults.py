@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 QUICK = "session,autosave"
 LEAST_RUNS = 30  # of a scenario: else nothing was injected
+MOST = "40"  # operations of the one that has 178; `make faults` does all
 
 
 def run(*options: str) -> list[dict[str, Any]]:
@@ -58,8 +59,8 @@ def test_a_journal_whose_names_are_not_brought_to_the_disk_is_found_out() -> Non
 
 
 @pytest.mark.slow
-def test_every_fault_at_every_operation_of_all_that_is_written() -> None:
-    assert_none_lost(run(), 40)  # the token: 7 operations, one of them a write
+def test_every_fault_at_the_operations_of_all_that_is_written() -> None:
+    assert_none_lost(run("--most", MOST), 40)  # the token: 7 operations, one of them a write
 
 
 @pytest.mark.slow
