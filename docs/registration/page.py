@@ -29,7 +29,7 @@ is not known it is told 50 degrees and lets it go.
   programs on the machine do not lengthen as much.
 """
 TARGETS = """The targets: error at most 3 degrees and IoU at least 0.97, both in the median, and at
-most 20 seconds on two cores. The machine was busy with other things while this page was made.
+most 20 seconds on two cores. The machine had little else to do while this page was made.
 
 What goes wrong: the plain mug turned by 180 degrees scores the same, and is called ambiguous. The
 wooden block, its focal length known: the candidate nearest to the truth, 6 degrees off, is drawn
