@@ -21,8 +21,8 @@ ROWS = 16  # of a level, converted at a time
 class PhotoLevels:
     """16 bits a channel, level by level; looked up by shaders/splat_photo.glsl.
 
-    Levels that are finer than what is shown are not uploaded before they are: of a photo of 100
-    megapixels that is 17 times less. OpenGL rounds odd sizes down when it halves them and
+    Levels that are finer than what is shown are not uploaded before they are: where 10,000 px fit
+    into 1,000 that is a sixteenth. OpenGL rounds odd sizes down when it halves them and
     `build_levels` rounds them up, so the texture is larger than its contents.
     """
 

@@ -16,7 +16,7 @@ from objectmorpher_core.arrays import RGB, Mask
 from objectmorpher_core.document import Prompt
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import Found, Quick, Segmenter, SelectionError
-from tests.core.segment.simulated_user import Step, boundary_f, overlap, use, worst_click
+from tests.core.segment.simulated_user import Step, around, boundary_f, overlap, use, worst_click
 from tests.core.segment.truth_masks import LATER, TRUTHS, Truth, truth, truth_mask
 from tests.photos import photo
 
@@ -116,15 +116,14 @@ def _row(each: Truth) -> Row:
     ours = _click(segmenter("dino"), rgb, _encoded("dino", each.photo)[0], each, mask)
     colors = _click(segmenter("grabcut"), rgb, None, each, mask)
     subject = _ask("subject", each.photo, Prompt(is_subject=True))
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    box = float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
-    boxed = [_boxed(name, each, box) for name in ("dino", "grabcut")]
+    boxed = [_boxed(name, each) for name in ("dino", "grabcut")]
     return Row(ours, colors, overlap(subject, mask), *boxed)
 
 
-def _boxed(name: str, each: Truth, box: tuple[float, float, float, float]) -> list[float]:
-    """IoU of a box, and after each of BOX_CLICKS on the largest error."""
-    mask, prompt, values = truth_mask(each.name), Prompt(box=box), []
+def _boxed(name: str, each: Truth) -> list[float]:
+    """IoU of the object's box, and after each of BOX_CLICKS on the largest error."""
+    mask = truth_mask(each.name)
+    prompt, values = Prompt(box=around(mask)), []
     for _ in range(BOX_CLICKS + 1):
         found = _ask(name, each.photo, prompt)
         values.append(overlap(found, mask))

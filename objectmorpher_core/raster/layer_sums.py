@@ -54,6 +54,29 @@ def _take_layer(s, at, count, g, dx0, dy0, before, limits):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _alpha(weight, distance, limits):
+    """A sample's alpha so far from the centre, 0 where it is not seen; and its bell there."""
+    b = weight * bell(distance)
+    alpha = min(b - weight * limits.tail, limits.most)
+    is_there = (alpha >= limits.least) & (alpha > ZERO)
+    return alpha if is_there else ZERO, b if is_there else ZERO
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _put(s, k, alpha, gx, gy, both, photo, depth, x, y):
+    """Adds a sample to the sums of pixel k; `gx`, `gy`: how its alpha falls."""
+    s[m.ALPHA + k] = alpha
+    s[m.SLOPE_X + k] = gx
+    s[m.SLOPE_Y + k] = gy
+    s[m.TOTAL + k] += alpha * both
+    s[m.GX + k] -= gx * both
+    s[m.GY + k] -= gy * both
+    s[m.DEPTH + k] += alpha * both * depth
+    s[m.SHX + k] += alpha * photo * x
+    s[m.SHY + k] += alpha * photo * y
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def add(s, spans, g, dx0, dy0, layer, limits):
     """Adds a Gaussian to the sums of the layer, as far as it belongs there.
 
@@ -65,7 +88,6 @@ def add(s, spans, g, dx0, dy0, layer, limits):
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
     qxy = qxx * tilt
     weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
-    tail, most, least = limits.tail, limits.most, limits.least
     is_photo = ONE if photo > ZERO else ZERO
     is_first = ONE if layer == 0 else ZERO
     is_last = ONE if layer == LAYERS - 1 else ZERO
@@ -75,11 +97,7 @@ def add(s, spans, g, dx0, dy0, layer, limits):
             e = dx + tilt * dy
             depth = z + zx * dx + zy * dy
             x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
-            b = weight * bell(qxx * e * e + ryy * dy * dy)
-            alpha = min(b - weight * tail, most)
-            is_there = (alpha >= least) & (alpha > ZERO)
-            alpha = alpha if is_there else ZERO
-            b = b if is_there else ZERO
+            alpha, b = _alpha(weight, qxx * e * e + ryy * dy * dy, limits)
             front = s[m.F_DEPTH + at + k]
             member = _member(
                 depth - front, x - s[m.F_X + at + k], y - s[m.F_Y + at + k],
@@ -93,15 +111,7 @@ def add(s, spans, g, dx0, dy0, layer, limits):
             s[m.LEFT + at + k] += later
             alpha, b = member * alpha, member * b
             gx, gy = b * qxx * e, b * (qxy * e + ryy * dy)
-            s[m.ALPHA + at + k] = alpha
-            s[m.SLOPE_X + at + k] = gx
-            s[m.SLOPE_Y + at + k] = gy
-            s[m.TOTAL + at + k] += alpha * both
-            s[m.GX + at + k] -= gx * both
-            s[m.GY + at + k] -= gy * both
-            s[m.DEPTH + at + k] += alpha * both * depth
-            s[m.SHX + at + k] += alpha * photo * x
-            s[m.SHY + at + k] += alpha * photo * y
+            _put(s, at + k, alpha, gx, gy, both, photo, depth, x, y)
     return rest
 
 
@@ -113,26 +123,15 @@ def add_all(s, spans, g, dx0, dy0, limits):
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
     qxy = qxx * tilt
     weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
-    tail, most, least = limits.tail, limits.most, limits.least
     for at, count in spans:
         for k in range(count):
             dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
             e = dx + tilt * dy
-            b = weight * bell(qxx * e * e + ryy * dy * dy)
-            alpha = min(b - weight * tail, most)
-            is_there = (alpha >= least) & (alpha > ZERO)
-            alpha = alpha if is_there else ZERO
-            b = b if is_there else ZERO
+            alpha, b = _alpha(weight, qxx * e * e + ryy * dy * dy, limits)
             gx, gy = b * qxx * e, b * (qxy * e + ryy * dy)
-            s[m.ALPHA + at + k] = alpha
-            s[m.SLOPE_X + at + k] = gx
-            s[m.SLOPE_Y + at + k] = gy
-            s[m.TOTAL + at + k] += alpha * both
-            s[m.GX + at + k] -= gx * both
-            s[m.GY + at + k] -= gy * both
-            s[m.DEPTH + at + k] += alpha * both * (z + zx * dx + zy * dy)
-            s[m.SHX + at + k] += alpha * photo * (sx + axx * dx + axy * dy)
-            s[m.SHY + at + k] += alpha * photo * (sy + ayx * dx + ayy * dy)
+            depth = z + zx * dx + zy * dy
+            x, y = sx + axx * dx + axy * dy, sy + ayx * dx + ayy * dy
+            _put(s, at + k, alpha, gx, gy, both, photo, depth, x, y)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

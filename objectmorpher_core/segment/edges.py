@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import F32, RGB, Mask
 from ..document import Prompt
 from .closed_form import Expected, solve_alpha
-from .selection import box_mask, check_mask, fill_small_holes, keep_touched
+from .selection import box_around, box_mask, check_mask, fill_small_holes, keep_touched
 
 WORK_AREA = 300_000  # px that GrabCut sees at most
 SURE = 0.05  # a guess nearer than this to 0 or 1 is not questioned
@@ -160,7 +160,7 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
     Where the matte (Levin et al. 2008) that its inside and outside leave open is half. With
     `near` (H, W), only there.
     """
-    around = _around_outline(mask, (THIN + 1) * band + 2)
+    around = box_around(_outline(mask), (THIN + 1) * band + 2)
     if around is None:
         return mask
     own = mask[around]
@@ -184,18 +184,12 @@ def sharpen_band(rgb: RGB, mask: Mask, near: Mask | None = None, band: int = BAN
     return sharp
 
 
-def _around_outline(mask: Mask, margin: int) -> tuple[slice, slice] | None:
-    """The rectangle of a mask (H, W) that holds its outline; None where it has none."""
-    down, across = mask[1:] != mask[:-1], mask[:, 1:] != mask[:, :-1]
-    rows = np.flatnonzero(across.any(1)), np.flatnonzero(down.any(1))
-    columns = np.flatnonzero(across.any(0)), np.flatnonzero(down.any(0))
-    if not any(map(len, rows)):
-        return None
-    (top, bottom), (left, right) = (
-        (min(int(k[0]) for k in found if len(k)), max(int(k[-1]) for k in found if len(k)) + 2)
-        for found in (rows, columns)
-    )
-    return np.s_[max(top - margin, 0) : bottom + margin, max(left - margin, 0) : right + margin]
+def _outline(mask: Mask) -> Mask:
+    """(H, W) the pixels of a mask that differ from the one above or to the left."""
+    outline = np.zeros_like(mask)
+    outline[1:] = mask[1:] != mask[:-1]
+    outline[:, 1:] |= mask[:, 1:] != mask[:, :-1]
+    return outline
 
 
 def rehearse() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import U8, Mask, Selection
 from ..document import SELECTED as HALF
+from .selection import box_around
 
 FULL = 255
 FINE = 4  # bits of a px that corners are given to
@@ -66,7 +67,7 @@ def without(selection: Selection | None, mask: Mask) -> Selection:
 def grow(selection: Selection, px: float) -> Selection:
     """All that is at most `px` from what is selected: round at corners."""
     changed = selection.copy()
-    window = _around(selection, px + 1)
+    window = box_around(selection, px + 1)
     if window is not None:
         changed[window] = _grown_everywhere(np.ascontiguousarray(selection[window]), px)
     return changed
@@ -75,7 +76,7 @@ def grow(selection: Selection, px: float) -> Selection:
 def shrink(selection: Selection, px: float) -> Selection:
     """All that is more than `px` from what is not selected."""
     changed = selection.copy()
-    window = _around(selection, 1)
+    window = box_around(selection, 1)
     if window is not None:
         changed[window] = invert(_grown_everywhere(invert(selection[window]), px))
     return changed
@@ -85,7 +86,7 @@ def smooth(selection: Selection, px: float) -> Selection:
     """What most of its surroundings, `px` to each side, are: no more teeth, specks and slits."""
     reach = round(min(max(px, 1.0), LARGEST_SMOOTHING))
     changed = selection.copy()
-    window = _around(selection, reach + 1)
+    window = box_around(selection, reach + 1)
     if window is None:
         return changed
     part = np.ascontiguousarray(selection[window]).view(np.uint8)
@@ -110,7 +111,7 @@ def remove_islands(selection: Selection, share: float = ISLAND) -> Selection:
     Pieces that touch at a corner are one. The soft rim of a piece goes with it.
     """
     changed = selection.copy()
-    window = _around(selection, 1)
+    window = box_around(selection, 1)
     if window is None:
         return changed
     part = np.ascontiguousarray(selection[window])
@@ -140,7 +141,7 @@ def feather(selection: Selection, px: float) -> U8:
 
     mask = is_selected(selection)
     coverage = np.zeros(mask.shape, np.uint8)
-    window = _around(mask, px + 1)
+    window = box_around(mask, px + 1)
     if window is None:
         return coverage
     part = np.ascontiguousarray(mask[window])
@@ -148,18 +149,6 @@ def feather(selection: Selection, px: float) -> U8:
     soft = (share * share * (3 - 2 * share) * FULL + 0.5).astype(np.uint8)
     coverage[window] = np.where(part, np.maximum(soft, HALF), np.minimum(soft, HALF - 1))
     return coverage
-
-
-def _around(selection: Selection, px: float) -> tuple[slice, slice] | None:
-    """The box around what is selected, `px` larger, inside the photo; None for nothing."""
-    rows, columns = np.flatnonzero(selection.any(1)), np.flatnonzero(selection.any(0))
-    if len(rows) == 0:
-        return None
-    reach, (height, width) = int(np.ceil(px)), selection.shape
-    return (
-        slice(max(int(rows[0]) - reach, 0), min(int(rows[-1]) + reach + 1, height)),
-        slice(max(int(columns[0]) - reach, 0), min(int(columns[-1]) + reach + 1, width)),
-    )
 
 
 def _grown_everywhere(part: Selection, px: float) -> Selection:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import RGB, Mask
+from ..arrays import RGB, Mask, Selection
 from ..document import Prompt
 
 SMALLEST = 16  # px; less is no object
@@ -59,6 +59,18 @@ def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
     inside = np.zeros(shape[:2], bool)
     inside[max(int(y0), 0) : int(np.ceil(y1)), max(int(x0), 0) : int(np.ceil(x1))] = True
     return inside
+
+
+def box_around(selection: Selection, px: float) -> tuple[slice, slice] | None:
+    """The box around what is selected, `px` larger, inside the photo; None for nothing."""
+    rows, columns = np.flatnonzero(selection.any(1)), np.flatnonzero(selection.any(0))
+    if len(rows) == 0:
+        return None
+    reach, (height, width) = int(np.ceil(px)), selection.shape
+    return (
+        slice(max(int(rows[0]) - reach, 0), min(int(rows[-1]) + reach + 1, height)),
+        slice(max(int(columns[0]) - reach, 0), min(int(columns[-1]) + reach + 1, width)),
+    )
 
 
 def keep_touched(mask: Mask, prompt: Prompt) -> Mask:

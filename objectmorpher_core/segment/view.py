@@ -188,9 +188,8 @@ class PhotoView:
         progress(0.1, "looking closer")
         inside = None if whole is None else whole[box[1] : box[3], box[0] : box[2]]
         moved = [_moved(step, box) for step in steps]
-        is_boxed = steps[0].box is not None
         is_final, rest = True, part(progress, 0.3, 0.6)
-        if self._is_large or is_boxed:
+        if self._is_large or steps[0].box is not None:
             is_final = not at_once or (box, True) in self._details
             if not is_final:
                 return self._owed(steps, whole, progress), len(steps)

@@ -53,6 +53,12 @@ def inmost(mask: Mask) -> tuple[float, float]:
     return float(x) - 0.5, float(y) - 0.5
 
 
+def around(mask: Mask) -> tuple[float, float, float, float]:
+    """The box that just holds a mask (H, W): left, top, right, bottom px."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
+
+
 def use(segment: Callable[[Prompt], Mask], truth: Mask, clicks: int, is_part: bool) -> list[Step]:
     """What each of so many clicks gives; fewer steps where nothing is wrong any more."""
     steps = [_ask(segment, Prompt((Click(*inmost(truth)),)), truth)]

@@ -15,7 +15,7 @@ from objectmorpher_core import segment
 from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.pipeline import Reading
 from objectmorpher_core.progress import Cancelled, silent
-from tests.core.segment.simulated_user import Step, boundary_f, inmost, overlap, use
+from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
 
@@ -203,12 +203,6 @@ def test_nothing_outside_a_box_is_chosen_and_a_box_is_enough():
     outside[top:bottom, left:right] = False
     assert not (found & outside).any()
     assert overlap(found, mask) > 0.85
-
-
-def around(mask: np.ndarray) -> tuple[float, float, float, float]:
-    """The box that just holds a mask (H, W)."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
 
 
 @pytest.mark.parametrize("name", ["spoon", "helmet", "cat"])
