@@ -71,9 +71,10 @@ class Drawer:
 def drawing() -> Iterator[Drawer]:
     """A drawer, with OpenGL where it can be had without a window."""
     try:
-        from app.render.headless import create_context  # what is measured need not be there
+        import moderngl  # what is measured need not be there
 
-        context = create_context()
+        settings: Any = {"backend": "egl"}  # moderngl's annotation of it is of another type
+        context = moderngl.create_context(standalone=True, **settings)
     except Exception as error:  # what the loader raises differs from system to system
         log.warning("OpenGL cannot be had without a window here, its rows are left out: %s", error)
         context = None
