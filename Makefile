@@ -38,8 +38,8 @@ help:
 
 run: .make/run
 	@$(COMPILE)
-	$(PYTHON) -m app models get || echo "The learned models could not be fetched; the built-in methods are used instead."
-	if [ -n "$(PHOTO)" ]; then exec $(PYTHON) -m app "$(PHOTO)"; else exec $(PYTHON) -m app --sample; fi
+	$(PYTHON) -m objectmorpher models get || echo "The learned models could not be fetched; the built-in methods are used instead."
+	if [ -n "$(PHOTO)" ]; then exec $(PYTHON) -m objectmorpher "$(PHOTO)"; else exec $(PYTHON) -m objectmorpher --sample; fi
 
 test: .make/test
 	@$(COMPILE)
@@ -85,7 +85,7 @@ test-browser: .make/browser
 	    apt_install libgl1 libegl1 || echo "The editor's window needs libGL and libEGL: install the packages libgl1 and libegl1."
 	fi
 	echo "Compiling the kernels (a minute or two, once)"
-	$(PYTHON) -m app.warm_up
+	$(PYTHON) -m objectmorpher.system.warm_up
 	touch $@
 
 .make/test: .make/venv pyproject.toml research/pyproject.toml

@@ -16,16 +16,16 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from .animation import Clip
-from .arrays import Mask, Pixels
-from .document import Document
-from .files import write_all
-from .image import encode_mask
-from .outputs import encode_output
+from .base.arrays import Mask, Pixels
+from .base.files import write_all
+from .base.progress import Progress, silent
+from .document.model import Document
+from .pictures.image import encode_mask
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
-from .progress import Progress, silent
-from .script import (
+from .scripting.animation import Clip
+from .scripting.outputs import encode_output
+from .scripting.script import (
     ALONE,
     CHOOSING,
     EditScript,
@@ -99,7 +99,7 @@ def read_scripts(script: File, photo: File | None = None) -> tuple[Edit, ...]:
 
 def replay(session: File | bytes, progress: Progress = silent) -> Result:
     """The edit of a session (.omorph), from the window or the command line, carried out again."""
-    from .session_file import decode_session
+    from .session.file import decode_session
 
     data = session if isinstance(session, bytes) else _read(session)[0]
     return Result(replay_document(decode_session(data), progress))

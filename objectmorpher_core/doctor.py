@@ -8,12 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 
-from . import backends, compose, lift, models, segment
+from . import compose, lift, models, segment
+from .base import backends
+from .base.threads import core_count
 from .compose import refine
-from .lift import depth_look, worker_file
+from .lift.relief import depth_look
 from .lift.trellis import weights
+from .lift.workers import file as worker_file
 from .models import device
-from .threads import core_count
 
 PACKAGES = (
     "numpy",

@@ -13,26 +13,37 @@ from typing import Any
 
 import numpy as np
 
-from . import compose, edits, front_edits, lift, scripted, segment
-from .arrays import RGB, Mask, Pixels, Selection
-from .camera import Camera
+from . import compose, lift, segment
+from .base.arrays import RGB, Mask, Pixels, Selection
+from .base.camera import Camera
+from .base.pixels import crop, unit_pixels
+from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
-from .compose.plate import build_plate
-from .document import AS_SEEN, Document, LiftedObject, LiftSettings, Matte, Photo, Plate, Prompt
-from .hint import Hint
-from .image import ImageError, Picture, read_mask, read_picture, to_u8
-from .importing import Scene, Source, place_import, register_file
-from .left_behind import has_left, with_plate
-from .pixels import crop, unit_pixels
-from .progress import Progress, part, silent
-from .puppet import Puppet, puppet_of
-from .refining import Refining, with_refinement
-from .report import Stopwatch, build_report
-from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
-from .scripted import prompt_of
+from .compose.plate.plate import build_plate
+from .deform.puppet import Puppet, puppet_of
+from .document import edits, front_edits
+from .document.hint import Hint
+from .document.model import (
+    AS_SEEN,
+    Document,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Photo,
+    Plate,
+    Prompt,
+)
+from .lift.registration.importing import Scene, Source, place_import, register_file
+from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
+from .scripting import scripted
+from .scripting.left_behind import has_left, with_plate
+from .scripting.refining import Refining, with_refinement
+from .scripting.report import Stopwatch, build_report
+from .scripting.script import ALONE, EditScript, FurtherObject, Others, ScriptError
+from .scripting.scripted import prompt_of
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
-from .segment.matte import band_width, build_matte
+from .segment.matting.matte import band_width, build_matte
 from .splat_files import COUNT
 
 MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop

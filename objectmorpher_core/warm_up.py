@@ -11,9 +11,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from .document import DeformSettings, Document, EditObject, Placement
-from .progress import silent
-from .puppet import Puppet, puppet_of
+from .base.progress import silent
+from .deform.puppet import Puppet, puppet_of
+from .document.model import DeformSettings, Document, EditObject, Placement
 
 SIZE = 96  # px
 NODES = 8  # unknowns of a made system
@@ -33,12 +33,12 @@ def warm_up() -> Document:
 
 def _edited() -> Document:
     """The main job."""
-    from .image import Picture, encode_mask, encode_picture
+    from .pictures.image import Picture, encode_mask, encode_picture
     from .pipeline import run_script
-    from .script import EditScript, HandleMove
-    from .segment.closed_form import affine, applied
-    from .segment.halving import halved_pixels
-    from .segment.pieces import Pieces
+    from .scripting.script import EditScript, HandleMove
+    from .segment.matting.closed_form import affine, applied
+    from .segment.matting.halving import halved_pixels
+    from .segment.pieces.pieces import Pieces
 
     rgb, alpha = np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)
     applied(affine(rgb, alpha), rgb, alpha == 0, alpha)  # of large photos only
@@ -61,12 +61,12 @@ def _edited() -> Document:
 def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     """A photo that is large, one of 16 bits, and Gaussians that are drawn as they are in a file."""
     from .compose.composite import object_texture
-    from .compose.grain import Grain, sketch_grain
-    from .compose.noise import BANDS, find_noise
-    from .compose.relight import Relit
-    from .lift.integration import solved
+    from .compose.light.grain import Grain, sketch_grain
+    from .compose.light.noise import BANDS, find_noise
+    from .compose.light.relight import Relit
+    from .lift.relief.integration import solved
     from .pipeline import lift_mask, make_plate
-    from .segment.closed_form import affine
+    from .segment.matting.closed_form import affine
 
     empty = np.zeros((4, 4))
     solved(empty, empty, empty, empty, empty, empty, 1, 1.0)  # after the shape network's look
@@ -115,10 +115,10 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
 
 def _register(document: Document, thing: EditObject) -> None:
     """The object as if it came out of a file: looked for in every way it can stand, and refined."""
-    from .importing import Scene, place_import
-    from .lift.placement import Registrar
-    from .lift.placement_search import search
-    from .lift.sketch import even_surfels, own_frame
+    from .lift.registration.importing import Scene, place_import
+    from .lift.registration.placement import Registrar
+    from .lift.registration.search import search
+    from .lift.registration.sketch import even_surfels, own_frame
 
     assert thing.lifted is not None and thing.mask is not None
     photo, gaussians = document.photo, thing.lifted.body

@@ -27,8 +27,8 @@ import bundled  # noqa: E402
 import licences  # noqa: E402
 import linux_packages  # noqa: E402
 
-from app import __version__  # noqa: E402
-from objectmorpher_core.installation import BUILD, build_name  # noqa: E402
+from objectmorpher import __version__  # noqa: E402
+from objectmorpher_core.base.installation import BUILD, build_name  # noqa: E402
 
 KINDS = {"deb": linux_packages.build_deb, "appimage": linux_packages.build_appimage}
 NEEDED = {"deb": ("dpkg-deb", "dpkg"), "appimage": ("mksquashfs", "squashfs-tools")}

@@ -31,11 +31,11 @@ def main() -> int:
         del sys.argv[:2]
         runpy.run_path(sys.argv[0], run_name="__main__")
         return 0
-    from objectmorpher_core import installation
+    from objectmorpher_core.base import installation
 
     installation.prepare(INSIDE)
     trust_certificates()
-    from app.__main__ import main as run
+    from objectmorpher.__main__ import main as run
 
     return run()
 

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import skimage.data
 
-from objectmorpher_core import edits
-from objectmorpher_core.compose.lighting import Lighting, Lit
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.puppet import puppet_of
+from objectmorpher_core.compose.light.lighting import Lighting, Lit
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
 from tests import shapes
 
 WIDTH, HEIGHT = 480, 360  # px

@@ -14,12 +14,14 @@ from time import perf_counter
 import cv2
 import numpy as np
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import Mask, Pixels
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import unit_pixels
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate import hole_margin
-from objectmorpher_core.document import (
+from objectmorpher_core.compose.plate.plate import hole_margin
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import (
     GAUSSIANS,
     Document,
     EditObject,
@@ -30,10 +32,8 @@ from objectmorpher_core.document import (
     Plate,
     Pose,
 )
-from objectmorpher_core.image import Picture, encode_picture, read_picture
-from objectmorpher_core.pixels import unit_pixels
-from objectmorpher_core.puppet import puppet_of
-from objectmorpher_core.report import peak_memory_mb
+from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
+from objectmorpher_core.scripting.report import peak_memory_mb
 from tests import shapes
 
 ROWS = 500  # that are compared at a time: the tests need memory, too

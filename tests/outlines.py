@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.compose.shadow import Standing, ground_normal
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.compose.shadow.shadow import Standing, ground_normal
 from objectmorpher_core.compose.silhouette import Silhouette, fine_grid
-from objectmorpher_core.joining import Shadow
+from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels

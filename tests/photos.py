@@ -61,7 +61,7 @@ def small_cup(step: int, across: float, up: float):
 
     The mask is an ellipse of the radii `across` and `up`, in px of the small photo.
     """
-    from objectmorpher_core.camera import Camera
+    from objectmorpher_core.base.camera import Camera
 
     pixels = photo("coffee")[::step, ::step].copy()
     height, width = pixels.shape[:2]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from skimage import data
 
-from objectmorpher_core.compose.shadow import GAMMA
+from objectmorpher_core.compose.shadow.shadow import GAMMA
 from tests.shadowed import FOOT, HEIGHT, MIDDLE, WIDTH, ground_of, inside
 
 

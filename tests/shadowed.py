@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objectmorpher_core.compose.shadow import GAMMA
+from objectmorpher_core.compose.shadow.shadow import GAMMA
 
 WIDTH, HEIGHT = 260, 200  # px
 MIDDLE, RADII = (130.0, 90.0), (30.0, 42.0)  # px, of a thing that stands

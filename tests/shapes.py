@@ -11,12 +11,16 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import KDTree
 
-from objectmorpher_core.arrays import F32, F64, RGB, Mask, frozen
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, F64, RGB, Mask, frozen
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.rotations import matrices_from_quats, quats_along
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.control_points import sample_control_points
+from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import (
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import (
     DeformSettings,
     Document,
     EditObject,
@@ -29,15 +33,11 @@ from objectmorpher_core.document import (
     Placement,
     Plate,
 )
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.pixels import crop
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
-from objectmorpher_core.rotations import matrices_from_quats, quats_along
-from objectmorpher_core.segment.matte import extended_mask, frame_extension
+from objectmorpher_core.segment.matting.matte import extended_mask, frame_extension
 
 WIDTH, HEIGHT = 160, 120  # px, of the made photos
 PLACEMENTS = {  # of an object that is drawn

@@ -8,8 +8,8 @@ import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
-from app import __version__
-from app.filing import PHOTO_ENDINGS, SESSION_ENDING
+from objectmorpher import __version__
+from objectmorpher.editor.filing import PHOTO_ENDINGS, SESSION_ENDING
 
 ROOT = Path(__file__).parents[1]
 LINUX = ROOT / "packaging" / "linux"

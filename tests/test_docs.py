@@ -15,8 +15,8 @@ from urllib.parse import unquote
 import pytest
 
 import objectmorpher_core as om
-from app import cli
-from objectmorpher_core.script import script_from
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.scripting.script import script_from
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

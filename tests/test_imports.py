@@ -34,7 +34,7 @@ CORE_AT_IMPORT = {
     "numpy", "scipy", "numba", "llvmlite", "cv2", "PIL", "platformdirs", "objectmorpher_core",
 }  # fmt: skip
 
-WINDOW_IMPORT = "import app.cli, app.gui.window"
+WINDOW_IMPORT = "import objectmorpher.cli.parser, objectmorpher.gui.window.window"
 RUNS = 7
 MOST_RATIO = 7.0  # it is about 4.5; scipy alone would add 2, torch 20
 
@@ -101,14 +101,16 @@ def test_the_program_knows_nothing_of_the_research_package(path):
 def test_gl_and_window_stay_in_their_folders(path):
     folder = path.relative_to(APP).parts[0]
     names = tops(path)
-    assert folder == "render" or not names & GL, "only app/render imports moderngl"
-    assert folder == "gui" or not names & WINDOW, "only app/gui imports imgui and glfw"
+    assert folder == "render" or not names & GL, "only app/objectmorpher/render imports moderngl"
+    assert folder == "gui" or not names & WINDOW, (
+        "only app/objectmorpher/gui imports imgui and glfw"
+    )
 
 
 @pytest.mark.parametrize("path", [APP / "editor.py", *sources(APP / "tools")], ids=name_of)
 def test_editor_and_tools_need_no_screen(path):
     reached = {".".join(name.split(".")[:2]) for name in imports(path)}
-    assert not reached & {"app.render", "app.gui"}
+    assert not reached & {"objectmorpher.render", "objectmorpher.gui"}
 
 
 @pytest.mark.parametrize("path", sources(APP), ids=name_of)
@@ -119,13 +121,17 @@ def test_app_starts_light(path):
 @pytest.mark.parametrize("path", sources(APP / "render"), ids=name_of)
 def test_renderer_knows_no_editor(path):
     reached = {".".join(name.split(".")[:2]) for name in imports(path)}
-    assert not reached & {"app.editor", "app.history", "app.gui"}
+    assert not reached & {
+        "objectmorpher.editor.editor",
+        "objectmorpher.editor.history",
+        "objectmorpher.gui",
+    }
 
 
 @pytest.mark.parametrize(
     "module",
     [
-        "objectmorpher_core.pipeline", "app.editor", "app.cli",
+        "objectmorpher_core.pipeline", "objectmorpher.editor.editor", "objectmorpher.cli.parser",
         "objectmorpher_core.lift.trellis.lifter", "objectmorpher_core.lift.trellis.cupid_lifter",
     ],
 )  # fmt: skip
@@ -155,7 +161,7 @@ def test_the_window_imports_in_a_few_times_what_numpy_takes():
     "module",
     [
         "scipy", "numba", "torch", "diffusers", "onnxruntime", "skimage", "ray", "http",
-        "app.remote.server", "app.remote.offers", "app.remote.tokens",
+        "objectmorpher.server.address", "objectmorpher.server.offers", "objectmorpher.server.tokens",
     ],
 )  # fmt: skip
 def test_the_window_is_there_before(module):

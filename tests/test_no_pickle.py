@@ -13,7 +13,7 @@ FOLDERS = ("app", "objectmorpher_core", "packaging", "research")
 SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 RUNNING = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"}
 # Between the window and the worker that it started itself: no byte of it comes from elsewhere.
-OWN_PIPE = {"app/wire.py"}
+OWN_PIPE = {"app/objectmorpher/worker/wire.py"}
 ONLY_ITS_ERROR = {  # that torch raises
     "research/objectmorpher_research/evaluation/measures/trunk_files.py"
 }

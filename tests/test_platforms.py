@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.files import OutputError, write_all
+from objectmorpher_core.base.files import OutputError, write_all
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -64,8 +64,8 @@ def test_the_job_is_done_without_what_windows_lacks(tmp_path) -> None:
     photo = ROOT / "assets" / "samples" / "coffee.jpg"
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_POSIX, photo, tmp_path / "s.omorph", tmp_path / "o.png",
-         "app.jobs", "app.editor", "app.recovery", "app.autosave", "objectmorpher_core.report",
-         "objectmorpher_core.doctor", "objectmorpher_core.lift.worker_process"],
+         "objectmorpher.worker.jobs", "objectmorpher.editor.editor", "objectmorpher.editor.recovery", "objectmorpher.editor.autosave", "objectmorpher_core.scripting.report",
+         "objectmorpher_core.doctor", "objectmorpher_core.lift.workers.process"],
         cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
@@ -149,7 +149,7 @@ def test_names_as_long_as_a_folder_takes_are_written(tmp_path) -> None:
 def test_a_terminal_without_the_characters_gets_a_sentence(tmp_path) -> None:
     """Windows' pipes have code page 1252."""
     done = subprocess.run(
-        [sys.executable, "-m", "app", "info", "東京の写真.omorph"],
+        [sys.executable, "-m", "objectmorpher", "info", "東京の写真.omorph"],
         cwd=tmp_path, capture_output=True,
         env=os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": str(ROOT)},
     )  # fmt: skip

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 READ_RESOURCES = """
 import sys
 from pathlib import Path
-from app.resources import resource
+from objectmorpher.system.resources import resource
 for name in sys.argv[1:]:
     assert resource(name).stat().st_size > 0, name
     assert Path(sys.prefix) in resource(name).parents, resource(name)
@@ -69,7 +69,7 @@ def test_the_research_package_is_apart(installed, tmp_path):
     """The wheel holds none of it, does not list its commands, and says how to get them."""
     files = run(installed / "python", "-m", "pip", "show", "--files", "objectmorpher", cwd=tmp_path)
     files = files.partition("Files:")[2]
-    assert "app/cli.py" in files and "research" not in files
+    assert "app/objectmorpher/cli/parser.py" in files and "research" not in files
     assert "evaluate" not in run(installed / "objectmorpher", "--help", cwd=tmp_path)
     done = subprocess.run(
         [installed / "objectmorpher", "bench", "deform"], cwd=tmp_path, env=clean(),

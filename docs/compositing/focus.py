@@ -10,17 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import Pixels
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import Pixels
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose import composite as composing
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.lighting import Lighting
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Document, EditObject, Photo, Placement
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.compose.light.lighting import Lighting
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, EditObject, Photo, Placement
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
-from objectmorpher_core.puppet import puppet_of
 from tests import focussed
 from tests.core.segment.truth_masks import TRUTHS, truth_mask
 from tests.photos import photo

@@ -13,14 +13,14 @@ import cv2
 import numpy as np
 from skimage import data
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import F64, Pixels
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, Pixels
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.noise import find_noise
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Document, Photo, Placement
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.compose.light.noise import find_noise
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Photo, Placement
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
 
 WIDTH, HEIGHT = 480, 360  # px

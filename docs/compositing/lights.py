@@ -10,16 +10,16 @@ import worlds
 from turning import middle_of
 from worlds import CAMERA, LIGHTS, Lamp
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.compose.light_estimate import estimate_light
-from objectmorpher_core.compose.lighting import object_texture
-from objectmorpher_core.compose.relight import relight
-from objectmorpher_core.document import DeformSettings, LiftSettings, Placement
-from objectmorpher_core.joining import USUAL_RELIGHT
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.compose.light.light_estimate import estimate_light
+from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.compose.light.relight import relight
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.joining import USUAL_RELIGHT
+from objectmorpher_core.document.model import DeformSettings, LiftSettings, Placement
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
-from objectmorpher_core.rotations import turn_matrix
 
 TURNS = {
     "yaw -35": (-35.0, 0.0), "yaw -20": (-20.0, 0.0), "yaw 20": (20.0, 0.0), "yaw 35": (35.0, 0.0),

@@ -7,13 +7,13 @@ import numpy as np
 from plates import SAMPLES
 from skimage import data
 
-from objectmorpher_core.arrays import Pixels
-from objectmorpher_core.compose.old_shadow import without_shadow
-from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.base.arrays import Pixels
+from objectmorpher_core.compose.shadow.old_shadow import without_shadow
+from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import open_photo, run_script, select
-from objectmorpher_core.script import EditScript, FillFrom
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.scripting.script import EditScript, FillFrom
+from objectmorpher_core.segment.matting.matte import build_matte
 
 
 def _bowl() -> Pixels:

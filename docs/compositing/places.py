@@ -18,13 +18,13 @@ from skimage import data
 from sklearn.datasets import load_sample_image
 from worlds import CAMERA, GAMMA, LIGHTS, SIDE
 
-from objectmorpher_core.arrays import F64, Pixels
-from objectmorpher_core.compose.harmonize import at_strength, light_gain, light_map
+from objectmorpher_core.base.arrays import F64, Pixels
+from objectmorpher_core.base.pixels import pixels_from_unit
+from objectmorpher_core.compose.light.harmonize import at_strength, light_gain, light_map
 from objectmorpher_core.compose.silhouette import Silhouette
-from objectmorpher_core.document import Document, Photo
-from objectmorpher_core.image import Picture, encode_picture
-from objectmorpher_core.joining import USUAL_HARMONY
-from objectmorpher_core.pixels import pixels_from_unit
+from objectmorpher_core.document.joining import USUAL_HARMONY
+from objectmorpher_core.document.model import Document, Photo
+from objectmorpher_core.pictures.image import Picture, encode_picture
 
 SIZE = 150  # px, of the object's square
 LEFT, RIGHT, TOP = 30, 332, 181  # px, where it is

@@ -11,7 +11,7 @@ import numpy as np
 from skimage import data
 
 from objectmorpher_core.pipeline import make_plate
-from objectmorpher_core.report import peak_memory_mb
+from objectmorpher_core.scripting.report import peak_memory_mb
 
 MEGAPIXELS = (1, 24)
 REACH = 0.15  # of the photo's width, radius of the thing that is taken out

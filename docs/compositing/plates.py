@@ -15,9 +15,9 @@ from skimage.metrics import structural_similarity
 from sklearn.datasets import load_sample_image
 
 from objectmorpher_core import models
-from objectmorpher_core.arrays import Mask, Pixels
+from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose import load
-from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.evaluation.measures.hed_vgg import WEIGHT, HedVgg, read_hed_vgg
 

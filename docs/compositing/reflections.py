@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 from skimage import data
 
-from objectmorpher_core.arrays import F64, Mask, Pixels
+from objectmorpher_core.base.arrays import F64, Mask, Pixels
 from objectmorpher_core.compose import load
-from objectmorpher_core.compose.old_reflection import OldReflection
-from objectmorpher_core.compose.old_shadow import traceless_plate
-from objectmorpher_core.compose.reflection_fit import find_old_reflection
-from objectmorpher_core.compose.shadow import GAMMA
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.compose.shadow.old_reflection import OldReflection
+from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
+from objectmorpher_core.compose.shadow.reflection_fit import find_old_reflection
+from objectmorpher_core.compose.shadow.shadow import GAMMA
+from objectmorpher_core.segment.matting.matte import build_matte
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 from tests.core.segment.truth_masks import TRUTHS, truth_mask

@@ -10,10 +10,10 @@ import numpy as np
 import worlds
 from worlds import GROUNDS, SIDE, SUNS
 
-from objectmorpher_core.arrays import F64, Pixels
-from objectmorpher_core.compose.old_shadow import without_shadow
-from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.base.arrays import F64, Pixels
+from objectmorpher_core.compose.shadow.old_shadow import without_shadow
+from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+from objectmorpher_core.segment.matting.matte import build_matte
 
 DARK = 0.1  # of the light, from which the ground counts as shaded
 AROUND = 9  # px about the solid, that the inpainter fills in any case

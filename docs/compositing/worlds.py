@@ -17,9 +17,9 @@ import numpy as np
 from skimage import data
 from solids import SOLIDS, Solid, load
 
-from objectmorpher_core.arrays import F64, Mask, Pixels
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_core.base.arrays import F64, Mask, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_research.evaluation.truth.rasterise import rasterised
 
 SIDE = 512  # px

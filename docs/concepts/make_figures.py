@@ -14,13 +14,13 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.sparse import csr_array, triu
 
 import objectmorpher_core as om
-from objectmorpher_core.arrays import F64, RGB
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.compose.lighting import object_texture
+from objectmorpher_core.base.arrays import F64, RGB
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings, Document
-from objectmorpher_core.image import to_u8
-from objectmorpher_core.puppet import puppet_of
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document.model import DeformSettings, Document
+from objectmorpher_core.pictures.image import to_u8
 from objectmorpher_core.raster import tiles
 
 ROOT = Path(__file__).parents[2]

@@ -21,13 +21,13 @@ from panels import (
 )
 from PIL import Image, ImageDraw
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.deform.splitting import split_stretched
-from objectmorpher_core.document import PhotoTexture
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import PhotoTexture
 
 PULL = 2.5  # x the limb's length at rest
 AROUND = ((1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1), (0, -1, 0))

@@ -10,12 +10,12 @@ from methods import OURS, PAPERS_LINKS, Handles
 from models import Gap
 from panels import BLUE, RED, Dots, Lines, Panel, draw_figure, posed
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.deform.graph import LINK_RADIUS, Graph
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import DeformSettings, Handle
+from objectmorpher_core.document.model import DeformSettings, Handle
 
 DRAG = 0.2  # x diameter
 PIN_DOT, LINE = 4.0, 0.6  # px

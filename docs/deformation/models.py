@@ -25,12 +25,12 @@ from solids import (
     union,
 )
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import matrix_from_vector, quats_along, turn_matrix
 from objectmorpher_core.deform.control_points import sample_control_points
-from objectmorpher_core.document import Handle, LiftedObject, PhotoTexture
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import matrix_from_vector, quats_along, turn_matrix
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import Handle, LiftedObject, PhotoTexture
 
 CONTROL_POINTS = 512
 CAMERA = Camera.from_fov(1000, 1000, 30.0)

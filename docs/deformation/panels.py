@@ -9,8 +9,8 @@ import numpy as np
 from models import CAMERA, Model
 from PIL import Image, ImageDraw, ImageFont
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.raster import columns, projection, tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats

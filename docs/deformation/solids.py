@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from skimage.measure import marching_cubes
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 Distance = Callable[[F64], F64]  # (N, 3) points -> (N,) to the surface, negative inside
 

@@ -29,14 +29,14 @@ from published import (
 )
 
 from objectmorpher_core import models
-from objectmorpher_core.compose import inpaint_pixelhacker
-from objectmorpher_core.compose.pixelhacker import sampler
+from objectmorpher_core.compose.plate import inpaint_pixelhacker
+from objectmorpher_core.compose.plate.pixelhacker import sampler
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.memory import PipelineNeed, Way
 from objectmorpher_core.lift.trellis import lifter
 from objectmorpher_core.models import depth_torch
 from objectmorpher_core.models.device import RESIDENT, Need
-from objectmorpher_core.segment import sam_torch
+from objectmorpher_core.segment.sam import sam_torch
 
 PAGE = Path(__file__).parents[1] / "models.md"
 START, END = "<!-- estimates -->\n", "<!-- end of estimates -->\n"

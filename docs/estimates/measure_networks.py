@@ -30,12 +30,12 @@ import torch
 from published import SAM, SAM2, build, parameters, trellis_parts
 from torch import Tensor
 
-from objectmorpher_core.compose.pixelhacker import sampler as pixelhacker
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.compose.plate.pixelhacker import sampler as pixelhacker
 from objectmorpher_core.compose.refine import klein
 from objectmorpher_core.lift.trellis.configs import Sampling
 from objectmorpher_core.lift.trellis.sampler import sample
 from objectmorpher_core.lift.trellis.voxels import Voxels
-from objectmorpher_core.progress import silent
 from objectmorpher_research.training.composition import edit_models
 
 HERE = Path(__file__).parent

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import FORMATS
 
 SMALL, LARGE, RUNS = 20_000, 1_000_000, 3

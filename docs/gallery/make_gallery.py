@@ -15,7 +15,7 @@ from PIL import Image
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent))
 
-from app.cli import main  # noqa: E402
+from objectmorpher.cli.parser import main  # noqa: E402
 
 GAP = 8  # px of white between before and after
 QUALITY = 92

@@ -9,11 +9,11 @@ import numpy as np
 from solids import SOLIDS, Solid, load
 from turning import AT, CAMERA, SHARE, SIDE, Shot, over_plate
 
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift import shape_look
-from objectmorpher_core.lift.body import Body
-from objectmorpher_core.lift.fusion import fused
-from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift.relief import shape_look
+from objectmorpher_core.lift.relief.body import Body
+from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.silhouette import Silhouette
 from objectmorpher_research.training.shape_eval import Score, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows

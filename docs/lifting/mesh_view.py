@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from solids import Solid
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_research.evaluation.truth.rasterise import SAMPLES, pixel_means, rasterised
 
 

@@ -12,10 +12,13 @@ import cv2
 import numpy as np
 from skimage.metrics import structural_similarity
 
-from objectmorpher_core.arrays import F32, F64
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import (
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import (
     DeformSettings,
     LiftedObject,
     LiftSettings,
@@ -23,17 +26,14 @@ from objectmorpher_core.document import (
     Placement,
 )
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.body import Body
-from objectmorpher_core.lift.depth_prior import Seen
-from objectmorpher_core.lift.mirror import MirrorAxis
-from objectmorpher_core.lift.relief import ReliefLifter
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.standing import FLAT
-from objectmorpher_core.lift.thickness import Thickness
+from objectmorpher_core.lift.relief.body import Body
+from objectmorpher_core.lift.relief.depth_prior import Seen
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
+from objectmorpher_core.lift.relief.mirror import MirrorAxis
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.standing import FLAT
+from objectmorpher_core.lift.relief.thickness import Thickness
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.pixels import crop
-from objectmorpher_core.progress import silent
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 from objectmorpher_research.evaluation.truth.stereo import FOCAL, OFFSET, StereoPair, read_pair
 

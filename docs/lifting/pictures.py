@@ -12,12 +12,12 @@ from motorcycle import read_pair
 from PIL import Image, ImageDraw, ImageFont
 from turning import Scene, Shot, over_plate
 
-from objectmorpher_core import edits
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import AS_SEEN, Document, LiftSettings, Placement, Prompt
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import AS_SEEN, Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import export, lift_mask, make_plate, open_photo, select
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.scripting.script import EditScript
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 CLICKS = {

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import trimesh
 
-from objectmorpher_core.arrays import F64, I32, U8
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_core.base.arrays import F64, I32, U8
+from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_research.evaluation.truth.lookup import looked_up
 from objectmorpher_research.evaluation.truth.materials import veins
 

@@ -20,19 +20,19 @@ import numpy as np
 from skimage import data
 from solids import Solid, load
 
-from objectmorpher_core.arrays import F64, Mask, Pixels
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, Mask, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import crop
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import DeformSettings, LiftSettings, Matte, Placement, Pose
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import DeformSettings, LiftSettings, Matte, Placement, Pose
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.depth_prior import Seen
-from objectmorpher_core.lift.relief import ReliefLifter
+from objectmorpher_core.lift.relief.depth_prior import Seen
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.pixels import crop
-from objectmorpher_core.progress import silent
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.texture import TextureLevels
-from objectmorpher_core.rotations import turn_matrix
 
 SIDE = 512  # px
 CAMERA = Camera.from_fov(SIDE, SIDE)

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import spsolve
 
-from objectmorpher_core.arrays import F32, Mask, Pixels, Selection
-from objectmorpher_core.pixels import unit_pixels
+from objectmorpher_core.base.arrays import F32, Mask, Pixels, Selection
+from objectmorpher_core.base.pixels import unit_pixels
 from objectmorpher_core.segment.mask_edit import FULL, grow, is_selected, is_soft
-from objectmorpher_core.segment.matte import band_width, signed_distance
+from objectmorpher_core.segment.matting.matte import band_width, signed_distance
 
 REACH = 2.5  # x band: how far the colours of object and background are gathered
 TRUST = 0.2  # sRGB: how far an unmixed colour may be from the object's colour beside it

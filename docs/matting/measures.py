@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from truth import Case
 
-from objectmorpher_core.arrays import F32, Mask
+from objectmorpher_core.base.arrays import F32, Mask
 
 AROUND = 9  # px added to where alpha is soft, in truth or in the given mask
 LEVELS = 255

@@ -8,11 +8,11 @@ from importlib.util import find_spec
 import first_version
 import numpy as np
 
-from objectmorpher_core.arrays import F32, Pixels, Selection
+from objectmorpher_core.base.arrays import F32, Pixels, Selection
+from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.pipeline import MATTE_MARGIN
-from objectmorpher_core.pixels import crop, unit_pixels
 from objectmorpher_core.segment.mask_edit import FULL, is_selected
-from objectmorpher_core.segment.matte import REACH, band_width, build_matte, signed_distance
+from objectmorpher_core.segment.matting.matte import REACH, band_width, build_matte, signed_distance
 
 Method = Callable[[Pixels, Selection], tuple[F32, F32]]  # alpha (H, W), foreground (H, W, 3)
 NARROW = 1.5  # x band: half-width of a usual trimap

@@ -10,7 +10,7 @@ from measures import over
 from PIL import Image, ImageDraw, ImageFont
 from truth import Case
 
-from objectmorpher_core.arrays import F32
+from objectmorpher_core.base.arrays import F32
 
 GAP = 6  # px of white between panels
 LABEL, FONT_SIZE = 26, 14  # px

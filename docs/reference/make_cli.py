@@ -9,8 +9,8 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from app.cli import build_parser, window_parser
-from app.terminal import PROGRAM
+from objectmorpher.cli.parser import build_parser, window_parser
+from objectmorpher.cli.terminal import PROGRAM
 
 PAGE = Path(__file__).with_name("cli.md")
 HEAD = f"""# The command line

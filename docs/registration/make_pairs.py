@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import GAUSSIANS, LiftSettings, Matte
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import GAUSSIANS, LiftSettings, Matte
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.placement import Hints, Registrar, Registration, register
-from objectmorpher_core.lift.placement_view import Target
+from objectmorpher_core.lift.registration.placement import Hints, Registrar, Registration, register
+from objectmorpher_core.lift.registration.view import Target
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_research.training.composition.made_pairs import FAMILIES, turn_of
 from objectmorpher_research.training.composition.pose_sources import Two, carried, matched
@@ -33,7 +33,7 @@ Made by `python docs/registration/make_pairs.py`: {count} made-up objects of `tr
 with other lamps and another backdrop. It is lifted out of one photo (**B**), its other side and its
 depths guessed, and registered to the other (**A**); each pair both ways. *error*: the turn between
 the pose found and the true one, degrees. *outline and colours*: the search alone; *details*: with
-matches of SIFT (`objectmorpher_core/lift/placement_matches.py`), which is what `--poses own` does.
+matches of SIFT (`objectmorpher_core/lift/registration/matches.py`), which is what `--poses own` does.
 *score* is that of the pose as the registration with details rates it. No constant was chosen on
 these pairs.
 

@@ -18,10 +18,10 @@ from page import write_page
 from pictures import draw_sheet
 from skimage import data
 
-from objectmorpher_core.arrays import F64, Pixels
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.lift.placement import Hints, Proposal, Registration, register
-from objectmorpher_core.lift.placement_view import Target
+from objectmorpher_core.base.arrays import F64, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.lift.registration.placement import Hints, Proposal, Registration, register
+from objectmorpher_core.lift.registration.view import Target
 
 FOLDER = Path(__file__).parent
 SEED = 100

@@ -9,12 +9,12 @@ import numpy as np
 import solids
 import truth
 
-from objectmorpher_core.compose.lighting import object_texture
-from objectmorpher_core.document import DeformSettings, Placement
-from objectmorpher_core.lift.imported import lift_imported
-from objectmorpher_core.lift.placement import Registration
-from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import DeformSettings, Placement
+from objectmorpher_core.lift.registration.imported import lift_imported
+from objectmorpher_core.lift.registration.placement import Registration
+from objectmorpher_core.segment.matting.matte import build_matte
 
 TURNS = (0.0, 20.0, 60.0, 120.0)  # degrees of yaw
 MARGIN = 30  # px around the object

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from objectmorpher_core.arrays import F32, F64
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.poisson_disk import thin_to_spacing
-from objectmorpher_core.rotations import matrix_from_vector, quats_along
+from objectmorpher_core.base.arrays import F32, F64
+from objectmorpher_core.base.poisson_disk import thin_to_spacing
+from objectmorpher_core.base.rotations import matrix_from_vector, quats_along
+from objectmorpher_core.document.gaussians import Gaussians
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from meshes import fetched  # beside this folder: other pages have them, too

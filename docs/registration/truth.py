@@ -12,9 +12,9 @@ import numba
 import numpy as np
 from solids import Solid
 
-from objectmorpher_core.arrays import F64, Mask, Pixels
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.rotations import matrices_from_quats
+from objectmorpher_core.base.arrays import F64, Mask, Pixels
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import matrices_from_quats
 
 WIDTH, HEIGHT = 640, 480  # px
 FOVS = 20.0, 70.0  # degrees, horizontal

@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import solid
 
-from objectmorpher_core.arrays import F32, F64, frozen
-from objectmorpher_core.document import LiftedObject, PhotoTexture, Placement
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.lift import relief
-from objectmorpher_core.poisson_disk import thin_to_spacing
+from objectmorpher_core.base.arrays import F32, F64, frozen
+from objectmorpher_core.base.poisson_disk import thin_to_spacing
+from objectmorpher_core.base.rotations import quats_along
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import LiftedObject, PhotoTexture, Placement
+from objectmorpher_core.lift.relief import lifter as relief
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
-from objectmorpher_core.rotations import quats_along
 
 RAYS = 5  # by as many in a pixel
 REST = np.eye(4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32, Mask
+from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.raster.reference_layers import Picture3D
 
 GREY = 0.5  # of the ground that objects are shown on

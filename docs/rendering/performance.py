@@ -16,8 +16,8 @@ import numpy as np
 from page import row
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import Click, Prompt
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.document.model import Click, Prompt
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import read_photo
 from objectmorpher_research.bench.scenes import made_mask, made_photo
 from objectmorpher_research.bench.timing import cpu_name, seconds
@@ -212,7 +212,7 @@ def _run(pixels: np.ndarray, mask: np.ndarray | None, *options: str) -> Row:
             chosen = Path(folder) / "mask.png"
             chosen.write_bytes(encode_mask(mask))
             options = (*options, "--mask", str(chosen))
-        command = [sys.executable, "-m", "app", "edit", str(photo), *options]
+        command = [sys.executable, "-m", "objectmorpher", "edit", str(photo), *options]
         command += ["-o", str(Path(folder) / "out.png"), "--report", str(report)]
         subprocess.run(command, cwd=ROOT, check=True)
         return json.loads(report.read_text())

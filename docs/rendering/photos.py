@@ -11,16 +11,16 @@ from measures import detail, inside, on_grey
 from panels import Box, Labelled, draw_sheet
 from plain import fitted_colors, lifted_colors
 
-from objectmorpher_core.arrays import F32, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, Mask
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import GAUSSIANS, DeformSettings, LiftSettings, Placement
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import GAUSSIANS, DeformSettings, LiftSettings, Placement
 from objectmorpher_core.pipeline import lift_mask, open_photo, select
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.scripting.script import EditScript
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 TURN = Placement(turn=(20, 0, 0))

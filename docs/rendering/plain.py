@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.lift.relief import bilinear
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.lift.relief.lifter import bilinear
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels

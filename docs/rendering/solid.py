@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, F64, Mask
+from objectmorpher_core.base.camera import Camera
 
 AXES = np.array([1.15, 1.0, 0.8])  # world units
 CENTRE = np.array([0.0, 0.0, 3.0])

@@ -12,10 +12,10 @@ from measures import GREY, detail, inside, on_grey, psnr
 from panels import Labelled, draw_sheet
 from plain import fitted_colors, lifted_colors
 
-from objectmorpher_core.arrays import F32, F64, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, F64, Mask
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 

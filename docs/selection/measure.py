@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from objectmorpher_core import segment
-from objectmorpher_core.arrays import RGB, Mask
-from objectmorpher_core.document import Prompt
-from objectmorpher_core.progress import silent
+from objectmorpher_core.base.arrays import RGB, Mask
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import Prompt
 from objectmorpher_core.segment import Found, Quick, Segmenter, SelectionError
 from tests.core.segment.simulated_user import Step, around, boundary_f, overlap, use, worst_click
 from tests.core.segment.truth_masks import LATER, TRUTHS, Truth, truth, truth_mask

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from measure import Row
 
-from objectmorpher_core.arrays import RGB, Mask
+from objectmorpher_core.base.arrays import RGB, Mask
 from tests.core.segment.simulated_user import Step
 from tests.photos import photo
 

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.lift.crop import Crop, planes_of
-from objectmorpher_core.lift.shape_look import SeenShape, ShapeNet
+from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeNet
 from objectmorpher_core.models import shipped
 from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shapes.sample import Sample, make_sample

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from hands import Hands
 from PIL import Image, ImageDraw
+
+from hands import Hands
 
 QUALITY = 80  # of the JPEGs
 DRAWN = 400  # px of the screen that differ: more than a hint, less than a small outline

@@ -25,9 +25,8 @@ ROOT = HERE.parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "app")]
 
 from hands import Hands, window_environment, x_display  # noqa: E402
-
 from objectmorpher_core.pipeline import open_photo  # noqa: E402
-from objectmorpher_core.session_file import save_session  # noqa: E402
+from objectmorpher_core.session.file import save_session  # noqa: E402
 
 SAMPLE = ROOT / "assets" / "samples" / "astronaut.jpg"
 SCREEN = (1440, 1100)  # px
@@ -136,7 +135,7 @@ def feel(sent: Places, log: Path, kind: str) -> Feel:
 @contextmanager
 def window(path: Path, environment: dict[str, str], log: Path) -> Iterator[Mouse]:
     """The window with a session, ready, and the pointer; it writes its frames when it is closed."""
-    command = [sys.executable, "-m", "app", str(path), "--size", "{},{}".format(*SIZE)]
+    command = [sys.executable, "-m", "objectmorpher", str(path), "--size", "{},{}".format(*SIZE)]
     command += ["--frame-log", str(log)]
     with subprocess.Popen(command, env=environment, cwd=ROOT) as process:
         hands, mouse = Hands(environment), Mouse(environment)
@@ -185,7 +184,7 @@ def work_beside(environment: dict[str, str], folder: Path) -> Feel:
 def start(environment: dict[str, str], folder: Path) -> float:
     """s from the command to the first frame on the screen."""
     log = folder / "frames.json"
-    command = [sys.executable, "-m", "app", "--frames", "2", "--frame-log", str(log)]
+    command = [sys.executable, "-m", "objectmorpher", "--frames", "2", "--frame-log", str(log)]
     began = time.monotonic()
     subprocess.run(command, env=environment, cwd=ROOT, check=True)
     return json.loads(log.read_text())[0]["shown"] - began
@@ -193,7 +192,7 @@ def start(environment: dict[str, str], folder: Path) -> float:
 
 def lift(count: int | None, path: Path) -> None:
     """A session with the lifted object of the sample photo and what is behind it."""
-    command = [sys.executable, "-m", "app", "edit", str(SAMPLE), "--subject"]
+    command = [sys.executable, "-m", "objectmorpher", "edit", str(SAMPLE), "--subject"]
     command += ["--session", str(path), "--move", "0.01,0", "-o", str(path.with_suffix(".png"))]
     command += [] if count is None else ["--gaussians", str(count)]
     subprocess.run(command, cwd=ROOT, check=True)

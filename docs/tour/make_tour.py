@@ -24,8 +24,9 @@ import platformdirs  # noqa: E402
 import stories  # noqa: E402
 import views  # noqa: E402
 from guide import Guide, write_captions  # noqa: E402
-from hands import opened, window_environment, x_display  # noqa: E402
 from page import write_page  # noqa: E402
+
+from hands import opened, window_environment, x_display  # noqa: E402
 
 SIZE = (1440, 900)  # points
 PICTURES = "Pictures"  # the folder, in the home of whoever is shown the tour, with the photos

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import first_use
 from guide import Caption, read_captions
 from stories import STORIES
+
+import first_use
 
 HEAD = """# A tour of the window
 

@@ -24,7 +24,7 @@ def make(docs: Path) -> None:
         environment = os.environ | {"DISPLAY": display, "PYTHONPATH": str(ROOT)}
         environment["OBJECTMORPHER_SETTINGS"] = f"{folder}/settings.toml"
         session = f"{folder}/edit.omorph"
-        edit = ("-m", "app", "edit", "--script", EDIT, "-o", f"{folder}/out.png")
+        edit = ("-m", "objectmorpher", "edit", "--script", EDIT, "-o", f"{folder}/out.png")
         shots = ("tests/app/shoot_views.py", folder, session, "--montage", docs / "views.jpg")
         for arguments in ((*edit, "--session", session), shots):
             command = [sys.executable, *map(str, arguments)]

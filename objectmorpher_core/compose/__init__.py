@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-from .. import backends
-from ..arrays import Mask, Pixels
-from ..hint import Hint
-from ..progress import Progress
+from ..base import backends
+from ..base.arrays import Mask, Pixels
+from ..base.progress import Progress
+from ..document.hint import Hint
 
 
 class InpaintError(ValueError):
@@ -68,11 +68,11 @@ REFINERS: tuple[str, ...] = (
 )  # what is done to a moved object so that it fits in
 
 BACKENDS = {  # best first; the last one is always there
-    "pixelhacker": "objectmorpher_core.compose.inpaint_pixelhacker:PixelHackerInpainter",
-    "lama": "objectmorpher_core.compose.inpaint_onnx:lama",
-    "migan": "objectmorpher_core.compose.inpaint_onnx:migan",
-    "patchmatch": "objectmorpher_core.compose.inpaint_patchmatch:PatchMatchInpainter",
-    "telea": "objectmorpher_core.compose.inpaint_telea:TeleaInpainter",
+    "pixelhacker": "objectmorpher_core.compose.plate.inpaint_pixelhacker:PixelHackerInpainter",
+    "lama": "objectmorpher_core.compose.plate.inpaint_onnx:lama",
+    "migan": "objectmorpher_core.compose.plate.inpaint_onnx:migan",
+    "patchmatch": "objectmorpher_core.compose.plate.inpaint_patchmatch:PatchMatchInpainter",
+    "telea": "objectmorpher_core.compose.plate.inpaint_telea:TeleaInpainter",
 }
 
 

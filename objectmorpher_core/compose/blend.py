@@ -15,10 +15,10 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from ..arrays import F32, Mask, Pixels
-from ..pixels import pixels_from_unit, unit_pixels
+from ..base.arrays import F32, Mask, Pixels
+from ..base.pixels import pixels_from_unit, unit_pixels
+from ..base.threads import in_threads
 from ..raster.reference_layers import Picture3D
-from ..threads import in_threads
 
 STILL = 0.05  # px: a surface that moved less is where it was
 STILL_ALPHA = 1.5 / 255  # likewise for its alpha

@@ -13,12 +13,12 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import F32, Mask, Pixels
-from ..camera import Camera
-from ..document import Document, EditObject, Matte, Placement, Plate
-from ..pixels import crop, pixels_from_unit, unit_pixels
-from ..progress import Progress, silent
-from ..puppet import Puppet, puppet_of
+from ..base.arrays import F32, Mask, Pixels
+from ..base.camera import Camera
+from ..base.pixels import crop, pixels_from_unit, unit_pixels
+from ..base.progress import Progress, silent
+from ..deform.puppet import Puppet, puppet_of
+from ..document.model import Document, EditObject, Matte, Placement, Plate
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
@@ -36,14 +36,14 @@ from .blend import (
     with_touched,
 )
 from .blend import STILL as STILL
-from .defocus import blurred, reach_of
-from .harmonize import lit
-from .lighting import NOTHING, Lighting, Lit
-from .lighting import object_texture as object_texture
+from .light.defocus import blurred, reach_of
+from .light.harmonize import lit
+from .light.lighting import NOTHING, Lighting, Lit
+from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
-from .plate import hole_margin, plate_crop, plate_of_holes
+from .plate.plate import hole_margin, plate_crop, plate_of_holes
 from .refined import with_refined
-from .shadow import Shade
+from .shadow.shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
 OPAQUE = 1 - STILL_ALPHA

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F32
-from ..document import Document
-from ..image import Picture
-from ..progress import Progress, silent
-from ..puppet import Puppet, puppet_of
+from ..base.arrays import F32
+from ..base.progress import Progress, silent
+from ..deform.puppet import Puppet, puppet_of
+from ..document.model import Document
+from ..pictures.image import Picture
 from ..raster import tiles
 from .composite import object_texture
-from .plate import overlap
+from .plate.plate import overlap
 
 SOLID = 0.5  # alpha from which on a pixel shows an object
 TOP = 65535

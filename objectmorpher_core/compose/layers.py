@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..document import Document, EditObject, Matte, Plate
-from ..pixels import crop, pixels_from_unit
-from ..progress import Progress, part, silent
-from ..refined import Refined
+from ..base.pixels import crop, pixels_from_unit
+from ..base.progress import Progress, part, silent
+from ..document.model import Document, EditObject, Matte, Plate
+from ..document.refinement import Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes
-from .plate import overlap, plate_of_holes
-from .shadow import Shade
+from .plate.plate import overlap, plate_of_holes
+from .shadow.shadow import Shade
 
 PHOTO, BACKGROUND, UNTOUCHED = "Photo", "Background", "Photo, untouched"
 REFINEMENT = "Refinement"

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..document import Document, EditObject, Matte
+from ..document.model import Document, EditObject, Matte
 from ..raster.posed import PosedSplats
-from .plate import hole_margin
+from .plate.plate import hole_margin
 
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Pixels
-from ..pixels import pixels_from_unit, unit_pixels
-from ..refined import Refined
+from ..base.arrays import Pixels
+from ..base.pixels import pixels_from_unit, unit_pixels
+from ..document.refinement import Refined
 from .blend import differ
 
 

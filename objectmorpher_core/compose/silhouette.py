@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64, Mask
-from ..camera import Camera
+from ..base.arrays import F32, F64, Mask
+from ..base.camera import Camera
 from ..raster.posed import PosedSplats
 from .blend import Box
 

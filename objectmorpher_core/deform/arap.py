@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 
-from ..arrays import F64, I32, Sparse
+from ..base.arrays import F64, I32, Sparse
 from .anderson import Anderson
 from .bodies import Bodies, Pivot
 from .constraints import Constraints, HeldResponse, Patch, Targets, followed

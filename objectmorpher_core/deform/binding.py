@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F64, I32, frozen
-from ..kernel_files import numba
-from ..threads import FAST, LEAST_ROWS, in_threads
+from ..base.arrays import F64, I32, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST, LEAST_ROWS, in_threads
 from .graph import Graph
 
 LANES = 64  # points that are skinned together

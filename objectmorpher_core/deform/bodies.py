@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..arrays import F64, I32, Sparse
+from ..base.arrays import F64, I32, Sparse
 from .rotation_fit import fit_rotations
 
 GRASP = 1e4  # x the weight of a body's links: several handles inside it say how it is turned

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from ..arrays import F64, I32, Sparse, frozen, frozen_rows
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import F64, I32, Sparse, frozen, frozen_rows
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from .binding import Binding
 from .response import Response
 from .skinning import coupling

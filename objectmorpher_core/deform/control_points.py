@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F32, F64, frozen
-from ..kernel_files import numba
+from ..base.arrays import F32, F64, frozen
+from ..base.kernel_files import numba
 
 COUNT = 512  # control points, paper 3.2
 MIN_COUNT = 4  # fewer do not span a volume

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import F64, I32
+from ..base.arrays import F64, I32
 
 
 def sides_of_cut(pairs: np.ndarray, picture: F64, stroke: F64) -> tuple[I32, I32]:

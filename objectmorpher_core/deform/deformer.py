@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..arrays import F64, I32, frozen
-from ..document import DeformSettings, Handle, LiftedObject, Pose
-from ..rig import Rig
-from ..rotations import matrix_from_vector
+from ..base.arrays import F64, I32, frozen
+from ..base.rotations import matrix_from_vector
+from ..document.model import DeformSettings, Handle, LiftedObject, Pose
+from ..document.rig import Rig
 from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F64, frozen
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import F64, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 FEW = 48  # unknowns up to which it is quicker
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F64, frozen
-from ..kernel_files import numba
-from ..rotations import quats_from_matrices
-from ..threads import FAST, LEAST_ROWS, in_threads
+from ..base.arrays import F64, frozen
+from ..base.kernel_files import numba
+from ..base.rotations import quats_from_matrices
+from ..base.threads import FAST, LEAST_ROWS, in_threads
 from .binding import Binding
 from .graph import Graph
 from .skinning import Motion, Skinned

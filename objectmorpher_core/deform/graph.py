@@ -9,9 +9,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import F64, I32, Mask
-from ..document import DeformSettings
-from ..rig import Seam
+from ..base.arrays import F64, I32, Mask
+from ..document.model import DeformSettings
+from ..document.rig import Seam
 from .struts import find_struts, weigh_struts
 from .surface_links import CHUNK, TINY, Cells, Edges, Surface, without_gaps
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F64, Sparse, frozen, frozen_rows
-from ..kernel_files import numba
+from ..base.arrays import F64, Sparse, frozen, frozen_rows
+from ..base.kernel_files import numba
 from .struts import thickness
 from .surface_links import Surface
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64, I32
-from ..document import Handle
-from ..rig import Rig
-from ..rotations import matrix_from_vector
+from ..base.arrays import F64, I32
+from ..base.rotations import matrix_from_vector
+from ..document.model import Handle
+from ..document.rig import Rig
 from .binding import Binding
 from .constraints import Constraints, Targets
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 # Five times its length a Gaussian still looks like the surface it lies on; what is stretched
 # farther comes from two neighbours that went different ways, and would be drawn as a needle

@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..arrays import F32, F64, Sparse, frozen, frozen_rows
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import F32, F64, Sparse, frozen, frozen_rows
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from .rotation_fit import fit_rotations
 
 GROUP = 16  # control points whose rows are multiplied together; 8 and 32 are slower

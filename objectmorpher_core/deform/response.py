@@ -13,9 +13,9 @@ from scipy.linalg import cholesky, get_lapack_funcs
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from ..arrays import F64, Sparse, frozen
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import F64, Sparse, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 SPARSE_FROM = 1500  # unknowns: from here two sparse triangular solves beat a dense product
 JITTER = 1e-10  # x the largest diagonal, where rounding makes a pivot negative

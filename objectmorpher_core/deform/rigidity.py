@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import Enum
 
-from ..document import DeformSettings
+from ..document.model import DeformSettings
 
 
 class Rigidity(Enum):

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 BLOCK = 32  # fits that are made together
 STEPS = 40  # at most; one or two from a warm start

@@ -28,9 +28,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F64, frozen
-from ..kernel_files import numba
-from ..threads import FAST, LEAST_ROWS, in_threads
+from ..base.arrays import F64, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST, LEAST_ROWS, in_threads
 from .binding import LANES, NEIGHBOURS, Binding
 from .jacobians import LEAST_STRETCH, MOST_STRETCH, limit_row, margin
 

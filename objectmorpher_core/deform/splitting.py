@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64, I32
-from ..gaussians import Gaussians
-from ..rotations import matrices_from_quats
+from ..base.arrays import F64, I32
+from ..base.rotations import matrices_from_quats
+from ..document.gaussians import Gaussians
 
 MOST_STRETCH = 2.0  # a Gaussian of half the resolution: the eye sees the smear from here on
 MOST_PIECES = 8

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64, Sparse, frozen, frozen_rows
-from ..document import Pose
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import F64, Sparse, frozen, frozen_rows
+from ..base.kernel_files import numba
+from ..base.threads import FAST
+from ..document.model import Pose
 
 
 @dataclass(frozen=True, eq=False)

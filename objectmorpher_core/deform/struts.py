@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..arrays import F64
+from ..base.arrays import F64
 from .surface_links import Edges, Surface
 
 SHARE = 0.2  # x the mean sum of a control point's links: what all its struts weigh together

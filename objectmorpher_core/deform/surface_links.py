@@ -18,8 +18,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import F64, I32, Mask
-from ..poisson_disk import thin_to_spacing
+from ..base.arrays import F64, I32, Mask
+from ..base.poisson_disk import thin_to_spacing
 
 # Lengths are in mean spacings of the control points, of which there are `EVEN_COUNT` or more.
 GRAIN = 0.15  # Gaussians nearer than this are thinned out: some 25 remain per control point

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..arrays import F64
+from ..base.arrays import F64
 
 CANDIDATES = 200  # directions on a half sphere: about 10 degrees apart
 ROUGH = 64  # points that all candidates mirror

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from .. import backends
-from ..arrays import Mask, Pixels
-from ..camera import Camera
-from ..document import LiftedObject, LiftSettings, Matte
-from ..progress import Progress
+from ..base import backends
+from ..base.arrays import Mask, Pixels
+from ..base.camera import Camera
+from ..base.progress import Progress
+from ..document.model import LiftedObject, LiftSettings, Matte
 
 
 class LiftError(ValueError):
@@ -46,7 +46,7 @@ class Lifter(Protocol):
 
 
 BACKENDS = {  # imported when chosen
-    "relief": "objectmorpher_core.lift.relief:ReliefLifter",
+    "relief": "objectmorpher_core.lift.relief.lifter:ReliefLifter",
     "trellis": "objectmorpher_core.lift.trellis.lifter:TrellisLifter",
     "cupid": "objectmorpher_core.lift.trellis.cupid_lifter:CupidLifter",
 }
@@ -61,11 +61,11 @@ def load(name: str = "auto") -> Lifter:
 
 
 def _lifter(name: str) -> Lifter:
-    from .worker_file import worker_names
+    from .workers.file import worker_names
 
     workers = () if name in BACKENDS else worker_names()
     if name not in workers:
         return backends.known(BACKENDS, name, "lifter", LiftError, workers)
-    from .external import load_worker
+    from .workers.external import load_worker
 
     return load_worker(name)

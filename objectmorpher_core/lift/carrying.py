@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..arrays import F64
-from ..document import EditObject, Handle, LiftedObject, LiftSettings, Matte
+from ..base.arrays import F64
+from ..document.model import EditObject, Handle, LiftedObject, LiftSettings, Matte
 
 OTHER_SIDE = 1e6  # px: the far side of the object is farther than anything on the near one
 

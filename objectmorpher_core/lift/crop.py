@@ -11,9 +11,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ..arrays import F32, F64, RGB, Mask, Pixels
-from ..camera import Camera
-from ..image import to_u8
+from ..base.arrays import F32, F64, RGB, Mask, Pixels
+from ..base.camera import Camera
+from ..pictures.image import to_u8
 
 SIDE = 224  # px of a crop as it is seen
 ROOM = 1.2  # crop's side over the object's longer side

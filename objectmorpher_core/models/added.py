@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ..files import make_folder, place_file
-from ..limits import FILE_BYTES as BYTES
+from ..base.files import make_folder, place_file
+from ..base.limits import FILE_BYTES as BYTES
 from .fetch import UNFINISHED, folder, sha256_of
 from .registry import ModelError
 

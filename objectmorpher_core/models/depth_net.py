@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..arrays import F32, RGB
+from ..base.arrays import F32, RGB
 from .onnx_session import open_session
 from .registry import ModelError
 

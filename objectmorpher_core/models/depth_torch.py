@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import F32, RGB
+from ..base.arrays import F32, RGB
 from . import device
 from .depth_net import prepared, size_in
 from .registry import ModelError

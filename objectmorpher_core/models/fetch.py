@@ -21,8 +21,8 @@ from typing import Literal
 
 import platformdirs
 
-from ..files import place_file
-from ..progress import Progress, part, silent
+from ..base.files import place_file
+from ..base.progress import Progress, part, silent
 from .hub_download import bytes_in
 from .registry import ModelError, Weight, weight, weights
 

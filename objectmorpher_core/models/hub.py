@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from .. import installation
-from ..files import sync_folder
-from ..progress import Progress, silent
-from ..shown import shown
+from ..base import installation
+from ..base.files import sync_folder
+from ..base.progress import Progress, silent
+from ..base.quoting import shown
 from . import hub_download, lock
 from .fetch import POLL, SLACK, check_online, folder, sha256_of
 from .lock import FileFacts, Locked

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..files import make_folder, write_all
+from ..base.files import make_folder, write_all
 from .fetch import folder
 from .registry import ModelError
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ..files import make_folder, place_file
+from ..base.files import make_folder, place_file
 from .fetch import UNFINISHED, folder, sha256_of
 from .registry import ModelError, Trunk, trunk
 from .weight_folder import PLAIN

@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..limits import WEIGHTS_HEADER as MOST_HEADER
-from ..shown import named, shown
+from ..base.limits import WEIGHTS_HEADER as MOST_HEADER
+from ..base.quoting import named, shown
 from .registry import ModelError
 
 CONFIG = "config.json"

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from . import columns as p
 from .singles import ONE, ZERO
 from .tile_memory import STRIP

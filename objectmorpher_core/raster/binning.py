@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F32, frozen
-from ..kernel_files import numba
-from ..threads import FAST, core_count, in_threads
+from ..base.arrays import F32, frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST, core_count, in_threads
 from .columns import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
 from .singles import HALF, ONE, ZERO
 

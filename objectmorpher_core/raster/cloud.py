@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from . import columns as p
 from .bell import SIXTEENTH, rows_of
 from .singles import HALF, INFINITE, ONE, ZERO

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from . import tile_memory as m
 from .look_up import look_up
 from .rules import coverage, ramp

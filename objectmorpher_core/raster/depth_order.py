@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import frozen
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.arrays import frozen
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 
 BITS = 8  # of a digit: more of them would write to more places than a processor keeps in reach
 PASSES = 4

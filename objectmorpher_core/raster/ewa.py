@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from ..deform import skinning
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT
-from ..kernel_files import numba
-from ..threads import FAST
 from . import columns as p
 from .posed import (
     COLOUR,

@@ -6,16 +6,11 @@ import math
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import EXACT
+from ..base.kernel_files import numba
+from ..base.threads import EXACT
 from . import tile_memory as m
 from .intrinsics import sixteen_texels
-from .sampling import (
-    C15,
-    C25,
-    add_halved,
-    sample,
-)
+from .sampling import C15, C25, add_halved, sample
 from .singles import HALF, ONE, TWO, ZERO
 
 HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing

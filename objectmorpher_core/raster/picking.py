@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import F64, I32
-from ..kernel_files import numba
+from ..base.arrays import F64, I32
+from ..base.kernel_files import numba
 from .columns import CUT, CX, CY, EX, EY, QXX, RYY, TILT, WEIGHT, ZX, ZY, Z
 from .texture import TextureLevels
 from .tiles import Drawable, draw

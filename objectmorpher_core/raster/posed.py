@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import F32, F64, frozen
-from ..camera import Camera
+from ..base.arrays import F32, F64, frozen
+from ..base.camera import Camera
 from ..deform.binding import LANES
 from ..deform.skinning import Skin, Skinned
-from ..document import LiftedObject
+from ..document.model import LiftedObject
 from .rules import SPLATTINGS, Splatting
 
 SURFACE_GAP = 5.0  # x spacing: samples farther apart in depth are different surfaces

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F32, frozen
-from ..camera import Camera
+from ..base.arrays import F32, frozen
+from ..base.camera import Camera
+from ..base.kernel_files import numba
+from ..base.threads import FAST, in_threads
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
-from ..kernel_files import numba
-from ..threads import FAST, in_threads
 from . import ewa
 from .columns import FRONT, PLAIN_SPAN, SPAN, SX, Z
 from .posed import REST_ROWS, PosedSplats, view_limits

@@ -31,8 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F64
-from ..camera import Camera
+from ..base.arrays import F64
+from ..base.camera import Camera
 from .posed import PosedSplats, projection_jacobians, view_limits
 from .reference_layers import MEDIAN, Composite, Picture3D, Projected, Samples, Sums, smoothstep
 from .rules import LAYERS, RULES, Splatting

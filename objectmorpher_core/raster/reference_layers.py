@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import F32, F64
-from ..camera import Camera
+from ..base.arrays import F32, F64
+from ..base.camera import Camera
 from .rules import RULES
 from .texture import TextureLevels, sample_texture
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernel_files import numba
+from ..base.kernel_files import numba
 from .singles import HALF, ONE, ZERO
 
 CUTOFF = 7.0  # squared Mahalanobis distance beyond which a Gaussian of a surface is 0

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import EXACT
+from ..base.kernel_files import numba
+from ..base.threads import EXACT
 from .intrinsics import sixteen_texels
 from .singles import HALF, ONE, TWO, ZERO
 

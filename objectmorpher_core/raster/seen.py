@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F64, Mask
-from ..camera import Camera
+from ..base.arrays import F64, Mask
+from ..base.camera import Camera
 from . import tiles
 from .posed import PosedSplats
 from .texture import TextureLevels

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F32, I32, U8
-from ..kernel_files import numba
-from ..threads import EXACT, in_threads
+from ..base.arrays import F32, I32, U8
+from ..base.kernel_files import numba
+from ..base.threads import EXACT, in_threads
 from .intrinsics import between, bytes_over, four_texels
 from .reference import Picture3D
 from .singles import HALF, ONE, TWO, ZERO

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import FAST
+from ..base.kernel_files import numba
+from ..base.threads import FAST
 from . import columns as p
 from . import tile_memory as m
 from .bell import bell

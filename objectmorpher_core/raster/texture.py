@@ -9,7 +9,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from ..arrays import F32, frozen
+from ..base.arrays import F32, frozen
 
 LEAST_LEVEL = 4  # px, shorter side of a picture that is halved again
 MOST_LEVELS = 8

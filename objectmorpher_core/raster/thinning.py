@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import I32, frozen
-from ..document import LiftedObject, PhotoTexture
-from ..poisson_disk import thin_to_spacing
+from ..base.arrays import I32, frozen
+from ..base.poisson_disk import thin_to_spacing
+from ..document.model import LiftedObject, PhotoTexture
 
 LEAST_GAIN = 1.2  # x spacing: with less, thinning is not worth it
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernel_files import numba
-from ..threads import EXACT
+from ..base.kernel_files import numba
+from ..base.threads import EXACT
 from .binning import TILE
 from .rules import LAYERS
 from .singles import HALF, ZERO

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import F32, F64, frozen
-from ..camera import Camera
-from ..threads import in_threads
+from ..base.arrays import F32, F64, frozen
+from ..base.camera import Camera
+from ..base.threads import in_threads
 from .binning import TILE, bin_tiles
 from .cloud import TALL, WIDE, draw_one_by_one
 from .columns import CX, CY, EX, EY, WEIGHT

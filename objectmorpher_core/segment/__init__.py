@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from .. import backends
-from ..arrays import RGB, Mask
-from ..document import Prompt
-from ..progress import Progress
+from ..base import backends
+from ..base.arrays import RGB, Mask
+from ..base.progress import Progress
+from ..document.model import Prompt
 from .selection import SelectionError
 
 __all__ = [
@@ -84,10 +84,10 @@ BACKENDS = {
     "dino": "objectmorpher_core.segment.dino_walk:DinoWalk",
     "subject": "objectmorpher_core.segment.subject:Subject",
     "grabcut": "objectmorpher_core.segment.grabcut:GrabCut",
-    "sam2": "objectmorpher_core.segment.sam:sam2",
-    "sam": "objectmorpher_core.segment.sam:sam",
-    "sam3": "objectmorpher_core.segment.sam:sam3",
-    "sam-onnx": "objectmorpher_core.segment.sam:sam_onnx",
+    "sam2": "objectmorpher_core.segment.sam.segmenter:sam2",
+    "sam": "objectmorpher_core.segment.sam.segmenter:sam",
+    "sam3": "objectmorpher_core.segment.sam.segmenter:sam3",
+    "sam-onnx": "objectmorpher_core.segment.sam.segmenter:sam_onnx",
 }
 
 
@@ -105,7 +105,7 @@ def load(name: str = "auto") -> Segmenter:
     `name` may be a SAM's own id, as "sam2.1-tiny"; "sam2" is the best of SAM 2.1 that is here.
     """
     if name == "auto":
-        from .sam import best
+        from .sam.segmenter import best
 
         found = best()
         if found is not None:
@@ -114,7 +114,7 @@ def load(name: str = "auto") -> Segmenter:
         return dino if dino.missing() is None else load("grabcut")
     if name not in BACKENDS and is_known(name):
         from ..models import hub_model
-        from .sam import Sam
+        from .sam.segmenter import Sam
 
         return Sam(hub_model(name).family, name)
     return backends.known(BACKENDS, name, "segmenter", SelectionError)

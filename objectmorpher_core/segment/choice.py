@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..arrays import F32, RGB, Mask
-from ..document import Click, Prompt
+from ..base.arrays import F32, RGB, Mask
+from ..document.model import Click, Prompt
 from .selection import SelectionError, box_mask
 from .walk import Region, Walk
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import Mask, Selection
-from ..document import EditObject, Prompt
+from ..base.arrays import Mask, Selection
+from ..document.model import EditObject, Prompt
 from .mask_edit import FULL, grow, is_soft
 
 
@@ -53,6 +53,6 @@ def _piece(mask: Mask, x: int, y: int) -> Mask:
 
 def _softness(mask: Mask, soft: Mask) -> float:
     """How far, in px, what is soft (H, W) reaches from the mask's edge."""
-    from .matte import signed_distance
+    from .matting.matte import signed_distance
 
     return 1.0 + float(np.abs(signed_distance(mask))[soft].max(initial=0.0))

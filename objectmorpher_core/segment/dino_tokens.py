@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from .. import models
-from ..arrays import F32, RGB
+from ..base.arrays import F32, RGB
+from ..base.progress import Progress, silent
 from ..models.onnx_session import open_session, run_session
-from ..progress import Progress, silent
 from .subject import DEVIATION, MEAN
 
 WEIGHT = "dinov2-vits14"

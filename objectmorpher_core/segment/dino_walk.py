@@ -12,17 +12,17 @@ import cv2
 import numpy as np
 
 from .. import models
-from ..arrays import F32, RGB, Mask
-from ..document import Prompt
-from ..progress import Progress, part, silent
+from ..base.arrays import F32, RGB, Mask
+from ..base.progress import Progress, part, silent
+from ..document.model import Prompt
 from . import Found
 from .dino_tokens import PATCH, WEIGHT, shared
-from .edges import rehearse
-from .piece_features import main_directions
-from .pieces import Pieces
+from .matting.edges import rehearse
+from .pieces.features import main_directions
+from .pieces.pieces import Pieces
+from .pieces.view import PhotoView, Seen, Tokens
 from .selection import SelectionError, box_mask, check_mask, check_prompt
 from .subject import SubjectNet
-from .view import PhotoView, Seen, Tokens
 
 Look = Callable[[PhotoView, Prompt, Progress], Seen]
 

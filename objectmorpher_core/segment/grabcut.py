@@ -5,12 +5,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import F32, RGB, Mask
-from ..document import Prompt
-from ..progress import Progress, silent
+from ..base.arrays import F32, RGB, Mask
+from ..base.progress import Progress, silent
+from ..document.model import Prompt
 from .choice import guess
-from .edges import cut
 from .level import at_level
+from .matting.edges import cut
 from .selection import SelectionError, box_mask, check_prompt
 from .subject import SubjectNet
 from .walk import Walk

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..arrays import Mask
-from ..document import Prompt
+from ..base.arrays import Mask
+from ..document.model import Prompt
 from .selection import SMALLEST, SelectionError
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import U8, Mask, Selection
-from ..document import SELECTED as HALF
+from ..base.arrays import U8, Mask, Selection
+from ..document.model import SELECTED as HALF
 from .selection import box_around
 
 FULL = 255
@@ -137,7 +137,7 @@ def feather(selection: Selection, px: float) -> U8:
 
     What is selected stays the same: the half line stays on the edge.
     """
-    from .matte import signed_distance  # its module needs numba; the window starts without
+    from .matting.matte import signed_distance  # its module needs numba; the window starts without
 
     mask = is_selected(selection)
     coverage = np.zeros(mask.shape, np.uint8)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import U8, Selection
-from ..brush import EDGE, Box, Brush, Stroke
+from ..base.arrays import U8, Selection
+from ..base.brush import EDGE, Box, Brush, Stroke
 from .mask_edit import FULL, as_coverage, is_selected
 
 

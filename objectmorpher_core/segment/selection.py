@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import RGB, Mask, Selection
-from ..document import Prompt
+from ..base.arrays import RGB, Mask, Selection
+from ..document.model import Prompt
 
 SMALLEST = 16  # px; less is no object
 SMALL_HOLE = 0.002  # x area of the mask; smaller holes are specks, larger ones are meant

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from .. import models
-from ..arrays import F32, RGB, Mask
-from ..document import Prompt
+from ..base.arrays import F32, RGB, Mask
+from ..base.progress import Progress, part, silent
+from ..document.model import Prompt
 from ..models.onnx_session import open_session
-from ..progress import Progress, part, silent
-from .edges import cut
+from .matting.edges import cut
 from .selection import SelectionError, box_mask, check_prompt
 
 WEIGHT = "u2netp"

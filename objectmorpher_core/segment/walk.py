@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from ..arrays import F32, F64, Mask
+from ..base.arrays import F32, F64, Mask
 
 REACH = 2  # cells, Chebyshev: how far a step goes; beyond 1, so that a thin line is no wall
 STAMINA = 0.999  # a: the chance that a walk goes on

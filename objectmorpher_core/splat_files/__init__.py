@@ -10,17 +10,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..gaussians import Gaussians
-from ..limits import FILE_BYTES as MAX_BYTES
-from ..shown import named
-from .axes import half_turned
-from .compressed_ply import decode_compressed, encode_compressed, is_compressed, read_compressed
+from ..base.limits import FILE_BYTES as MAX_BYTES
+from ..base.quoting import named
+from ..document.gaussians import Gaussians
 from .limits import SplatFileError
-from .ply import decode_ply, encode_ply, is_mere_points, read_ply
-from .ply_table import read_header
-from .point_cloud import read_points
-from .splat import decode_splat, encode_splat
-from .spz import decode_spz, encode_spz
+from .splats.axes import half_turned
+from .splats.compressed_ply import (
+    decode_compressed,
+    encode_compressed,
+    is_compressed,
+    read_compressed,
+)
+from .splats.ply import decode_ply, encode_ply, is_mere_points, read_ply
+from .splats.ply_table import read_header
+from .splats.point_cloud import read_points
+from .splats.splat import decode_splat, encode_splat
+from .splats.spz import decode_spz, encode_spz
 
 __all__ = [
     "COUNT", "FORMATS", "MESH_ENDINGS", "SPLAT_ENDINGS", "Format", "SplatFileError",
@@ -79,7 +84,7 @@ def read(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gaussians:
     try:
         _check_file(path)
         if _is_mesh(path):
-            from .meshes import read_mesh
+            from .meshes.reader import read_mesh
 
             gaussians = read_mesh(path, count)
         elif ending.endswith(".ply"):
@@ -98,7 +103,7 @@ def read_object(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gau
     training left floating around it is left out; of a mesh everything belongs to it.
     Raises SplatFileError.
     """
-    from .objects import as_object, centred
+    from .splats.objects import as_object, centred
 
     gaussians = read(path, count, is_flipped)
     try:

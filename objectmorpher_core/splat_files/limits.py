@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import F32
-from ..gaussians import Gaussians
-from ..limits import GAUSSIANS as MAX_GAUSSIANS
-from ..shown import counted
+from ..base.arrays import F32
+from ..base.limits import GAUSSIANS as MAX_GAUSSIANS
+from ..base.quoting import counted
+from ..document.gaussians import Gaussians
 
 LEAST_SCALE = 1e-12  # trainers leave logarithms of -inf; its square is still a float32
 GREATEST = 1e9  # position or scale: beyond it products of squares leave float32

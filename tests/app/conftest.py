@@ -12,17 +12,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import hands
 import numpy as np
 import pytest
-from hands import PATIENCE
 from PIL import Image
 
-from app.commands import run
-from app.editor import Editor
-from app.settings import Settings
-from app.view import ToolName, View
-from objectmorpher_core.document import Document, Placement
+import hands
+from hands import PATIENCE
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.view import ToolName, View
+from objectmorpher_core.document.model import Document, Placement
 
 if TYPE_CHECKING:
     from desk import Desk
@@ -184,7 +184,9 @@ def display() -> Iterator[str]:
 @pytest.fixture(scope="session")
 def compiled() -> None:
     """The kernels are on the disk: who compiles them answers nobody for a minute or two."""
-    subprocess.run([sys.executable, "-m", "app.warm_up"], cwd=hands.ROOT, check=True)
+    subprocess.run(
+        [sys.executable, "-m", "objectmorpher.system.warm_up"], cwd=hands.ROOT, check=True
+    )
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, EditObject, Matte, Photo, Placement
-from objectmorpher_core.image import Picture, encode_picture, read_picture
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Document, EditObject, Matte, Photo, Placement
+from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 
 STEP = 0.05  # s between two steps
 
@@ -37,8 +37,8 @@ def step_document(base: Document, n: int) -> Document:
 
 
 def main(log: Path) -> None:
-    from app.editor import Editor
-    from app.settings import Settings
+    from objectmorpher.editor.editor import Editor
+    from objectmorpher.editor.settings import Settings
 
     editor = Editor(Settings())
     base = base_document()

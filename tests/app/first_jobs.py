@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from app import job_functions
-from app.job_functions import Choice, Cut
-from app.shape import build_shape, rehearse
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import (
+from objectmorpher.canvas.shape import build_shape, rehearse
+from objectmorpher.worker import job_functions
+from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import (
     DeformSettings,
     EditObject,
     Handle,
@@ -26,9 +28,7 @@ from objectmorpher_core.document import (
     Matte,
     Placement,
 )
-from objectmorpher_core.importing import Scene
-from objectmorpher_core.progress import silent
-from objectmorpher_core.puppet import Puppet
+from objectmorpher_core.lift.registration.importing import Scene
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.splat_files import encode
 from tests.core.lift import registered

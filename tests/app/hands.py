@@ -180,7 +180,14 @@ def opened(
     """
     if shutil.which("xdotool") is None:
         pytest.skip("xdotool is not installed")
-    command = [*by, sys.executable, "-m", "app", *options, *([] if path is None else [str(path)])]
+    command = [
+        *by,
+        sys.executable,
+        "-m",
+        "objectmorpher",
+        *options,
+        *([] if path is None else [str(path)]),
+    ]
     title = "ObjectMorpher" if path is None else path.name
     with subprocess.Popen(command, env=environment, cwd=ROOT) as window:
         hands = Hands(environment, window)

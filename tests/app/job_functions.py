@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.export_plan import Plan
-from objectmorpher_core.document import Document
-from objectmorpher_core.edits import EditError
-from objectmorpher_core.files import OutputError
-from objectmorpher_core.progress import Progress
+from objectmorpher.editor.export_plan import Plan
+from objectmorpher_core.base.files import OutputError
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.model import Document
 
 _seen: list[np.ndarray] = []
 

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+
 from conftest import HEIGHT, WIDTH
 from hands import Hands
 

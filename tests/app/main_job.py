@@ -10,14 +10,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from conftest import CENTRE, lift_ball, open_file, wait_for_jobs, wait_until
-from strokes import stroke
 
-from app import cli
-from app.editor import Editor
-from app.settings import Settings, read_settings, settings_path, write_settings
-from app.tools.registry import TOOLS
-from app.view import ToolName
+from conftest import CENTRE, lift_ball, open_file, wait_for_jobs, wait_until
+from objectmorpher.cli import parser as cli
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings, read_settings, settings_path, write_settings
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.registry import TOOLS
+from strokes import stroke
 from tests.core.models.small_networks import brightness
 
 AT = ",".join(str(round(n)) for n in CENTRE)

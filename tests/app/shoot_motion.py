@@ -13,15 +13,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from shoot_views import made_document
 
-from app.commands import run
-from app.editor import Editor
-from app.feedback import Message
-from app.gui.glfw_window import open_window
-from app.gui.window import Window
-from app.options import WindowOptions
-from app.view import Popup, ToolName
+from objectmorpher.cli.options import WindowOptions
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.feedback import Message
+from objectmorpher.editor.view import Popup, ToolName
+from objectmorpher.gui.window.glfw_window import open_window
+from objectmorpher.gui.window.window import Window
+from shoot_views import made_document
 
 SIZE = (900, 640)
 FRAMES = 12

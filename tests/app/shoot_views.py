@@ -13,16 +13,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from app.commands import COMMANDS
-from app.derived import Derived
-from app.gui.glfw_window import open_window
-from app.gui.window import Window
-from app.options import WindowOptions
-from app.view import Shown
-from objectmorpher_core import edits, pipeline
-from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
-from objectmorpher_core.image import Picture, encode_picture
-from objectmorpher_core.session_file import decode_session
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.cli.options import WindowOptions
+from objectmorpher.commands import COMMANDS
+from objectmorpher.editor.view import Shown
+from objectmorpher.gui.window.glfw_window import open_window
+from objectmorpher.gui.window.window import Window
+from objectmorpher_core import pipeline
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.pictures.image import Picture, encode_picture
+from objectmorpher_core.session.file import decode_session
 
 WIDTH, HEIGHT = 240, 160  # px of the made photo
 AROUND = (48 + 300, 32 + 28)  # points of the window beside the canvas

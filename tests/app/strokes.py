@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from app.editor import Editor
-from app.tools.pointer import Button, Pointer, Tool
+from objectmorpher.editor.editor import Editor
+from objectmorpher.tools.pointer import Button, Pointer, Tool
 
 Place = np.ndarray | Sequence[float]
 

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from conftest import open_file, wait_for_jobs
-from strokes import move, press, release
 
-from app.commands import run
-from app.editor import Editor
-from app.resources import resource
-from app.settings import Settings
-from app.tools.registry import TOOLS
-from app.view import ToolName
+from conftest import open_file, wait_for_jobs
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.view import ToolName
+from objectmorpher.system.resources import resource
+from objectmorpher.tools.registry import TOOLS
+from strokes import move, press, release
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import objectmorpher_core as om
-from app import __version__, cli
-from objectmorpher_core.image import read_picture
+from objectmorpher import __version__
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.pictures.image import read_picture
 from tests import shapes
 
 ROOT = Path(__file__).parents[2]

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from conftest import wait_until
 from edit_until_killed import base_document, step_document
 from hands import ROOT
-
-from app.autosave import recovery_root
-from app.editor import Editor
-from app.settings import Settings
-from objectmorpher_core.document import Document, EditObject, Matte, Photo, Placement
-from objectmorpher_core.image import Picture
-from objectmorpher_core.journal import DOCUMENT, read_journal
+from objectmorpher.editor.autosave import recovery_root
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher_core.document.model import Document, EditObject, Matte, Photo, Placement
+from objectmorpher_core.pictures.image import Picture
+from objectmorpher_core.session.journal import DOCUMENT, read_journal
 
 INTERVAL = 0.5  # s, for tests that need not wait for the editor's own
 MOST_LOST = 10.0  # s of work that a crash may cost
@@ -35,7 +35,7 @@ MAIN_THREAD = 0.02  # of what keeping a document takes: what autosaving may take
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A data folder of the test's own."""
     monkeypatch.setenv("OBJECTMORPHER_DATA", str(tmp_path / "data"))
-    monkeypatch.setattr("app.autosave.INTERVAL", INTERVAL)
+    monkeypatch.setattr("objectmorpher.editor.autosave.INTERVAL", INTERVAL)
     return recovery_root()
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from objectmorpher_core.image import read_picture
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.pictures.image import read_picture
 from tests import shapes
 
 MASK = shapes.mask("ellipse")

@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from conftest import CENTRE, wait_for_jobs, wait_until
 
-from app.candidate import CANDIDATE
-from app.commands import run, take_next_step
-from app.editor import Editor
-from app.tasks import SELECT
-from app.tools.pointer import Pointer
-from app.tools.select_tool import SelectTool
-from app.view import Selecting, ToolName
+from conftest import CENTRE, wait_for_jobs, wait_until
+from objectmorpher.commands import run, take_next_step
+from objectmorpher.editor.candidate import CANDIDATE
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.tasks import SELECT
+from objectmorpher.editor.view import Selecting, ToolName
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.select_tool import SelectTool
 
 
 def rest_on(editor: Editor, x: float, y: float) -> None:

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.chores import Chores
-from app.job_error import JobError
-from app.opening import OpeningError
-from objectmorpher_core.progress import Progress
+from objectmorpher.editor.opening import OpeningError
+from objectmorpher.worker.job_error import JobError
+from objectmorpher.worker.threads import Chores
+from objectmorpher_core.base.progress import Progress
 
 
 @pytest.fixture

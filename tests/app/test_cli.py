@@ -16,10 +16,10 @@ import pytest
 import tifffile
 from PIL import Image, ImageSequence
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher_core.compose import BACKENDS
-from objectmorpher_core.image import read_picture
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.scripting.script import EditScript
 from tests import shapes
 
 ROOT = Path(__file__).parents[2]
@@ -540,7 +540,7 @@ def test_the_bench_reports_what_the_design_names(folder):
 
 
 def test_the_version_is_told(capsys):
-    from app import __version__
+    from objectmorpher import __version__
 
     with pytest.raises(SystemExit):
         cli.main(["--version"])
@@ -550,7 +550,7 @@ def test_the_version_is_told(capsys):
 def test_the_parser_is_built_without_heavy_imports():
     """`--help` answers at once: no numpy, numba, OpenCV or scipy is imported for it."""
     code = (
-        "import sys; from app.cli import build_parser; build_parser();"
+        "import sys; from objectmorpher.cli.parser import build_parser; build_parser();"
         "print([m for m in ('numpy', 'numba', 'cv2', 'scipy', 'PIL') if m in sys.modules])"
     )
     told = subprocess.run(
@@ -561,7 +561,7 @@ def test_the_parser_is_built_without_heavy_imports():
 
 def test_the_program_runs_as_a_module(folder):
     told = subprocess.run(
-        [sys.executable, "-m", "app", *EDIT, *TURN], cwd=folder, capture_output=True, text=True,
+        [sys.executable, "-m", "objectmorpher", *EDIT, *TURN], cwd=folder, capture_output=True, text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
     )  # fmt: skip
     assert (told.returncode, told.stderr) == (0, "")
@@ -570,7 +570,7 @@ def test_the_program_runs_as_a_module(folder):
 
 def test_a_failing_program_exits_with_a_code_and_a_sentence(folder):
     told = subprocess.run(
-        [sys.executable, "-m", "app", "edit", "none.png", *EDIT[2:]], cwd=folder,
+        [sys.executable, "-m", "objectmorpher", "edit", "none.png", *EDIT[2:]], cwd=folder,
         capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
     )  # fmt: skip
     assert told.returncode == cli.FAILED

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher_core import models
 from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
 
-from app.commands import run
-from app.editor import Editor
-from app.tasks import Combine, Question
-from objectmorpher_core.document import Click, Prompt
+from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.tasks import Combine, Question
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment import Found
 
 ASKED = Prompt((Click(*CENTRE),))

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs, wait_until
-from strokes import press, stroke
 
-from app.commands import COMMANDS, run
-from app.editor import Editor
-from app.layers import FRAME
-from app.tools.compose_tool import ComposeTool
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.compose.plate import plate_cover, plate_picture
-from objectmorpher_core.document import Document, LiftSettings, Placement, Prompt
-from objectmorpher_core.joining import (
+from conftest import wait_for_jobs, wait_until
+from objectmorpher.canvas.layers import FRAME
+from objectmorpher.commands import COMMANDS, run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.compose_tool import ComposeTool
+from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import (
     USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
     Shadow,
 )
+from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
+from strokes import press, stroke
 from tests.reflected import mirrored, photo_with
 from tests.shadowed import inside, photo_of, thrown
 from tests.shapes import png

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher_core.splat_files import SPLAT_ENDINGS, encode, read
 from tests.core.splat_files.clouds import gaussians, matched
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import CENTRE, wait_for_jobs
 
-from app.editor import Editor
-from app.gui.input import Input
-from app.shortcuts import Shortcuts
-from app.tools.pose_strokes import DEPTH_STEP
-from app.view import ToolName
-from objectmorpher_core.document import Document
+from conftest import CENTRE, wait_for_jobs
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.shortcuts import Shortcuts
+from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.window.input import Input
+from objectmorpher.tools.pose_strokes import DEPTH_STEP
+from objectmorpher_core.document.model import Document
 
 
 @pytest.fixture

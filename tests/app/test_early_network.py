@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.early_network import open_early
+from objectmorpher.system.early_network import open_early
 from objectmorpher_core import models
 from objectmorpher_core.segment import dino_tokens
 
@@ -17,7 +17,7 @@ PHOTO = ROOT / "assets/samples/coffee.jpg"
 TOLD = """
 import sys
 from pathlib import Path
-from app.early_network import open_early
+from objectmorpher.system.early_network import open_early
 opening = open_early(Path(sys.argv[1]), sys.argv[2] or None)
 if opening is None:
     print("nothing")
@@ -25,7 +25,7 @@ else:
     opening.join()
     from objectmorpher_core.segment import dino_tokens
     print("opened", dino_tokens._opened.cache_info().currsize)
-    print(any(name in sys.modules for name in ("objectmorpher_core.pipeline", "app.cli_commands")))
+    print(any(name in sys.modules for name in ("objectmorpher_core.pipeline", "objectmorpher.cli.commands")))
 """
 
 

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CENTRE, lift_ball, open_file, wait_for_jobs
 from PIL import Image
-from strokes import move, press, release, stroke
 
-from app.commands import COMMANDS, next_step, run
-from app.editor import Editor
-from app.filing import Dialog
-from app.tools.pointer import Pointer
-from app.tools.pose_tool import PoseTool
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.session_file import decode_session
+from conftest import CENTRE, lift_ball, open_file, wait_for_jobs
+from objectmorpher.commands import COMMANDS, next_step, run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import decode_session
+from strokes import move, press, release, stroke
 
 PIXEL = 1.0  # canvas px, DESIGN promise 3: a handle ends within one of its target
 
@@ -217,7 +217,7 @@ def test_what_cannot_be_done_says_why(editor: Editor) -> None:
 
 def test_the_editor_needs_no_window_and_no_heavy_modules() -> None:
     code = (
-        "import sys, app.editor, app.commands, app.tools.place_tool, app.tools.pose_tool; "
+        "import sys, objectmorpher.editor.editor, objectmorpher.commands, objectmorpher.tools.place_tool, objectmorpher.tools.pose_tool; "
         "heavy = {'moderngl', 'imgui_bundle', 'glfw', 'torch', 'numba', 'scipy'}; "
         "print(sorted(heavy & set(sys.modules)))"
     )

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from app.first_start import mark_compiled, needs_compiling, start_compiling
-from objectmorpher_core import installation
+from objectmorpher.system.first_start import mark_compiled, needs_compiling, start_compiling
+from objectmorpher_core.base import installation
 
 # A copy as an installer's: a small kernel of its own, under the settings that such a copy has.
 KERNEL = """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import first_use
 import numpy as np
 import pytest
-from hands import ROOT, Hands, opened
 from PIL import Image
+
+import first_use
+from hands import ROOT, Hands, opened
 
 pytestmark = pytest.mark.window
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs, wait_until
-from strokes import move, press, stroke
 
-from app.commands import COMMANDS, run
-from app.editor import Editor
-from app.tools.compose_tool import ComposeTool
-from app.tools.pointer import Button
-from app.view import Composed, ToolName
-from objectmorpher_core.compose.plate import plate_picture
-from objectmorpher_core.document import Document
-from objectmorpher_core.hint import Hint
-from objectmorpher_core.session_file import decode_session, encode_session
+from conftest import wait_for_jobs, wait_until
+from objectmorpher.commands import COMMANDS, run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import Composed, ToolName
+from objectmorpher.tools.compose_tool import ComposeTool
+from objectmorpher.tools.pointer import Button
+from objectmorpher_core.compose.plate.plate import plate_picture
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.file import decode_session, encode_session
+from strokes import move, press, stroke
 
 
 @pytest.fixture

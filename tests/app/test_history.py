@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import history
-from app.history import History
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document, EditObject, Matte, Photo
-from objectmorpher_core.image import Picture
-from objectmorpher_core.pose import Pose
+from objectmorpher.editor import history
+from objectmorpher.editor.history import History
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Document, EditObject, Matte, Photo
+from objectmorpher_core.document.pose import Pose
+from objectmorpher_core.pictures.image import Picture
 
 POSE = Pose(np.zeros((4, 3)), np.zeros((4, 3, 3)))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.job_functions import PhotoMemory
-from objectmorpher_core.progress import silent
+from objectmorpher.worker.job_functions import PhotoMemory
+from objectmorpher_core.base.progress import silent
 from tests import shapes
 
 

@@ -8,14 +8,14 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import job_functions
 import numpy as np
 import pytest
 from PIL import UnidentifiedImageError
 
-from app.job_error import JobError
-from app.jobs import Jobs
-from app.opening import OpeningError
+import job_functions
+from objectmorpher.editor.opening import OpeningError
+from objectmorpher.worker.job_error import JobError
+from objectmorpher.worker.jobs import Jobs
 
 
 class Log:
@@ -164,7 +164,7 @@ def test_the_log_tells_the_programs_failures_from_the_requests(
     worker: Jobs, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = Log()
-    with caplog.at_level(logging.INFO, "app.job_error"):
+    with caplog.at_level(logging.INFO, "objectmorpher.worker.job_error"):
         for function in (job_functions.fail, job_functions.divide, job_functions.refuse):
             start(worker, log, function)
             run_until(worker, lambda: worker.is_idle)

@@ -6,14 +6,14 @@ import time
 
 import numpy as np
 import pytest
-from conftest import PATIENCE, wait_for_jobs
 
-from app.blend import CELL
-from app.editor import Editor
-from app.layers import FRAME, Layer
-from app.view import Shown, View
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
+from conftest import PATIENCE, wait_for_jobs
+from objectmorpher.canvas.blend import CELL
+from objectmorpher.canvas.layers import FRAME, Layer
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import Shown, View
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
 
 
 @pytest.fixture

@@ -13,17 +13,17 @@ ROOT = Path(__file__).parents[2]
 CODE = """
 import logging, sys
 from pathlib import Path
-from app.logs import start_log
+from objectmorpher.system.logs import start_log
 start_log(Path(sys.argv[1]))
-logging.getLogger("app.jobs").info("Lifted")
-logging.getLogger("app.jobs").warning("Odd")
+logging.getLogger("objectmorpher.worker.jobs").info("Lifted")
+logging.getLogger("objectmorpher.worker.jobs").warning("Odd")
 """
 
 FAULT = """
 import os, sys, time
 from pathlib import Path
-from app.jobs import Jobs
-from app.logs import start_log
+from objectmorpher.worker.jobs import Jobs
+from objectmorpher.system.logs import start_log
 
 def end(progress=None):
     os.abort()

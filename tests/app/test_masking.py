@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
 from PIL import Image
-from strokes import move, press, stroke
 
-from app.commands import run, why_not
-from app.editor import Editor
-from app.filing import Dialog
-from app.tasks import Combine, Question
-from app.tools.mask_tool import MaskTool
-from app.tools.pointer import Button, Tool
-from app.tools.select_tool import SelectTool
-from app.view import Selecting, SelectMode, ToolName
+from conftest import CENTRE, HEIGHT, WIDTH, lift_ball, wait_for_jobs, wait_until
+from objectmorpher.commands import run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.tasks import Combine, Question
+from objectmorpher.editor.view import Selecting, SelectMode, ToolName
+from objectmorpher.tools.mask_tool import MaskTool
+from objectmorpher.tools.pointer import Button, Tool
+from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher_core import segment
-from objectmorpher_core.brush import Brush
-from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.base.brush import Brush
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment import mask_edit
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.session.file import decode_session, encode_session
+from strokes import move, press, stroke
 
 FAR = (20.0, 20.0)  # image px, on the wall
 Places = list[tuple[float, float]]

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
 from conftest import CENTRE
 from hands import ROOT, Hands
-
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.session.file import decode_session, encode_session
 
 pytestmark = pytest.mark.window
 
@@ -118,7 +118,7 @@ def test_random_events_break_nothing(
     window_environment: dict[str, str], photo_path: Path, tmp_path: Path, seed: int, count: int
 ) -> None:
     session, log = tmp_path / "monkey.omorph", tmp_path / "objectmorpher.log"
-    command = [sys.executable, "-m", "app", str(photo_path)]
+    command = [sys.executable, "-m", "objectmorpher", str(photo_path)]
     with subprocess.Popen(
         command, env=window_environment, cwd=ROOT, stderr=subprocess.PIPE, text=True
     ) as window:

@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from conftest import PATIENCE
 from hands import ROOT
-
-from app.motion import FULL, REDUCED, Motion
-from app.settings import AUTO, read_settings
+from objectmorpher.editor.settings import AUTO, read_settings
+from objectmorpher.system.motion import FULL, REDUCED, Motion
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads GNOME's setting")

@@ -11,12 +11,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import first_use
 import pytest
-from hands import ROOT, opened
 
-from objectmorpher_core.image import read_picture
-from objectmorpher_core.session_file import decode_session
+import first_use
+from hands import ROOT, opened
+from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.session.file import decode_session
 from tests.faults import network
 from tests.faults.tracer import missing
 

@@ -13,14 +13,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from conftest import CENTRE, open_file, wait_for_jobs, wait_until
 
-from app.editor import Editor
-from app.freed_memory import set_aside
-from app.jobs import Jobs
-from app.settings import Backends
-from objectmorpher_core.document import Document
-from objectmorpher_core.image import read_picture
+from conftest import CENTRE, open_file, wait_for_jobs, wait_until
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Backends
+from objectmorpher.system.freed_memory import set_aside
+from objectmorpher.worker.jobs import Jobs
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.pictures.image import read_picture
 
 SHARE = 0.1  # of what reading a large photo takes: what a look at what has come in may, meanwhile
 MEGAPIXELS = (6000, 4000)

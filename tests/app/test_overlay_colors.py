@@ -6,14 +6,14 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from color_vision import MATRICES, SIGHTS, difference, lab
 
-from app.gui.overlay.canvas import ACCENT, WARM, WHITE
-from app.gui.overlay.place import COLOURS
-from app.gui.overlay.rig import HATCHES, YELLOW
-from app.gui.scenes import INPAINTED, LIFTED, REFINED
-from app.gui.theme import PALETTES, rgb
-from app.paint import DEPTH_STOPS, STRAIN_STOPS
+from color_vision import MATRICES, SIGHTS, difference, lab
+from objectmorpher.canvas.paint import DEPTH_STOPS, STRAIN_STOPS
+from objectmorpher.gui.overlay.canvas import ACCENT, WARM, WHITE
+from objectmorpher.gui.overlay.place import COLOURS
+from objectmorpher.gui.overlay.rig import HATCHES, YELLOW
+from objectmorpher.gui.widgets.theme import PALETTES, rgb
+from objectmorpher.gui.window.scenes import INPAINTED, LIFTED, REFINED
 
 APART = 25.0  # Delta E 1976; 2.3 is just noticed side by side, this is seen apart and in a hurry
 Mark = tuple[str, tuple[float, float, float]]  # shape, colour

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app import paint
-from app.derived import Derived
-from app.editor import Editor
-from app.painter import PAINTED, shown_now
-from app.view import Shown, ToolName, View
-from objectmorpher_core import edits, refine_edits
+from objectmorpher.canvas import paint
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.painter import PAINTED, shown_now
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import Shown, ToolName, View
+from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.refined import Refined
-from objectmorpher_core.refining import coarse_edit
-from objectmorpher_core.rotations import matrix_from_vector
+from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.refinement import Refined
+from objectmorpher_core.scripting.refining import coarse_edit
 
 COUNTED = 0.06  # of all changed pixels: the view counts on a small picture, its blend is coarser
 F32 = 1e-6

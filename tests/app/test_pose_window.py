@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hands import Hands, opened
-from test_window import is_red, screen_xy
 
-from objectmorpher_core.document import Document
-from objectmorpher_core.session_file import decode_session, save_session
+from hands import Hands, opened
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.file import decode_session, save_session
+from test_window import is_red, screen_xy
 
 pytestmark = pytest.mark.window
 

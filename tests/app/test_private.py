@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from app import cli
-from app.logs import CRASHES, NAME
-from app.private import without_names
-from app.report import report
-from objectmorpher_core.image import read_picture
+from objectmorpher.cli import parser as cli
+from objectmorpher.system.logs import CRASHES, NAME
+from objectmorpher.system.private import without_names
+from objectmorpher.system.report import report
+from objectmorpher_core.pictures.image import read_picture
 
 ROOT = Path(__file__).parents[2]
 SECRETS = ("anna", "Anna", "Kowalska", "wedding", "holiday", "clinic")
@@ -81,7 +81,7 @@ CRASH = """
 import os, sys
 from pathlib import Path
 from app import cli
-from app.logs import start_log
+from objectmorpher.system.logs import start_log
 start_log(Path(sys.argv[1]))
 os.abort()
 """

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
 from conftest import wait_until
 from edit_until_killed import base_document, step_document
+from objectmorpher.editor.autosave import LOCK, recovery_root
+from objectmorpher.editor.editor import Editor
+from objectmorpher.system.file_lock import FileLock
+from objectmorpher_core.session.journal import DOCUMENT, Journal
 from test_autosave import folders, settle
-
-from app.autosave import LOCK, recovery_root
-from app.editor import Editor
-from app.file_lock import FileLock
-from objectmorpher_core.journal import DOCUMENT, Journal
 
 
 @pytest.fixture

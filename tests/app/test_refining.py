@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import wait_until
 
-from app import job_functions
-from app.commands import COMMANDS, run
-from app.editor import Editor
-from app.view import ToolName
-from objectmorpher_core import edits
+from conftest import wait_until
+from objectmorpher.commands import COMMANDS, run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.worker import job_functions
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.refine.refinement import CoarseEdit
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.progress import silent
-from objectmorpher_core.refined import Refined
-from objectmorpher_core.refining import Refining as How
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.refinement import Refined
+from objectmorpher_core.scripting.refining import Refining as How
 
 
 class Asked:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import job_functions
 import numpy as np
 import pytest
-from conftest import open_file, wait_for_jobs
 
-from app.editor import Editor
-from app.tasks import PLATE
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement, Prompt
+import job_functions
+from conftest import open_file, wait_for_jobs
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.tasks import PLATE
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement, Prompt
 
 
 def retry(editor: Editor) -> None:
@@ -37,7 +37,9 @@ def moved(editor: Editor, ball: Document, tmp_path: Path) -> Editor:
 def test_a_full_disk_can_be_cleared_and_the_session_saved_as_it_is_then(
     moved: Editor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.job_functions.write_session", job_functions.save_when_there_is_room)
+    monkeypatch.setattr(
+        "objectmorpher.worker.job_functions.write_session", job_functions.save_when_there_is_room
+    )
     moved.filing.save_as(tmp_path / "ball.omorph")
     wait_for_jobs(moved)
     assert moved.message is not None and "No space left" in moved.message.text
@@ -55,7 +57,8 @@ def test_an_export_can_be_tried_again(
     moved: Editor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "app.editing.exporting.write_export", job_functions.export_when_there_is_room
+        "objectmorpher.editor.intents.exporting.write_export",
+        job_functions.export_when_there_is_room,
     )
     moved.exporting.export_to(tmp_path / "out.png")
     wait_for_jobs(moved)
@@ -67,7 +70,7 @@ def test_a_background_that_failed_can_be_tried_again(
     editor: Editor, ball: Document, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("app.job_functions.inpaint", job_functions.inpaint_badly)
+        broken.setattr("objectmorpher.worker.job_functions.inpaint", job_functions.inpaint_badly)
         editor.start(edits.set_plate(ball, None))
         wait_for_jobs(editor)
     assert editor.message is not None and "did not converge" in editor.message.text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from app.settings import Backends, Settings, read_settings, write_settings
+from objectmorpher.editor.settings import Backends, Settings, read_settings, write_settings
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:

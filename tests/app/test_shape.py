@@ -6,15 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from conftest import open_file, wait_for_jobs
 
-from app.derived import MOST_SHAPES, Derived
-from app.editor import Editor
-from app.shape import Shape, build_shape, rehearse
-from app.view import View
-from objectmorpher_core import edits
-from objectmorpher_core.document import DeformSettings, Document
-from objectmorpher_core.session_file import save_session
+from conftest import open_file, wait_for_jobs
+from objectmorpher.canvas.derived import MOST_SHAPES, Derived
+from objectmorpher.canvas.shape import Shape, build_shape, rehearse
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import View
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import DeformSettings, Document
+from objectmorpher_core.session.file import save_session
 
 
 def _shape(editor: Editor) -> Shape:

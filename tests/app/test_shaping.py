@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CENTRE, lift_ball, wait_for_jobs
-from strokes import stroke
 
-from app.commands import COMMANDS, run, why_not
-from app.editor import Editor
-from app.tools.mask_tool import MaskTool
-from app.view import Painted, Selecting, ToolName
-from objectmorpher_core import edits, splat_files
-from objectmorpher_core.brush import Brush
-from objectmorpher_core.document import LiftedObject, Placement
-from objectmorpher_core.session_file import decode_session, encode_session
+from conftest import CENTRE, lift_ball, wait_for_jobs
+from objectmorpher.commands import COMMANDS, run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import Painted, Selecting, ToolName
+from objectmorpher.tools.mask_tool import MaskTool
+from objectmorpher_core import splat_files
+from objectmorpher_core.base.brush import Brush
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import LiftedObject, Placement
+from objectmorpher_core.session.file import decode_session, encode_session
+from strokes import stroke
 from tests import shapes
 
 

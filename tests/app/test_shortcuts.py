@@ -6,10 +6,10 @@ from collections import Counter
 
 import pytest
 
-from app.commands import COMMANDS, GROUPS, keys_of
-from app.editor import Editor
-from app.settings import Settings
-from app.shortcuts import FIXED, Shortcuts
+from objectmorpher.commands import COMMANDS, GROUPS, keys_of
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.shortcuts import FIXED, Shortcuts
 
 
 @pytest.fixture

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from app import view
-from app.export_plan import Motion, What
-from app.filing import Dialog
-from app.texts import languages, t, use_language
+from objectmorpher.editor import view
+from objectmorpher.editor.export_plan import Motion, What
+from objectmorpher.editor.filing import Dialog
+from objectmorpher.system.texts import languages, t, use_language
 
 ROOT = Path(__file__).parents[2]
 APP, LANGUAGES = ROOT / "app", ROOT / "assets" / "languages"

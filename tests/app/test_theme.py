@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.gui.theme import PALETTES, Palette, rgb
+from objectmorpher.gui.widgets.theme import PALETTES, Palette, rgb
 
 TEXT = 4.5  # contrast of text of the usual size
 PARTS = 3.0  # of what is no text but means something, and of large text

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.commands import COMMANDS, run
-from app.editor import Editor
-from app.view import MARGIN, Shown, View
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Document
+from objectmorpher.commands import COMMANDS, run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import MARGIN, Shown, View
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Document
 
 PHOTO = (600, 400)
 
@@ -77,7 +77,7 @@ def test_a_zoomed_photo_keeps_its_zoom_when_the_window_grows(view: View) -> None
 
 def test_views_have_keys_of_their_own_and_are_in_the_menu() -> None:
 
-    from app.gui.menu import MENUS
+    from objectmorpher.gui.window.menu import MENUS
 
     keys = [command.keys for command in COMMANDS.values() if command.keys]
     assert len(keys) == len(set(keys))

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image, ImageChops
+
 from conftest import PATIENCE
 from hands import ROOT, Hands, opened
-from PIL import Image, ImageChops
+from objectmorpher_core.session.file import save_session
 from shoot_views import NAMES, made_document
-
-from objectmorpher_core.session_file import save_session
 
 pytestmark = pytest.mark.window
 

@@ -22,6 +22,6 @@ def test_after_the_warm_up_neither_an_import_nor_a_lift_compiles_anything(tmp_pa
         subprocess.run([sys.executable, *command], cwd=ROOT, check=True, env=environment)
         return {file.name for file in (tmp_path / "kernels").rglob("*.nbc")}
 
-    compiled = run("-m", "app.warm_up")
+    compiled = run("-m", "objectmorpher.system.warm_up")
     assert len(compiled) > 50
     assert run("tests/app/first_jobs.py", str(tmp_path)) - compiled == set()

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+
 from conftest import CENTRE, HEIGHT, PATIENCE, WIDTH
 from hands import ROOT, Hands, opened
-from PIL import Image
 
 pytestmark = pytest.mark.window
 
@@ -22,7 +23,7 @@ POSE_TOOL = (10, 132)  # in the Pose tool's button, beside its icon
 
 
 def run_app(environment: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "app", *arguments]
+    command = [sys.executable, "-m", "objectmorpher", *arguments]
     return subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
     )
@@ -147,7 +148,7 @@ def test_closing_asks_about_unsaved_changes(hands: Hands, keys: str) -> None:
 
 def test_without_a_screen_there_is_one_sentence(window_environment: dict[str, str]) -> None:
     environment = window_environment | {"DISPLAY": ":9999"}
-    command = [sys.executable, "-m", "app"]
+    command = [sys.executable, "-m", "objectmorpher"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 1
     assert done.stderr.startswith("objectmorpher: no window can be opened: ")

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from conftest import CENTRE
 from hands import ROOT, Hands, opened
 from test_window import screen_xy
@@ -31,7 +32,7 @@ def test_a_killed_window_gives_its_work_back(
         hands.wait(lambda: "edited" in hands.title(), "selecting")
         kept = tmp_path / "data" / "recovery"
         hands.wait(lambda: bool(list(kept.glob("*/document.json"))), "keeping")
-    command = [sys.executable, "-m", "app"]
+    command = [sys.executable, "-m", "objectmorpher"]
     with subprocess.Popen(command, env=window_environment, cwd=ROOT) as window:
         hands = Hands(window_environment)
         try:

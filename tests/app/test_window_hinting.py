@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import lift_ball
-from hands import ACCENT, opened
 from PIL import Image
 
-from app.editor import Editor
-from objectmorpher_core.session_file import save_session
+from conftest import lift_ball
+from hands import ACCENT, opened
+from objectmorpher.editor.editor import Editor
+from objectmorpher_core.session.file import save_session
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]
 

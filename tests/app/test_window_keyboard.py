@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+
 from conftest import CENTRE, WIDTH
 from hands import Hands, opened
 from keyboard import Keys
-from PIL import Image
 from test_window import POSE_TOOL, PRIMARY
 
 pytestmark = [pytest.mark.window, pytest.mark.slow]

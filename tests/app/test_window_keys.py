@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from conftest import CENTRE
 from hands import opened
 from test_window import POSE_TOOL, PRIMARY, screen_xy

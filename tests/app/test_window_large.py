@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import hands
 import pytest
+
+import hands
 from hands import Hands, opened
 from keyboard import Keys
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from conftest import CENTRE
 from hands import Hands, opened
-from test_window import PRIMARY, screen_xy
-
 from objectmorpher_core import segment
+from test_window import PRIMARY, screen_xy
 
 pytestmark = pytest.mark.window
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from conftest import lift_ball
 from hands import ACCENT, Hands, opened
-
-from app.editor import Editor
-from objectmorpher_core import edits
-from objectmorpher_core.document import Placement
-from objectmorpher_core.session_file import decode_session, save_session
+from objectmorpher.editor.editor import Editor
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.session.file import decode_session, save_session
 
 pytestmark = pytest.mark.window
 

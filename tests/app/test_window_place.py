@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from conftest import lift_ball
 from hands import opened
-
-from app.editor import Editor
-from app.tools.gizmo import gizmo
-from app.view import ToolName
-from objectmorpher_core.session_file import save_session
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.gizmo import gizmo
+from objectmorpher_core.session.file import save_session
 
 pytestmark = pytest.mark.window
 

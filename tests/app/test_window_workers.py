@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hands import Hands, opened
 from PIL import Image
 
-from objectmorpher_core.lift import worker_file
+from hands import Hands, opened
+from objectmorpher_core.lift.workers import file as worker_file
 
 WORKER = """
 command = ["{python}", "-c", "raise SystemExit(9)"]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app import shared_memory, wire
-from app.wire import KEPT, LARGE, Reader, Writer
-from objectmorpher_core.arrays import frozen
+from objectmorpher.worker import shared_memory, wire
+from objectmorpher.worker.wire import KEPT, LARGE, Reader, Writer
+from objectmorpher_core.base.arrays import frozen
 
 
 class Line:

@@ -10,15 +10,15 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from conftest import wait_for_jobs, wait_until
 
-from app.commands import run
-from app.editor import Editor
-from app.tasks import READ, WRITE
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.image import ImageError, read_picture
-from objectmorpher_core.session_file import decode_session
+from conftest import wait_for_jobs, wait_until
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.tasks import READ, WRITE
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.pictures.image import ImageError, read_picture
+from objectmorpher_core.session.file import decode_session
 
 KILLS = int(os.environ.get("OBJECTMORPHER_KILLS", "9"))  # seconds each
 HEARD = 0.02  # s in which the thread that reads the pipe hands over what it has read

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from objectmorpher_core import edits
-from objectmorpher_core.animation import Clip, frames, share_at
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.shrinking import shrunk
-from objectmorpher_core.video_file import ENDINGS, VideoError, encode_video
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.shrink import shrunk
+from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
+from objectmorpher_core.scripting.animation import Clip, frames, share_at
 from tests import shapes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.brush import Brush, Stroke
+from objectmorpher_core.base.brush import Brush, Stroke
 
 
 @pytest.mark.parametrize("radius", [0.5, 3.0, 12.5])

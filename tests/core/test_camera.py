@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.camera import Camera
 from tests import shapes
 
 F64 = 1e-9  # px or world units of size 1

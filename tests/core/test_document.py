@@ -7,15 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import (
-    Document,
-    EditObject,
-    Handle,
-    Placement,
-    Pose,
-    Prompt,
-)
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.document.model import Document, EditObject, Handle, Placement, Pose, Prompt
 from tests import shapes
 
 F64 = 1e-9

@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, rig_edits
-from objectmorpher_core.document import Click, DeformSettings, Document, Placement, Pose, Prompt
-from objectmorpher_core.edits import EditError
-from objectmorpher_core.rig import Rig, Seam
+from objectmorpher_core.document import edits, rig_edits
+from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.model import (
+    Click,
+    DeformSettings,
+    Document,
+    Placement,
+    Pose,
+    Prompt,
+)
+from objectmorpher_core.document.rig import Rig, Seam
 from objectmorpher_core.segment.mask_edit import feather, grow, shrink
 from tests import shapes
 

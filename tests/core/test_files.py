@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from objectmorpher_core.files import OutputError, write_all
+from objectmorpher_core.base.files import OutputError, write_all
 
 
 def test_writes_new_and_existing_files(tmp_path):
@@ -70,7 +70,7 @@ def test_permissions_and_links_are_kept(tmp_path):
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
-from objectmorpher_core.files import OutputError, write_all
+from objectmorpher_core.base.files import OutputError, write_all
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # then writing past the limit is an OSError
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 folder = Path(sys.argv[1])

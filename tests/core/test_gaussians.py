@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import matrices_from_quats
+from objectmorpher_core.base.rotations import matrices_from_quats
+from objectmorpher_core.document.gaussians import Gaussians
 from tests import shapes
 
 F32 = 2e-6  # quaternions and scales are stored as float32 of numbers below 1

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Placement
-from objectmorpher_core.ground import GroundError, ground_under
-from objectmorpher_core.placements import Hold, centre_of, with_centre
-from objectmorpher_core.rotations import turn_matrix, turn_of
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import turn_matrix, turn_of
+from objectmorpher_core.document.ground import GroundError, ground_under
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.placement import Hold, centre_of, with_centre
 from tests import shapes
 
 EXACT = 1e-9

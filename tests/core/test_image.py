@@ -11,8 +11,8 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms, ImageOps
 
-from objectmorpher_core import png
-from objectmorpher_core.image import (
+from objectmorpher_core.pictures import png
+from objectmorpher_core.pictures.image import (
     ImageError,
     Picture,
     encode_mask,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from test_session_file import assert_equal, full_document
 
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.image import Picture, encode_picture, read_picture
-from objectmorpher_core.journal import DOCUMENT, Journal, read_about, read_journal
-from objectmorpher_core.session_tree import SessionError
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
+from objectmorpher_core.session.journal import DOCUMENT, Journal, read_about, read_journal
+from objectmorpher_core.session.tree import SessionError
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import Any
 
 from numba.core import caching
 
-from objectmorpher_core import kernel_files  # noqa: F401  (names the files)
+from objectmorpher_core.base import kernel_files  # noqa: F401  (names the files)
 
 ROOT = Path(__file__).parents[2]
 Files: Any = caching.IndexDataCacheFile

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from objectmorpher_core import limits
+from objectmorpher_core.base import limits
 
 DOCS = Path(__file__).parents[2] / "docs" / "reliability.md"
 

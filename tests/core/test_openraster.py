@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.layers import Layer, layers
-from objectmorpher_core.document import Placement
-from objectmorpher_core.image import Picture
-from objectmorpher_core.openraster import encode_openraster
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.pictures.image import Picture
+from objectmorpher_core.pictures.openraster import encode_openraster
 from tests import shapes
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.picture_line import along_line
+from objectmorpher.tools.picture_line import along_line
+from objectmorpher_core.base.camera import Camera
 
 CAMERA = Camera.from_fov(400, 300)
 EXACT = 1e-9

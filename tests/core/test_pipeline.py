@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, pipeline, segment
+from objectmorpher_core import pipeline, segment
+from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.compose.composite import object_texture, straight_cutout
-from objectmorpher_core.document import Placement
-from objectmorpher_core.edits import EditError
-from objectmorpher_core.image import ImageError, Picture, encode_picture, read_picture
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.pictures.image import ImageError, Picture, encode_picture, read_picture
 from objectmorpher_core.pipeline import (
     Edited,
     export,
@@ -20,8 +22,7 @@ from objectmorpher_core.pipeline import (
     run_script,
     select,
 )
-from objectmorpher_core.progress import Cancelled
-from objectmorpher_core.script import EditScript, ScriptError, script_from
+from objectmorpher_core.scripting.script import EditScript, ScriptError, script_from
 from tests import shapes
 
 MASK = shapes.mask("ellipse")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.poisson_disk import thin_to_spacing
+from objectmorpher_core.base.poisson_disk import thin_to_spacing
 from tests import shapes
 
 CLOUD = shapes.ball(5000)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pipeline import Edited, run_script
-from objectmorpher_core.report import STAGES, Stopwatch, peak_memory_mb
-from objectmorpher_core.script import script_from
+from objectmorpher_core.scripting.report import STAGES, Stopwatch, peak_memory_mb
+from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
 MASK = shapes.mask("ellipse")
@@ -112,7 +112,7 @@ def test_a_stopwatch_adds_up_by_stage_even_when_a_stage_fails():
 
 
 def test_the_memory_of_who_started_the_process_does_not_count():
-    told = "from objectmorpher_core.report import peak_memory_mb; print(peak_memory_mb())"
+    told = "from objectmorpher_core.scripting.report import peak_memory_mb; print(peak_memory_mb())"
     held = np.ones(100_000_000)  # 800 MB
     ran = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
     assert 20 < float(ran.stdout) < held.nbytes / 1e6 - 200

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.rotations import (
+from objectmorpher_core.base.rotations import (
     matrices_from_quats,
     matrix_from_vector,
     quats_from_matrices,

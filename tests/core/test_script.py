@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from objectmorpher_core.script import (
+from objectmorpher_core.scripting.script import (
     BatchItem,
     EditScript,
     HandleMove,

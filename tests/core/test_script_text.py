@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from objectmorpher_core.script import BatchItem, EditScript, parse_scripts, script_text
+from objectmorpher_core.scripting.script import BatchItem, EditScript, parse_scripts, script_text
 
 SCRIPTS = (
     {},

@@ -10,8 +10,10 @@ import zipfile
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import (
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.model import (
     Click,
     DeformSettings,
     Document,
@@ -26,17 +28,15 @@ from objectmorpher_core.document import (
     Pose,
     Prompt,
 )
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.hint import Hint
-from objectmorpher_core.image import Picture, encode_picture, read_picture
-from objectmorpher_core.rig import Rig, Seam
-from objectmorpher_core.session_file import (
+from objectmorpher_core.document.rig import Rig, Seam
+from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
+from objectmorpher_core.session.file import (
     SessionError,
     decode_session,
     encode_session,
     save_session,
 )
-from objectmorpher_core.splat_files.ply import decode_ply
+from objectmorpher_core.splat_files.splats.ply import decode_ply
 
 COUNT, NODES = 200, 16
 

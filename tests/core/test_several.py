@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.pipeline import Edited, replay, run_script
-from objectmorpher_core.script import BatchItem, ScriptError, parse_scripts
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.scripting.script import BatchItem, ScriptError, parse_scripts
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
 PARTS = shapes.mask("parts")

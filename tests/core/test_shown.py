@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objectmorpher_core.shown import LONGEST, named, shown
+from objectmorpher_core.base.quoting import LONGEST, named, shown
 
 ANYTHING = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from objectmorpher_core.threads import core_count, in_threads
+from objectmorpher_core.base.threads import core_count, in_threads
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 7, 1000])

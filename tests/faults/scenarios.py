@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from app.export_functions import write_export
-from app.export_plan import Plan, What
-from app.remote.tokens import TokenError, read_token, write_token
-from app.settings import Settings, read_settings, write_settings
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.files import write_all, write_new
-from objectmorpher_core.image import encode_picture, read_picture
-from objectmorpher_core.journal import DOCUMENT, Journal, read_journal
+from objectmorpher.editor.export_plan import Plan, What
+from objectmorpher.editor.settings import Settings, read_settings, write_settings
+from objectmorpher.server.tokens import TokenError, read_token, write_token
+from objectmorpher.worker.export_functions import write_export
+from objectmorpher_core.base.files import write_all, write_new
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.models import lock
 from objectmorpher_core.models.added import add, added
 from objectmorpher_core.models.fetch import install
 from objectmorpher_core.models.lock import FileFacts, Locked
 from objectmorpher_core.models.registry import ModelError, Weight
+from objectmorpher_core.pictures.image import encode_picture, read_picture
 from objectmorpher_core.pipeline import export
-from objectmorpher_core.progress import silent
-from objectmorpher_core.session_file import decode_session, encode_session, save_session
+from objectmorpher_core.session.file import decode_session, encode_session, save_session
+from objectmorpher_core.session.journal import DOCUMENT, Journal, read_journal
 from tests.core.models.small_networks import brightness, constant
 from tests.fuzz.checks import check_same
 from tests.fuzz.documents import documents

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from app.recovery import _left_in
-from app.shape import build_ready
-from objectmorpher_core.document import Document, EditObject, LiftSettings, Placement
-from objectmorpher_core.image import Picture, encode_picture
-from objectmorpher_core.journal import Journal, read_about, read_journal
+from objectmorpher.canvas.shape import build_ready
+from objectmorpher.editor.recovery import _left_in
+from objectmorpher_core.document.model import Document, EditObject, LiftSettings, Placement
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import export, lift_mask, open_photo
-from objectmorpher_core.session_file import SessionError, decode_session, encode_session
+from objectmorpher_core.session.file import SessionError, decode_session, encode_session
+from objectmorpher_core.session.journal import Journal, read_about, read_journal
 from tests.core.test_session_file import full_document
 
 from .checks import Reader, check_finite, check_picture, check_same, refusing

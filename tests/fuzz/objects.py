@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.external import read_answer
+from objectmorpher_core.lift.workers.external import read_answer
 from objectmorpher_core.splat_files import FORMATS, SplatFileError, read, read_object
 from tests.core.splat_files import mesh_files
 from tests.core.splat_files.clouds import gaussians
@@ -140,7 +140,7 @@ def read_worker_answer(data: bytes, folder: Path) -> None:
         made, seen = read_answer(folder, "w", COUNT)
     check_gaussians(made)
     if seen is not None:
-        from objectmorpher_core.camera import Camera
+        from objectmorpher_core.base.camera import Camera
 
         with refusing(LiftError):
             matrix = seen.pose_for(Camera.from_fov(100, 80), made.means.astype(np.float64), "w")

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageCms
 
-from objectmorpher_core import exif
-from objectmorpher_core.image import (
+from objectmorpher_core.pictures import exif
+from objectmorpher_core.pictures.image import (
     ENDINGS,
     ImageError,
     Picture,

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from app.job_functions import Choice, Cut
-from app.remote.message import MessageError, decode, encode
-from app.remote.table import table, types
-from app.remote.tokens import TokenError, check_token, read_token
-from app.settings import Settings, read_settings, write_settings
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Click, LiftSettings, Plate, Prompt
+from objectmorpher.editor.settings import Settings, read_settings, write_settings
+from objectmorpher.server.message import MessageError, decode, encode
+from objectmorpher.server.table import table, types
+from objectmorpher.server.tokens import TokenError, check_token, read_token
+from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Click, LiftSettings, Plate, Prompt
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.worker_file import FOLDER, read_worker
+from objectmorpher_core.lift.workers.file import FOLDER, read_worker
 from objectmorpher_core.models import lock
 from objectmorpher_core.models.added import added
 from objectmorpher_core.models.registry import ModelError
@@ -30,7 +30,7 @@ from objectmorpher_core.models.weight_folder import (
     check_folder,
     check_safetensors,
 )
-from objectmorpher_core.script import BatchItem, EditScript, ScriptError, parse_scripts
+from objectmorpher_core.scripting.script import BatchItem, EditScript, ScriptError, parse_scripts
 
 from .checks import Reader, check_finite, check_same, refusing
 

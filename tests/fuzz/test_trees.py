@@ -12,10 +12,10 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.remote.message import MessageError, decode, encode
-from app.remote.table import types
-from app.settings import Settings, read_settings, write_settings
-from objectmorpher_core.script import EditScript, ScriptError, parse_scripts, script_from
+from objectmorpher.editor.settings import Settings, read_settings, write_settings
+from objectmorpher.server.message import MessageError, decode, encode
+from objectmorpher.server.table import types
+from objectmorpher_core.scripting.script import EditScript, ScriptError, parse_scripts, script_from
 from tests.fuzz.checks import check_finite, check_same, check_sentence
 
 PLAIN = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)

@@ -25,17 +25,17 @@ import cv2
 import moderngl
 import numpy as np
 
-from app.commands import run
-from app.editor import Editor
-from app.gui.scenes import build_scene
-from app.settings import Settings
-from app.tools.pointer import Pointer
-from app.tools.pose_tool import PoseTool
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement, Prompt
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.pose import Pose
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.window.scenes import build_scene
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import Document, Placement, Prompt
+from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.splat_files import encode
 from tests import photos
 

@@ -18,17 +18,17 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from app.commands import run
-from app.editor import Editor
-from app.gui.scenes import build_scene
-from app.render.renderer import Renderer
-from app.settings import Settings
-from app.tools.pointer import Pointer
-from app.tools.pose_tool import PoseTool
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import Mask
-from objectmorpher_core.document import Placement, Prompt
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher.editor.view import ToolName
+from objectmorpher.gui.window.scenes import build_scene
+from objectmorpher.render.renderer import Renderer
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement, Prompt
 
 SIZE = (360, 280)  # canvas px: software OpenGL takes a second for four times as many
 DRAWN = 50  # edits from one frame to the next

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ... import backends
-from ...arrays import F32, RGB
-from ...progress import Progress
+from ...base import backends
+from ...base.arrays import F32, RGB
+from ...base.progress import Progress
 
 
 class RefineError(ValueError):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ...arrays import F32, F64
+from ...base.arrays import F32, F64
 from . import RefineError
 
 MOST_LEFT = 0.5  # px that may remain after the correction

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 
 from ... import models
-from ...arrays import F32, RGB
+from ...base.arrays import F32, RGB
+from ...base.progress import Progress
 from ...models import HubModel, ModelError, device
 from ...models.weight_folder import PLAIN, check_safetensors
-from ...progress import Progress
 from . import RefineError
 from .memory import PipelineNeed, PipelinePlan, placed, plans, quantised
 

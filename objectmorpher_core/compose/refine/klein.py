@@ -92,7 +92,7 @@ def encode_instruction(folder: Path) -> Path:
     from safetensors.torch import save
     from transformers import AutoTokenizer, Qwen3ForCausalLM
 
-    from ...files import write_all
+    from ...base.files import write_all
 
     try:
         tokenizer = AutoTokenizer.from_pretrained(folder / "tokenizer", local_files_only=True)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import F32, RGB, U8, Pixels
-from ...image import to_u8
-from ...pixels import pixels_from_unit, unit_pixels
-from ...progress import Progress, part
-from ...refined import Refined
+from ...base.arrays import F32, RGB, U8, Pixels
+from ...base.pixels import pixels_from_unit, unit_pixels
+from ...base.progress import Progress, part
+from ...document.refinement import Refined
+from ...pictures.image import to_u8
 from ..blend import Box
 from ..composite import Composite
 from . import RefineError, Refiner

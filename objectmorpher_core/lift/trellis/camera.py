@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from scipy.linalg import rq
 
-from ...arrays import F64
-from ...camera import Camera
+from ...base.arrays import F64
+from ...base.camera import Camera
 from .. import LiftError
 
 LEAST = 6  # points that tell a camera

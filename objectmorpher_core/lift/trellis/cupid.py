@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...arrays import F64
+from ...base.arrays import F64
 from ...models.device import Plan
 from .camera import view
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied

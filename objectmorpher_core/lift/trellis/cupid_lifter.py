@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...arrays import F64
-from ...camera import Camera
-from ...gaussians import Gaussians
-from ...progress import Progress
-from ...splat_files.axes import QUARTER_TURN, turned
+from ...base.arrays import F64
+from ...base.camera import Camera
+from ...base.progress import Progress
+from ...document.gaussians import Gaussians
+from ...splat_files.splats.axes import QUARTER_TURN, turned
 from .. import Subject
-from ..placement import Hints
+from ..registration.placement import Hints
 from . import weights
 from .camera import View, pose_in
 from .lifter import UP, TrellisLifter, within_memory

@@ -10,9 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ...gaussians import Gaussians
+from ...base.progress import Progress, part, silent
+from ...document.gaussians import Gaussians
 from ...models.device import Plan, empty_cache
-from ...progress import Progress, part, silent
 from .. import LiftError
 from .camera import View
 from .configs import Pipeline, Sampling, part_path, pipeline

@@ -7,15 +7,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ...document import LiftedObject, LiftSettings
-from ...gaussians import Gaussians
+from ...base.progress import Progress, part
+from ...document.gaussians import Gaussians
+from ...document.model import LiftedObject, LiftSettings
 from ...models import ModelError, device
-from ...progress import Progress, part
-from ...splat_files.axes import QUARTER_TURN, turned
+from ...splat_files.splats.axes import QUARTER_TURN, turned
 from .. import LiftError, Subject
-from ..imported import lift_imported
-from ..placement import Hints, Proposal, Registrar, register
-from ..placement_view import Target
+from ..registration.imported import lift_imported
+from ..registration.placement import Hints, Proposal, Registrar, register
+from ..registration.view import Target
 from . import weights
 from .configs import Sampling
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
-from ...arrays import F32, F64
-from ...document import Matte
+from ...base.arrays import F32, F64
+from ...document.model import Matte
 from ...models.registry import ModelError
 from ...models.transformers_net import open_net
 from .. import LiftError

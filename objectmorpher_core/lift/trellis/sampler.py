@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...progress import Progress
+from ...base.progress import Progress
 from .configs import Sampling
 
 Velocity = Callable[[Tensor, Tensor, bool], Tensor]

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ...gaussians import Gaussians
+from ...document.gaussians import Gaussians
 from .attention import attend_in_windows
 from .blocks import Block, Part, place_code, unit_layer_norm
 from .configs import Activations, GaussianDecoderConfig, LatentEncoderConfig, WindowedConfig

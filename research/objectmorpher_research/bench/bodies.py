@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import quats_along, turn_matrix
 from objectmorpher_core.deform.control_points import sample_control_points
-from objectmorpher_core.document import Handle, LiftedObject, PhotoTexture
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import quats_along, turn_matrix
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import Handle, LiftedObject, PhotoTexture
 
 LIMBS = 5
 LENGTH, RADIUS = 0.5, 0.07  # of a limb

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.arrays import F32
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.gaussians import Gaussians
 
 TEXELS = 4  # of a Gaussian: mean and opacity, quaternion, sizes, colour
 ROW = 512  # Gaussians in a row of the texture

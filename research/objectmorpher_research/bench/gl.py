@@ -41,7 +41,7 @@ class Drawer:
     def _own_row(self, scene: Scene, effort: Effort) -> Row:
         """The pass with which the editor draws."""
         if self._pass is None:
-            from app.render.splat_pass import SplatPass
+            from objectmorpher.render.splat_pass import SplatPass
 
             self._pass = SplatPass(self._context)
         splat_pass, photo = self._pass, scene.puppet.camera

@@ -45,8 +45,8 @@ def bench_pipeline(is_quick: bool) -> list[Row]:
 
 
 def _case(name: str) -> Case:
-    from app.resources import resource
-    from objectmorpher_core.image import Picture, encode_picture, read_picture, resized
+    from objectmorpher.system.resources import resource
+    from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture, resized
 
     from .scenes import made_mask, made_photo
 
@@ -64,9 +64,9 @@ def _case(name: str) -> Case:
 
 def _rows(case: Case, again: int, asked: float) -> list[Row]:
     """The rows of one photo, in this process; it was `asked` for then, s since 1970."""
-    from objectmorpher_core.image import encode_picture
+    from objectmorpher_core.pictures.image import encode_picture
     from objectmorpher_core.pipeline import run_script
-    from objectmorpher_core.script import EditScript
+    from objectmorpher_core.scripting.script import EditScript
 
     start, reports = time.time() - asked, []
     script = EditScript(click=(case.click,), turn=TURN)

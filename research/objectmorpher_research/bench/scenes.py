@@ -8,11 +8,14 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB, Mask, frozen
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, RGB, Mask, frozen
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import quats_along
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.control_points import COUNT, sample_control_points
-from objectmorpher_core.document import (
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import (
     DeformSettings,
     Handle,
     LiftedObject,
@@ -21,12 +24,9 @@ from objectmorpher_core.document import (
     Placement,
     Pose,
 )
-from objectmorpher_core.gaussians import Gaussians
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels, build_levels
-from objectmorpher_core.rotations import quats_along
 
 from .timing import Timing, ms, seconds
 

@@ -19,8 +19,8 @@ def add_bench(parser: argparse.ArgumentParser) -> None:
 
 def run_bench(options: argparse.Namespace) -> None:
     """Print the figures of one benchmark, or write them into a file."""
-    from app.cli_commands import json_bytes
-    from objectmorpher_core.files import write_all
+    from objectmorpher.cli.commands import json_bytes
+    from objectmorpher_core.base.files import write_all
 
     encoded = json_bytes(figures(options.what, options.quick))
     if options.json:

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli_ray import add_ray, check_ray
-from app.subcommands import Subcommand, add_subcommands
-from app.terminal import UsageError, progress_bar
+from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.subcommands import Subcommand, add_subcommands
+from objectmorpher.cli.terminal import UsageError, progress_bar
 
 from .figures import cell, number, numbers
 from .paper import add_paper, run_paper
@@ -60,7 +60,7 @@ def _add_metrics(metrics: argparse.ArgumentParser) -> None:
 
 def _run_metrics(options: argparse.Namespace) -> None:
     """Measures, prints a table, writes the figures."""
-    from objectmorpher_core.files import write_all
+    from objectmorpher_core.base.files import write_all
 
     from ..evaluation.measures.mmd import Subsets
     from ..evaluation.metrics import Choices, measure

@@ -11,8 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli_ray import add_ray, check_ray
-from app.terminal import FAILURES, UsageError, failure_sentence, progress_bar
+from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
 from .figures import Number, aligned, cell, number, numbers
 
@@ -45,7 +45,7 @@ def add_paper(parser: argparse.ArgumentParser) -> None:
 
 def run_paper(options: argparse.Namespace) -> None:
     """Measures, prints the table, writes the figures."""
-    from objectmorpher_core.files import write_all
+    from objectmorpher_core.base.files import write_all
 
     from ..evaluation.paper.table import measure_paper
     from ..evaluation.subjects.folders import read_subjects, with_results
@@ -151,7 +151,7 @@ def run_ours(options: argparse.Namespace, subjects: Sequence[Subject]) -> tuple[
             continue
         wanted.append(subject)
     if options.ray is not None:
-        from app.remote.spread import spread
+        from objectmorpher.server.spread import spread
 
         at = {"source": str(options.folder.absolute()), "folder": str(folder.absolute())}
         jobs = [at | {"name": subject.name} for subject in wanted]
@@ -175,8 +175,8 @@ def _run_there(job: dict[str, Any]) -> dict[str, Any]:
 
 def _run_one(subject: Subject, folder: Path) -> list[str]:
     """Edits a subject; why not, if not."""
-    from objectmorpher_core.files import write_all
-    from objectmorpher_core.image import encode_picture
+    from objectmorpher_core.base.files import write_all
+    from objectmorpher_core.pictures.image import encode_picture
 
     from ..evaluation.paper.interaction_log import encode_events
     from ..evaluation.paper.timed_run import run_subject

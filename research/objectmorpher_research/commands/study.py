@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.terminal import UsageError
+from objectmorpher.cli.terminal import UsageError
 
 from .figures import Number, aligned, cell, numbers
 from .paper import named_folder
@@ -57,7 +57,7 @@ def add_results(parser: argparse.ArgumentParser) -> None:
 
 def run_study(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
-    from app.remote.server import LOOPBACK
+    from objectmorpher.server.address import LOOPBACK
 
     from ..study.pages import CONSENT, Pages, study_of
     from ..study.server import StudyServer
@@ -86,7 +86,7 @@ def run_study(options: argparse.Namespace) -> None:
 
 def run_results(options: argparse.Namespace) -> None:
     """Prints the figures, and writes what is asked for."""
-    from objectmorpher_core.files import write_all
+    from objectmorpher_core.base.files import write_all
 
     from ..study.chart import draw_chart
     from ..study.figures import figures

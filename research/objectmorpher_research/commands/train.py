@@ -9,10 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from app.cli_ray import add_ray, check_ray
-from app.subcommands import Subcommand, add_subcommands
-from app.terminal import UsageError, progress_bar
-from objectmorpher_core.files import write_all
+from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.subcommands import Subcommand, add_subcommands
+from objectmorpher.cli.terminal import UsageError, progress_bar
+from objectmorpher_core.base.files import write_all
 
 NEEDED = {"torch": "torch", "onnx": "onnx", "skimage": "scikit-image", "sklearn": "scikit-learn"}
 MOST_REASONS = 8  # that are told on the terminal
@@ -218,7 +218,7 @@ def _say_pairs(found: dict[str, Any], out: Path) -> None:
 
 
 def _part_of(progress: Any, k: int, count: int) -> Any:
-    from objectmorpher_core.progress import part
+    from objectmorpher_core.base.progress import part
 
     return part(progress, k / count, (k + 1) / count)
 

@@ -7,9 +7,9 @@ import json
 import sys
 from pathlib import Path
 
-from app.cli_ray import add_ray, check_ray
-from app.terminal import UsageError, progress_bar
-from objectmorpher_core.progress import Progress
+from objectmorpher.cli.ray import add_ray, check_ray
+from objectmorpher.cli.terminal import UsageError, progress_bar
+from objectmorpher_core.base.progress import Progress
 
 ABLATIONS = ("mesh", "harmonise", "links", "deform", "iterations", "camera")
 
@@ -37,7 +37,7 @@ def _add_made(parser: argparse.ArgumentParser) -> None:
 
 def run_made(options: argparse.Namespace) -> None:
     """The benchmark with ground truth, or an ablation on its cases."""
-    from objectmorpher_core.files import write_all
+    from objectmorpher_core.base.files import write_all
 
     from ..evaluation.truth.methods import ABLATIONS, METHODS
     from ..evaluation.truth.report import report

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
-from objectmorpher_core.progress import Progress, silent
+from objectmorpher_core.base.arrays import F64, RGB
+from objectmorpher_core.base.progress import Progress, silent
 
 from .bootstrap import Estimate, mean_with_interval
 from .error import EvaluationError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
-from objectmorpher_core.image import READ_ENDINGS, read_mask, read_picture, to_u8
+from objectmorpher_core.base.arrays import F64, RGB
+from objectmorpher_core.pictures.image import READ_ENDINGS, read_mask, read_picture, to_u8
 
 from .error import EvaluationError
 from .measures.regions import check_pair

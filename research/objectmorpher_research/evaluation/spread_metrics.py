@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from app.remote.spread import Job, spread
-from objectmorpher_core.progress import Progress
+from objectmorpher.server.spread import Job, spread
+from objectmorpher_core.base.progress import Progress
 
 from .metrics import Choices, Opened, Results, Taken
 from .pairs import Pair

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..evaluation.bootstrap import Estimate
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..evaluation.bootstrap import RESAMPLES, Estimate
 from .agreement import ordinal_alpha

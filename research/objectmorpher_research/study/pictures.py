@@ -9,8 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.image import Picture, at_most, encode_picture, read_picture, resized, to_u8
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.pictures.image import (
+    Picture,
+    at_most,
+    encode_picture,
+    read_picture,
+    resized,
+    to_u8,
+)
 
 from ..evaluation.error import EvaluationError
 from ..evaluation.pairs import read_pixels

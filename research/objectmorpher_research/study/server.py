@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
-from app.http_server import Handler, HttpServer, Refusal
-from app.remote.server import LOOPBACK
+from objectmorpher.server.address import LOOPBACK
+from objectmorpher.server.http import Handler, HttpServer, Refusal
 
 from ..evaluation.error import EvaluationError
 from .pages import Pages, QuestionError

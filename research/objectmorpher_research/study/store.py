@@ -23,7 +23,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.files import write_all
+from objectmorpher_core.base.files import write_all
 
 from ..evaluation.error import EvaluationError
 from .design import CRITERIA, LEAST, MOST, Item, plan_items

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import Mask
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.lift.crop import planes_of
-from objectmorpher_core.progress import Progress, silent
 
 from .shapes.sample import Sample, make_sample
 

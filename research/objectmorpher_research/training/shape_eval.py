@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift.body import BACK, FRONT, Body
+from objectmorpher_core.base.arrays import F32, F64, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import Crop, rays
-from objectmorpher_core.lift.fusion import fused
-from objectmorpher_core.lift.shape_look import SeenShape
-from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.shape_look import SeenShape
+from objectmorpher_core.lift.relief.silhouette import Silhouette
 
 
 class Surfaces(NamedTuple):

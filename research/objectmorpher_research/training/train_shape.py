@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from objectmorpher_core.progress import Progress, silent
+from objectmorpher_core.base.progress import Progress, silent
 
 from .export_shape import weights_of
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CENTRE, open_file, run, wait_for_jobs
 
-from app import cli
-from app.editor import Editor
-from app.filing import Dialog
-from app.settings import Settings
+from conftest import CENTRE, open_file, run, wait_for_jobs
+from objectmorpher.cli import parser as cli
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.filing import Dialog
+from objectmorpher.editor.settings import Settings
 from objectmorpher_core import models
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 from tests.core.models.small_networks import brightness
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
 from PIL import Image, ImageSequence
 
-from app.commands import run
-from app.editor import Editor
-from app.export_plan import FORMATS, Format, Motion, What
-from app.settings import Settings
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.image import read_picture
+from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.export_plan import FORMATS, Format, Motion, What
+from objectmorpher.editor.settings import Settings
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.pictures.image import read_picture
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_an_object_that_was_not_moved_is_cut_out_of_the_photo(
     editor.exporting.choose_what(What.CUTOUT)
     assert ball.objects[0].mask is not None
     editor.exporting.close()
-    from app.export_functions import _unmoved
+    from objectmorpher.worker.export_functions import _unmoved
 
     cutout = _unmoved(ball, ball.objects[0])
     inside = cutout[..., 3] == 255

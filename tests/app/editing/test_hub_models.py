@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import wait_until
 
-from app.editing import hub_models
-from app.editor import Editor
-from app.gui.hub_rows import GAINS, NAMES, SIZES, STAGES
+from conftest import wait_until
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents import hub_models
+from objectmorpher.gui.dialogs.hub_rows import GAINS, NAMES, SIZES, STAGES
 from objectmorpher_core import models
 from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 

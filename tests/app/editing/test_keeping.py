@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import wait_for_jobs
 from PIL import Image
 
-from app import cli
-from app.commands import next_step, run, why_not
-from app.editor import Editor
-from app.view import ToolName
-from objectmorpher_core import edits
+from conftest import wait_for_jobs
+from objectmorpher.cli import parser as cli
+from objectmorpher.commands import next_step, run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.document import Document, Placement, Prompt
-from objectmorpher_core.pixels import crop
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement, Prompt
 
 STRIP = slice(128, 142)  # columns of the wall that stay in front
 

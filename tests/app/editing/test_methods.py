@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from conftest import wait_until
-
-from app.editor import Editor
-from app.settings import Backends, Settings
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Backends, Settings
 from objectmorpher_core import compose, segment
 
 

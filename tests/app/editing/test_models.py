@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import wait_until
 
-from app.editing.models import NAMES
-from app.editor import Editor
-from app.settings import Settings
+from conftest import wait_until
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.models import NAMES
+from objectmorpher.editor.settings import Settings
 from objectmorpher_core import models
 
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import duplicate, wait_for_jobs
 from PIL import Image
 
-from app.commands import run, why_not
-from app.editor import Editor
-from app.tasks import PLATE
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.session_file import decode_session, encode_session
+from conftest import duplicate, wait_for_jobs
+from objectmorpher.commands import run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.tasks import PLATE
+from objectmorpher.editor.view import ToolName
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import decode_session, encode_session
 
 
 @pytest.fixture

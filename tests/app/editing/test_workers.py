@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from conftest import wait_until
 
-from app.cli import main
-from app.editor import Editor
-from app.settings import Settings
-from objectmorpher_core.lift import worker_file
+from conftest import wait_until
+from objectmorpher.cli.parser import main
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import Settings
+from objectmorpher_core.lift.workers import file as worker_file
 
 WORKER = """
 command = ["{python}", "-c", "raise SystemExit(9)"]

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from app import job_functions
-from app.jobs import Jobs
-from app.remote.alone import Alone
-from app.remote.elsewhere import Elsewhere
-from app.remote.front import Front
-from app.remote.running import Call, Outcome
-from app.remote.server import Address, Server
-from app.remote.table import Served, table
-from objectmorpher_core.arrays import frozen
-from objectmorpher_core.progress import Progress
+from objectmorpher.server.address import Address, Server
+from objectmorpher.server.alone import Alone
+from objectmorpher.server.elsewhere import Elsewhere
+from objectmorpher.server.front import Front
+from objectmorpher.server.running import Call, Outcome
+from objectmorpher.server.table import Served, table
+from objectmorpher.worker import job_functions
+from objectmorpher.worker.jobs import Jobs
+from objectmorpher_core.base.arrays import frozen
+from objectmorpher_core.base.progress import Progress
 
 TOKEN = "a-token-that-is-long-enough"
 

@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
-from app.remote.message import MessageError
-from app.remote.table import Served
-from objectmorpher_core.arrays import F32
-from objectmorpher_core.edits import EditError
-from objectmorpher_core.progress import Progress
+from objectmorpher.server.message import MessageError
+from objectmorpher.server.table import Served
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.edits import EditError
 
 seen: list[str] = []
 

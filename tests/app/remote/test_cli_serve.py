@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import main
-from app.remote.client import hello
-from app.remote.server import Address, Server
-from app.remote.tokens import read_token
+from objectmorpher.cli.parser import main
+from objectmorpher.server.address import Address, Server
+from objectmorpher.server.client import hello
+from objectmorpher.server.tokens import read_token
 
 ROOT = Path(__file__).parents[3]
 
@@ -54,7 +54,7 @@ def test_it_makes_a_token_serves_this_computer_only_and_ends_when_asked(tmp_path
     path = tmp_path / "token"
     environment = {k: v for k, v in os.environ.items() if k != "OBJECTMORPHER_TOKEN"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "app", "serve", "--alone", "--port", "0", "--stages", "inpaint",
+        [sys.executable, "-m", "objectmorpher", "serve", "--alone", "--port", "0", "--stages", "inpaint",
          "--token-file", str(path)],
         cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

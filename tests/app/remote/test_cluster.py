@@ -22,16 +22,16 @@ import numpy as np
 import pytest
 from same_values import same_values
 
-from app import job_functions
-from app.job_functions import Choice, Cut
-from app.remote.client import call, hello
-from app.remote.offers import read_offers
-from app.remote.server import Address, NotServed, ServedError, Server
+from objectmorpher.server.address import Address, NotServed, ServedError, Server
+from objectmorpher.server.client import call, hello
+from objectmorpher.server.offers import read_offers
+from objectmorpher.worker import job_functions
+from objectmorpher.worker.job_functions import Choice, Cut
 from objectmorpher_core import compose
-from objectmorpher_core.arrays import frozen
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Click, LiftSettings, Prompt
-from objectmorpher_core.progress import Cancelled, silent
+from objectmorpher_core.base.arrays import frozen
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.document.model import Click, LiftSettings, Prompt
 
 pytestmark = [
     pytest.mark.slow,
@@ -80,7 +80,7 @@ def serving() -> Iterator[Serving]:
         environment.pop(name, None)
     with (folder / "log").open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "app", "serve", *OPTIONS], cwd=ROOT, env=environment,
+            [sys.executable, "-m", "objectmorpher", "serve", *OPTIONS], cwd=ROOT, env=environment,
             stdout=subprocess.PIPE, stderr=log, text=True,
         )  # fmt: skip
         assert process.stdout is not None

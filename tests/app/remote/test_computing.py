@@ -12,24 +12,24 @@ from pathlib import Path
 import desk as desks
 import numpy as np
 import pytest
-from conftest import lift_ball
 from desk import TOKEN, Desk
 from same_values import same_values
 
-from app import job_functions
-from app.commands import run
-from app.editing.computing import ADDRESS, TOKEN_FILE
-from app.editor import Editor
-from app.remote.client import call
-from app.remote.front import Front
-from app.remote.server import Address, AddressError, Server
-from app.remote.table import table
-from app.remote.tokens import TokenError, is_same, make_token, read_token, write_token
-from app.settings import HERE, SERVER, Settings, read_settings, write_settings
-from objectmorpher_core.arrays import frozen
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Click, LiftSettings, Matte, Prompt
-from objectmorpher_core.progress import silent
+from conftest import lift_ball
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.computing import ADDRESS, TOKEN_FILE
+from objectmorpher.editor.settings import HERE, SERVER, Settings, read_settings, write_settings
+from objectmorpher.server.address import Address, AddressError, Server
+from objectmorpher.server.client import call
+from objectmorpher.server.front import Front
+from objectmorpher.server.table import table
+from objectmorpher.server.tokens import TokenError, is_same, make_token, read_token, write_token
+from objectmorpher.worker import job_functions
+from objectmorpher_core.base.arrays import frozen
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import Click, LiftSettings, Matte, Prompt
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_a_job_goes_to_the_server_and_answers_as_here(desk: Desk, fill: tuple) -
 
 
 def test_every_served_function_answers_as_here(desk: Desk, fill: tuple) -> None:
-    from objectmorpher_core.compose.repair import Patch
+    from objectmorpher_core.compose.plate.repair import Patch
 
     pixels, hole, choice, _ = fill
     assert desk.server is not None

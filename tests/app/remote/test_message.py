@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from same_values import same_values
 
-from app.job_functions import Choice, Cut
-from app.remote.answers import is_sound
-from app.remote.message import LARGE, MessageError, MissingError, decode, encode
-from app.remote.table import table, types
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Click, LiftSettings, Matte, Plate, Prompt
-from objectmorpher_core.hint import Hint
+from objectmorpher.server.answers import is_sound
+from objectmorpher.server.message import LARGE, MessageError, MissingError, decode, encode
+from objectmorpher.server.table import table, types
+from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.model import Click, LiftSettings, Matte, Plate, Prompt
 from objectmorpher_core.segment import Found
 
 RANDOM = np.random.default_rng(3)
@@ -232,7 +232,7 @@ def test_answers_whose_parts_fit_are_believed() -> None:
 
 
 def test_everything_served_is_a_job_function_by_its_own_name() -> None:
-    from app import job_functions
+    from objectmorpher.worker import job_functions
 
     for name, row in table().items():
         assert getattr(job_functions, name) is row.function

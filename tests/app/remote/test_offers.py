@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 from desk import TOKEN, Desk
-from hands import PATIENCE
 
-from app.editor import Editor
-from app.remote.client import hello
-from app.remote.offers import Offer, look_at_offers, read_offers
-from app.settings import SERVER
+from hands import PATIENCE
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.settings import SERVER
+from objectmorpher.server.client import hello
+from objectmorpher.server.offers import Offer, look_at_offers, read_offers
 from objectmorpher_core import compose, segment
 
 

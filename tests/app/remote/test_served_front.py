@@ -15,14 +15,14 @@ import pytest
 import served_jobs
 from test_message import HOSTILE
 
-from app.remote import client
-from app.remote.alone import Alone
-from app.remote.client import hello
-from app.remote.front import Front, Limits
-from app.remote.message import LARGE, digest, encode
-from app.remote.server import Address, ServedError, Server, ServerLost
-from app.remote.table import types
-from objectmorpher_core.progress import Cancelled, silent
+from objectmorpher.server import client
+from objectmorpher.server.address import Address, ServedError, Server, ServerLost
+from objectmorpher.server.alone import Alone
+from objectmorpher.server.client import hello
+from objectmorpher.server.front import Front, Limits
+from objectmorpher.server.message import LARGE, digest, encode
+from objectmorpher.server.table import types
+from objectmorpher_core.base.progress import Cancelled, silent
 
 TOKEN = "a-token-that-is-long-enough"
 MOST = 4 << 20  # bytes of a request

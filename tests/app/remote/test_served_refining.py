@@ -11,16 +11,16 @@ import pytest
 from desk import Desk
 from same_values import same_values
 
-from app import job_functions
-from app.remote.answers import is_sound
-from app.remote.client import call
-from app.remote.offers import Offer
-from app.remote.server import ServerLost
-from objectmorpher_core.arrays import F32, RGB, frozen
+from objectmorpher.server.address import ServerLost
+from objectmorpher.server.answers import is_sound
+from objectmorpher.server.client import call
+from objectmorpher.server.offers import Offer
+from objectmorpher.worker import job_functions
+from objectmorpher_core.base.arrays import F32, RGB, frozen
+from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.refine.refinement import CoarseEdit
-from objectmorpher_core.progress import Progress, silent
-from objectmorpher_core.refining import Refining
+from objectmorpher_core.scripting.refining import Refining
 
 
 class Dimming:

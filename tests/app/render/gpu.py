@@ -21,6 +21,6 @@ def context() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def splat_pass(context: Any) -> Any:
-    from app.render.splat_pass import SplatPass
+    from objectmorpher.render.splat_pass import SplatPass
 
     return SplatPass(context)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F32
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import Handle, Pose
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Handle, Pose
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels
@@ -64,7 +64,7 @@ def make_renderer(
     """A renderer whose window is a framebuffer of `size` px."""
     import moderngl
 
-    from app.render.renderer import Renderer
+    from objectmorpher.render.renderer import Renderer
 
     window = context.framebuffer([context.texture(size, 4)])
     monkeypatch.setattr(moderngl, "create_context", lambda **_: context)

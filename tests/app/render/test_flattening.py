@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.blend import CELL
-from app.layers import Layer
-from app.render.scene import Hatch, Scene
-from app.view import View
-from objectmorpher_core.document import Plate
+from objectmorpher.canvas.blend import CELL
+from objectmorpher.canvas.layers import Layer
+from objectmorpher.editor.view import View
+from objectmorpher.render.scene import Hatch, Scene
+from objectmorpher_core.document.model import Plate
 from tests.app.render.pictures import make_renderer
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
@@ -68,7 +68,7 @@ def _shown(renderer, scene: Scene, view: View, is_emulated: bool) -> np.ndarray:
 
 def _both(renderer, monkeypatch, scene: Scene, view: View) -> tuple[np.ndarray, np.ndarray, int]:
     """The window by the processor and by the shaders, and how often the first was asked."""
-    from app.render import flattening
+    from objectmorpher.render import flattening
 
     calls = []
     flatten = flattening.flatten

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.derived import Derived
-from app.fronts import Fronts
-from app.gui.scenes import OF_THE_PHOTO
-from app.layers import Layer, is_front
-from app.render.scene import Scene, SplatObject
-from app.view import View
-from objectmorpher_core import edits, front_edits
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.fronts import Fronts
+from objectmorpher.canvas.layers import Layer, is_front
+from objectmorpher.editor.view import View
+from objectmorpher.gui.window.scenes import OF_THE_PHOTO
+from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Document, Placement, Prompt
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document.model import Document, Placement, Prompt
 from objectmorpher_core.pipeline import cut_front, make_plate
 from tests import shapes
 from tests.app.render.pictures import make_renderer

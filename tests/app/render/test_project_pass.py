@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F32
+from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import columns as p
 from objectmorpher_core.raster.depth_order import depth_order
 from objectmorpher_core.raster.posed import PosedSplats
@@ -33,8 +33,8 @@ NEARLY_NOTHING = 1e-6  # what is left of a difference that is 0
 
 @pytest.fixture(scope="module")
 def project_pass(context):
-    from app.render.gpu_memory import Uploads
-    from app.render.project_pass import ProjectPass
+    from objectmorpher.render.gpu_memory import Uploads
+    from objectmorpher.render.project_pass import ProjectPass
 
     context.framebuffer([context.texture((1, 1), 4)]).use()
     return ProjectPass(context, Uploads())
@@ -136,7 +136,7 @@ def test_rows_come_in_the_order_that_is_given(project_pass):
 
 @pytest.mark.parametrize("motion", ["none", "given", "skin"])
 def test_depths_are_those_that_the_rasterisers_sort_by(motion):
-    from app.render.view_depths import near_to_far, view_depths
+    from objectmorpher.render.view_depths import near_to_far, view_depths
 
     if motion == "given":
         splats, _ = shapes.random_splats(0, "classic", False)

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.derived import Derived
-from app.gui.scenes import REFINED
-from app.render.scene import Scene, SplatObject
-from app.view import View
-from objectmorpher_core import edits, refine_edits
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.editor.view import View
+from objectmorpher.gui.window.scenes import REFINED
+from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Document, Placement
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.refinement import Refined
 from objectmorpher_core.pipeline import make_plate
-from objectmorpher_core.refined import Refined
 from tests import shapes
 from tests.app.render.pictures import make_renderer
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.derived import Derived
-from app.render.scene import Scene, SplatObject
-from app.view import View
-from objectmorpher_core import edits
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.editor.view import View
+from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Placement
-from objectmorpher_core.joining import Shadow
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified
@@ -81,7 +81,7 @@ def test_of_an_object_that_is_gone_nothing_stays_on_the_gpu(renderer):
 
 
 def test_where_the_driver_cannot_the_processor_draws(renderer, monkeypatch, caplog):
-    from app.render import layered_pass
+    from objectmorpher.render import layered_pass
 
     def refuse(*_):
         raise moderngl.Error("the framebuffer is not complete\nand much else")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
 from tests import shapes
 from tests.app.render.pictures import bent, pixels_of, rendered, specified
@@ -130,7 +130,7 @@ def test_a_painted_object_shows_its_colours(splat_pass):
 
 
 def test_a_picture_larger_than_the_targets_is_drawn_in_bands(splat_pass, monkeypatch):
-    from app.render import layered_pass
+    from objectmorpher.render import layered_pass
 
     scene = shapes.scene("star", 800)
     splats = scene.puppet.posed(None, Placement(turn=(35.0, -20.0, 15.0)))
@@ -186,7 +186,7 @@ def test_a_view_of_one_pixel_draws_it(splat_pass):
 
 
 def test_what_is_not_drawn_any_more_is_released(context):
-    from app.render.splat_pass import SplatPass
+    from objectmorpher.render.splat_pass import SplatPass
 
     own = SplatPass(context)
     scene, pose = bent("star", 800, 0.5)
@@ -205,7 +205,7 @@ def test_what_is_not_drawn_any_more_is_released(context):
 
 
 def test_a_photo_too_large_for_the_driver_is_halved(context, caplog):
-    from app.render.splat_pass import SplatPass
+    from objectmorpher.render.splat_pass import SplatPass
 
     scene = shapes.scene("ellipse", 2000)  # its crop is 122 px wide
     splats = scene.puppet.posed(None, Placement())
@@ -220,7 +220,7 @@ def test_a_photo_too_large_for_the_driver_is_halved(context, caplog):
 
 
 def test_only_what_is_looked_at_is_uploaded_and_the_picture_is_the_same(context):
-    from app.render.splat_pass import SplatPass
+    from objectmorpher.render.splat_pass import SplatPass
 
     scene = shapes.scene("ellipse", 2000)
     splats = scene.puppet.posed(None, Placement((10.0, 5.0), turn=(20.0, 0.0, 0.0)))
@@ -248,8 +248,8 @@ def _never() -> None:
 DRAW = """
 import sys
 import moderngl, numpy as np
-from app.render.splat_pass import SplatPass
-from objectmorpher_core.document import Placement
+from objectmorpher.render.splat_pass import SplatPass
+from objectmorpher_core.document.model import Placement
 from tests import shapes
 from tests.app.render.pictures import bent, rendered
 context = moderngl.create_standalone_context(require=330, backend="egl")

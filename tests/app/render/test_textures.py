@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from app.render.textures import PictureTexture
-from objectmorpher_core.brush import Brush
+from objectmorpher.render.textures import PictureTexture
+from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.segment.mask_painting import MaskPainting
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures

@@ -7,16 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.commands import run, why_not
-from app.editor import Editor
-from app.pose_view import PoseMode, PoseView
-from app.tools.pointer import Button, Pointer
-from app.tools.pose_tool import PoseTool
-from app.view import ToolName
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.brush import Brush
-from objectmorpher_core.document import Document
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher.commands import run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.pose_view import PoseMode, PoseView
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.pointer import Button, Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.brush import Brush
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.file import decode_session, encode_session
 
 STAYS = 1e-6  # object units
 TOOL = PoseTool()

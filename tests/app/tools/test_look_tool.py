@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strokes import stroke
 
-from app.commands import COMMANDS, next_step, run, why_not
-from app.editor import Editor
-from app.tools.look_tool import LookTool
-from app.tools.pointer import TURN_SPEED
-from app.view import STEEPEST, Shown, ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher.commands import COMMANDS, next_step, run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import STEEPEST, Shown, ToolName
+from objectmorpher.tools.look_tool import LookTool
+from objectmorpher.tools.pointer import TURN_SPEED
+from objectmorpher_core.base.rotations import turn_matrix
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from strokes import stroke
 
 PLACED = Placement(move=(20.0, 5.0), depth=0.3, turn=(10.0, 20.0, 30.0), scale=0.8)
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import duplicate
 
-from app.commands import run
-from app.editor import Editor
-from app.tools.pointer import Button, Pointer, Shape, Tool
-from app.tools.registry import TOOLS
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document
+from conftest import duplicate
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.pointer import Button, Pointer, Shape, Tool
+from objectmorpher.tools.registry import TOOLS
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document
 
 FIRST, BOTH, SECOND, BESIDE = (75.0, 100.0), (115.0, 75.0), (155.0, 72.0), (12.0, 12.0)  # px
 LEFT = (-40.0, -10.0)  # px that the objects are moved

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from strokes import move, press, release
 
-from app.commands import run, why_not
-from app.editor import Editor
-from app.tools.gizmo import TURNS, gizmo
-from app.tools.place_tool import PlaceTool, wrapped
-from app.tools.pointer import Pointer, Shape
-from app.view import ToolName
-from objectmorpher_core import edits
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.placements import centre_of
+from objectmorpher.commands import run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.gizmo import TURNS, gizmo
+from objectmorpher.tools.place_tool import PlaceTool, wrapped
+from objectmorpher.tools.pointer import Pointer, Shape
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.placement import centre_of
+from strokes import move, press, release
 
 PIXEL = 1.0  # canvas px
 EXACT = 1e-6

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.tools.pointer import Button, Hand, Pointer, Stroke, draw_box
+from objectmorpher.tools.pointer import Button, Hand, Pointer, Stroke, draw_box
 
 DOWN = Pointer(1, 2, is_down=True)
 UP = Pointer(3, 4, is_down=False)

@@ -6,17 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from conftest import CENTRE, RADII
-from strokes import move, press, release
 
-from app.commands import run
-from app.editor import Editor
-from app.pose_view import PoseView
-from app.tools.pointer import Pointer
-from app.tools.pose_tool import RING, PoseTool
-from app.view import ToolName
-from objectmorpher_core.document import Document
-from objectmorpher_core.rotations import matrix_from_vector
+from conftest import CENTRE, RADII
+from objectmorpher.commands import run
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.pose_view import PoseView
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pose_tool import RING, PoseTool
+from objectmorpher_core.base.rotations import matrix_from_vector
+from objectmorpher_core.document.model import Document
+from strokes import move, press, release
 
 PIXEL = 1.0  # canvas px
 TOOL = PoseTool()

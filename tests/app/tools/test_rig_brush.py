@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import CENTRE
-from strokes import press, stroke
 
-from app.editing.rigging import gaps_to_way
-from app.editor import Editor
-from app.pose_view import PoseMode, PoseView
-from app.tools.pointer import Pointer
-from app.tools.pose_tool import PoseTool
-from app.view import ToolName
-from objectmorpher_core.brush import Brush
+from conftest import CENTRE
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.rigging import gaps_to_way
+from objectmorpher.editor.pose_view import PoseMode, PoseView
+from objectmorpher.editor.view import ToolName
+from objectmorpher.tools.pointer import Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
-from objectmorpher_core.document import Document
+from objectmorpher_core.document.model import Document
+from strokes import press, stroke
 
 RADIUS = 8.0  # px, of the brush
 TOOL = PoseTool()

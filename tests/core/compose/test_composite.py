@@ -13,12 +13,12 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
+from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.compose import composite as composite_module
 from objectmorpher_core.compose.composite import Composite, composite, straight_cutout
-from objectmorpher_core.compose.plate import hole_margin
-from objectmorpher_core.document import Document, Placement, Pose
-from objectmorpher_core.progress import Cancelled
+from objectmorpher_core.compose.plate.plate import hole_margin
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement, Pose
 from tests import shapes
 
 MOVES = {

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import skimage.data
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose import composite as composing
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.defocus import blurred
-from objectmorpher_core.compose.sharpness import measure_blur
-from objectmorpher_core.document import Placement
+from objectmorpher_core.compose.light.defocus import blurred
+from objectmorpher_core.compose.light.sharpness import measure_blur
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement
 from tests import focussed, shapes
 
 

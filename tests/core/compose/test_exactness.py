@@ -8,18 +8,18 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.lighting import object_texture
-from objectmorpher_core.compose.old_shadow import traceless_plate
-from objectmorpher_core.compose.plate import hole_margin, plate_cover
-from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.document import Document, EditObject, Photo, Placement, Prompt
-from objectmorpher_core.image import Picture
-from objectmorpher_core.joining import Shadow
+from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.compose.plate.plate import hole_margin, plate_cover
+from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
+from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+from objectmorpher_core.deform.puppet import Puppet, puppet_of
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Document, EditObject, Photo, Placement, Prompt
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
-from objectmorpher_core.puppet import Puppet, puppet_of
 from objectmorpher_core.raster.texture import TextureLevels
 from tests.outlines import silhouette
 from tests.photos import NAMES, photo

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite, straight_cutout
-from objectmorpher_core.compose.plate import plate_cover
-from objectmorpher_core.document import Document, Photo, Placement
-from objectmorpher_core.image import Picture
+from objectmorpher_core.compose.plate.plate import plate_cover
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Photo, Placement
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import make_plate
-from objectmorpher_core.puppet import Puppet
 from tests import shapes
 
 WIDTH, HEIGHT = 320, 160  # px

@@ -8,18 +8,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, front_edits
+from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import layers
 from objectmorpher_core.compose.order import reordered, stack
-from objectmorpher_core.compose.plate import build_plate, plate_cover, plate_picture
-from objectmorpher_core.document import Document, Placement, Prompt
-from objectmorpher_core.edits import EditError
+from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.model import Document, Placement, Prompt
 from objectmorpher_core.pipeline import cut_front
-from objectmorpher_core.pixels import crop, unit_pixels
-from objectmorpher_core.puppet import puppet_of
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
 WIDTH, HEIGHT = 320, 120

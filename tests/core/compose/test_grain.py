@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.grain import Grain, find_grain, sketch_grain
-from objectmorpher_core.compose.noise import BANDS, TILE, Noise, find_noise
-from objectmorpher_core.document import DeformSettings, Document, Placement
-from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.session_file import SessionError, decode_session, encode_session
+from objectmorpher_core.compose.light.grain import Grain, find_grain, sketch_grain
+from objectmorpher_core.compose.light.noise import BANDS, TILE, Noise, find_noise
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import DeformSettings, Document, Placement
+from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 
 WIDTH, HEIGHT = 320, 200  # px
@@ -119,7 +119,7 @@ def test_a_move_by_nothing_asks_for_nothing():
 
 
 def puppet_texture(document: Document):
-    from objectmorpher_core.compose.lighting import object_texture
+    from objectmorpher_core.compose.light.lighting import object_texture
 
     matte = document.objects[0].matte
     assert matte is not None

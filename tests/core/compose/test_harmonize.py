@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.harmonize import LEAST, MOST, NEUTRAL, light_gain, light_map
-from objectmorpher_core.compose.shadow import GAMMA
+from objectmorpher_core.compose.light.harmonize import LEAST, MOST, NEUTRAL, light_gain, light_map
+from objectmorpher_core.compose.shadow.shadow import GAMMA
 from objectmorpher_core.compose.silhouette import Silhouette, sketch
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement
 from tests import shapes
 
 

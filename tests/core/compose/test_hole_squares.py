@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.compose.hole_squares import fill_squares, squares
-from objectmorpher_core.progress import silent
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.compose.plate.hole_squares import fill_squares, squares
 
 SIDE = 64  # px that the network sees
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import BACKENDS, InpaintError, load
-from objectmorpher_core.progress import Cancelled, silent
 from tests.core.compose import tiny_inpainters
 
 LEARNED = tiny_inpainters.FAMILIES

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import Pixels
+from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
-from objectmorpher_core.document import Document, Photo, Placement
-from objectmorpher_core.image import Picture
-from objectmorpher_core.joining import Shadow
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Document, Photo, Placement
+from objectmorpher_core.pictures.image import Picture
 from tests import shapes
 
 OFF = 2.0  # of 255: each of the layers is rounded

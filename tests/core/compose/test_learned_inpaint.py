@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.compose import InpaintError, inpaint_onnx, inpaint_pixelhacker, load
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.compose import InpaintError, load
+from objectmorpher_core.compose.plate import inpaint_onnx, inpaint_pixelhacker
 from objectmorpher_core.models import ModelError, device
 from objectmorpher_core.models.tensors_only import take_tensors
-from objectmorpher_core.progress import Cancelled, silent
 from tests.core.compose import tiny_inpainters
 from tests.core.models.local_hub import serving
 
@@ -46,7 +47,7 @@ def pixelhacker(tmp_path, monkeypatch) -> Path:
 def test_chunks_are_the_recurrence(length, closed):
     """Also where gates are all but shut, whose cumulative logarithm no float32 can invert."""
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.pixelhacker.linear_attention import chunked, recurrence
+    from objectmorpher_core.compose.plate.pixelhacker.linear_attention import chunked, recurrence
 
     random = torch.Generator().manual_seed(length)
     q, k, logits = torch.randn(3, 2, 3, length, 5, generator=random)
@@ -58,7 +59,7 @@ def test_chunks_are_the_recurrence(length, closed):
 
 def test_pairs_in_portions_are_the_same(monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.pixelhacker import linear_attention as attention
+    from objectmorpher_core.compose.plate.pixelhacker import linear_attention as attention
 
     q, k, g = torch.randn(3, 1, 2, 70, 4, generator=torch.Generator().manual_seed(0))
     once = attention.chunked(q, k, q, -g.abs())
@@ -70,7 +71,7 @@ def test_keys_and_shapes_are_the_published_ones():
     """As the published classes name them, with the published configuration: 862 M numbers."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("diffusers")
-    from objectmorpher_core.compose.pixelhacker.network import PUBLISHED, build
+    from objectmorpher_core.compose.plate.pixelhacker.network import PUBLISHED, build
 
     def flat(tree: dict, path: str = "") -> dict[str, str]:
         found = {}
@@ -116,9 +117,9 @@ def test_each_step_is_told_and_can_be_the_last(pixelhacker, view, hole):
 
 def test_bfloat16_invents_nearly_the_same(pixelhacker):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.pixelhacker.network import load as load_network
-    from objectmorpher_core.compose.pixelhacker.network import load_codec
-    from objectmorpher_core.compose.pixelhacker.sampler import sample
+    from objectmorpher_core.compose.plate.pixelhacker.network import load as load_network
+    from objectmorpher_core.compose.plate.pixelhacker.network import load_codec
+    from objectmorpher_core.compose.plate.pixelhacker.sampler import sample
 
     codec = load_codec(pixelhacker / "vae", "cpu")
     weights = pixelhacker / "diffusion_pytorch_model.safetensors"
@@ -135,7 +136,7 @@ def test_bfloat16_invents_nearly_the_same(pixelhacker):
 
 def test_the_masks_cells_are_whole():
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.pixelhacker.sampler import in_cells
+    from objectmorpher_core.compose.plate.pixelhacker.sampler import in_cells
 
     mask = torch.zeros(1, 1, 32, 32)
     mask[..., 13, 13] = 1
@@ -145,7 +146,7 @@ def test_the_masks_cells_are_whole():
 
 def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, hole, monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.pixelhacker import network
+    from objectmorpher_core.compose.plate.pixelhacker import network
 
     least = device.Plan("cpu", "float32", "cpu", "8.0 GB free")
     first = device.Plan("cpu", "bfloat16", "whole", "0.1 GB free")

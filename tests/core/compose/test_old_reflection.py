@@ -8,13 +8,13 @@ import pytest
 from skimage import data
 
 from objectmorpher_core.compose import load
-from objectmorpher_core.compose.old_reflection import without_reflection
-from objectmorpher_core.compose.old_shadow import traceless_plate
-from objectmorpher_core.compose.reflection_fit import find_old_reflection
-from objectmorpher_core.document import Matte
+from objectmorpher_core.compose.shadow.old_reflection import without_reflection
+from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
+from objectmorpher_core.compose.shadow.reflection_fit import find_old_reflection
+from objectmorpher_core.document.model import Matte
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.script import script_from
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.scripting.script import script_from
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.core.segment.truth_masks import truth, truth_mask
 from tests.photos import photo

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from skimage import data
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.old_shadow import OldShadow, traceless_plate, without_shadow
-from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.document import Matte, Placement
+from objectmorpher_core.compose.shadow.old_shadow import OldShadow, traceless_plate, without_shadow
+from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Matte, Placement
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.script import script_from
+from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 from tests.shadowed import DARK, HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
 

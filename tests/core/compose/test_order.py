@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.order import back_to_front, leaves_a_hole, reordered, stack
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.puppet import puppet_of
+from objectmorpher_core.deform.puppet import puppet_of
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.raster.posed import PosedSplats
 from tests import shapes
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import compose
-from objectmorpher_core.arrays import Mask, Pixels
-from objectmorpher_core.compose.plate import (
+from objectmorpher_core.base.arrays import Mask, Pixels
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.compose.plate.plate import (
     SEAM,
     build_plate,
     hole_margin,
@@ -18,8 +19,7 @@ from objectmorpher_core.compose.plate import (
     plate_crop,
     plate_picture,
 )
-from objectmorpher_core.document import Plate
-from objectmorpher_core.progress import Progress
+from objectmorpher_core.document.model import Plate
 from tests import shapes
 
 DISC = shapes.mask("disc")

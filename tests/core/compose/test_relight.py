@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.light_estimate import ABOVE, estimate_light
-from objectmorpher_core.compose.relight import LEAST, MOST, Relit, relight, turned_normals
+from objectmorpher_core.compose.light.light_estimate import ABOVE, estimate_light
+from objectmorpher_core.compose.light.relight import LEAST, MOST, Relit, relight, turned_normals
 from objectmorpher_core.compose.silhouette import sampled
-from objectmorpher_core.document import Placement
-from objectmorpher_core.session_file import SessionError, decode_session, encode_session
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 from tests.outlines import silhouette
 

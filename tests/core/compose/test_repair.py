@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core import compose, edits
-from objectmorpher_core.brush import Brush, Stroke
+from objectmorpher_core import compose
+from objectmorpher_core.base.brush import Brush, Stroke
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.plate import hole_margin, plate_picture
-from objectmorpher_core.compose.repair import (
+from objectmorpher_core.compose.plate.plate import hole_margin, plate_picture
+from objectmorpher_core.compose.plate.repair import (
     THUMB,
     fill_patch,
     patch_of,
@@ -20,8 +20,9 @@ from objectmorpher_core.compose.repair import (
     thumbnail,
     with_patch,
 )
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
 MARGIN = hole_margin(shapes.WIDTH, shapes.HEIGHT)

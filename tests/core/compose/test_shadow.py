@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.lighting import stand
-from objectmorpher_core.compose.shadow import Standing, cast, ground_normal
+from objectmorpher_core.compose.light.lighting import stand
+from objectmorpher_core.compose.shadow.shadow import Standing, cast, ground_normal
 from objectmorpher_core.compose.silhouette import sampled
-from objectmorpher_core.document import Document, Placement
-from objectmorpher_core.joining import Shadow
-from objectmorpher_core.session_file import SessionError, decode_session, encode_session
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 from tests.outlines import silhouette, standing, upright
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from skimage import data
 
-from objectmorpher_core.compose.old_shadow import without_shadow
-from objectmorpher_core.compose.shadow_fit import find_old_shadow
-from objectmorpher_core.document import Matte
-from objectmorpher_core.image import read_picture
+from objectmorpher_core.compose.shadow.old_shadow import without_shadow
+from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
+from objectmorpher_core.document.model import Matte
+from objectmorpher_core.pictures.image import read_picture
 
 BOWL = Path(__file__).parents[3] / "assets" / "samples" / "bowl.jpg"
 WIDTH, HEIGHT = 300, 240

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from objectmorpher_core.compose.silhouette import sampled, sketch
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from tests import shapes
 from tests.outlines import silhouette
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from objectmorpher_core.arrays import F64 as Array
+from objectmorpher_core.base.arrays import F64 as Array
 from objectmorpher_core.deform.anderson import Anderson
 from objectmorpher_core.deform.arap import ArapSolver, minimise
 from objectmorpher_core.deform.constraints import Constraints, Targets

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.arap import ArapSolver, Minimum, minimise
 from objectmorpher_core.deform.constraints import Constraints, Targets
 from objectmorpher_core.deform.graph import build_graph

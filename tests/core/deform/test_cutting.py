@@ -6,8 +6,8 @@ import numpy as np
 
 from objectmorpher_core.deform.cutting import sides_of_cut
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings
-from objectmorpher_core.rig import Rig, Seam
+from objectmorpher_core.document.model import DeformSettings
+from objectmorpher_core.document.rig import Rig, Seam
 from tests import shapes
 
 BAR = shapes.capsule()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.deformer import ANCHORED_SHARE, Deformer
-from objectmorpher_core.document import DeformSettings, Handle
+from objectmorpher_core.document.model import DeformSettings, Handle
 from tests import shapes
 
 F64 = 1e-9

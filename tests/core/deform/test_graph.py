@@ -13,8 +13,8 @@ from objectmorpher_core.deform.graph import (
     Graph,
     build_graph,
 )
-from objectmorpher_core.document import DeformSettings
-from objectmorpher_core.rig import Seam
+from objectmorpher_core.document.model import DeformSettings
+from objectmorpher_core.document.rig import Seam
 from tests import shapes
 
 F64 = 1e-9

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings, Document, Handle, Pose
-from objectmorpher_core.pose import turn_at
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import DeformSettings, Document, Handle, Pose
+from objectmorpher_core.document.pose import turn_at
 from tests import shapes
 
 BAR = shapes.capsule()

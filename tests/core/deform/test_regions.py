@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.document import DeformSettings, Handle, LiftedObject, Pose
-from objectmorpher_core.rig import Rig, Seam
+from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObject, Pose
+from objectmorpher_core.document.rig import Rig, Seam
 from tests import shapes
 
 EXACT = 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.constraints import HeldResponse, Patch
 from objectmorpher_core.deform.response import (
     DenseResponse,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from objectmorpher_core.base.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
 from objectmorpher_core.deform.binding import Binding, bind
 from objectmorpher_core.deform.graph import build_graph
 from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
 from objectmorpher_core.deform.skinning import Motion, Skinned, coupling, skin
-from objectmorpher_core.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
 from tests import shapes
 
 F64 = 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.splitting import MOST_PIECES, split_stretched
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
 from tests import shapes
 
 F32 = 1e-5

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.graph import build_graph
 from objectmorpher_core.deform.strain import measure_strain
-from objectmorpher_core.document import Pose
+from objectmorpher_core.document.model import Pose
 from tests import shapes
 
 EXACT = 1e-9

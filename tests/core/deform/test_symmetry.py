@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.deform.symmetry import find_mirror, plane_through
-from objectmorpher_core.rotations import matrix_from_vector
 from tests import shapes
 
 DEGREE = 1.0

@@ -9,12 +9,12 @@ from functools import cache
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.lift.placement_view import Target
-from objectmorpher_core.poisson_disk import thin_to_spacing
-from objectmorpher_core.rotations import quats_along
+from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.poisson_disk import thin_to_spacing
+from objectmorpher_core.base.rotations import quats_along
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.lift.registration.view import Target
 from tests import shapes
 
 WIDTH, HEIGHT = 240, 180  # px

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.base.camera import Camera
 
 SHIFT = 6  # binary digits of a pixel in which polygons are drawn
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift.body import BACK, FRONT, MIDDLE, Body
-from objectmorpher_core.lift.mirror import MirrorAxis
-from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
+from objectmorpher_core.lift.relief.mirror import MirrorAxis
+from objectmorpher_core.lift.relief.silhouette import Silhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder
 

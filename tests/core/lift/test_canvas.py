@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Matte
-from objectmorpher_core.lift.canvas import LEAST_SIDE, Canvas
+from objectmorpher_core.document.model import Matte
+from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, Canvas
 
 F32 = 1e-5
 HEIGHT, WIDTH = 3 * LEAST_SIDE + 1, 5 * LEAST_SIDE // 2

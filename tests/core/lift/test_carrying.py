@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, rig_edits
-from objectmorpher_core.document import Click, Document, LiftedObject, LiftSettings, Prompt
-from objectmorpher_core.edits import EditError
+from objectmorpher_core.document import edits, rig_edits
+from objectmorpher_core.document.edits import EditError
+from objectmorpher_core.document.model import Click, Document, LiftedObject, LiftSettings, Prompt
+from objectmorpher_core.document.rig import Rig
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.rig import Rig
 from tests import shapes
 
 thicknesses = pytest.mark.parametrize("thickness", [0.3, 1.8])

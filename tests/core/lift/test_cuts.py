@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift.body import FRONT, Body
-from objectmorpher_core.lift.cuts import REACH, find_cuts
-from objectmorpher_core.lift.fusion import fused
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.spreading import spread
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift.relief.body import FRONT, Body
+from objectmorpher_core.lift.relief.cuts import REACH, find_cuts
+from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.spreading import spread
 from objectmorpher_research.training.shapes.sample import make_sample
 from tests.core.lift.test_fusion import SIDE, camera_of, truth
 

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.document import LiftedObject, LiftSettings
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import LiftedObject, LiftSettings
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.body import BACK, FRONT, MIDDLE, Body
-from objectmorpher_core.lift.depth_look import box_around
-from objectmorpher_core.lift.depth_prior import Seen, align, follow, membrane
-from objectmorpher_core.lift.relief import ReliefLifter
-from objectmorpher_core.lift.rethicken import with_thickness
-from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
+from objectmorpher_core.lift.relief.depth_look import box_around
+from objectmorpher_core.lift.relief.depth_prior import Seen, align, follow, membrane
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
+from objectmorpher_core.lift.relief.rethicken import with_thickness
+from objectmorpher_core.lift.relief.silhouette import Silhouette
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.progress import silent
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.core.models.small_networks import brightness, constant
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftSettings
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.body import BACK, FRONT, Body
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
-from objectmorpher_core.lift.fusion import fused
-from objectmorpher_core.lift.relief import ReliefLifter
-from objectmorpher_core.lift.shape_look import SeenShape
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.progress import silent
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
+from objectmorpher_core.lift.relief.shape_look import SeenShape
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.segment.matting.matte import build_matte
 from objectmorpher_research.training import shape_eval
 from objectmorpher_research.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
 from objectmorpher_research.training.shapes.sample import Sample, make_sample

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.compose.composite import composite, object_texture
-from objectmorpher_core.document import (
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import (
     DeformSettings,
     Document,
     EditObject,
@@ -19,15 +21,13 @@ from objectmorpher_core.document import (
     Photo,
     Placement,
 )
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.image import Picture
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.imported import lift_imported
-from objectmorpher_core.lift.placement import Proposal, Registrar
+from objectmorpher_core.lift.registration.imported import lift_imported
+from objectmorpher_core.lift.registration.placement import Proposal, Registrar
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import export
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster.reference_layers import Picture3D
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
 from tests.core.lift import registered
 from tests.core.lift.registered import Scene

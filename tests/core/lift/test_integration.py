@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.lift.crop import rays
-from objectmorpher_core.lift.integration import integrated
+from objectmorpher_core.lift.relief.integration import integrated
 
 SIDE = 96
 TANGENTS = np.array([0.2, -0.1, 0.5], np.float32)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import Mask
-from objectmorpher_core.lift.silhouette import GRID, Silhouette, lower_hull
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.lift.relief.silhouette import GRID, Silhouette, lower_hull
 from tests import shapes
 
 EXACT = 1e-9

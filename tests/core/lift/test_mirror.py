@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F32
-from objectmorpher_core.document import Matte
-from objectmorpher_core.lift.canvas import Canvas
-from objectmorpher_core.lift.mirror import MirrorAxis, find_axis
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.document.model import Matte
+from objectmorpher_core.lift.relief.canvas import Canvas
+from objectmorpher_core.lift.relief.mirror import MirrorAxis, find_axis
 
 EXACT = 1e-9
 SIZE = 240  # px

@@ -8,19 +8,31 @@ from functools import cache
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.placement import NOISE, Hints, Registrar, Registration, register
-from objectmorpher_core.lift.placement_search import angles, spread_rotations
-from objectmorpher_core.lift.placement_view import Stance, Target, towards
-from objectmorpher_core.lift.sketch import COLOR, COVERAGE, even_surfels, own_frame, sketch
-from objectmorpher_core.progress import Cancelled
-from objectmorpher_core.rotations import (
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import Cancelled
+from objectmorpher_core.base.rotations import (
     matrices_from_quats,
     matrix_from_vector,
     quats_from_matrices,
 )
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.lift import LiftError
+from objectmorpher_core.lift.registration.placement import (
+    NOISE,
+    Hints,
+    Registrar,
+    Registration,
+    register,
+)
+from objectmorpher_core.lift.registration.search import angles, spread_rotations
+from objectmorpher_core.lift.registration.sketch import (
+    COLOR,
+    COVERAGE,
+    even_surfels,
+    own_frame,
+    sketch,
+)
+from objectmorpher_core.lift.registration.view import Stance, Target, towards
 from tests import shapes
 from tests.core.lift import registered
 

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.lift.placement import Hints, Registrar, register
-from objectmorpher_core.lift.placement_matches import LEAST, NEAR, Matches, alike
-from objectmorpher_core.rotations import matrix_from_vector
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.rotations import matrix_from_vector
+from objectmorpher_core.lift.registration.matches import LEAST, NEAR, Matches, alike
+from objectmorpher_core.lift.registration.placement import Hints, Registrar, register
 from tests.core.lift import registered
 from tests.core.lift.registered import CAMERA, Body, Scene
 

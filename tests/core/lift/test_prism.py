@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift.body import FRONT, Body
-from objectmorpher_core.lift.prism import Sides, find_prism
-from objectmorpher_core.lift.silhouette import Silhouette
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift.relief.body import FRONT, Body
+from objectmorpher_core.lift.relief.prism import Sides, find_prism
+from objectmorpher_core.lift.relief.silhouette import Silhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder, figure
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftedObject, LiftSettings
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import Cancelled
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.document.model import LiftedObject, LiftSettings
 from objectmorpher_core.lift import BACKENDS, LiftError, load
-from objectmorpher_core.lift.body import BACK, FRONT, Body
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.thickness import FULLNESS, RIM_SLOPE
+from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.thickness import FULLNESS, RIM_SLOPE
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.progress import Cancelled
-from objectmorpher_core.segment.matte import signed_distance
+from objectmorpher_core.segment.matting.matte import signed_distance
 from tests import shapes
 from tests.core.lift.standing_things import Box, View
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import DeformSettings, LiftedObject, LiftSettings, Placement
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import DeformSettings, LiftedObject, LiftSettings, Placement
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.rethicken import with_thickness
+from objectmorpher_core.lift.relief.rethicken import with_thickness
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 from tests import shapes
 from tests.core.lift.standing_things import Box, View

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift import shape_look
+from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import Crop, planes_of
-from objectmorpher_core.lift.fusion import fused
-from objectmorpher_core.lift.shape_look import SeenShape, ShapeNet
+from objectmorpher_core.lift.relief import shape_look
+from objectmorpher_core.lift.relief.fusion import fused
+from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeNet
 from objectmorpher_core.models import shipped
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment import dino_tokens

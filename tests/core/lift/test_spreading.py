@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.arrays import F64
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift.body import BACK, FRONT, MIDDLE, Body
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.spreading import BRIM, MIN_SPACING, PACKING, Surface, spread
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.spreading import BRIM, MIN_SPACING, PACKING, Surface, spread
 from tests import shapes
 from tests.core.lift.standing_things import Box, View
 

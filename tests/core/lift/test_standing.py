@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.lift.plan import Plan
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.standing import FLAT, LEAST_DEPTH, TRUST, Standing, stand
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.lift.relief.plan import Plan
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.standing import FLAT, LEAST_DEPTH, TRUST, Standing, stand
 from tests.core.lift.standing_things import View, figure
 
 EXACT = 1e-9

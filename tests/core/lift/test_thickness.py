@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64, Mask
-from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.lift.thickness import FULL_BODY, FULLNESS, RIM_SLOPE, Thickness
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.thickness import FULL_BODY, FULLNESS, RIM_SLOPE, Thickness
 from tests import shapes
 
 EXACT = 1e-9

@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch", reason="Depth Anything needs torch")
 transformers = pytest.importorskip("transformers", reason="Depth Anything needs transformers")
 
 from objectmorpher_core import models  # noqa: E402
-from objectmorpher_core.lift import depth_look  # noqa: E402
+from objectmorpher_core.lift.relief import depth_look  # noqa: E402
 from objectmorpher_core.models import device  # noqa: E402
 from objectmorpher_core.models.depth_torch import DepthTorch  # noqa: E402
 from tests import photos  # noqa: E402

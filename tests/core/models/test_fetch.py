@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.progress import Cancelled
+from objectmorpher_core.base.progress import Cancelled
 
 SMALL = models.weight("u2netp")
 

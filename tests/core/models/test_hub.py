@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models
+from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.models import hub, lock, registry
 from objectmorpher_core.models.hub_download import PART
 from objectmorpher_core.models.weight_folder import check_folder, check_safetensors
-from objectmorpher_core.progress import Cancelled
 from tests.core.models.local_hub import COMMIT, TOKEN, Hub, offering, own_cache
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher_core import models
 from objectmorpher_core.models import published
 

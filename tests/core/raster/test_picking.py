@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.picking import LEAST_ALPHA, pick
 from tests import shapes

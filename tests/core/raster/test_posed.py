@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats, projection_jacobians
 from tests import shapes
 

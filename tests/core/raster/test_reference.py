@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import reference
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.rules import RULES, coverage, facing_weight, ramp

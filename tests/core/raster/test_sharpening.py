@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import DeformSettings, Placement
-from objectmorpher_core.puppet import Puppet
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import DeformSettings, Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.sharpening import sharpen
 from objectmorpher_core.raster.thinning import thinned

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.document import PhotoTexture, Placement
+from objectmorpher_core.document.model import PhotoTexture, Placement
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.reference_layers import Picture3D

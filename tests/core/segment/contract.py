@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Click, Prompt
-from objectmorpher_core.progress import Cancelled, silent
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment import SelectionError
 from objectmorpher_core.segment.selection import check_prompt
 

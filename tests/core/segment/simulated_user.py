@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import Mask
-from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document.model import Click, Prompt
 
 TOLERANCE = 2.0  # px, of the boundary measure
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.pipeline import Reading
-from objectmorpher_core.progress import Cancelled, silent
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo

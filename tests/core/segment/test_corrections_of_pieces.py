@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import Click, Prompt
-from objectmorpher_core.segment import correcting
-from objectmorpher_core.segment.answers import Answer, add_click
-from objectmorpher_core.segment.piece_choice import Ground, correct
-from objectmorpher_core.segment.pieces import Pieces
+from objectmorpher_core.document.model import Click, Prompt
+from objectmorpher_core.segment.pieces import correcting
+from objectmorpher_core.segment.pieces.answers import Answer, add_click
+from objectmorpher_core.segment.pieces.choice import Ground, correct
+from objectmorpher_core.segment.pieces.pieces import Pieces
 
 GROUND, COAT, FACE, POLE = (120, 150, 90), (40, 40, 50), (210, 180, 160), (70, 70, 85)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import LEVELS, Click, Prompt
-from objectmorpher_core.image import read_picture
-from objectmorpher_core.progress import silent
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import LEVELS, Click, Prompt
+from objectmorpher_core.pictures.image import read_picture
 
 SAMPLES = Path(__file__).parents[3] / "assets" / "samples"
 PLACES = {

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.pixels import crop, pixels_from_unit, unit_pixels
-from objectmorpher_core.segment import soft_edge, unmix
+from objectmorpher_core.base.pixels import crop, pixels_from_unit, unit_pixels
 from objectmorpher_core.segment.mask_edit import feather
-from objectmorpher_core.segment.matte import (
+from objectmorpher_core.segment.matting import soft_edge, unmix
+from objectmorpher_core.segment.matting.matte import (
     band_width,
     build_matte,
     extended,
@@ -19,8 +19,8 @@ from objectmorpher_core.segment.matte import (
     signed_distance,
     soft_cutout,
 )
-from objectmorpher_core.segment.unmix import exact, unmixed
-from objectmorpher_core.segment.veil import unveiled, veil
+from objectmorpher_core.segment.matting.unmix import exact, unmixed
+from objectmorpher_core.segment.matting.veil import unveiled, veil
 from tests import shapes
 
 LEVEL = 1 / 255

@@ -6,9 +6,9 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.csgraph import connected_components
 
-from objectmorpher_core.arrays import Sparse
-from objectmorpher_core.segment import piece_graph
-from objectmorpher_core.segment.piece_features import (
+from objectmorpher_core.base.arrays import Sparse
+from objectmorpher_core.segment.pieces import graph as piece_graph
+from objectmorpher_core.segment.pieces.features import (
     DISTRUST,
     LIKE_COLOR,
     REACH,

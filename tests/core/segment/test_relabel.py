@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from objectmorpher_core.segment.pieces import Pieces
-from objectmorpher_core.segment.relabel import relabel, touching, votes
+from objectmorpher_core.segment.pieces.pieces import Pieces
+from objectmorpher_core.segment.pieces.relabel import relabel, touching, votes
 from tests.core.segment.simulated_user import inmost
 from tests.core.segment.truth_masks import truth_mask
 from tests.photos import photo

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models, segment
-from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.models import ModelError, device
-from objectmorpher_core.progress import Cancelled, silent
 from objectmorpher_core.segment import SelectionError
-from objectmorpher_core.segment.sam import Sam
-from objectmorpher_core.segment.sam_choice import at_level
-from objectmorpher_core.segment.sam_frame import Frame
-from objectmorpher_core.segment.sam_network import Asked, Masks, open_network
+from objectmorpher_core.segment.sam.choice import at_level
+from objectmorpher_core.segment.sam.frame import Frame
+from objectmorpher_core.segment.sam.network import Asked, Masks, open_network
+from objectmorpher_core.segment.sam.segmenter import Sam
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt

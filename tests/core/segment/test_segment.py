@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import Click, Prompt
-from objectmorpher_core.progress import silent
+from objectmorpher_core.base.progress import silent
+from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment import SelectionError
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import SKETCH, ellipses, overlap, prompt

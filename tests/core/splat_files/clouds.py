@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
 
 
 def gaussians(count: int = 20, seed: int = 7) -> Gaussians:

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import matrices_from_quats
+from objectmorpher_core.base.rotations import matrices_from_quats
+from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import COUNT, read, read_object
-from objectmorpher_core.splat_files.mesh_texture import linear_from_srgb, srgb_from_linear
+from objectmorpher_core.splat_files.meshes.texture import linear_from_srgb, srgb_from_linear
 from tests.core.splat_files import mesh_files
 
 COLORS = np.array(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.rotations import quats_along
+from objectmorpher_core.base.rotations import quats_along
+from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import SplatFileError, encode, read, read_object
-from objectmorpher_core.splat_files.objects import (
+from objectmorpher_core.splat_files.splats.objects import (
     as_object,
     core_box,
     is_of_object,

@@ -7,9 +7,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files.limits import LEAST_SCALE
-from objectmorpher_core.splat_files.ply import (
+from objectmorpher_core.splat_files.splats.ply import (
     FLATNESS,
     SH0,
     SURFEL,

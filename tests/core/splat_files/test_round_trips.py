@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objectmorpher_core.gaussians import Gaussians
+from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import FORMATS, SplatFileError, ending_of, read
 from objectmorpher_core.splat_files import encode as encode_file
 from tests.core.splat_files.clouds import gaussians, matched, turn_between

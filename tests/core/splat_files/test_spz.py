@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import zstandard
 
-from objectmorpher_core.gaussians import Gaussians
-from objectmorpher_core.splat_files.spz import decode_spz, encode_spz
-from objectmorpher_core.splat_files.spz_container import HEADER, SpzParts, unpack
+from objectmorpher_core.document.gaussians import Gaussians
+from objectmorpher_core.splat_files.splats.spz import decode_spz, encode_spz
+from objectmorpher_core.splat_files.splats.spz_container import HEADER, SpzParts, unpack
 from tests.core.splat_files.clouds import gaussians, matched
 
 HALF = np.sqrt(0.5)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from objectmorpher_core.image import read_picture
-from objectmorpher_core.report import STAGES
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.pictures.image import read_picture
+from objectmorpher_core.scripting.report import STAGES
 from objectmorpher_research.bench import pipeline
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from objectmorpher_core.document import Placement
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_research.bench import gl

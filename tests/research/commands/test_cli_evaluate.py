@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 from tests.photos import photo
 
 NUMBERS = "psnr,ssim"

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from objectmorpher_core.image import encode_mask
+from objectmorpher.cli import parser as cli
+from objectmorpher_core.pictures.image import encode_mask
 from objectmorpher_research.evaluation.measures import dino
 from objectmorpher_research.evaluation.paper.interaction_log import read_recorded
 from objectmorpher_research.study.design import CRITERIA
@@ -160,7 +160,16 @@ def test_what_people_said(tmp_path, capsys):
 
 
 def test_the_command_serves_and_ends_when_it_is_told_to(folder):
-    command = [sys.executable, "-m", "app", "evaluate", "study", str(folder), "--port", "0"]
+    command = [
+        sys.executable,
+        "-m",
+        "objectmorpher",
+        "evaluate",
+        "study",
+        str(folder),
+        "--port",
+        "0",
+    ]
     with subprocess.Popen(
         command, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE, text=True
     ) as process:

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from app.cli import main
+from objectmorpher.cli.parser import main
 from tests import shapes
 
 needs_torch = pytest.mark.skipif(

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher_research.commands.truth import ABLATIONS
 from objectmorpher_research.evaluation.truth import methods
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
+from objectmorpher_core.scripting.script import EditScript
 from objectmorpher_research.evaluation.error import EvaluationError
 from objectmorpher_research.evaluation.paper.interaction_log import (
     Event,
@@ -156,7 +156,7 @@ def test_geobench(tmp_path, small):
 
 def test_a_positive_turn_of_geobench_is_clockwise_as_ours_is():
     """Both turn x towards y, which points down: `--turn` 0,0,90 takes right to down."""
-    from objectmorpher_core.rotations import turn_matrix
+    from objectmorpher_core.base.rotations import turn_matrix
 
     assert np.allclose(turn_matrix(0, 0, 90) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
 

@@ -16,8 +16,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from app import cli
-from app.remote.spread import spread
+from objectmorpher.cli import parser as cli
+from objectmorpher.server.spread import spread
 from objectmorpher_research.commands import paper
 from objectmorpher_research.evaluation.subjects.folders import read_subjects
 from objectmorpher_research.evaluation.truth import spread_photos

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from ray_apart import NEEDS_RAY_DATA, own_folder, told_by
 
-from app import cli
+from objectmorpher.cli import parser as cli
 from tests import shapes
 
 pytestmark = [

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from tests.photos import photo
 
 METHODS = ("blurrer-x", "shifter-y")  # words that occur nowhere else

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 from objectmorpher_research.training.shapes.distance import distance, lowest, trace
 from objectmorpher_research.training.shapes.families import FAMILIES
 from objectmorpher_research.training.shapes.sample import Sample, make_sample

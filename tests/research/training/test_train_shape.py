@@ -139,7 +139,7 @@ def test_training_goes_on_from_exported_weights(tmp_path):
 
 def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
     pytest.importorskip("onnx")
-    from app.cli import main
+    from objectmorpher.cli.parser import main
 
     for name, first in (("samples", 0), ("unseen", train_shape.UNSEEN)):
         (tmp_path / name).mkdir()

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core import models
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 from objectmorpher_core.segment.dino_tokens import PATCH, WEIGHT, shared
 
 from .regions import Region, check_pair, weighted_mean

@@ -13,7 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 
 from .trunk_files import Shapes, read
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 
 from ..error import EvaluationError
 from .regions import Region, check_pair, weighted_mean

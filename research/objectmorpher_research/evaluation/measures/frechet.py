@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..error import EvaluationError
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, RGB
+from objectmorpher_core.base.arrays import F32, F64, RGB
 from objectmorpher_core.models.onnx_session import open_session
 
 from ..error import EvaluationError

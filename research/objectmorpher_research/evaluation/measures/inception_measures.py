@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 
 from ..error import EvaluationError
 from .frechet import fitted, frechet_distance

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.arrays import RGB
+from objectmorpher_core.base.arrays import RGB
 
 from ..error import EvaluationError
 from .plain_convolutions import ALEX_LAYERS, VGG_LAYERS, Layer, features, shapes

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from objectmorpher_core.arrays import F32
+from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.models.onnx_graph import GRAPH, INPUT, OUTPUT, as_varint, bytes_field
 
 IR, OPSET = 7, 13  # versions that every onnxruntime of ours knows

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from objectmorpher_core.arrays import F64, RGB
-from objectmorpher_core.image import resized
-from objectmorpher_core.progress import Progress, part, silent
+from objectmorpher_core.base.arrays import F64, RGB
+from objectmorpher_core.base.progress import Progress, part, silent
+from objectmorpher_core.pictures.image import resized
 
 from ..bootstrap import Estimate, mean_with_interval
 from ..error import EvaluationError

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose.composite import object_texture
-from objectmorpher_core.document import Document, Handle, Placement, Pose
-from objectmorpher_core.image import Picture
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document.model import Document, Handle, Placement, Pose
+from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.progress import Progress, silent
-from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
 
 from ..error import EvaluationError

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.script import XY, BatchItem, EditScript, HandleMove
+from objectmorpher_core.scripting.script import XY, BatchItem, EditScript, HandleMove
 
 from ..error import EvaluationError
 from .guidance import Guidance, from_item

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from objectmorpher_core.image import READ_ENDINGS
+from objectmorpher_core.pictures.image import READ_ENDINGS
 
 from ..error import EvaluationError
 from ..pairs import pictures_in

@@ -17,8 +17,8 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from objectmorpher_core.image import ImageError, read_picture
-from objectmorpher_core.script import BatchItem, EditScript
+from objectmorpher_core.pictures.image import ImageError, read_picture
+from objectmorpher_core.scripting.script import BatchItem, EditScript
 
 from ..error import EvaluationError
 from .guidance import Guidance, from_item

@@ -8,8 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.image import ImageError, read_picture
-from objectmorpher_core.script import XY, BatchItem, EditScript, ScriptError, parse_scripts
+from objectmorpher_core.pictures.image import ImageError, read_picture
+from objectmorpher_core.scripting.script import (
+    XY,
+    BatchItem,
+    EditScript,
+    ScriptError,
+    parse_scripts,
+)
 
 from ..error import EvaluationError
 

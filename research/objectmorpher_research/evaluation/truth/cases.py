@@ -8,8 +8,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.camera import Camera
 
 from .materials import SURFACES, Material
 from .motions import RIGID, Motion, Rigid, grips

@@ -6,16 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objectmorpher_core import edits
-from objectmorpher_core.arrays import F64, RGB, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.composite import (
     Composite,
     composite,
     object_texture,
     straight_cutout,
 )
-from objectmorpher_core.document import (
+from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import (
     LEAST_THICKNESS,
     DeformSettings,
     Document,
@@ -27,13 +30,10 @@ from objectmorpher_core.document import (
     Pose,
     Prompt,
 )
-from objectmorpher_core.image import Picture, encode_picture
-from objectmorpher_core.joining import Shadow
-from objectmorpher_core.left_behind import with_plate
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo
-from objectmorpher_core.progress import silent
-from objectmorpher_core.puppet import Puppet
-from objectmorpher_core.script import EditScript
+from objectmorpher_core.scripting.left_behind import with_plate
+from objectmorpher_core.scripting.script import EditScript
 
 from .cases import Case, Guidance
 from .outcome import Outcome
@@ -136,7 +136,7 @@ class Chain:
 
     def _plate(self, document: Document) -> tuple[Plate, Shadow]:
         """What is behind the object, and the shadow that it takes along."""
-        from objectmorpher_core.left_behind import has_left
+        from objectmorpher_core.scripting.left_behind import has_left
 
         item = document.objects[0]
         leaves = has_left(item)
@@ -215,7 +215,7 @@ def coverage(result: Composite, document: Document) -> F64:
     if not result.moved:
         matte = document.objects[0].matte
         assert matte is not None
-        from objectmorpher_core.pixels import crop
+        from objectmorpher_core.base.pixels import crop
 
         width, height = document.photo.size
         return crop(matte.alpha, matte.box, (0, 0, width, height)).astype(np.float64)

@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from scipy.spatial import Delaunay, KDTree
 
-from objectmorpher_core.arrays import F64, I32, RGB, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, I32, RGB, Mask
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.harmonize import lit
-from objectmorpher_core.document import LiftedObject, Matte
+from objectmorpher_core.compose.light.harmonize import lit
+from objectmorpher_core.document.model import LiftedObject, Matte
 from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.body import BACK, FRONT, Body
-from objectmorpher_core.lift.relief import ReliefLifter
+from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.lifter import ReliefLifter
 
 from .cases import Case
 from .chain import LIFTS, OWN, Chain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, U8
+from objectmorpher_core.base.arrays import F32, F64, U8
 
 AT_ONCE = 30_000  # places: cv2.remap takes fewer than 32,768 rows
 

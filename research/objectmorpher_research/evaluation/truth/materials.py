@@ -12,7 +12,7 @@ from functools import cache
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, RGB
+from objectmorpher_core.base.arrays import F32, F64, RGB
 
 from ..error import EvaluationError
 from .lookup import looked_up

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.document import Matte
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.document.model import Matte
 
 from . import flat_methods
 from .cases import Case

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, I32
-from objectmorpher_core.rotations import matrix_from_vector, turn_matrix
+from objectmorpher_core.base.arrays import F64, I32
+from objectmorpher_core.base.rotations import matrix_from_vector, turn_matrix
 
 RIGID = ("turn", "tilt", "depth", "scale")  # the whole thing moves as one
 SPATIAL = ("turn", "tilt", "depth", "bend out")  # what happens in depth: the 3-D categories

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, I32
-from objectmorpher_core.kernel_files import numba
+from objectmorpher_core.base.arrays import F64, I32
+from objectmorpher_core.base.kernel_files import numba
 
 SAMPLES = 3  # by as many in a pixel: odd, so that one is in its middle
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.image import Picture, encode_picture, read_picture
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 
 from .methods import Method
 from .running import Row

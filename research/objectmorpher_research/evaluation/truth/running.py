@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher_core.files import write_all
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.progress import Progress, silent
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.progress import Progress, silent
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 
 from ..error import EvaluationError
 from ..measures import dino

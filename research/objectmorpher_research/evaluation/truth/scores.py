@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB
+from objectmorpher_core.base.arrays import F64, RGB
 
 from ..measures.dino import Dino
 from ..measures.fidelity import psnr, ssim

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, I32, RGB, Mask
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_core.base.arrays import F64, I32, RGB, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.rotations import turn_matrix
 
 from .materials import GAMMA, Material, background
 from .motions import Body, Motion, moved

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, I32
+from objectmorpher_core.base.arrays import F64, I32
 
 Point = tuple[float, float, float]
 ROUND = 40  # patches around an axis

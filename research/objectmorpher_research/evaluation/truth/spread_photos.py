@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from app.remote.spread import spread
-from objectmorpher_core.progress import Progress
+from objectmorpher.server.spread import spread
+from objectmorpher_core.base.progress import Progress
 
 
 def run_photos(

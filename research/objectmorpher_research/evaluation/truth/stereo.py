@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.camera import Camera
 
 from ..error import EvaluationError
 from .cases import RIGID_POINTS, Case, Guidance, inner_pixels, spread_out

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher_core.files import write_all
+from objectmorpher_core.base.files import write_all
 
 from . import TrainingError
 from .edit_models import EditModel

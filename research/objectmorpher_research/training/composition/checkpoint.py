@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher_core.files import write_all
+from objectmorpher_core.base.files import write_all
 
 from . import TrainingError
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from objectmorpher_core import models
-from objectmorpher_core.arrays import RGB
+from objectmorpher_core.base.arrays import RGB
 
 from . import TrainingError
 from .shards import read_json

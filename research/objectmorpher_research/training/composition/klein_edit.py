@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import RGB
+from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.compose.refine import klein
 
 from . import TrainingError

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose.refine.diffusion import INSTRUCTION
-from objectmorpher_core.files import write_all
-from objectmorpher_core.progress import Progress, silent
 
 from . import TrainingError
 from .edit_models import EditModel, Latents

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.files import write_all
+from objectmorpher_core.base.files import write_all
 
 from . import TrainingError
 

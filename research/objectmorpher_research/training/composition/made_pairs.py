@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from objectmorpher_core.files import write_all
-from objectmorpher_core.image import Picture, encode_mask, encode_picture
-from objectmorpher_core.progress import Progress, silent
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.progress import Progress, silent
+from objectmorpher_core.pictures.image import Picture, encode_mask, encode_picture
 
 from ..shapes.views import make_views
 from .sources import MASK

@@ -13,9 +13,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.image import ImageError, read_picture, to_u8
-from objectmorpher_core.video_file import VideoError, read_frames
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.pictures.image import ImageError, read_picture, to_u8
+from objectmorpher_core.pictures.video import VideoError, read_frames
 
 from . import TrainingError
 

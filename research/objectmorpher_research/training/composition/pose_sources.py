@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, frozen
-from objectmorpher_core.document import LiftedObject
+from objectmorpher_core.base.arrays import F32, F64, frozen
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.model import LiftedObject
 from objectmorpher_core.lift import LiftError, Subject
-from objectmorpher_core.lift.external import write_job
-from objectmorpher_core.lift.placement_matches import Matches, alike
-from objectmorpher_core.lift.placement_view import towards
-from objectmorpher_core.lift.worker_answer import WRONG, check_similarity, read_told
-from objectmorpher_core.lift.worker_file import Worker, read_worker, worker_names
-from objectmorpher_core.lift.worker_process import run_worker
-from objectmorpher_core.progress import Progress
+from objectmorpher_core.lift.registration.matches import Matches, alike
+from objectmorpher_core.lift.registration.view import towards
+from objectmorpher_core.lift.workers.answer import WRONG, check_similarity, read_told
+from objectmorpher_core.lift.workers.external import write_job
+from objectmorpher_core.lift.workers.file import Worker, read_worker, worker_names
+from objectmorpher_core.lift.workers.process import run_worker
 
 from . import TrainingError
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher_core.arrays import RGB
+from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.compose.refine.diffusion import INSTRUCTION
 
 from .edit_models import Grid, Latents, open_pipeline, rgb_of

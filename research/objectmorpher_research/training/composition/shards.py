@@ -20,10 +20,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.files import write_all
-from objectmorpher_core.image import Picture, encode_coverage, encode_picture
-from objectmorpher_core.progress import Progress, part, silent
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.progress import Progress, part, silent
+from objectmorpher_core.pictures.image import Picture, encode_coverage, encode_picture
 
 from . import TrainingError
 from .sources import Pair, fingerprint

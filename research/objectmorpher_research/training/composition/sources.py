@@ -13,8 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.image import READ_ENDINGS
-from objectmorpher_core.video_file import VideoError, frame_rate
+from objectmorpher_core.pictures.image import READ_ENDINGS
+from objectmorpher_core.pictures.video import VideoError, frame_rate
 
 from . import TrainingError
 from .pictures import PADDING, Picture

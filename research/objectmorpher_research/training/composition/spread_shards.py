@@ -6,8 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.remote.spread import spread
-from objectmorpher_core.progress import Progress
+from objectmorpher.server.spread import spread
+from objectmorpher_core.base.progress import Progress
 
 if TYPE_CHECKING:
     from .shards import Shard

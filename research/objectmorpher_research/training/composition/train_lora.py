@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objectmorpher_core.progress import Progress, silent
+from objectmorpher_core.base.progress import Progress, silent
 
 from . import TrainingError, adapter, edit_models
 from .checkpoint import State

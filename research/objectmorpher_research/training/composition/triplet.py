@@ -16,19 +16,19 @@ import cv2
 import numpy as np
 
 from objectmorpher_core import compose, lift, segment
-from objectmorpher_core.arrays import F32, F64, RGB, U8, Mask
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.arrays import F32, F64, RGB, U8, Mask
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import unit_pixels
+from objectmorpher_core.base.progress import Progress, part, silent
 from objectmorpher_core.compose import InpaintError
-from objectmorpher_core.compose.lighting import object_texture
-from objectmorpher_core.compose.plate import plate_crop
-from objectmorpher_core.document import GAUSSIANS, LiftSettings, Matte, Prompt
-from objectmorpher_core.image import ImageError, at_most, read_mask, to_u8
+from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.compose.plate.plate import plate_crop
+from objectmorpher_core.document.model import GAUSSIANS, LiftSettings, Matte, Prompt
 from objectmorpher_core.lift import LiftError, Subject
-from objectmorpher_core.lift.placement import Hints, Proposal, Registrar, register
-from objectmorpher_core.lift.placement_view import Target
+from objectmorpher_core.lift.registration.placement import Hints, Proposal, Registrar, register
+from objectmorpher_core.lift.registration.view import Target
+from objectmorpher_core.pictures.image import ImageError, at_most, read_mask, to_u8
 from objectmorpher_core.pipeline import cut_front, lift_mask, make_plate, read_photo
-from objectmorpher_core.pixels import unit_pixels
-from objectmorpher_core.progress import Progress, part, silent
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.reference_layers import Picture3D

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.image import ImageError, read_picture, to_u8
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.pictures.image import ImageError, read_picture, to_u8
 
 from . import TrainingError
 from .shards import PICTURES, PLAN, SHARD, read_json

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import RGB
-from objectmorpher_core.files import write_all
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.base.arrays import RGB
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.pictures.image import Picture, encode_picture
 
 from .edit_models import EditModel, Latents
 from .randomness import drawn

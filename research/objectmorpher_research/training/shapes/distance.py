@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from objectmorpher_core.kernel_files import numba
-from objectmorpher_core.threads import FAST
+from objectmorpher_core.base.kernel_files import numba
+from objectmorpher_core.base.threads import FAST
 
 # Kinds of primitives, and what their numbers mean; all lie about their own origin.
 ELLIPSOID = 0  # half sizes x, y, z

@@ -8,7 +8,7 @@ from functools import cache
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64
+from objectmorpher_core.base.arrays import F32, F64
 
 PLAIN, PHOTO, GRAIN, STRIPES, CHECKS, PRINT, SPOTS = range(7)
 WEIGHTS = (0.22, 0.27, 0.17, 0.09, 0.05, 0.12, 0.08)  # how often each is chosen

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from objectmorpher_core.arrays import F32, F64, RGB, Mask
+from objectmorpher_core.base.arrays import F32, F64, RGB, Mask
 from objectmorpher_core.lift.crop import SIDE
 
 from .distance import lowest, trace

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from . import distance as sdf
 

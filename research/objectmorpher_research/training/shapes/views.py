@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64, RGB, Mask
-from objectmorpher_core.camera import DEFAULT_FOV
+from objectmorpher_core.base.arrays import F64, RGB, Mask
+from objectmorpher_core.base.camera import DEFAULT_FOV
 
 from .distance import lowest, trace
 from .families import FAMILIES

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core import edits, refine_edits
+from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import REFINEMENT, layers
 from objectmorpher_core.compose.refine import RefineError, refinement
-from objectmorpher_core.document import Placement
-from objectmorpher_core.joining import Shadow
-from objectmorpher_core.progress import silent
-from objectmorpher_core.refining import coarse_edit
-from objectmorpher_core.session_file import decode_session, encode_session
+from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.scripting.refining import coarse_edit
+from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
 
@@ -133,8 +133,8 @@ def test_it_is_the_topmost_layer_and_the_pile_is_the_export():
 
 
 def test_every_backend_is_known_to_scripts():
-    from objectmorpher_core.script import EditScript, ScriptError
-    from objectmorpher_core.scripted import refuse_missing
+    from objectmorpher_core.scripting.script import EditScript, ScriptError
+    from objectmorpher_core.scripting.scripted import refuse_missing
 
     for name in refine.BACKENDS:
         if refine.missing(name) is not None:

@@ -14,10 +14,10 @@ pytest.importorskip("peft")
 import tiny_pipelines
 
 from objectmorpher_core import models
+from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.refine import RefineError, diffusion, klein, memory, qwen
 from objectmorpher_core.models import ModelError
-from objectmorpher_core.progress import Cancelled, silent
 
 GB = 1 << 30
 IDS = {"qwen": "qwen-image-edit-2511", "klein": "flux2-klein-4b"}

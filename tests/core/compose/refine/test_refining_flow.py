@@ -17,17 +17,18 @@ pytest.importorskip("peft")
 
 import tiny_pipelines
 
-from app import job_functions
-from objectmorpher_core import edits, models, refine_edits
+from objectmorpher.worker import job_functions
+from objectmorpher_core import models
+from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.refine import RefineError, klein
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
-from objectmorpher_core.document import Placement
+from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document.model import Placement
 from objectmorpher_core.models import device
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.progress import Cancelled, silent
-from objectmorpher_core.refining import Refining, coarse_edit
-from objectmorpher_core.script import script_from
+from objectmorpher_core.scripting.refining import Refining, coarse_edit
+from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
 INSIDE = shapes.mask("ellipse")

@@ -12,11 +12,13 @@ import pytest
 from PIL import Image
 
 from objectmorpher_core import lift
-from objectmorpher_core.camera import Camera
-from objectmorpher_core.lift import LiftError, LiftSettings, Subject, external, worker_process
-from objectmorpher_core.lift.worker_file import read_worker, worker_names
-from objectmorpher_core.progress import Cancelled, silent
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.lift import LiftError, LiftSettings, Subject
+from objectmorpher_core.lift.workers import external
+from objectmorpher_core.lift.workers import process as worker_process
+from objectmorpher_core.lift.workers.file import read_worker, worker_names
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import photos
 
 CARD = Path(__file__).parents[4] / "packaging" / "workers" / "card"

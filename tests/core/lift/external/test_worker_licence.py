@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from objectmorpher_core import doctor, lift
-from objectmorpher_core.lift import LiftError, worker_file
-from objectmorpher_core.lift.worker_file import accept_licence, forget_licence, read_worker
+from objectmorpher_core.lift import LiftError
+from objectmorpher_core.lift.workers import file as worker_file
+from objectmorpher_core.lift.workers.file import accept_licence, forget_licence, read_worker
 
 PACKAGED = Path(__file__).parents[4] / "packaging" / "workers"
 

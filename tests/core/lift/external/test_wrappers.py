@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import LiftSettings
-from objectmorpher_core.lift import Subject, external
-from objectmorpher_core.lift.worker_file import read_worker
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.document.model import LiftSettings
+from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift.workers import external
+from objectmorpher_core.lift.workers.file import read_worker
+from objectmorpher_core.segment.matting.matte import build_matte
 from objectmorpher_core.splat_files import read
 from tests import photos
 

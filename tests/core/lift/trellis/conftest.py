@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import photos
 
 

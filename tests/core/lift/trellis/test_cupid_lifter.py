@@ -12,8 +12,9 @@ torch = pytest.importorskip("torch", reason="CUPID needs torch")
 pytest.importorskip("transformers", reason="CUPID needs transformers")
 
 from objectmorpher_core import lift
+from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.placement import Hints, Registrar
+from objectmorpher_core.lift.registration.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
 from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
 from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter, pose_seen
@@ -23,9 +24,8 @@ from objectmorpher_core.lift.trellis.picture import Picture
 from objectmorpher_core.lift.trellis.views import looked_up
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.progress import Cancelled, silent
-from objectmorpher_core.segment.matte import build_matte
-from objectmorpher_core.splat_files.axes import QUARTER_TURN
+from objectmorpher_core.segment.matting.matte import build_matte
+from objectmorpher_core.splat_files.splats.axes import QUARTER_TURN
 from tests.core.lift import registered
 from tests.core.lift.trellis import tiny_trellis
 

@@ -11,13 +11,13 @@ pytest.importorskip("torch", reason="TRELLIS needs torch")
 pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 
 from objectmorpher_core import lift
-from objectmorpher_core.document import SPLATTINGS, LiftSettings
-from objectmorpher_core.lift import worker_file
+from objectmorpher_core.base.progress import Cancelled, silent
+from objectmorpher_core.document.model import SPLATTINGS, LiftSettings
 from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter
+from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import device
-from objectmorpher_core.progress import Cancelled, silent
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
 from tests.core.lift.trellis.test_cupid_lifter import CUPID_PARTS, SHARED_PARTS
 

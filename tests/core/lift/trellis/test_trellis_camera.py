@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis.camera import pose_in, view
 from tests import shapes

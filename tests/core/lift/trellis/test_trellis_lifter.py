@@ -16,6 +16,7 @@ pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 from safetensors.torch import load_file, save_file
 
 from objectmorpher_core import lift
+from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis import generator as generators
 from objectmorpher_core.lift.trellis import weights
@@ -23,8 +24,7 @@ from objectmorpher_core.lift.trellis.generator import Generator, unseen
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
 from objectmorpher_core.lift.trellis.parts import build
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.progress import Cancelled, silent
-from objectmorpher_core.segment.matte import build_matte
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
 
 F32 = 1e-5

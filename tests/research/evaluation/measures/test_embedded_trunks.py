@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.image import Picture, encode_picture
+from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_research.evaluation.error import EvaluationError
 from objectmorpher_research.evaluation.measures import efficientnet, hed_vgg
 from objectmorpher_research.evaluation.measures.efficientnet import EfficientNetFeatures

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from objectmorpher_core.progress import Progress
+from objectmorpher_core.base.progress import Progress
 from objectmorpher_research.training.composition import shards
 from objectmorpher_research.training.composition.pictures import Picture
 from objectmorpher_research.training.composition.sources import Pair

@@ -13,7 +13,7 @@ import made_up
 import numpy as np
 import pytest
 
-from objectmorpher_core.progress import Cancelled
+from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_research.training.composition import TrainingError
 from objectmorpher_research.training.composition.shards import (
     SHARD,

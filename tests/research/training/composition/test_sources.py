@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from skimage import data
 
-from objectmorpher_core.video_file import VideoError, encode_video, frame_rate, read_frames
+from objectmorpher_core.pictures.video import VideoError, encode_video, frame_rate, read_frames
 from objectmorpher_research.training.composition import TrainingError
 from objectmorpher_research.training.composition.pictures import Picture, halved
 from objectmorpher_research.training.composition.sources import (

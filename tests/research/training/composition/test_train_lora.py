@@ -23,9 +23,9 @@ import made_up  # noqa: E402
 from train_in_process import COURSE, PLAN  # noqa: E402
 
 from objectmorpher_core import models  # noqa: E402
+from objectmorpher_core.base.progress import silent  # noqa: E402
 from objectmorpher_core.compose import refine  # noqa: E402
 from objectmorpher_core.compose.refine.diffusion import INSTRUCTION  # noqa: E402
-from objectmorpher_core.progress import silent  # noqa: E402
 from objectmorpher_research.training.composition import (  # noqa: E402
     TrainingError,
     adapter,

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from objectmorpher_core.camera import Camera
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.lift import LiftError, Subject
-from objectmorpher_core.lift.worker_file import FOLDER
+from objectmorpher_core.lift.workers.file import FOLDER
 from objectmorpher_research.training.composition import TrainingError, pose_sources
 from objectmorpher_research.training.composition.made_pairs import turn_of, write_made_pairs
 from objectmorpher_research.training.composition.pose_sources import Two, carried, matched

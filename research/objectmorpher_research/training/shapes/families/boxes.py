@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..solid import Builder, turned
 from .buildings import buildings, house, tower

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..solid import Builder, along, turned
 from .making import Rng, chance, joint, pick, span, two_bones, vary, vec

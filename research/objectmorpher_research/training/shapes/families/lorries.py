@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.base.arrays import F64
 
 from ..solid import Builder, turned
 from .making import Rng, chance, pick, rounded, smooth, span, vec

@@ -1,0 +1,101 @@
+"""Arguments, construction, loop: `objectmorpher` and `python -m objectmorpher`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from io import TextIOWrapper
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .cli.options import WindowOptions
+
+# One BLAS thread: the solver's matrices are small, and a second thread costs more than it helps.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+SAMPLE_EDIT = ("--click", "280,150", "--turn", "18,0,0")  # what the first run does headless
+HEADLESS_OUT = Path("objectmorpher-edited.png")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the program; returns its exit code."""
+    from .cli import parser as cli
+
+    _forgive_characters()
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments and (
+        arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
+    ):
+        return cli.main(arguments)
+    options = cli.parse_window(arguments)
+    if not has_display():
+        return _edit_headless(options.file)
+    return _run_window(cli.window_options(options))
+
+
+def _forgive_characters() -> None:
+    """What a terminal or a pipe has no character for is a question mark there, and no error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _run_window(options: WindowOptions) -> int:
+    """The driver takes as long to make a window as the imports of what is drawn in it."""
+    from .cli.terminal import PROGRAM
+    from .gui.window.glfw_window import WindowError, open_window
+
+    imports = Thread(target=import_module, args=("objectmorpher.gui.window.window",), daemon=True)
+    imports.start()
+    try:
+        handle = open_window(options)
+    except WindowError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 1
+    imports.join()
+
+    from .editor.settings import settings_path
+    from .gui.window.window import run_window
+    from .system.first_start import start_compiling
+    from .system.logs import start_log
+
+    start_log(settings_path().parent)
+    compiling = start_compiling() if options.frames is None else None
+    try:
+        return run_window(options, handle)
+    finally:
+        if compiling is not None:
+            compiling.kill()
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here at all."""
+    if sys.platform.startswith("linux"):
+        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return True
+
+
+def _edit_headless(photo: Path | None) -> int:
+    """Without a screen: the sample edit, or a turn of the photo's subject, into a file."""
+    from .cli import parser as cli
+    from .system.resources import resource
+
+    choice = SAMPLE_EDIT if photo is None else ("--subject", *SAMPLE_EDIT[2:])
+    photo = photo or resource(cli.SAMPLE)
+    if photo.suffix.lower() == ".omorph":
+        arguments = ["replay", str(photo), "-o", str(HEADLESS_OUT)]
+    else:
+        arguments = ["edit", str(photo), *choice, "-o", str(HEADLESS_OUT)]
+    print(f"There is no display, so this edit runs without a window:\n  {' '.join(arguments)}")
+    code = cli.main(arguments)
+    if code == 0:
+        print(f"The edited photo is {HEADLESS_OUT.resolve()}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

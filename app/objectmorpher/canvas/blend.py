@@ -1,0 +1,78 @@
+"""Where the view shows the edit and where the photo: the export's own rule, quick and coarse.
+
+The composite keeps the photo wherever nothing moved, so that an object that is bent at one end
+shows no seam at the other. The export decides that per pixel; the view by the Gaussians that are
+not where they were, on a grid, with the same margin around them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import F32, F64
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document.model import Document
+
+from ..editor.view import View
+
+if TYPE_CHECKING:
+    from objectmorpher_core.raster.posed import PosedSplats
+
+    from .derived import Derived
+
+CELL = 4  # canvas px, of the grid
+TOLERANCE = 0.25  # canvas px: a Gaussian that moved less is where it was
+PAD = 32  # cells around the canvas, for what is beside it
+FAR = 1e9  # photo px
+NOWHERE = np.empty((0, 3))
+REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one counts
+
+
+def build_blend(derived: Derived, document: Document, view: View) -> F32:
+    """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
+    from objectmorpher_core.compose import composite
+    from objectmorpher_core.compose.light.defocus import reach_of
+    from objectmorpher_core.compose.order import leaves_a_hole
+    from objectmorpher_core.compose.plate.plate import hole_margin
+
+    height, width = -(-view.height // CELL), -(-view.width // CELL)
+    distance = np.full((height, width), FAR, np.float32)  # photo px to what moved
+    for k, thing in enumerate(document.objects):
+        if thing.lifted is None or not thing.is_moved:
+            continue
+        splats = derived.draft(document, k)
+        world = splats.means if thing.is_visible else NOWHERE
+        # What moved leaves a hole, unless a copy of it is still there.
+        has_left = leaves_a_hole(document.objects, k)
+        reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
+        reach += reach_of(derived.lights.of(document, k).blur)
+        own = _distance(splats, world, document.photo.camera, view, has_left)
+        distance = np.minimum(distance, own - reach)
+    margin = document.feather * hole_margin(*document.photo.size)
+    ramp = (1 - composite.FEATHER_START) * margin
+    blend = np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
+    return np.maximum(blend, derived.lights.touched(document, view, CELL))
+
+
+def _distance(splats: PosedSplats, world: F64, camera: Camera, view: View, has_left: bool) -> F32:
+    """(h, w) photo px from each cell to what moved, on the canvas or a little beside it."""
+    from objectmorpher_core.compose import composite
+
+    from .moved_cells import mark_moved
+
+    height, width = -(-view.height // CELL), -(-view.width // CELL)
+    free = np.ones((height + 2 * PAD, width + 2 * PAD), np.uint8)
+    scale = view.zoom / CELL
+    lens = (camera.focal, camera.cx, camera.cy)
+    corner = (view.left - PAD / scale, view.top - PAD / scale)
+    mark_moved(
+        free, splats.rest.lifted.texture.u0, world, lens, corner, scale,
+        max(composite.STILL, TOLERANCE / view.zoom), has_left,
+    )  # fmt: skip
+    if free.all():
+        return np.full((height, width), FAR, np.float32)
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5)
+    return distance[PAD:-PAD, PAD:-PAD] / np.float32(scale)

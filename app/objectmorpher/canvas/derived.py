@@ -1,0 +1,347 @@
+"""What is computed from the document and never saved; remembered by identity (ARCHITECTURE 1).
+
+The heavy modules of the core are imported when the first object is lifted, or by `import_core`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import (
+    DeformSettings,
+    Document,
+    EditObject,
+    LiftedObject,
+    Photo,
+    Plate,
+    Pose,
+)
+
+from ..editor.view import View
+from .blend import build_blend
+from .fronts import Fronts
+from .layers import Layers
+from .lights import Lights
+from .memo import Memo
+from .painter import Painter
+from .refined_view import RefinedView
+from .shape import Shape, Shapes, build_shape
+from .surface_facts import SurfaceFacts
+
+if TYPE_CHECKING:
+    from objectmorpher_core.deform.puppet import SurfacePoint
+    from objectmorpher_core.raster.posed import PosedSplats
+    from objectmorpher_core.raster.tiles import Drawable
+
+PICK_REACH = 3.0  # points beside an object within which its nearest point is picked
+MOST_SHAPES = 24  # remembered: every object of a document needs its own in each frame
+SPARE_SHAPES = 4  # more than there are objects: of what was undone
+POSES = 3  # remembered of each object: as it is, as a stroke has it, as somebody looks at it
+OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A place in the picture, and how far away."""
+
+    xy: F64  # (2,) image px
+    depth: float  # world units along z
+    diameter: float  # of the object, world units
+
+    def moved(self, delta: np.ndarray, diameters: float) -> Spot:
+        """`delta` (2,) image px and so many object diameters away."""
+        depth = max(self.depth + diameters * self.diameter, 0.05 * self.depth)
+        return replace(self, xy=self.xy + delta, depth=depth)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectFrame:
+    """The box around an object in the picture."""
+
+    corners: F64  # (4, 2) image px: left top, right top, right bottom, left bottom
+    centre: F64  # (2,) image px, of the placed object
+    radius: float  # image px, of the ring around it
+
+
+class Derived:
+    """Solver, posed Gaussians and rendered layers of the document's objects."""
+
+    def __init__(self) -> None:
+        self._shapes = Memo(MOST_SHAPES)
+        self._posed: dict[int, Memo] = {}  # of each object
+        self._drafts: dict[int, Memo] = {}
+        self.layers, self.fronts = Layers(self), Fronts()
+        self.refined = RefinedView()
+        self.painter = Painter(self)
+        self.facts = SurfaceFacts(self)
+        self.lights = Lights(self)
+        self._latest: tuple[LiftedObject | None, DeformSettings, Shape] | None = None
+        self._blend: tuple[Document, tuple[float, ...], F32] | None = None
+        self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
+        self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
+        self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
+
+    def share(self, mask: Mask) -> float:
+        """Share of the photo that a mask covers."""
+        return self._shares(lambda: float(mask.mean()), mask)
+
+    def moved_mask(self, document: Document) -> Mask:
+        """Where the moved objects were in the photo, and nothing is left."""
+        from objectmorpher_core.compose.order import leaves_a_hole
+
+        objects = document.objects
+        there = [k for k, o in enumerate(objects) if o.is_moved and leaves_a_hole(objects, k)]
+        masks = [mask for k in there if (mask := objects[k].mask) is not None]
+
+        def build() -> Mask:
+            nothing = np.zeros(document.photo.size[::-1], bool)
+            return np.logical_or.reduce([nothing, *masks])
+
+        return self._holes(build, document.photo, *masks)
+
+    def plate(self, document: Document) -> Plate | None:
+        """What is seen behind the objects: the photo around those that are still there."""
+        from objectmorpher_core.compose.order import holes
+        from objectmorpher_core.compose.plate.plate import plate_of_holes
+
+        gone = holes(document)
+        return self._plates(
+            lambda: plate_of_holes(document, gone), document.plate,
+            *gone, *(o.mask for o in document.objects),
+        )  # fmt: skip
+
+    def contours(self, mask: Mask) -> tuple[F32, ...]:
+        """A mask's outlines, each (N, 2) image px."""
+        return self._contours(lambda: _outlines(mask), mask)
+
+    def shape(self, photo: Photo, thing: EditObject) -> Shape:
+        """Solver, poser and texture; a fraction of a second the first time."""
+        return self._shapes(
+            lambda: self._build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
+        )
+
+    def _build_shape(self, photo: Photo, thing: EditObject) -> Shape:
+        """Of a rig that changed, only what depends on it."""
+        similar = self._latest
+        if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
+            shape = similar[2].with_rig(thing.rig)
+        else:
+            shape = build_shape(photo.camera, thing)
+        self._latest = (thing.lifted, thing.deform, shape)
+        return shape
+
+    def adopt(self, shapes: Shapes) -> None:
+        """Takes over shapes of the document's objects that were made elsewhere."""
+        self.make_room(len(shapes))
+        for thing, shape in shapes:
+            self.remember(thing, shape)
+
+    def remember(self, thing: EditObject, shape: Shape) -> None:
+        """Takes over an object's shape that was made in a thread."""
+        self._shapes(lambda: shape, thing.lifted, thing.deform, thing.rig)
+        self._latest = (thing.lifted, thing.deform, shape)
+
+    def make_room(self, objects: int) -> None:
+        """Remembers what so many objects need in each frame."""
+        self._shapes.make_room(objects + SPARE_SHAPES)
+        self.fronts.make_room(objects)
+
+    def posed(self, document: Document, k: int) -> PosedSplats:
+        """Object `k`'s Gaussians where the edit has put them, world."""
+        thing = document.objects[k]
+        puppet = self.shape(document.photo, thing).puppet
+        return self._posed.setdefault(k, Memo(POSES))(
+            lambda: puppet.posed(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
+    def draft(self, document: Document, k: int) -> PosedSplats:
+        """The same for pictures that must be quick: of a large object fewer, wider ones."""
+        thing = document.objects[k]
+        puppet = self.shape(document.photo, thing).puppet
+        if not puppet.has_draft:
+            return self.posed(document, k)
+        return self._drafts.setdefault(k, Memo(POSES))(
+            lambda: puppet.draft(thing.pose, thing.placement), puppet, thing.pose, thing.placement
+        )
+
+    def body_points(self, document: Document, k: int) -> F64:
+        """(N, 3) object frame: object `k`'s solid Gaussians, deformed."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        if thing.pose is None:
+            return thing.lifted.body.means.astype(np.float64)
+        return self._bodies(lambda: self._deformed_body(document, k), thing.lifted, thing.pose)
+
+    def _deformed_body(self, document: Document, k: int) -> F64:
+        splats = self.posed(document, k)
+        is_solid = splats.rest.lifted.texture.solidity > 0.5
+        return splats.skinned.points[is_solid if is_solid.any() else slice(None)]
+
+    def drawable(self, document: Document, k: int, view: View) -> Drawable:
+        """Object `k`'s Gaussians on the canvas."""
+        from objectmorpher_core.raster import tiles
+
+        splats, camera = self.posed(document, k), document.photo.camera
+        key = view.place
+        kept = self._drawables.get(k)
+        if kept is None or kept[0] is not splats or kept[1] != key:
+            kept = (splats, key, tiles.prepare(splats, view.camera(camera), camera))
+            self._drawables[k] = kept
+        return kept[2]
+
+    def forget(self, lifted: set[int]) -> None:
+        """Drops what was posed and projected of objects other than these."""
+        self._posed = {k: kept for k, kept in self._posed.items() if k in lifted}
+        self._drafts = {k: kept for k, kept in self._drafts.items() if k in lifted}
+        self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
+
+    def blend(self, document: Document, view: View) -> F32:
+        """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
+        key = (*view.place, *self.lights.state(document))
+        if self._blend is None or self._blend[0] is not document or self._blend[1] != key:
+            self._blend = (document, key, build_blend(self, document, view))
+        return self._blend[2]
+
+    def solved(self, document: Document, k: int, start: Pose | None, **effort: float) -> Document:
+        """The document with object `k` in the pose that its handles ask for.
+
+        `start` and little `effort` (`Deformer.solve`) give a drag's frame; without, the solve is
+        complete.
+        """
+        thing = document.objects[k]
+        if not thing.handles and thing.rig.shifts is None:
+            return edits.set_pose(document, k, None)
+        deformer = self.shape(document.photo, thing).puppet.deformer
+        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, **effort)
+        return edits.set_pose(document, k, solution.pose)
+
+    def anchors(self, document: Document, k: int) -> F64:
+        """Where the automatic anchors are seen: (A, 2) image px."""
+        thing = document.objects[k]
+        deformer = self.shape(document.photo, thing).puppet.deformer
+        index = deformer.anchors(thing.handles, thing.has_auto_anchors)
+        points = thing.pose.points if thing.pose else deformer.points
+        return self.project(document, k, points[index])
+
+    def control_places(self, document: Document, k: int) -> F64:
+        """Where the control points are now: (M, 3) world."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        points = thing.pose.points if thing.pose else thing.lifted.control_points
+        return self.world(document, k, points)
+
+    def control_points(self, document: Document, k: int) -> F64:
+        """Where the control points are seen: (M, 2) image px."""
+        return document.photo.camera.project(self.control_places(document, k))
+
+    def links(self, document: Document, k: int, count: int) -> F64:
+        """The strongest links of each control point: (L, 2, 2) image px of their ends."""
+        thing = document.objects[k]
+        graph = self.shape(document.photo, thing).puppet.deformer.graph
+        pairs = self._links(lambda: _strongest(graph.weights, count), graph)
+        return self.control_points(document, k)[pairs]
+
+    # Between the object's frame and the picture
+
+    def world(self, document: Document, k: int, points: np.ndarray) -> F64:
+        """World positions (..., 3) of object-frame points, after the placement."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        motion = thing.placement.matrix(thing.lifted, document.photo.camera)
+        return thing.lifted.world_points(points) @ motion[:3, :3].T + motion[:3, 3]
+
+    def project(self, document: Document, k: int, points: np.ndarray) -> F64:
+        """Image px (..., 2) of object-frame points (..., 3), after the placement."""
+        return document.photo.camera.project(self.world(document, k, points))
+
+    def spot(self, document: Document, k: int, point: np.ndarray) -> Spot:
+        """Where an object-frame point (3,) is seen."""
+        lifted = document.objects[k].lifted
+        assert lifted is not None
+        world = self.world(document, k, np.asarray(point))
+        xy = document.photo.camera.project(world)
+        scale = document.objects[k].placement.scale
+        return Spot(xy, float(world[2]), lifted.diameter * lifted.scale * scale)
+
+    def unplaced(self, document: Document, k: int, world: np.ndarray) -> F64:
+        """Object-frame position (3,) of a world point, the placement taken back."""
+        thing = document.objects[k]
+        return self.shape(document.photo, thing).puppet.unplaced(world, thing.placement)
+
+    def frame(self, document: Document, k: int) -> ObjectFrame:
+        """The box of the posed and placed object."""
+        thing = document.objects[k]
+        assert thing.lifted is not None
+        xy = self.control_points(document, k)
+        (x0, y0), (x1, y1) = xy.min(0), xy.max(0)
+        camera = document.photo.camera
+        motion = thing.placement.matrix(thing.lifted, camera)
+        centre = camera.project(motion[:3, :3] @ thing.lifted.centre + motion[:3, 3])
+        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        radius = 0.62 * float(np.hypot(x1 - x0, y1 - y0))
+        return ObjectFrame(corners, centre, radius)
+
+    # The picture
+
+    def surface_at(
+        self, document: Document, k: int, view: View, xy: np.ndarray
+    ) -> SurfacePoint | None:
+        """The surface of object `k` at canvas px `xy` or close beside it; None where it is not."""
+        thing = document.objects[k]
+        shape = self.shape(document.photo, thing)
+        at, reach = (float(xy[0]), float(xy[1])), PICK_REACH * view.scale
+        drawable = self.drawable(document, k, view)
+        return shape.puppet.pick_in(
+            drawable, shape.texture, at, thing.pose, thing.placement, reach
+        )  # fmt: skip
+
+
+def _strongest(weights: Sparse, count: int) -> I32:
+    """(L, 2) the ends of each control point's strongest links, each link once."""
+    pairs = set()
+    for i, (first, last) in enumerate(pairwise(weights.indptr)):
+        strongest = np.argsort(-weights.data[first:last], kind="stable")[:count]
+        ends = weights.indices[first + strongest]
+        pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
+    return np.array(sorted(pairs), np.int32).reshape(-1, 2)
+
+
+def _outlines(mask: Mask) -> tuple[F32, ...]:
+    """Along the pixels' edges, corners cut: half a pixel of rounding makes the line quiet."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    if len(rows) == 0:
+        return ()
+    top, left = rows[0], columns[0]
+    crop = mask[top : rows[-1] + 1, left : columns[-1] + 1].view(np.uint8)
+    # Twice the size, so that the outline runs around pixels and not through their centres; of a
+    # large photo less, which nobody sees unless far zoomed in.
+    scale = min(2.0, float(np.sqrt(OUTLINE_PIXELS / crop.size)))
+    size = (max(round(crop.shape[1] * scale), 1), max(round(crop.shape[0] * scale), 1))
+    sized = cv2.resize(crop * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 127
+    sized = np.pad(sized.view(np.uint8), 1)  # so that the photo's border closes the outline
+    found, _ = cv2.findContours(sized, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    outlines = []
+    for contour in found:
+        if len(contour) < 8:
+            continue
+        points = contour[:, 0].astype(np.float32)
+        for _ in range(2):
+            points = (np.roll(points, 1, 0) + 2 * points + np.roll(points, -1, 0)) / 4
+        simple = cv2.approxPolyDP(points[:, None], 0.4, True)[:, 0]
+        per_px = np.array([crop.shape[1] / size[0], crop.shape[0] / size[1]])
+        outlines.append(((simple - 0.5) * per_px + (left, top)).astype(np.float32))
+    return tuple(outlines)
+
+
+def import_core() -> None:
+    """Imports what the first lift needs, in a quiet moment."""
+    from objectmorpher_core.deform import puppet
+
+    assert puppet

@@ -1,0 +1,85 @@
+"""What stays in front of the edit, as the canvas shows it: the photo's pixels by their matte."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import U8
+from objectmorpher_core.document.model import EditObject, Matte
+
+from ..editor.view import View
+from .layers import Layer
+from .memo import Memo
+
+if TYPE_CHECKING:
+    from objectmorpher_core.raster.texture import TextureLevels
+
+MOST = 12  # pictures that are remembered
+PIXELS_FROM = 4.0  # magnification from which the photo shows single pixels, and so does this
+
+
+class Fronts:
+    """The pictures of each view, remembered."""
+
+    def __init__(self) -> None:
+        self._levels, self._most = Memo(MOST), MOST
+        self._kept: dict[int, tuple[Matte, tuple[float, ...], Layer | None]] = {}
+
+    def make_room(self, count: int) -> None:
+        """Remembers so many, which are shown together."""
+        self._most = max(MOST, count)
+        self._levels.make_room(count)
+
+    def layer(self, item: EditObject, view: View) -> Layer | None:
+        """Px for px; None where nothing of it is on the canvas."""
+        matte = item.matte
+        assert matte is not None, "what stays in front has one"
+        kept = self._kept.get(id(matte))
+        if kept is None or kept[0] is not matte or kept[1] != view.place:
+            levels = self._levels(lambda: _levels(matte), matte)
+            self._kept.pop(id(matte), None)
+            while len(self._kept) >= self._most:
+                del self._kept[next(iter(self._kept))]  # the oldest
+            kept = self._kept[id(matte)] = (matte, view.place, drawn(levels, view))
+        return kept[2]
+
+
+def _levels(matte: Matte) -> TextureLevels:
+    """Premultiplied, with halved copies for what is shown smaller than it is."""
+    from objectmorpher_core.raster.texture import build_levels
+
+    own = matte.foreground * matte.alpha[..., None]
+    return build_levels(own, matte.alpha, matte.left, matte.top)
+
+
+def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | None:
+    """As the photo's own texture is looked up: linear between its pixels, single ones when near.
+
+    `levels` hold premultiplied colours, of which `strength` in [0, 1] is shown.
+    None where nothing of it is on the canvas.
+    """
+    height, width = levels.levels[0].shape[:2]
+    corner = np.array([levels.left, levels.top])
+    low = np.floor(view.canvas_from_image(corner)).astype(int)
+    high = np.ceil(view.canvas_from_image(corner + (width, height))).astype(int)
+    x0, y0 = (max(int(v), 0) for v in low)
+    x1, y1 = min(int(high[0]), view.width), min(int(high[1]), view.height)
+    if x0 >= x1 or y0 >= y1:
+        return None
+    times = min(max(int(math.log2(1 / view.zoom)), 0), len(levels.levels) - 1)
+    step = 1 / (view.zoom * 2**times)  # px of the level for each canvas px
+    start = (view.image_from_canvas((x0 + 0.5, y0 + 0.5)) - corner) / 2**times - 0.5
+    matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
+    way = cv2.INTER_NEAREST if view.zoom >= PIXELS_FROM else cv2.INTER_LINEAR
+    level = np.ascontiguousarray(levels.levels[times])
+    shown = cv2.warpAffine(level, matrix, (x1 - x0, y1 - y0), flags=way | cv2.WARP_INVERSE_MAP)
+    box = (float(x0), float(y0), float(x1), float(y1))
+    return Layer(box, _as_u8(shown * np.float32(strength)))
+
+
+def _as_u8(premultiplied: np.ndarray) -> U8:
+    return (premultiplied * 255 + 0.5).clip(0, 255).astype(np.uint8)

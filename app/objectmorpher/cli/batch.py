@@ -1,0 +1,221 @@
+"""Many edit scripts, one after the other: `objectmorpher batch`.
+
+A failure does not stop the others. What was made already is left as it is, so that a batch that
+was stopped goes on where it was. Each edit may be made on another machine (`server/spread.py`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.pictures.image import ENDINGS, encode_picture
+from objectmorpher_core.scripting.script import (
+    BatchItem,
+    beside,
+    files_of,
+    parse_scripts,
+    script_text,
+)
+
+from .commands import check_outputs, edited_by, json_bytes
+from .ray import check_ray
+from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
+
+USUAL_ENDING = ".png"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One edit, and the script it stands in; `problem`: why it cannot be tried."""
+
+    script: Path
+    item: BatchItem | None
+    problem: str = ""
+
+    @property
+    def name(self) -> str:
+        """What its line begins with."""
+        out = None if self.item is None else self.item.out
+        return str(self.script) if out is None else str(Path(out))
+
+
+def run_batch(options: argparse.Namespace) -> None:
+    """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
+    if options.report:
+        check_outputs([], {options.report: (".json",)})
+    if options.out is not None and not options.out.is_dir():
+        raise UsageError(f"{options.out} is no folder")
+    check_ray(options)
+    tasks = list(_tasks(options))
+    if not tasks:
+        raise UsageError("there is no script to run")
+    entries: dict[int, dict[str, Any]] = {}
+    for number, entry in _entries(tasks, options):
+        entries[number] = entry
+        _say(entry)
+    _finish([entries[number] for number in sorted(entries)], options.report)
+
+
+def _finish(entries: list[dict[str, Any]], report: Path | None) -> None:
+    """The summary; an error where something failed."""
+    counts = {
+        state: sum(e["state"] == state for e in entries) for state in ("done", "kept", "failed")
+    }
+    told = f"{counts['done']} done, {counts['kept']} kept, {counts['failed']} failed"
+    sys.stdout.write(f"{told}\n")
+    if report is not None:
+        write_all({report: json_bytes({"version": 1, **counts, "edits": entries})})
+    if counts["failed"]:
+        raise RuntimeError(f"{counts['failed']} of {len(entries)} edits failed")
+
+
+def _entries(
+    tasks: list[Task], options: argparse.Namespace
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """What became of each edit, with its number: in their order, or as a cluster is done."""
+    if options.ray is None:
+        for number, task in enumerate(tasks):
+            known = _known(task, options.overwrite)
+            yield number, _told(task) | (known or _outcome(task.item))
+        return
+    from ..server.spread import spread
+
+    jobs = []
+    for number, task in enumerate(tasks):
+        if (known := _known(task, options.overwrite)) is not None:
+            yield number, _told(task) | known
+        elif task.item is not None:
+            text = script_text(beside(task.item, Path.cwd()))  # with whole paths
+            jobs.append({"number": number, "edit": text})
+    for answer in spread(_made_there, jobs, options.ray):
+        number = answer["number"]
+        yield number, _told(tasks[number]) | answer["outcome"]
+
+
+def _made_there(job: dict[str, Any]) -> dict[str, Any]:
+    """In a worker of a cluster: one edit."""
+    (item,) = parse_scripts(job["edit"])
+    return {"number": job["number"], "outcome": _outcome(item)}
+
+
+def _told(task: Task) -> dict[str, Any]:
+    return {"script": str(task.script), "out": task.name}
+
+
+def _known(task: Task, is_overwriting: bool) -> dict[str, Any] | None:
+    """What becomes of an edit that is not to be made."""
+    if task.item is None or task.problem:
+        return {"state": "failed", "error": task.problem}
+    try:
+        is_kept = not is_overwriting and _is_newer(task)
+    except FAILURES as error:
+        return {"state": "failed", "error": failure_sentence(error)}
+    return {"state": "kept", "seconds": 0.0} if is_kept else None
+
+
+def _outcome(item: BatchItem | None) -> dict[str, Any]:
+    assert item is not None, "a task without an edit has a problem"
+    start = time.perf_counter()
+    try:
+        figures = _edit(item)
+    except FAILURES as error:
+        return {"state": "failed", "error": failure_sentence(error)}
+    seconds = round(time.perf_counter() - start, 3)
+    return {"state": "done", "seconds": seconds, "report": figures}
+
+
+def _edit(item: BatchItem) -> dict[str, Any]:
+    out = Path(item.out or "")
+    check_outputs([Path(name) for name in _inputs(item)], {out: ENDINGS})
+    with progress_bar("Opening") as progress:
+        edited = edited_by(item, progress)
+        write_all({out: encode_picture(edited.picture, out.suffix)})
+    return edited.report()
+
+
+def _inputs(item: BatchItem) -> list[str]:
+    scripts = (item.script, *(each.script for each in item.others.objects))
+    names = (item.photo, *(name for script in scripts for name in files_of(script)))
+    return [name for name in names if name is not None]
+
+
+def _is_newer(task: Task) -> bool:
+    """Whether the output was made after all that it is made from."""
+    assert task.item is not None
+    out = Path(task.item.out or "")
+    if not out.is_file():
+        return False
+    sources = [task.script, *(Path(name) for name in _inputs(task.item))]
+    return all(s.is_file() and s.stat().st_mtime <= out.stat().st_mtime for s in sources)
+
+
+def _say(entry: dict[str, Any]) -> None:
+    """Its line."""
+    told = {
+        "done": f"{entry.get('seconds', 0):.1f} s",
+        "kept": "newer than its script and photo",
+        "failed": entry.get("error", ""),
+    }[entry["state"]]
+    sys.stdout.write(f"{entry['state']:<6}  {entry['out']}  {told}\n")
+    sys.stdout.flush()
+
+
+def _tasks(options: argparse.Namespace) -> Iterator[Task]:
+    """All edits in their order. One that makes no sense is a task that fails."""
+    photos = _files(options.photo or [], ENDINGS)
+    taken: set[Path] = set()
+    for script in _files(options.scripts, (".json",)):
+        try:
+            items = parse_scripts(script.read_text(encoding="utf-8"))
+        except (ValueError, OSError) as error:
+            yield Task(script, None, failure_sentence(error))
+            continue
+        for number, item in enumerate(items, 1):
+            stem = script.stem if len(items) == 1 else f"{script.stem}-{number}"
+            for each, name in _with_photos(beside(item, script.parent), stem, photos):
+                yield _task(script, _with_out(each, name, options.out), taken)
+
+
+def _task(script: Path, item: BatchItem, taken: set[Path]) -> Task:
+    if item.photo is None:
+        return Task(script, item, 'it names no "photo"; add --photo PHOTO')
+    if item.out is None:
+        return Task(script, item, 'it names no "out"; add -o FOLDER')
+    out = Path(item.out).resolve()
+    if out in taken:
+        return Task(script, item, "an edit before it writes the same file")
+    taken.add(out)
+    return Task(script, item)
+
+
+def _with_photos(item: BatchItem, stem: str, photos: list[Path]) -> Iterator[tuple[BatchItem, str]]:
+    """The edit for each photo it is meant for, and a name for what it makes."""
+    if item.photo is not None or not photos:
+        yield item, stem
+        return
+    for photo in photos:
+        yield replace(item, photo=str(photo)), f"{photo.stem}-{stem}"
+
+
+def _with_out(item: BatchItem, name: str, folder: Path | None) -> BatchItem:
+    if item.out is not None or folder is None:
+        return item
+    return replace(item, out=str(folder / f"{name}{USUAL_ENDING}"))
+
+
+def _files(paths: list[Path], endings: tuple[str, ...]) -> list[Path]:
+    """Files as they are, and those in folders with these endings by their names."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found += sorted(f for f in path.iterdir() if f.suffix.lower() in endings)
+        else:
+            found.append(path)
+    return found

@@ -1,0 +1,255 @@
+"""What the subcommands do. Every output is written at the end, all of them or none."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_picture
+from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
+from objectmorpher_core.pipeline import select as select_object
+from objectmorpher_core.scripting.animation import Clip
+from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, encode_output
+from objectmorpher_core.scripting.script import (
+    BatchItem,
+    EditScript,
+    ScriptError,
+    beside,
+    files_of,
+    parse_scripts,
+    script_from,
+)
+from objectmorpher_core.scripting.scripted import refuse_missing
+from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
+from objectmorpher_core.splat_files import encode as encode_splats
+
+from .terminal import UsageError, progress_bar
+
+SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
+EXTRAS = {  # further outputs of `edit` and what each holds
+    "session": "session",
+    "save_mask": "mask",
+    "save_plate": "plate",
+    "save_object": "object",
+    "save_splats": "splats",
+    "save_depth": "depth",
+    "save_layers": "layers",
+    "save_video": "video",
+    "report": "report",
+}
+LEAST_COUNT, MOST_COUNT = 100, 500_000  # Gaussians on a mesh
+
+
+def run_edit(options: argparse.Namespace) -> None:
+    """`objectmorpher edit`"""
+    items = _items(options)
+    scripts = [s for i in items for s in (i.script, *(o.script for o in i.others.objects))]
+    named = [name for s in scripts for name in files_of(s)]
+    inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
+    outputs: dict[Path, bytes] = {}
+    clip = Clip(options.video, options.seconds)
+    for item in items:
+        out = Path(item.out or "")
+        extras = {name: getattr(options, name) for name in EXTRAS if getattr(options, name)}
+        check_outputs(inputs, {out: ENDINGS})
+        check_outputs(inputs, {path: _endings(EXTRAS[name]) for name, path in extras.items()})
+        everything = [*outputs, out, *extras.values()]
+        if len({path.resolve() for path in everything}) < len(everything):
+            raise UsageError("two outputs have the same name")
+        refuse_missing(item.script, item.others)
+        outputs |= _edit_one(item, extras, clip)
+    write_all(outputs)
+
+
+def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
+    """One edit of a batch, or the only one."""
+    photo, script = Path(item.photo or ""), item.script
+    mask = Path(script.mask).read_bytes() if script.mask else None
+    data = photo.read_bytes()
+    return run_script(data, photo.name, script, mask, progress, needs_plate, item.others)
+
+
+def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path, bytes]:
+    out = Path(item.out or "")
+    with progress_bar("Opening") as progress:
+        edited = edited_by(item, progress, any(EXTRAS[name] in NEED_PLATE for name in extras))
+        with edited.stopwatch.stage("save"):
+            outputs = {out: encode_output("photo", edited, out)}
+            for name, path in extras.items():
+                if name != "report":
+                    outputs[path] = encode_output(EXTRAS[name], edited, path, clip)
+        if "report" in extras:
+            outputs[extras["report"]] = json_bytes(edited.report())
+    return outputs
+
+
+def _endings(what: str) -> tuple[str, ...]:
+    return (".json",) if what == "report" else OUTPUTS[what]
+
+
+def run_select(options: argparse.Namespace) -> None:
+    """`objectmorpher select`"""
+    script = _script(options)
+    inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
+    check_outputs(inputs, {options.out: (".png",)})
+    refuse_missing(script)
+    mask = Path(script.mask).read_bytes() if script.mask else None
+    with progress_bar("Selecting") as progress:
+        document = open_photo(options.photo.read_bytes(), options.photo.name)
+        document = select_object(document, script, mask, progress)
+    write_all({options.out: encode_mask(_mask(document))})
+
+
+def run_replay(options: argparse.Namespace) -> None:
+    """`objectmorpher replay`"""
+    from objectmorpher_core.session.file import decode_session
+
+    wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
+    if options.report:
+        wanted[options.report] = (".json",)
+    check_outputs([options.session], wanted)
+    with progress_bar("Opening") as progress:
+        edited = replay(decode_session(options.session.read_bytes()), progress)
+        outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
+        if options.report:
+            outputs[options.report] = json_bytes(edited.report())
+    write_all(outputs)
+
+
+def run_info(options: argparse.Namespace) -> None:
+    """`objectmorpher info`"""
+    from objectmorpher_core.session.file import decode_session
+
+    info = describe(decode_session(options.session.read_bytes()))
+    if options.json:
+        sys.stdout.write(json_bytes(info).decode())
+        return
+    for key, value in info.items():
+        if key != "objects":
+            sys.stdout.write(f"{key}: {_line(value)}\n")
+    for item in info["objects"]:
+        sys.stdout.write("- " + ", ".join(f"{k}: {_line(v)}" for k, v in item.items()) + "\n")
+
+
+def describe(document: Document) -> dict[str, Any]:
+    """What a document holds, in plain values."""
+    width, height = document.photo.size
+    objects = []
+    for item in document.objects:
+        lifted = item.lifted
+        objects.append({
+            "name": item.name,
+            "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
+            "gaussians": 0 if lifted is None else len(lifted.gaussians),
+            "control_points": 0 if lifted is None else len(lifted.control_points),
+            "handles": sum(not h.is_pin for h in item.handles),
+            "pins": sum(h.is_pin for h in item.handles),
+            "is_moved": item.is_moved,
+            "move": list(item.placement.move), "depth": item.placement.depth,
+            "turn": list(item.placement.turn), "scale": item.placement.scale,
+        })  # fmt: skip
+    return {
+        "photo": {
+            "name": document.photo.name, "width": width, "height": height,
+            "bits": document.photo.pixels.dtype.itemsize * 8,
+        },
+        "focal_px": round(document.photo.camera.focal, 2),
+        "seed": document.seed,
+        "backends": dict(document.backends),
+        "has_plate": document.plate is not None,
+        "objects": objects,
+    }  # fmt: skip
+
+
+def run_convert(options: argparse.Namespace) -> None:
+    """`objectmorpher convert`"""
+    count = COUNT if options.count is None else options.count
+    if not LEAST_COUNT <= count <= MOST_COUNT:
+        raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")
+    check_outputs([options.source], {options.out: SPLAT_ENDINGS})
+    with progress_bar("Converting") as progress:
+        gaussians = read(options.source, count, options.flip)
+        progress(0.7, "Writing")
+        data = encode_splats(gaussians, options.out)
+    write_all({options.out: data})
+
+
+def run_warm_up(options: argparse.Namespace) -> None:
+    """`objectmorpher warm-up`"""
+    from ..system.first_start import compile_kernels
+
+    compile_kernels()
+
+
+def _items(options: argparse.Namespace) -> list[BatchItem]:
+    """The edits that the command line asks for, each with its photo and output."""
+    said = _script(options)
+    if options.script is None:
+        items = [BatchItem(said)]
+    else:
+        read = parse_scripts(options.script.read_text(encoding="utf-8"))
+        folder = options.script.parent
+        items = [beside(item, folder) for item in read]
+        items = [replace(i, script=i.script.merged(said, _said(options))) for i in items]
+    if len(items) > 1:
+        single = [name for name in EXTRAS if getattr(options, name)]
+        if options.photo or options.out or single:
+            raise UsageError('a batch names "photo" and "out" in the script, and nothing else')
+        if any(item.photo is None or item.out is None for item in items):
+            raise ScriptError('every edit of a batch needs "photo" and "out"')
+        return items
+    photo, out = options.photo or items[0].photo, options.out or items[0].out
+    if photo is None:
+        raise UsageError("which photo? objectmorpher edit PHOTO -o OUT.png")
+    if out is None:
+        raise UsageError("where to? add -o OUT.png")
+    return [replace(items[0], photo=str(photo), out=str(out))]
+
+
+def _script(options: argparse.Namespace) -> EditScript:
+    return script_from(_said(options))
+
+
+def _said(options: argparse.Namespace) -> dict[str, Any]:
+    """The script's options that stand on the command line."""
+    return {
+        name: getattr(options, name)
+        for name in SCRIPT_OPTIONS
+        if getattr(options, name, None) is not None
+    }
+
+
+def check_outputs(inputs: list[Path], outputs: dict[Path, tuple[str, ...]]) -> None:
+    """Refuses, before any work, what could not be written or would overwrite an input."""
+    read = {path.resolve() for path in inputs}
+    for path, endings in outputs.items():
+        if path.resolve() in read:
+            raise UsageError(f"{path} is an input; choose another name for the output")
+        if path.suffix.lower() not in endings:
+            raise UsageError(f"{path}: the ending must be {' or '.join(endings)}")
+        if not path.parent.is_dir():
+            raise UsageError(f"{path} cannot be written: the folder {path.parent} does not exist")
+
+
+def _mask(document: Document) -> Mask:
+    mask = document.objects[0].mask
+    assert mask is not None
+    return mask
+
+
+def json_bytes(value: Any) -> bytes:
+    return (json.dumps(value, indent=2) + "\n").encode()
+
+
+def _line(value: Any) -> str:
+    if isinstance(value, dict):
+        return " ".join(f"{k} {_line(v)}" for k, v in value.items())
+    return str(value)

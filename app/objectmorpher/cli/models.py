@@ -1,0 +1,234 @@
+"""`objectmorpher models`: what is there of learned weights, getting and checking them."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from objectmorpher_core import lift, models
+from objectmorpher_core.lift.workers import file as worker_file
+from objectmorpher_core.models import Added, HubModel, HubState, State, TrunkState
+
+from .terminal import UsageError, progress_bar
+
+WIDE, NARROW = 34, 12  # characters of the list's columns
+THERE = {"ok": "installed", "missing": "not installed", "damaged": "damaged"}
+
+
+def run_models(options: argparse.Namespace) -> None:
+    """`objectmorpher models list|get|path|verify|add|remove`"""
+    action, id = options.action, options.id
+    if (action == "add") != (options.file is not None):
+        raise UsageError(
+            "a file is added as in: objectmorpher models add depth FILE.onnx, and a folder as in:"
+            " objectmorpher models add sam2 FOLDER"
+        )
+    if options.is_offline:
+        os.environ[models.OFFLINE] = "1"
+    if action == "add":
+        _add(id, options.file, options.is_converted)
+    elif action == "remove":
+        _remove(id or "")
+    elif action == "get":
+        _get(options)
+    else:
+        _look(action, id)
+
+
+def _add(id: str, source: Path, is_converted: bool) -> None:
+    if is_converted:
+        with progress_bar(f"Converting {source.name}") as progress:
+            _write(_line_of_hub("list", models.convert_folder(id, source, progress)))
+        return
+    if id in {kind.id for kind in models.KINDS}:
+        _write(_line_of_added("list", models.add(id, source)))
+        return
+    if id in _trunks():
+        _write(_line_of_trunk("list", models.add_trunk(id, source)))
+        return
+    known = (*models.families(), *(model.id for model in models.hub_models()))
+    if id not in known:
+        names = ", ".join((*(kind.id for kind in models.KINDS), *known, *_trunks()))
+        raise UsageError(f"nothing can be added as {id!r}; known are {names}")
+    _write(_line_of_hub("list", models.use_folder(id, source)))
+
+
+def _remove(id: str) -> None:
+    if id in {model.id for model in models.hub_models()}:
+        models.remove_hub(id)
+    elif id in {weight.id for weight in models.weights()}:
+        models.remove_weight(id)
+    elif id in _trunks():
+        models.remove_trunk(id)
+    elif id in worker_file.worker_names():
+        worker_file.forget_licence(id)
+    else:
+        models.remove(id)
+
+
+def _get(options: argparse.Namespace) -> None:
+    """One; or all single files that editing uses. What else there is is got one by one."""
+    id = options.id
+    if id in _trunks():
+        trunk = models.trunk(id)
+        raise UsageError(
+            f"{id} is not fetched: download {' or '.join(trunk.files)} by way of {trunk.page},"
+            f" then objectmorpher models add {id} FILE"
+        )
+    if id in {model.id for model in models.hub_models()}:
+        model = models.hub_model(id)
+        if models.place(id) is None and model.repository:
+            models.check_licence(model, options.accept_licence or "")
+            _ask(model, options.is_agreed)
+        with progress_bar(f"Getting {id}") as progress:
+            at = models.get(id, progress, options.accept_licence or "")
+        _write(f"{id}: {at}")
+        return
+    if id in worker_file.worker_names():
+        worker_file.accept_licence(id, options.accept_licence or "")
+        _write(_line_of_worker(id))
+        return
+    usual = [weight for weight in models.weights() if weight.category == "edit"]
+    for weight in [models.weight(id)] if id else usual:
+        with progress_bar(f"Getting {weight.id}") as progress:
+            at = models.fetch(weight.id, progress)
+        _write(f"{weight.id}: {at}")
+
+
+def _ask(model: HubModel, is_agreed: bool) -> None:
+    """The user's consent to a download. Raises UsageError without it."""
+    told = f"{model.id}: {_size(model.size)} from {model.home}, licence {model.licence}"
+    if models.has_pickles(model):
+        told += "; it comes as pickles, of which nothing but the numbers is read"
+    if is_agreed:
+        sys.stderr.write(f"{told}\n")
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(f"{told}; to download it add --yes")
+    sys.stderr.write(f"{told}. Download it? [y/N] ")
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise UsageError(f"{model.id} was not downloaded")
+
+
+def _look(action: str, id: str | None) -> None:
+    """Lists, tells the places of, or hashes one of them or all."""
+    workers = tuple(name for name in worker_file.worker_names() if id in (None, name))
+    others = {known.id for known in (*models.KINDS, *models.hub_models(), *models.trunks())}
+    is_worker = id is not None and bool(workers)
+    states = () if id in others or is_worker else _states(action, id)
+    brought = tuple(models.added(kind.id) for kind in models.KINDS if id in (None, kind.id))
+    look = models.verify_hub if action == "verify" else models.look_hub
+    several = tuple(look(model.id) for model in models.hub_models() if id in (None, model.id))
+    trunks = tuple(models.look_trunk(known) for known in _trunks() if id in (None, known))
+    if action != "list" and id is None:  # what nobody has got is only listed
+        several = tuple(state for state in several if state.state != "missing")
+        trunks = tuple(state for state in trunks if state.state != "missing")
+        states = tuple(s for s in states if s.weight.category == "edit" or s.state != "missing")
+    for state in states:
+        _write(_line_of(action, state))
+    for official in trunks:
+        _write(_line_of_trunk(action, official))
+    for own in brought:
+        _write(_line_of_added(action, own))
+    for found in several:
+        _write(_line_of_hub(action, found))
+    for name in workers if action == "list" else ():
+        _write(_line_of_worker(name))
+    # What only a user can bring is not missed, unless it is asked for.
+    broken = [state.weight.id for state in states if state.state != "ok"]
+    broken += [b.kind.id for b in brought if b.state == "damaged" or (id and b.state != "ok")]
+    broken += [found.model.id for found in several if found.state != "ok"]
+    broken += [official.trunk.id for official in trunks if official.state != "ok"]
+    if broken and action != "list":
+        raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")
+
+
+def _states(action: str, id: str | None) -> tuple[State, ...]:
+    return models.verify(id) if action == "verify" else models.look(id)
+
+
+def _line_of(action: str, state: State) -> str:
+    weight = state.weight
+    if action != "list":
+        return _checked(action, weight.id, state)
+    there = "installed" if state.state == "ok" else "not installed"
+    return _columns(weight.id, _size(weight.size), weight.licence, there, weight.purpose)
+
+
+def _line_of_trunk(action: str, found: TrunkState) -> str:
+    """Of an official network of a measure: whether it is there, or how it can be."""
+    trunk = found.trunk
+    if action != "list":
+        return _checked(action, trunk.id, found, found.reason)
+    purpose = f"{trunk.name}, {trunk.purpose}"
+    if found.state == "missing":
+        purpose += f"; models add {trunk.id} FILE, {trunk.files[0]} from {trunk.page}"
+    return _columns(trunk.id, _size(trunk.size), trunk.licence, THERE[found.state], purpose)
+
+
+def _line_of_hub(action: str, found: HubState) -> str:
+    model = found.model
+    if action != "list":
+        return _checked(action, model.id, found, found.reason)
+    there, purpose = THERE[found.state], model.purpose
+    if found.is_own:
+        there, purpose = "yours" if found.state == "ok" else there, f"{purpose} ({found.path})"
+    elif not model.repository:
+        purpose += f"; models add {model.id} FOLDER, from {model.home}"
+    licence = model.licence if model.is_free else f"{model.licence}*"
+    return _columns(model.id, _size(model.size), licence, there, purpose)
+
+
+def _line_of_added(action: str, own: Added) -> str:
+    """Which of the user's files it is, or which it could be."""
+    kind = own.kind
+    if action != "list":
+        return _checked(action, kind.id, own)
+    if own.state == "ok":
+        told = f"{kind.purpose} ({own.name}, sha256 {own.sha256})"
+        return _columns(kind.id, _size(own.size), "yours", THERE["ok"], told)
+    told = f"{kind.purpose}; models add {kind.id} FILE, {kind.example}"
+    return _columns(kind.id, "", "yours", THERE[own.state], told)
+
+
+def _checked(
+    action: str, id: str, found: State | TrunkState | HubState | Added, reason: str = ""
+) -> str:
+    """What `verify` and `path` say; `reason`: why it is damaged."""
+    if action == "verify":
+        return f"{id}: {found.state}{f' ({reason})' if reason else ''}"
+    return str(found.path) if found.state == "ok" else ""
+
+
+def _line_of_worker(name: str) -> str:
+    """A program of the user's that lifts: its files are its own matter."""
+    try:
+        worker = worker_file.read_worker(name)
+    except lift.LiftError as error:
+        return _columns(name, "", "", "damaged", str(error))
+    licence = (worker.licence or "not told") + ("" if worker.is_free else "*")
+    missing = worker.missing()
+    told = f"a worker of yours that lifts{f'; {missing}' if missing else ''}"
+    return _columns(name, "", licence, "not usable" if missing else "yours", told)
+
+
+def _trunks() -> tuple[str, ...]:
+    return tuple(known.id for known in models.trunks())
+
+
+def _columns(id: str, size: str, licence: str, there: str, purpose: str) -> str:
+    return f"{id:<{WIDE}}{size:>10}  {licence:<{NARROW}} {there:<14} {purpose}"
+
+
+def _size(count: int) -> str:
+    """Bytes for people."""
+    if count < 5e4:
+        return f"{count / 1e3:.0f} kB"
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.2f} GB"
+
+
+def _write(line: str) -> None:
+    sys.stdout.write(f"{line}\n" if line else "")

@@ -1,0 +1,362 @@
+"""The command line (DESIGN section 6): subcommands, progress bars, exit codes.
+
+A failure is one sentence on stderr and a non-zero exit; nothing is then written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from .options import RENDERERS, WindowOptions
+from .ray import add_ray
+from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
+from .terminal import FAILURES, PROGRAM, failure_sentence
+
+SAMPLE = "assets/samples/coffee.jpg"
+FAILED, MISUSED = 1, 2  # exit codes
+
+
+class _Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose errors are one sentence."""
+
+    def error(self, message: str) -> Any:
+        sys.stderr.write(f"{PROGRAM}: {message}\n")
+        raise SystemExit(MISUSED)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs a subcommand; returns the exit code."""
+    if (absent := _absent(arguments)) is not None:
+        sys.stderr.write(f"{PROGRAM}: {absent}\n")
+        return FAILED
+    options = build_parser().parse_args(_joined_negatives(arguments))
+    try:
+        options.run(options)
+    except KeyboardInterrupt:
+        sys.stderr.write(f"{PROGRAM}: interrupted\n")
+        return 130
+    except FAILURES as error:
+        sys.stderr.write(f"{PROGRAM}: {failure_sentence(error)}\n")
+        return FAILED
+    return 0
+
+
+def _absent(arguments: Sequence[str]) -> str | None:
+    """Return why a command of the research package cannot run: one sentence, or None."""
+    word = next(iter(arguments), "")
+    if word not in RESEARCH or word in (command.name for command in research_commands()):
+        return None
+    from objectmorpher_core.base.installation import extra
+
+    return f"{word} is part of the research package, which is not installed: `{extra('research')}`"
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """All subcommands and their options; those of the research package where it is installed."""
+    parser = _Parser(
+        prog=PROGRAM,
+        description="Open a photo, click an object, drag points on it in 3D, save the photo.",
+        epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    add_subcommands(parser, "command", (*SUBCOMMANDS, *research_commands()))
+    return parser
+
+
+def window_parser() -> argparse.ArgumentParser:
+    """The options of the editor's window: `objectmorpher [FILE]`."""
+    parser = _Parser(prog=PROGRAM, description="Open the editor.")
+    add = parser.add_argument
+    add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
+    add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
+    add("--renderer", choices=RENDERERS, default="auto", help="gl draws on the GPU, tiles does not")
+    add("--theme", choices=("dark", "light"), help="this once; else as in the preferences")
+    add("--scale", type=float, metavar="S", help="pixels per point")
+    add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
+    add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
+    add("--seed", type=int, default=0, help="of all that is random")
+    add("--frames", type=int, metavar="N", help="close after N frames")
+    add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
+    add("--frame-log", type=Path, metavar="F.json", help="when each frame was shown")
+    return parser
+
+
+def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
+    """What they say on this command line."""
+    return window_parser().parse_args(list(arguments))
+
+
+def window_options(options: argparse.Namespace) -> WindowOptions:
+    """What `parse_window` read, as the window takes it."""
+    from ..system.resources import resource
+
+    file = options.file or (resource(SAMPLE) if options.is_sample else None)
+    width, height = options.size
+    return WindowOptions(
+        file, options.renderer, options.theme, options.scale, (int(width), int(height)),
+        options.fov, options.seed, options.frames, options.screenshot, options.frame_log,
+    )  # fmt: skip
+
+
+def _add_choosing(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("choosing the object (px of the upright photo)")
+    add = group.add_argument
+    add("--click", action="append", type=_list(2, 2), metavar="X,Y", help="on the object")
+    add("--not-click", action="append", type=_list(2, 2), metavar="X,Y", help="beside it")
+    add("--box", type=_list(4, 4), metavar="X0,Y0,X1,Y1", help="around it")
+    add("--subject", action="store_true", default=None, help="the photo's main subject")
+    add("--mask", metavar="M.png", help="a mask picture; it wins over everything else")
+    add(
+        "--segment",
+        metavar="NAME",
+        help="backend: auto, dino, grabcut, subject, sam2, sam, sam3, sam-onnx, or one model's id",
+    )
+    add("--seed", type=int, metavar="N", help="default 0; two runs give identical bytes")
+
+
+def _add_edit(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "photo", type=Path, nargs="?", metavar="PHOTO", help="else the script names it"
+    )
+    parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
+    _add_choosing(parser)
+    add = parser.add_argument_group("backends").add_argument
+    add("--inpaint", metavar="NAME", help="auto, pixelhacker, lama, migan, patchmatch or telea")
+    add("--lift", metavar="NAME", help="auto, relief, trellis, cupid, or a worker")
+    add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
+        help="the background R px around X2,Y2 is filled in from around X,Y")  # fmt: skip
+    add("--refine", metavar="NAME",
+        help="none (also auto), harmonise (light, grain, focus), qwen or klein")  # fmt: skip
+    add("--refine-strength", type=float, metavar="S", help="how much of a network's, 0 to 1")
+    add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
+    add = parser.add_argument_group("the object's shape").add_argument
+    add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
+    add("--thickness", type=float, metavar="S", help="times what its outline says, default 1")
+    add("--back", metavar="KIND", help="auto, mirrored or continued: the side that is not seen")
+    add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
+    add("--floating", action="store_true", default=None,
+        help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
+    add(
+        "--trust",
+        type=float,
+        metavar="T",
+        help="in the shape network, 0 to 1; 0: its outline alone tells its shape; default 1",
+    )
+    add("--no-depth", action="store_true", default=None,
+        help="not as a depth model sees it, though one is installed")  # fmt: skip
+    add("--hidden", metavar="M.png", help="a mask of what of it is hidden behind something")
+    add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
+    add("--flip", action="store_true", default=None, help="that file stands on its head")
+    add = parser.add_argument_group("deforming").add_argument
+    add("--pin", action="append", type=_list(2, 2), metavar="X,Y", help="a point that stays")
+    add("--handle", action="append", type=_handle, metavar="X,Y:X2,Y2[,DZ]",
+        help="drag the surface point seen at X,Y to X2,Y2, DZ diameters away")  # fmt: skip
+    add("--deform", metavar="MODE", help="arap (default) or laplacian")
+    add("--links", metavar="KIND", help="geodesic (default) or euclidean")
+    add("--faithful", action="store_true", default=None, help="the paper as printed")
+    add("--nodes", type=int, metavar="N", help="control points, 4 to 4096, default 512")
+    add("--stiffness", type=float, metavar="S",
+        help="reach of the links between control points, 0.25 to 4, default 1")  # fmt: skip
+    add("--stretch-limit", type=float, metavar="S",
+        help="handles stop where a part would be S times as long as it was")  # fmt: skip
+    add("--split", action="store_true", default=None,
+        help="Gaussians that are stretched far become several")  # fmt: skip
+    add = parser.add_argument_group("placing the whole object, after the handles").add_argument
+    add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
+    add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
+    add("--scale", type=float, metavar="S", help="times as large")
+    add("--shadow", metavar="auto|none",
+        help="default auto: its own goes with it, its reflection goes, where found")  # fmt: skip
+    add("--remove", action="store_true", default=None, help="it is gone, what is behind it shows")
+    add("--front", action="append", type=_list(2, 2), metavar="X,Y",
+        help="on a thing that stays in front of what is edited")  # fmt: skip
+    add("--front-mask", metavar="M.png", help="a mask of such a thing")
+    add = parser.add_argument_group("scripts and further outputs").add_argument
+    add(
+        "--script",
+        type=Path,
+        metavar="EDIT.json",
+        help="the same options from a file, and further objects (docs/formats.md)",
+    )
+    add("--session", type=Path, metavar="S.omorph", help="for the editor, and for replay")
+    add("--save-mask", type=Path, metavar="FILE", help="what was selected")
+    add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
+    add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
+    add("--save-depth", type=Path, metavar="FILE", help="its nearness, 16 bit: white is nearest")
+    add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
+    add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
+    add("--video", metavar="KIND", default="morph",
+        help="morph (photo to edit and back, the default), sway or turn")  # fmt: skip
+    add("--seconds", type=float, default=4.0, metavar="S", help="its length, default 4")
+    add("--save-splats", type=Path, metavar="FILE",
+        help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
+    add("--report", type=Path, metavar="R.json", help="seconds, handles, footprint and more")
+
+
+def _add_batch(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs scripts one after the other, a line for each. A failure does not stop the others; "
+        "an output that is newer than all it is made from is left as it is."
+    )
+    add = parser.add_argument
+    add("scripts", type=Path, nargs="+", metavar="SCRIPT", help="edit scripts, or folders of them")
+    add("-o", "--out", type=Path, metavar="FOLDER", help="of outputs that a script does not name")
+    add("--photo", type=Path, action="append", metavar="PHOTO",
+        help="photos, or folders of them, for scripts that name none")  # fmt: skip
+    add("--overwrite", action="store_true", help="also what is newer already")
+    add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
+    add_ray(parser)
+
+
+def _add_select(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("photo", type=Path, metavar="PHOTO", help="a picture file")
+    add("-o", "--out", type=Path, metavar="MASK.png", required=True, help="white is the object")
+    _add_choosing(parser)
+
+
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="an .omorph file")
+    add("-o", "--out", type=Path, metavar="OUT", required=True, help="the edited photo")
+    add("--report", type=Path, metavar="R.json", help="the figures of it")
+
+
+def _add_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("session", type=Path, metavar="SESSION", help="an .omorph file")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
+
+
+def _add_convert(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Reads and writes what the files' endings say."
+    add = parser.add_argument
+    add("source", type=Path, metavar="IN",
+        help=".ply .compressed.ply .splat .spz, or a mesh: .glb .gltf .obj .stl .off")  # fmt: skip
+    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz")
+    add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
+    add("--flip", action="store_true",
+        help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
+
+
+def _add_warm_up(parser: argparse.ArgumentParser) -> None:
+    parser.description = "A minute or two after an installation, seconds afterwards."
+
+
+def _add_models(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Learned weights: fetched ones, and those that you bring."
+    actions = ("list", "get", "path", "verify", "add", "remove")
+    parser.add_argument("action", choices=actions, help="path: where it is; add: one of yours")
+    parser.add_argument("id", nargs="?", help="one of the list; default all of them")
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE",
+        help="to add: add depth FILE, or add sam2 FOLDER, which is used where it is")  # fmt: skip
+    add = parser.add_argument_group("downloads").add_argument
+    add("--yes", dest="is_agreed", action="store_true", help="its size and licence are all right")
+    add("--accept-licence", metavar="NAME", help="for those with a star in the list")
+    add("--convert", dest="is_converted", action="store_true",
+        help="to add pixelhacker: take the numbers out of its pickles")  # fmt: skip
+    add("--offline", dest="is_offline", action="store_true",
+        help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
+
+
+def _add_doctor(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Tells which backend each stage would use on this machine, and why."
+    parser.add_argument("--json", dest="is_json", action="store_true", help="as one JSON object")
+
+
+def _joined_negatives(arguments: Sequence[str]) -> list[str]:
+    """`--move -10,4` as `--move=-10,4`: a value may begin with a minus sign."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and re.fullmatch(r"--[a-z-]+", joined[-1]) and re.match(r"-[\d.]", word):
+            joined[-1] += "=" + word
+        else:
+            joined.append(word)
+    return joined
+
+
+def _list(least: int, most: int) -> Callable[[str], tuple[float, ...]]:
+    def parse(text: str) -> tuple[float, ...]:
+        try:
+            numbers = tuple(float(word) for word in text.split(","))
+        except ValueError:
+            numbers = ()
+        if not least <= len(numbers) <= most:
+            count = f"{least}" if least == most else f"{least} or {most}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not {count} numbers with commas")
+        return numbers
+
+    return parse
+
+
+def _handle(text: str) -> dict[str, Any]:
+    at, colon, to = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,DZ")
+    target = _list(2, 3)(to)
+    return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
+
+
+def _fill_from(text: str) -> dict[str, Any]:
+    source, colon, to = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,R")
+    target = _list(2, 3)(to)
+    radius = {"radius": target[2]} if target[2:] else {}
+    return {"source": _list(2, 2)(source), "to": target[:2], **radius}
+
+
+def _command(
+    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
+) -> Subcommand:
+    run = lazily("cli_commands", f"run_{name.replace('-', '_')}")
+    return Subcommand(name, help, add_options, run)
+
+
+def _on_photo(
+    name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
+) -> Subcommand:
+    """A command that looks for an object in a photo first of all."""
+    command = _command(name, help, add_options)
+
+    def run(options: argparse.Namespace) -> None:
+        from ..system.early_network import open_early
+
+        open_early(options.photo, options.segment)
+        assert command.run is not None
+        command.run(options)
+
+    return replace(command, run=run)
+
+
+SUBCOMMANDS = (
+    _on_photo("edit", "edit a photo without a window", _add_edit),
+    Subcommand(
+        "batch", "run many edit scripts, whatever becomes of each", _add_batch,
+        lazily("cli_batch", "run_batch"),
+    ),
+    _on_photo("select", "write the mask of the chosen object", _add_select),
+    _command("replay", "render a saved session again", _add_replay),
+    _command("info", "what a session holds", _add_info),
+    _command("convert", "turn splat and mesh files into each other", _add_convert),
+    Subcommand(
+        "models", "list, get and check learned weights", _add_models,
+        lazily("cli_models", "run_models"),
+    ),
+    Subcommand(
+        "doctor", "what runs here, and what would help", _add_doctor,
+        lazily("cli_doctor", "run_doctor"),
+    ),
+    _command("warm-up", "compile the kernels now, not when needed", _add_warm_up),
+    Subcommand(
+        "serve", "compute for the windows of other computers", lazily("cli_serve", "add_serve"),
+        lazily("cli_serve", "run_serve"),
+    ),
+)  # fmt: skip
+COMMANDS = (*(subcommand.name for subcommand in SUBCOMMANDS), *RESEARCH)

@@ -1,0 +1,129 @@
+"""`objectmorpher serve`: this machine, or a cluster, computes for other desks."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import math
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+
+from .terminal import UsageError
+
+
+def add_serve(parser: argparse.ArgumentParser) -> None:
+    """The options of `objectmorpher serve`."""
+    from ..server.address import PORT
+
+    parser.description = (
+        "Selects, lifts, fills in and refines for the windows of other computers (docs/serve.md)."
+        " Whoever asks needs the token: from --token-file, or OBJECTMORPHER_TOKEN, else it is made"
+        " anew and printed."
+    )
+    add = parser.add_argument_group("who may ask").add_argument
+    add("--host", default="127.0.0.1", metavar="H", help="default: this computer only")
+    add("--port", type=int, default=PORT, metavar="P", help=f"default {PORT}; 0: any free one")
+    add("--token-file", type=Path, metavar="FILE", help="the token; made there if there is none")
+    add("--max-body", type=int, default=512, metavar="MB", help="of a request, default 512")
+    add = parser.add_argument_group("who computes").add_argument
+    add("--alone", action="store_true",
+        help="this process, one job after the other: without Ray")  # fmt: skip
+    add("--ray", metavar="ADDRESS", help="of a running Ray cluster; default: one is started here")
+    add("--stages", metavar="A,B", help="of segment, lift, inpaint and refine; default all of them")
+    add("--replicas", metavar="MIN[,MAX]", default="1",
+        help="processes per backend, as many as the queue needs; default 1")  # fmt: skip
+    add("--cpus", type=float, default=1.0, metavar="N", help="per process, default 1")
+    add("--gpus", type=float, metavar="N",
+        help="per process; default: the backends share one, where there are any")  # fmt: skip
+    add("--store", type=int, metavar="MB", help="of memory for Ray's objects; default Ray's own")
+
+
+def run_serve(options: argparse.Namespace) -> None:
+    """Serves until it is interrupted or ended."""
+    from ..server.alone import Alone
+    from ..server.cluster import Cluster, Plan
+    from ..server.front import Front, Limits
+    from ..server.table import table
+    from ..worker.stages import STAGES
+
+    stages = tuple(options.stages.split(",")) if options.stages else STAGES
+    unknown = [stage for stage in stages if stage not in STAGES]
+    if unknown:
+        raise UsageError(f"there is no stage {unknown[0]!r}; there are {', '.join(STAGES)}")
+    least, most = _range(options.replicas)
+    if options.max_body < 1 or not 0 <= options.port < 65536 or not 0 < options.cpus < math.inf:
+        raise UsageError("--max-body and --cpus are numbers above zero, --port is below 65536")
+    if options.gpus is not None and not 0 <= options.gpus < math.inf:
+        raise UsageError("--gpus is a number of GPUs, or a share of one")
+    if options.store is not None and options.store < 1:
+        raise UsageError("--store is a number of MB above zero")
+    token, is_new = _token(options.token_file)
+    if not options.alone and find_spec("ray") is None:
+        raise UsageError("Ray is not installed: `pip install 'objectmorpher[cluster]'`, or --alone")
+    store = None if options.store is None else options.store << 20
+    plan = Plan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    served = {name: row for name, row in table().items() if row.stage in stages}
+    stop = threading.Event()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        stop.set()
+
+    runner = Alone(stages) if options.alone else Cluster(plan)
+    signal.signal(signal.SIGTERM, end)  # only now: Ray sets its own when it starts
+    try:
+        limits = Limits(body=options.max_body << 20)
+        front = Front((options.host, options.port), token, runner, served, limits)
+        front.start()
+        try:
+            _greet(front.url, token if is_new else None, options)
+            stop.wait()
+        finally:
+            front.close()
+    finally:
+        runner.close()
+
+
+def _greet(url: str, token: str | None, options: argparse.Namespace) -> None:
+    from ..server.address import LOOPBACK
+
+    lines = [f"serving on {url}"]
+    if token is not None:
+        where = f", kept in {options.token_file}" if options.token_file else ""
+        lines.append(f"token: {token}{where}")
+    if options.host not in LOOPBACK:
+        lines.append("plain HTTP: whoever is on the way can read the token and the photos;"
+                     " put an HTTPS proxy or an SSH tunnel before it")  # fmt: skip
+    sys.stdout.write("\n".join(lines) + "\n")
+    sys.stdout.flush()
+
+
+def _token(path: Path | None) -> tuple[str, bool]:
+    """The token, and whether it was made just now."""
+    from ..server.tokens import VARIABLE, check_token, make_token, read_token, write_token
+
+    if path is not None:
+        if kept := read_token(path):
+            return kept, False
+        token = make_token()
+        write_token(path, token)
+        return token, True
+    if given := os.environ.get(VARIABLE):
+        return check_token(given), False
+    return make_token(), True
+
+
+def _range(text: str) -> tuple[int, int]:
+    words: Sequence[str] = text.split(",")
+    if not 1 <= len(words) <= 2 or not all(word.isascii() and word.isdigit() for word in words):
+        raise UsageError(f"--replicas is MIN or MIN,MAX, not {text!r}")
+    least, most = int(words[0]), int(words[-1])
+    if not 1 <= least <= most <= 256:
+        raise UsageError(f"--replicas is from 1 to 256, the smaller first, not {text!r}")
+    return least, most

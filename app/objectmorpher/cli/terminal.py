@@ -1,0 +1,45 @@
+"""What the subcommands say on the terminal: progress bars, and failures in one sentence."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from objectmorpher_core.base.progress import Progress, silent
+
+PROGRAM = "objectmorpher"
+FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
+
+
+class UsageError(ValueError):
+    """The command line asks for something impossible; one sentence."""
+
+
+def failure_sentence(error: BaseException) -> str:
+    """One line for the user: what failed, in the words of whoever noticed."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
+        reason = {FileNotFoundError: "does not exist", PermissionError: "cannot be read"}
+        if error.filename is not None:
+            return f"{error.filename} {reason.get(type(error), 'is a folder, not a file')}"
+    text = str(error) or type(error).__name__
+    return json.dumps(text)[1:-1] if "\n" in text else text
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Progress]:
+    """A Progress that draws a bar on a terminal, and does nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description:<28}"), BarColumn(), TimeElapsedColumn())
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task(title, total=1.0)
+        yield lambda fraction, note: bars.update(task, completed=fraction, description=note)

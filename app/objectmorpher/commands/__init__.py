@@ -1,0 +1,86 @@
+"""Every command by name: menu, shortcuts, buttons and tests run the same entry."""
+
+from __future__ import annotations
+
+from ..editor.editor import Editor
+from ..editor.tasks import SELECT
+from ..editor.view import ToolName
+from ..system.texts import t
+from . import compose, edit, files, look, objects, place, pose, select, window
+from .command import Command
+
+__all__ = [
+    "COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "take_next_step", "why_not",
+]  # fmt: skip
+
+GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
+    "File": files.COMMANDS,
+    "Edit": edit.COMMANDS,
+    "Select": select.COMMANDS,
+    "Objects": objects.COMMANDS,
+    "Pose": pose.COMMANDS,
+    "Place": place.COMMANDS,
+    "Look": look.COMMANDS,
+    "Compose": compose.COMMANDS,
+    "Window": window.COMMANDS,
+}
+COMMANDS: dict[str, Command] = {
+    name: command for group in GROUPS.values() for name, command in group.items()
+}
+
+
+def why_not(editor: Editor, name: str) -> str | None:
+    """Why a command cannot run now, or None."""
+    return COMMANDS[name].why_not(editor)
+
+
+def run(editor: Editor, name: str) -> None:
+    """Runs a command, or says why it cannot."""
+    command = COMMANDS[name]
+    reason = command.why_not(editor)
+    if reason is None:
+        command.run(editor)
+    else:
+        editor.say(reason)
+
+
+def keys_of(editor: Editor, name: str) -> str:
+    """The keys that run a command: the user's own, or the usual ones; "" for none."""
+    return editor.settings.shortcuts.get(name, COMMANDS[name].keys)
+
+
+def take_next_step(editor: Editor) -> None:
+    """What the primary button does; where it asks for a click, one where the pointer is.
+
+    Also before the candidate is marked: a slow machine, or a worker that ended, marks none.
+    """
+    name = next_step(editor)[1]
+    if editor.hand.is_busy:
+        return
+    if name is not None:
+        run(editor, name)
+    elif editor.is_click_awaited and editor.hover.place is not None:
+        editor.selection.add_click(*editor.hover.place, is_foreground=True)
+
+
+def next_step(editor: Editor) -> tuple[str, str | None]:
+    """What the primary button says, and the command behind it (None: it only says it)."""
+    if editor.document is None:
+        return t("Open a photo…"), "open"
+    if editor.tasks.is_lifting:
+        return t("Lifting…"), None
+    if editor.mask is None:
+        is_busy = editor.jobs.is_busy(SELECT)
+        return (t("Selecting…") if is_busy else t("Click an object in the photo")), None
+    if not editor.is_lifted:
+        is_kept = editor.object is not None and editor.object.stays_in_front
+        return (t("Another object"), "another") if is_kept else (t("Lift object"), "lift")
+    is_moved = editor.object is not None and editor.object.is_moved
+    if editor.view.tool in (ToolName.SELECT, ToolName.MASK) or (
+        editor.view.tool is ToolName.LOOK and not is_moved
+    ):
+        return t("Pose the object"), "pose"
+    if not is_moved:
+        is_posing = editor.view.tool is ToolName.POSE
+        return (t("Drag a point on the object") if is_posing else t("Drag the object")), None
+    return t("Export photo…"), "export"

@@ -1,0 +1,88 @@
+"""One command, and the usual reasons why one cannot run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..editor.editor import Editor
+from ..editor.filing import Dialog
+from ..editor.tasks import SELECT
+from ..system.texts import t
+
+Reason = Callable[[Editor], str | None]
+
+
+def never(editor: Editor) -> str | None:
+    """It can always run."""
+    return None
+
+
+def no_photo(editor: Editor) -> str | None:
+    return None if editor.document else t("Open a photo first")
+
+
+def no_selection(editor: Editor) -> str | None:
+    if editor.mask is None:
+        return no_photo(editor) or t("Click an object in the photo first")
+    return None
+
+
+def no_lift(editor: Editor) -> str | None:
+    return None if editor.is_lifted else no_photo(editor) or t("Lift an object first")
+
+
+def nothing_lifted(editor: Editor) -> str | None:
+    document = editor.document
+    is_there = document is not None and any(o.lifted for o in document.objects)
+    return None if is_there else no_photo(editor) or t("Lift an object first")
+
+
+def no_handle(editor: Editor) -> str | None:
+    is_chosen = editor.posing.handle is not None
+    return no_lift(editor) or (None if is_chosen else t("Select a handle first"))
+
+
+def cannot_lift(editor: Editor) -> str | None:
+    if editor.tasks.is_lifting:
+        return t("The object is being lifted")
+    if editor.jobs.is_busy(SELECT):
+        return t("The selection is not ready yet")
+    is_lifted = editor.is_lifted
+    return no_selection(editor) or (t("The object is lifted already") if is_lifted else None)
+
+
+def no_undo(editor: Editor) -> str | None:
+    if editor.selection.pending is not None:
+        return None
+    has_step = editor.history is not None and editor.history.undo_label is not None
+    return None if has_step else t("Nothing to undo")
+
+
+def no_redo(editor: Editor) -> str | None:
+    has_step = editor.history is not None and editor.history.redo_label is not None
+    return None if has_step else t("Nothing to redo")
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing the user can ask for.
+
+    `why_not` is the sentence that a greyed-out button shows, or None where it can run.
+    """
+
+    label: str  # English
+    keys: str  # "Ctrl+Shift+S", or "" for none; the user may have others, see `keys_of`
+    run: Callable[[Editor], None]
+    why_not: Reason = no_photo
+    is_on: Callable[[Editor], bool] | None = None  # of a toggle
+    other_keys: tuple[str, ...] = ()  # that do the same and are not shown
+
+
+def asks_for(dialog: Dialog) -> Callable[[Editor], None]:
+    """What such a command does: the window shows a file dialog."""
+
+    def run(editor: Editor) -> None:
+        editor.filing.wanted = dialog
+
+    return run

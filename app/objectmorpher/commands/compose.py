@@ -1,0 +1,132 @@
+"""The background, and how the object is joined to it."""
+
+from __future__ import annotations
+
+from objectmorpher_core import compose
+
+from ..editor.editor import Editor
+from ..editor.intents.composing import SHADOW, VARIANTS
+from ..editor.intents.refining import REFINE
+from ..editor.tasks import PLATE
+from ..editor.view import Composed, ToolName
+from ..system.texts import sentence, t
+from .command import Command, no_lift, nothing_lifted
+
+
+def _toggle_bare(editor: Editor) -> None:
+    if editor.view.tool is not ToolName.COMPOSE:
+        editor.choose_tool(ToolName.COMPOSE)
+        editor.view.compose.is_bare = False
+    editor.composing.toggle_bare()
+
+
+def _is_bare(editor: Editor) -> bool:
+    return editor.view.tool is ToolName.COMPOSE and editor.view.compose.is_bare
+
+
+def _toggle_taking(editor: Editor) -> None:
+    """To the drag that says from where, with the background alone; or back to repairing."""
+    is_taking = _is_taking(editor)
+    if not _is_bare(editor):
+        _toggle_bare(editor)
+    editor.view.compose.drag = Composed.REPAIR if is_taking else Composed.TAKE
+
+
+def _is_taking(editor: Editor) -> bool:
+    return _is_bare(editor) and editor.view.compose.drag is Composed.TAKE
+
+
+def _no_sources(editor: Editor) -> str | None:
+    return nothing_lifted(editor) or (
+        None if editor.hinting.shown else t("Nothing says where the background is taken from")
+    )
+
+
+def _cannot_fill(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(PLATE):
+        return t("The background is being filled in…")
+    document, name = editor.document, editor.composing.inpainter
+    if (reason := compose.missing(name)) is not None:
+        return sentence(reason)
+    if document is not None and document.plate is not None:
+        is_same = not compose.is_random(name) and document.plate.backend == name
+        if is_same and document.plate.painted is None:
+            return t("This way of filling gives the same every time")
+    return nothing_lifted(editor)
+
+
+def _cannot_vary(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(VARIANTS):
+        return t("The variants are being made")
+    if (trouble := editor.composing.trouble) is not None:
+        return nothing_lifted(editor) or trouble
+    name = editor.composing.inpainter
+    if (reason := compose.missing(name)) is not None:
+        return sentence(reason)
+    if not compose.is_random(name):
+        return t("This way of filling gives the same every time")
+    return nothing_lifted(editor)
+
+
+def not_moved(editor: Editor) -> str | None:
+    """Shadow and light are of objects that have moved: the photo has those of the others."""
+    if (reason := no_lift(editor)) is not None:
+        return reason
+    is_moved = editor.object is not None and editor.object.is_moved
+    return None if is_moved else t("Move the object first")
+
+
+def _cannot_take(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(SHADOW):
+        return t("Its shadow is being looked for")
+    return not_moved(editor) or editor.composing.trouble
+
+
+def _cannot_refine(editor: Editor) -> str | None:
+    if editor.jobs.is_busy(REFINE):
+        return t("The edit is being refined")
+    if (reason := nothing_lifted(editor)) is not None:
+        return reason
+    assert editor.document is not None
+    if not any(item.is_moved for item in editor.document.objects):
+        return t("Move the object first")
+    if (trouble := editor.composing.trouble) is not None:
+        return trouble
+    if not editor.methods.is_known:
+        return t("Looking at what can run here")
+    reason = editor.methods.why_not("refine")
+    return None if reason is None else sentence(reason)
+
+
+def _not_refined(editor: Editor) -> str | None:
+    is_refined = editor.refining.refined is not None
+    return nothing_lifted(editor) or (None if is_refined else t("The edit is not refined"))
+
+
+COMMANDS: dict[str, Command] = {
+    "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
+    "take_from": Command(
+        "Take from here", "Shift+B", _toggle_taking, nothing_lifted, _is_taking
+    ),
+    "forget_sources": Command(
+        "Remove all sources", "", lambda e: e.hinting.remove_all(), _no_sources
+    ),
+    "fill_again": Command(
+        "Fill in again", "", lambda e: e.composing.fill_again(), _cannot_fill
+    ),
+    "variants": Command(
+        "Try 3 variants", "", lambda e: e.composing.try_variants(), _cannot_vary
+    ),
+    "take_shadow": Command(
+        "Shadow as in the photo", "", lambda e: e.composing.take_shadow(), _cannot_take
+    ),
+    "refine": Command("Refine", "", lambda e: e.refining.run(), _cannot_refine),
+    "refine_again": Command(
+        "Another", "", lambda e: e.refining.run_again(),
+        lambda e: _not_refined(e) or _cannot_refine(e),
+    ),
+    "unrefine": Command(
+        "Remove refinement", "", lambda e: e.refining.remove(), _not_refined
+    ),
+    "shadow": Command("Shadow", "", lambda e: e.composing.toggle_shadow(), not_moved),
+}  # fmt: skip

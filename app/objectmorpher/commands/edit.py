@@ -1,0 +1,32 @@
+"""Steps back and forth, tools, and what belongs to no tool."""
+
+from __future__ import annotations
+
+from ..editor.editor import Editor
+from ..editor.view import ToolName
+from ..tools import navigate
+from .command import Command, Reason, never, no_lift, no_photo, no_redo, no_undo
+
+
+def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
+    def is_on(editor: Editor) -> bool:
+        return editor.view.tool is tool
+
+    return Command(tool.value, keys, lambda editor: editor.choose_tool(tool), why_not, is_on)
+
+
+COMMANDS: dict[str, Command] = {
+    "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
+    "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
+    "select": _tool(ToolName.SELECT, "1", no_photo),
+    "mask": _tool(ToolName.MASK, "2", no_photo),
+    "pose": _tool(ToolName.POSE, "3", no_lift),
+    "place": _tool(ToolName.PLACE, "4", no_lift),
+    "look": _tool(ToolName.LOOK, "5", no_lift),
+    "compose": _tool(ToolName.COMPOSE, "6", no_lift),
+    "smaller_brush": Command("Smaller brush", "[", lambda e: navigate.size_brush(e, -1)),
+    "larger_brush": Command("Larger brush", "]", lambda e: navigate.size_brush(e, 1)),
+    "softer_brush": Command("Softer brush", "Shift+[", lambda e: navigate.harden_brush(e, -1)),
+    "harder_brush": Command("Harder brush", "Shift+]", lambda e: navigate.harden_brush(e, 1)),
+    "cancel": Command("Cancel the running job", "", lambda e: e.jobs.cancel(), never),
+}

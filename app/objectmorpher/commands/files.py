@@ -1,0 +1,16 @@
+"""Opening, saving, exporting."""
+
+from __future__ import annotations
+
+from ..editor.filing import Dialog
+from .command import Command, asks_for, never
+
+COMMANDS: dict[str, Command] = {
+    "open": Command("Open…", "Ctrl+O", asks_for(Dialog.OPEN), never),
+    "save": Command("Save session", "Ctrl+S", lambda e: e.filing.save()),
+    "save_as": Command("Save session as…", "Ctrl+Shift+S", asks_for(Dialog.SAVE)),
+    "export": Command("Export photo…", "Ctrl+E", lambda e: e.exporting.open()),
+    "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close)),
+    "models": Command("Models…", "", lambda e: e.models.open(), never),
+    "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.guard(e.quit), never),
+}

@@ -1,0 +1,1 @@
+"""The editor without a window: its state, its history, and a method for each intention."""

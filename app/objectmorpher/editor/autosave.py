@@ -1,0 +1,187 @@
+"""Keeps what is not saved on the disk, so that a crash costs seconds of work and no more.
+
+Each running editor has a folder of its own in the user's data folder, as long as it shows
+something unsaved, and holds a lock on it. A folder whose lock nobody holds was left by an editor
+that crashed; `recovery.py` offers it. A thread writes; the main thread compares two references.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import shutil
+import threading
+import time
+import uuid
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import platformdirs
+
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.journal import DOCUMENT, Journal
+from objectmorpher_core.session.tree import SessionError
+
+from ..system.file_lock import FileLock
+from ..system.texts import t
+
+if TYPE_CHECKING:
+    from .editor import Editor
+
+log = logging.getLogger(__name__)
+
+INTERVAL = 3.0  # s between two writes while the user keeps working
+FAREWELL = 30.0  # s that closing waits for the last write
+LOCK = "lock"
+
+
+def recovery_root() -> Path:
+    """Where the editors' folders are; OBJECTMORPHER_DATA overrides the user's data folder."""
+    named = os.environ.get("OBJECTMORPHER_DATA")
+    base = Path(named) if named else platformdirs.user_data_path("objectmorpher", appauthor=False)
+    return base / "recovery"
+
+
+@dataclass(frozen=True)
+class About:
+    """What a journal says about its document."""
+
+    name: str  # of the photo
+    edited: str  # local time, ISO 8601
+    objects: int
+    path: str | None  # of the session, where it was saved once
+    source: str | None  # of the photo's file
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A journal's folder and its lock."""
+
+    journal: Journal
+    lock: FileLock
+
+    def remove(self) -> None:
+        """Its document goes first: without one a folder is nothing to recover."""
+        (self.journal.folder / DOCUMENT).unlink(missing_ok=True)
+        self.lock.release()
+        shutil.rmtree(self.journal.folder, ignore_errors=True)
+
+
+class Autosave:
+    """Looks each frame whether there is something new, and has it written."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._asked: Document | None = None  # last one given to the thread
+        self._asked_at = -INTERVAL  # s, monotonic
+        self._is_kept = False  # the folder holds something, or soon will
+        self._held: Held | None = None  # the thread's own
+        self._orders: queue.SimpleQueue[tuple[Document, About] | Held | str | None]
+        self._orders = queue.SimpleQueue()
+        self._problem: str | None = None  # why the last write failed
+        self._is_told = False
+        self._given = self._done = 0  # orders; the one counted here, the other in the thread
+        self._thread: threading.Thread | None = None
+
+    def poll(self) -> None:
+        """Once a frame, on the main thread."""
+        editor, document = self._editor, self._editor.committed
+        if self._problem is not None:
+            self._tell(self._problem)
+        if document is None or editor.is_saved:
+            if self._is_kept:
+                self._asked, self._is_kept = None, False
+                self._order(None)
+            return
+        now = time.monotonic()
+        is_early = now - self._asked_at < INTERVAL
+        if document is self._asked or self._given > self._done or is_early:
+            return
+        self._asked, self._asked_at, self._is_kept = document, now, True
+        self._order((document, self._about(document)))
+
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether the disk holds what is unsaved, and nothing else of this editor."""
+        is_asked = (
+            not self._is_kept if self._editor.is_saved else self._asked is self._editor.committed
+        )
+        return is_asked and self._given == self._done
+
+    def adopt(self, held: Held) -> None:
+        """Goes on in the folder of an editor that crashed, whose document is open now."""
+        self._is_kept = True
+        self._order(held)
+
+    def close(self) -> None:
+        """The editor ends. What is unsaved even now, after an error, stays to be recovered."""
+        document = self._editor.committed
+        if document is not None and not self._editor.is_saved and document is not self._asked:
+            self._order((document, self._about(document)))
+        elif document is None or self._editor.is_saved:
+            self._order(None)
+        self._orders.put("end")
+        if self._thread is not None:
+            self._thread.join(FAREWELL)
+
+    def _about(self, document: Document) -> About:
+        path, source = self._editor.path, self._editor.source
+        return About(
+            document.photo.name, datetime.now().isoformat(timespec="seconds"),
+            sum(thing.mask is not None for thing in document.objects),
+            str(path) if path else None, str(source) if source else None,
+        )  # fmt: skip
+
+    def _tell(self, problem: str) -> None:
+        """Once: the work goes on, and so does trying."""
+        self._problem, self._asked = None, None
+        if not self._is_told:
+            self._is_told = True
+            self._editor.complain(t("Unsaved work cannot be kept safe: {reason}", reason=problem))
+
+    # In the thread
+
+    def _order(self, order: tuple[Document, About] | Held | None) -> None:
+        self._given += 1
+        self._orders.put(order)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, daemon=True, name="autosave")
+            self._thread.start()
+
+    def _work(self) -> None:
+        while (order := self._orders.get()) != "end":
+            try:
+                self._carry_out(order)
+            except (OSError, SessionError) as error:
+                log.warning("Unsaved work cannot be kept safe: %s", error)
+                self._problem = getattr(error, "strerror", None) or str(error)
+            except Exception as error:  # our mistake: the editor must outlive it
+                log.exception("Unsaved work cannot be kept safe")
+                self._problem = str(error) or type(error).__name__
+            finally:
+                self._done += 1
+        if self._held is not None:
+            self._held.lock.release()
+
+    def _carry_out(self, order: tuple[Document, About] | Held | str | None) -> None:
+        if isinstance(order, tuple):
+            started = time.monotonic()
+            self._held = self._held or _new_folder()
+            self._held.journal.write(order[0], asdict(order[1]))
+            log.debug("Kept safe in %.2f s", time.monotonic() - started)
+        else:
+            if self._held is not None:
+                self._held.remove()
+            self._held = order if isinstance(order, Held) else None
+
+
+def _new_folder() -> Held:
+    folder = recovery_root() / uuid.uuid4().hex
+    folder.mkdir(parents=True)
+    lock = FileLock.take(folder / LOCK)
+    if lock is None:
+        raise OSError(f"{folder} is locked")
+    return Held(Journal(folder), lock)

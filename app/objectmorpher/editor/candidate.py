@@ -1,0 +1,188 @@
+"""What a click under the pointer would select, found while the pointer rests.
+
+The worker is asked only while it has nothing else to do, and any request of the user ends it. A
+click on what is shown uses the answer that is there. One that was found at a glance is looked at
+more closely while the pointer goes on resting: what that costs the click need not wait for.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document.model import Click, Photo, Prompt
+from objectmorpher_core.segment import Found
+
+from ..worker import job_functions
+from ..worker.job_error import JobError
+from ..worker.jobs import RELUCTANCE
+from .closer_look import choice_of
+from .tasks import SELECT, Question
+
+if TYPE_CHECKING:
+    from .editor import Editor
+
+CANDIDATE = "candidate"  # kind of job
+CLOSER = "closer candidate"  # kind of job, of one that is shown
+REST = 0.06  # s that the pointer rests before the worker is asked
+SAME_PLACE = 2.0  # points: a hand moves so much when it presses
+TOO_SLOW = 2.5  # s; after such an answer the photo is not asked about again
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """The answer of a click that was not made."""
+
+    photo: Photo
+    prompt: Prompt
+    found: Found
+
+    @property
+    def mask(self) -> Mask:
+        return self.found.mask
+
+
+class Candidates:
+    """The one under the pointer."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.shown: Candidate | None = None
+        self._place: tuple[float, float] | None = None  # image px, where the pointer is
+        self._since = 0.0  # s, monotonic, when it came there
+        self._asked: Prompt | None = None  # the last one
+        self._wanted: Question | None = None  # the user clicked while it was being answered
+        self._slow: Photo | None = None
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the worker will be asked within a moment."""
+        return self._next_prompt() is not None and self._is_free()
+
+    def poll(self, now: float) -> None:
+        """Asks when the pointer rests; once a frame. `now`: s, monotonic."""
+        place = self._editor.hover.place
+        if not self._is_wished():
+            self.shown = self._place = self._asked = None
+            return
+        assert place is not None
+        if place != self._place:
+            self._place, self._since = place, now
+            if self.shown is not None and not self.shown.mask[int(place[1]), int(place[0])]:
+                self.shown = None
+        prompt = self._next_prompt()
+        if prompt is not None and now - self._since >= REST and self._is_free():
+            self._ask(prompt, now)
+
+    def take(self, question: Question) -> bool:
+        """Whether the question is answered already, or will be by what runs: then nobody asks."""
+        editor, shown = self._editor, self.shown
+        photo = editor.document.photo if editor.document else None
+        is_here = shown is not None and shown.photo is photo
+        if shown is not None and is_here and self._is_same(shown.prompt, question.prompt):
+            editor.jobs.cancel(CANDIDATE)
+            self.shown = self._asked = None
+            # A closer look goes on: the step's own then finds that it was taken.
+            editor.selection.take(question, shown.found, shown.prompt)
+            return True
+        asked = self._asked is not None and self._is_same(self._asked, question.prompt)
+        if not asked or not editor.jobs.promote(CANDIDATE, SELECT):
+            return False
+        self._wanted = editor.tasks.question = question
+        return True
+
+    def _is_free(self) -> bool:
+        """Whether the worker does nothing, or nothing but look for an older candidate."""
+        jobs = self._editor.jobs
+        current = jobs.current
+        return jobs.is_idle or (current is not None and current.kind in (CANDIDATE, CLOSER))
+
+    def _is_wished(self) -> bool:
+        """Whether the user may want to know what a click here would select."""
+        editor = self._editor
+        return (
+            editor.is_click_awaited
+            and editor.document is not None
+            and editor.document.photo is not self._slow
+            and editor.hover.place is not None
+            and not editor.hand.is_busy
+        )
+
+    def _next_prompt(self) -> Prompt | None:
+        """What a click would say now, where that was not asked yet."""
+        if self._place is None:
+            return None
+        prompt = Prompt((Click(*self._place),), level=self._editor.view.selecting.level)
+        return None if prompt == self._asked else prompt
+
+    def _is_same(self, known: Prompt, prompt: Prompt) -> bool:
+        """Whether both are one click at one place."""
+        if len(prompt.clicks) != 1 or prompt.box is not None or known.level != prompt.level:
+            return False
+        a, b, view = known.clicks[0], prompt.clicks[0], self._editor.view
+        gap = float(np.hypot(a.x - b.x, a.y - b.y)) * view.zoom
+        return b.is_foreground and gap <= SAME_PLACE * view.scale
+
+    def _ask(self, prompt: Prompt, now: float) -> None:
+        editor, document = self._editor, self._editor.document
+        assert document is not None
+        photo = document.photo
+        self._asked = prompt
+        editor.jobs.cancel(CLOSER, RELUCTANCE)
+
+        def accept(answer: Found | str) -> None:
+            wanted = self._pop_wanted()
+            if time.monotonic() - now > TOO_SLOW:
+                self._slow = photo
+            current = editor.document
+            if current is None or current.photo is not photo:
+                return
+            if isinstance(answer, str):
+                self.shown = None
+                if wanted is not None:
+                    editor.complain(answer)
+            elif wanted is not None:
+                editor.selection.take(wanted, answer, prompt)
+            elif self._is_wished():
+                self.shown = Candidate(photo, prompt, answer)
+                self._look_closer(self.shown)
+
+        def fail(error: JobError) -> None:
+            if self._pop_wanted() is not None:
+                editor.complain_of(error)
+
+        editor.jobs.start(
+            "Selecting", job_functions.candidate, photo.pixels, prompt, choice_of(editor),
+            done=accept, failed=fail, cancelled=self._drop, kind=CANDIDATE, is_quiet=True,
+            is_spare=True,
+        )  # fmt: skip
+
+    def _look_closer(self, shown: Candidate) -> None:
+        """The candidate told better, where it can be."""
+        if shown.found.is_final:
+            return
+
+        def accept(answer: Found) -> None:
+            if self.shown is shown:
+                self.shown = Candidate(shown.photo, shown.prompt, answer)
+
+        editor = self._editor
+        editor.jobs.start(
+            "Looking closer", job_functions.closer_look, shown.photo.pixels, shown.prompt,
+            choice_of(editor), done=accept, failed=lambda error: None, kind=CLOSER,
+            is_quiet=True, is_spare=True,
+        )  # fmt: skip
+
+    def _drop(self) -> None:
+        self._asked = None
+        self._pop_wanted()
+
+    def _pop_wanted(self) -> Question | None:
+        wanted, self._wanted = self._wanted, None
+        if wanted is not None:
+            self._editor.tasks.question = None
+        return wanted

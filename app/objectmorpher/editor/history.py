@@ -1,0 +1,210 @@
+"""Undo: a list of documents and a cursor (ARCHITECTURE section 4).
+
+Documents share what did not change, so a step costs what is new in it: kilobytes for a drag,
+hundreds of megabytes for the lift of a large object. The oldest steps go when there are too many
+of them, or when what they alone hold is too large. What a step costs in time does not grow with
+the steps before it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from objectmorpher_core.document.model import Document
+
+DEPTH = 10_001  # steps: a day's ten thousand edits, and the one that undoing them all leaves
+LIMIT = 1 << 30  # bytes that old steps may hold beside what the shown document holds
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A document, and what was done to get it."""
+
+    label: str  # "Move handle"
+    document: Document
+
+
+class History:
+    """The documents since the file was opened, and which of them is shown."""
+
+    def __init__(self, document: Document, limit: int = LIMIT) -> None:
+        """`limit`: bytes."""
+        self._steps: list[Step] = []
+        self._memory = _Memory()
+        self._limit = limit
+        self._cursor = 0
+        self._saved: Document | None = document
+        self._append("Open", document)
+
+    @property
+    def document(self) -> Document:
+        return self._steps[self._cursor].document
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """What was done, oldest first; the first is what undoing everything leaves."""
+        return tuple(step.label for step in self._steps)
+
+    @property
+    def cursor(self) -> int:
+        """Which of the steps is shown."""
+        return self._cursor
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether what is shown is what the file holds."""
+        return self.document is self._saved
+
+    def mark_saved(self, document: Document) -> None:
+        """`document`, which may be an older one by now, is what the file holds."""
+        self._saved = document
+
+    def mark_unsaved(self) -> None:
+        """No file holds any of this."""
+        self._saved = None
+
+    def apply(self, label: str, document: Document) -> None:
+        """`document` is the next step; steps that were undone are forgotten."""
+        if document is self.document:
+            return
+        for step in self._steps[self._cursor + 1 :]:
+            self._memory.let_go(step.document)
+        del self._steps[self._cursor + 1 :]
+        self._append(label, document)
+        self._cursor = len(self._steps) - 1
+        self._forget_oldest()
+
+    def amend(self, document: Document) -> None:
+        """`document` replaces the current one without a step: computed additions to it."""
+        step = self._steps[self._cursor]
+        if step.document is self._saved:
+            self._saved = document
+        self._memory.let_go(step.document)
+        self._steps[self._cursor] = Step(step.label, document)
+        self._memory.take(document)
+        self._forget_oldest()
+
+    @property
+    def undo_label(self) -> str | None:
+        """What `undo` would take back, or None."""
+        return self._steps[self._cursor].label if self._cursor > 0 else None
+
+    @property
+    def redo_label(self) -> str | None:
+        """What `redo` would do again, or None."""
+        following = self._cursor + 1
+        return self._steps[following].label if following < len(self._steps) else None
+
+    def undo(self) -> None:
+        self.jump(self._cursor - 1)
+
+    def redo(self) -> None:
+        self.jump(self._cursor + 1)
+
+    def jump(self, index: int) -> None:
+        """Shows the step at `index`, the nearest one where there is none."""
+        self._cursor = min(max(index, 0), len(self._steps) - 1)
+
+    @property
+    def count(self) -> int:
+        """How many steps there are, those that were undone too."""
+        return len(self._steps)
+
+    def label(self, index: int) -> str:
+        """What was done in the step at `index`."""
+        return self._steps[index].label
+
+    # Memory
+
+    @property
+    def old_bytes(self) -> int:
+        """What the steps hold beside what the shown document holds."""
+        return self._memory.bytes - self._memory.bytes_of(self.document)
+
+    def _forget_oldest(self) -> None:
+        while self._cursor > 0 and (
+            len(self._steps) > DEPTH
+            or (self._memory.bytes > self._limit and self.old_bytes > self._limit)
+        ):
+            self._memory.let_go(self._steps.pop(0).document)
+            self._cursor -= 1
+
+    def _append(self, label: str, document: Document) -> None:
+        self._steps.append(Step(label, document))
+        self._memory.take(document)
+
+
+class _Memory:
+    """The bytes behind some documents, those that several of them share counted once.
+
+    It counts parts (the photo, an object, the plate ...), which documents share as they are: an
+    edit of one object of twenty costs the look at that one. Whoever asks keeps the documents
+    alive, so that no part's `id` becomes another's.
+    """
+
+    def __init__(self) -> None:
+        self.bytes = 0
+        self._blocks: dict[int, Mapping[int, int]] = {}  # part -> its blocks of memory -> bytes
+        self._documents: Counter[int] = Counter()  # part -> how many documents hold it
+        self._parts: Counter[int] = Counter()  # block -> how many parts hold it
+
+    def take(self, document: Document) -> None:
+        for part in _parts(document):
+            key = id(part)
+            self._documents[key] += 1
+            if key in self._blocks:
+                continue
+            self._blocks[key] = blocks = dict(_blocks(part))
+            for block, size in blocks.items():
+                self.bytes += size if self._parts[block] == 0 else 0
+                self._parts[block] += 1
+
+    def let_go(self, document: Document) -> None:
+        for part in _parts(document):
+            key = id(part)
+            self._documents[key] -= 1
+            if self._documents[key] > 0:
+                continue
+            del self._documents[key]
+            for block, size in self._blocks.pop(key).items():
+                self._parts[block] -= 1
+                if self._parts[block] == 0:
+                    del self._parts[block]
+                    self.bytes -= size
+
+    def bytes_of(self, document: Document) -> int:
+        """What one of the documents holds, all by itself."""
+        blocks: dict[int, int] = {}
+        for part in _parts(document):
+            blocks |= self._blocks[id(part)]
+        return sum(blocks.values())
+
+
+def _parts(document: Document) -> Iterator[Any]:
+    """What documents share as a whole; a part may be there twice."""
+    for f in fields(document):
+        value = getattr(document, f.name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if is_dataclass(part):
+                yield part
+
+
+def _blocks(value: Any) -> Iterator[tuple[int, int]]:
+    """(id, bytes) of the memory behind every array and the file's bytes in a document."""
+    if isinstance(value, np.ndarray):
+        while isinstance(value.base, np.ndarray):  # views share the memory of another array
+            value = value.base
+        yield id(value), value.nbytes
+    elif isinstance(value, bytes):
+        yield id(value), len(value)
+    elif is_dataclass(value):
+        for f in fields(value):
+            yield from _blocks(getattr(value, f.name))
+    elif isinstance(value, tuple):
+        for part in value:
+            yield from _blocks(part)

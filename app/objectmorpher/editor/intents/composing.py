@@ -1,0 +1,389 @@
+"""What is behind the objects, and how they are joined to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.brush import Stroke
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.model import Document, EditObject, Plate
+
+from ...canvas.layers import Layer
+from ...canvas.memo import same
+from ...system.texts import t
+from ...worker import job_functions
+from ...worker.job_error import JobError
+from ...worker.job_functions import Choice, Variant
+from ..tasks import PLATE
+
+if TYPE_CHECKING:
+    from objectmorpher_core.compose.plate.repair import Patch
+
+    from ..editor import Editor
+
+VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besides PLATE
+COUNT = 3  # variants
+USUAL_SHADOW = 0.55
+GRAIN = 2  # canvas px per px of the picture of a stroke
+FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
+
+
+class Composing:
+    """The plate and the joining."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
+        self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
+        self._stroke: Stroke | None = None  # being painted
+        self._is_restoring = False
+        self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
+
+    def forget(self) -> None:
+        """Another document is opened."""
+        self._variants, self._ready = ((), ()), []
+        self._stroke, self._waiting = None, []
+
+    def deliver(self) -> bool:
+        """Takes in what the worker has made, between strokes; once a frame."""
+        if not self._ready or self._editor.hand.is_busy:
+            return False
+        ready, self._ready = self._ready, []
+        for take in ready:
+            take()
+        return True
+
+    # The background
+
+    @property
+    def trouble(self) -> str | None:
+        """What is said in place of the background; None where it is there."""
+        editor = self._editor
+        if editor.jobs.is_busy(PLATE):
+            return t("The background is being filled in…")
+        if editor.document is not None and editor.document.plate is None:
+            return t("The background is not filled in")
+        return None
+
+    @property
+    def is_repairing(self) -> bool:
+        return bool(self._waiting)
+
+    def toggle_bare(self) -> None:
+        """Shows the background alone, or the whole picture."""
+        view = self._editor.view
+        view.compose.is_bare = not view.compose.is_bare
+
+    @property
+    def inpainter(self) -> str:
+        """The backend that is asked to fill in the background; "auto" is the best that can run."""
+        return self._editor.methods.chosen("inpaint")
+
+    def fill_again(self) -> None:
+        """A new background with another seed: a step of its own."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        if document.plate is None:
+            editor.tasks.fill_background()
+            return
+        self._ask_plate(document.hints, document.plate.seed + 1, t("Fill in again"), _nothing)
+
+    def fill_from(self, hints: tuple[Hint, ...], label: str, end: Callable[[], None]) -> None:
+        """A new background with other hints: a step of its own; then, or if not, `end`."""
+        document = self._editor.document
+        if document is None or document.plate is None:
+            end()
+            return
+        self._ask_plate(hints, document.plate.seed, label, end)
+
+    def _ask_plate(
+        self, hints: tuple[Hint, ...], seed: int, label: str, end: Callable[[], None]
+    ) -> None:
+        editor, document = self._editor, self._editor.document
+        assert document is not None
+        masks = _masks(document)
+
+        def take(plate: Plate) -> None:
+            end()
+            self._take_plate(masks, plate, label, hints)
+
+        def accept(plate: Plate) -> None:
+            self._ready.append(lambda: take(plate))
+
+        def fail(error: JobError) -> None:
+            end()
+            editor.complain_of(error)
+
+        editor.jobs.start(
+            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
+            editor.derived.lights.hidden(document), Choice(self.inpainter, seed, hints),
+            done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
+        )  # fmt: skip
+
+    def try_variants(self) -> None:
+        """Asks for some backgrounds to choose from."""
+        editor, document = self._editor, self._editor.document
+        if document is None or document.plate is None:
+            return
+        masks = _masks(document)
+
+        def accept(variants: tuple[Variant, ...]) -> None:
+            self._variants = (masks, variants)
+
+        editor.jobs.start(
+            t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
+            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1), COUNT,
+            done=accept, failed=editor.complain_of, kind=VARIANTS,
+        )  # fmt: skip
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """The backgrounds to choose from, as long as the masks are the same."""
+        document = self._editor.document
+        masks, variants = self._variants
+        return variants if document is not None and same(masks, _masks(document)) else ()
+
+    def choose_variant(self, variant: Variant) -> None:
+        document = self._editor.document
+        if document is not None and document.plate is not variant.plate:
+            masks, hints = _masks(document), document.hints
+            self._take_plate(masks, variant.plate, t("Choose background"), hints)
+
+    def _take_plate(
+        self, masks: tuple[Mask | None, ...], plate: Plate, label: str, hints: tuple[Hint, ...]
+    ) -> None:
+        editor = self._editor
+        document = editor.committed
+        if document is not None and same(masks, _masks(document)):
+            editor.apply(label, edits.set_plate(edits.set_hints(document, hints), plate))
+
+    def _choice(self, seed: int) -> Choice:
+        document = self._editor.document
+        return Choice(self.inpainter, seed, () if document is None else document.hints)
+
+    # Repairing it
+
+    def start_stroke(self, is_restoring: bool) -> bool:
+        """The brush is put down; False where there is nothing to paint on."""
+        editor = self._editor
+        if editor.document is None or editor.document.plate is None:
+            editor.say(self.trouble or t("Open a photo first"))
+            return False
+        self._stroke = Stroke(editor.document.photo.size, editor.view.brush)
+        self._is_restoring = is_restoring
+        return True
+
+    def paint(self, canvas_xy: np.ndarray) -> None:
+        if self._stroke is not None:
+            x, y = self._editor.view.image_from_canvas(canvas_xy)
+            self._stroke.move_to(float(x), float(y))
+
+    def drop_stroke(self) -> None:
+        self._stroke = None
+
+    def end_stroke(self) -> None:
+        """What was painted is filled in anew, or is the photo's again: one step."""
+        from objectmorpher_core.compose.plate.repair import patch_of, restored
+
+        editor, stroke, self._stroke = self._editor, self._stroke, None
+        document = editor.committed
+        if stroke is None or stroke.box is None or document is None or document.plate is None:
+            return
+        x0, y0, x1, y1 = stroke.box
+        if not stroke.coverage[y0:y1, x0:x1].any():
+            return
+        if not self._is_restoring:
+            self._enqueue(stroke)
+            return
+        plate = restored(document, patch_of(document, stroke.coverage, stroke.box))
+        if plate is not document.plate:
+            editor.apply(t("Restore background"), edits.set_plate(document, plate))
+
+    def _enqueue(self, stroke: Stroke) -> None:
+        """One after the other."""
+        self._waiting.append(stroke)
+        if len(self._waiting) == 1:
+            self._ask_repair()
+
+    def _ask_repair(self) -> None:
+        """For the first stroke that waits, on the background as it is now."""
+        from objectmorpher_core.compose.plate.repair import margin_of, patch_of
+
+        editor, document = self._editor, self._editor.committed
+        if document is None or document.plate is None or not self._waiting:
+            self._waiting = []
+            return
+        stroke, asked = self._waiting[0], document.plate
+        assert stroke.box is not None
+        patch = patch_of(document, stroke.coverage, stroke.box)
+
+        def accept(answer: tuple[Patch, str]) -> None:
+            self._ready.append(lambda: self._take_repair(asked, *answer))
+
+        def fail(error: JobError) -> None:
+            self._waiting = []
+            editor.complain_of(error.retried_by(lambda: self._enqueue(stroke)))
+
+        def drop() -> None:
+            self._waiting = []
+
+        editor.jobs.start(
+            t("Repairing the background"), job_functions.repair, patch, margin_of(document),
+            self._choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
+        )  # fmt: skip
+
+    def _take_repair(self, asked: Plate, patch: Patch, backend: str) -> None:
+        """A repaired part; it is dropped where the background is another one by now."""
+        from objectmorpher_core.compose.plate.repair import with_patch
+
+        editor, document = self._editor, self._editor.committed
+        self._waiting = self._waiting[1:]
+        if document is not None and document.plate is asked:
+            plate = with_patch(document, patch, backend)
+            editor.apply(t("Repair background"), edits.set_plate(document, plate))
+        if self._waiting:
+            self._ask_repair()
+
+    def painted_layer(self) -> Layer | None:
+        """What is painted and not filled in yet, as a tint over the canvas."""
+        view = self._editor.view
+        strokes = [s for s in (self._stroke, *self._waiting) if s is not None]
+        if not strokes:
+            return None
+        size = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
+        step = GRAIN / view.zoom  # photo px per px of the tint
+        start = (view.left + step / 2 - 0.5, view.top + step / 2 - 0.5)
+        matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        covered = np.zeros(size[::-1], np.float32)
+        for stroke in strokes:
+            shown = cv2.warpAffine(stroke.coverage, matrix, size, flags=flags)
+            np.maximum(covered, shown, out=covered)
+        is_white = self._is_restoring and self._stroke is not None
+        ink = np.array(RESTORING if is_white else FILLING, np.float32)
+        rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
+        box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
+        return Layer(box, rgba, is_coarse=True, is_tint=True)
+
+    # Joining the object to it
+
+    def preview_shadow(self, shadow: Shadow) -> None:
+        """Previews another shadow of the current object; `Editor.commit` makes it a step."""
+        self._preview(lambda document, k: edits.set_shadow(document, k, shadow))
+
+    def preview_harmony(self, harmony: float) -> None:
+        self._preview(lambda document, k: edits.set_harmony(document, k, harmony))
+
+    def preview_relight(self, relight: float) -> None:
+        self._preview(lambda document, k: edits.set_relight(document, k, relight))
+
+    def preview_grain(self, grain: float) -> None:
+        self._preview(lambda document, k: edits.set_grain(document, k, grain))
+
+    def preview_defocus(self, defocus: float) -> None:
+        self._preview(lambda document, k: edits.set_defocus(document, k, defocus))
+
+    def preview_feather(self, feather: float) -> None:
+        self._preview(lambda document, _: edits.set_feather(document, feather))
+
+    def ground(self, shadow: Shadow) -> float:
+        """From how many degrees above the ground one looks at the current object on it."""
+        editor = self._editor
+        assert editor.document is not None
+        return editor.derived.lights.ground(editor.document, editor.current, shadow)
+
+    def toggle_shadow(self) -> None:
+        """Gives the current object a shadow, or takes it."""
+        item = self._item
+        if item is not None:
+            is_new = item.shadow.strength == 0
+            self.preview_shadow(replace(item.shadow, strength=USUAL_SHADOW if is_new else 0.0))
+            self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
+
+    def take_shadow(self) -> None:
+        """Imitates its shadow in the photo; takes that and its reflection off the background."""
+        editor, document, k = self._editor, self._editor.committed, self._editor.current
+        if document is None or document.plate is None or not editor.is_lifted:
+            return
+        masks, item = _masks(document), document.objects[k]
+        assert item.matte is not None
+        lights, told = editor.derived.lights, item.shadow.ground
+        is_known = told is not None or document.horizon is not None
+        ground = lights.ground(document, k, item.shadow) if is_known else None
+        covered = lights.hidden(document)
+        cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
+
+        def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
+            if answer is None:
+                editor.say(t("No shadow or reflection is sure; paint it out of the background (B)"))
+                return
+            shadow, plate = answer
+            if shadow is not None and is_known:
+                shadow = replace(shadow, ground=told)
+            self._ready.append(lambda: self._take_shadow(masks, k, shadow, plate))
+
+        editor.jobs.start(
+            t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
+            self._choice(document.plate.seed + 1), done=accept, failed=editor.complain_of,
+            kind=SHADOW,
+        )  # fmt: skip
+
+    def _take_shadow(
+        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow | None, plate: Plate
+    ) -> None:
+        editor, document = self._editor, self._editor.committed
+        if document is not None and same(masks, _masks(document)):
+            changed = edits.set_plate(document, plate)
+            if shadow is None:
+                editor.apply(t("Remove old reflection"), changed)
+            else:
+                changed = edits.set_shadow(changed, k, shadow)
+                editor.apply(t("Shadow as in the photo"), changed)
+
+    def choose_refiner(self, name: str) -> None:
+        """One of `compose.REFINERS`."""
+        item = self._item
+        if item is not None and name != self.refiner:
+            is_wanted = name == "harmonise"
+            self._preview(lambda document, k: edits.harmonised(document, k, is_wanted))
+            self._editor.commit(t("Adjust light"))
+
+    @property
+    def refiner(self) -> str:
+        """What the document says; not a preview, so that no field vanishes while it is dragged."""
+        editor = self._editor
+        if editor.committed is None or self._item is None:
+            return "none"
+        item = editor.committed.objects[editor.current]
+        has_any = item.harmony or item.relight or item.grain or item.defocus
+        return "harmonise" if has_any else "none"
+
+    @property
+    def _item(self) -> EditObject | None:
+        return self._editor.object if self._editor.is_lifted else None
+
+    def _preview(self, change: Callable[[Document, int], Document]) -> None:
+        editor = self._editor
+        if editor.committed is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        try:
+            editor.preview = change(editor.committed, editor.current)
+        except ValueError as error:
+            editor.complain(str(error))
+
+
+def _nothing() -> None:
+    """Nobody waits for the background."""
+
+
+def _masks(document: Document) -> tuple[Mask | None, ...]:
+    return tuple(o.mask for o in document.objects)

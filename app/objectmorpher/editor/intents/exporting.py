@@ -1,0 +1,315 @@
+"""The export that the user puts together: what, how, and where to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...system.texts import t
+from ...worker.export_functions import write_export
+from ..export_plan import FORMATS, LENGTHS, NAMES, Format, Motion, Plan, What, format_of, is_folder
+from ..tasks import WRITE
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+KNOWN = "PNG, JPG, TIF, WEBP, ORA"
+
+
+@dataclass(frozen=True)
+class Draft:
+    """The choices so far."""
+
+    what: What
+    format: Format
+    bits: int  # 0: the photo's own
+    quality: int  # of JPEG
+    webp_quality: int
+    motion: Motion
+    seconds: float  # of a video
+    folder: Path
+    name: str  # as typed: a file name, or a whole path
+
+
+class Exporting:
+    """The export dialog's state, and what may be done with it."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.draft: Draft | None = None  # None: no dialog
+        self._replacing: Path | None = None  # asked whether it may be overwritten
+
+    # Choosing
+
+    def open(self) -> None:
+        """Begins with what was exported last."""
+        editor, settings = self._editor, self._editor.settings
+        self._replacing = None
+        what = next((w for w in What if w.value == settings.export_what), What.PHOTO)
+        what = what if self.why_not(what) is None else What.PHOTO
+        format = next((f for f in Format if f.value == settings.export_format), Format.PNG)
+        file = editor.source or editor.path
+        last = Path(settings.export_folder)
+        is_kept = file is None and settings.export_folder and last.is_dir()
+        folder = file.parent if file else (last if is_kept else Path.home())
+        motion = next((m for m in Motion if m.value == settings.export_motion), Motion.MORPH)
+        motion = motion if self.why_no_motion(motion) is None else Motion.SWAY
+        seconds = min(max(settings.export_seconds, LENGTHS[0]), LENGTHS[1])
+        draft = Draft(
+            what, format, settings.export_bits, settings.quality, settings.webp_quality, motion,
+            seconds, folder, "",
+        )  # fmt: skip
+        self.draft = self._named(self._fitting(draft))
+
+    def close(self) -> None:
+        self.draft = self._replacing = None
+
+    def why_not(self, what: What) -> str | None:
+        """Why this cannot be exported now, or None."""
+        editor = self._editor
+        document = editor.committed
+        if what in (What.CUTOUT, What.MASK) and editor.mask is None:
+            return t("Click an object in the photo first")
+        has_plate = document is not None and document.plate is not None
+        objects = () if document is None else document.objects
+        if what is What.DEPTH and not any(item.lifted is not None for item in objects):
+            return t("Lift an object first")
+        if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
+            return t("Lift an object first")
+        return None
+
+    def why_no_motion(self, motion: Motion) -> str | None:
+        """Why a video cannot show this now, or None."""
+        document = self._editor.committed
+        objects = () if document is None else document.objects
+        if motion is Motion.MORPH:
+            is_moved = any(item.is_moved for item in objects)
+            return None if is_moved else t("Move or pose an object first")
+        current = self._editor.current
+        is_lifted = current < len(objects) and objects[current].lifted is not None
+        return None if is_lifted else t("Lift an object first")
+
+    def choose_what(self, what: What) -> None:
+        self._change(replace(self._draft, what=what), is_named=True)
+
+    def choose_format(self, format: Format) -> None:
+        draft = self._draft
+        typed = Path(draft.name)
+        ending = "" if is_folder(draft.what, format) else format.endings[0]
+        name = str(typed.with_suffix(ending)) if typed.name else draft.name
+        self._change(replace(draft, format=format, name=name))
+
+    def choose_bits(self, bits: int) -> None:
+        """8 or 16 a channel; 0 the photo's own."""
+        self._change(replace(self._draft, bits=bits))
+
+    def choose_quality(self, quality: int) -> None:
+        draft = self._draft
+        is_webp = draft.format is Format.WEBP
+        self._change(
+            replace(draft, webp_quality=quality) if is_webp else replace(draft, quality=quality)
+        )
+
+    def choose_motion(self, motion: Motion) -> None:
+        self._change(replace(self._draft, motion=motion))
+
+    def choose_seconds(self, seconds: float) -> None:
+        self._change(replace(self._draft, seconds=seconds))
+
+    def set_name(self, name: str) -> None:
+        """As typed; an ending chooses the format."""
+        draft = replace(self._draft, name=name)
+        format = format_of(Path(name).suffix)
+        if format is not None and format in FORMATS[draft.what]:
+            draft = replace(draft, format=format)
+        self._change(draft)
+
+    def set_path(self, path: Path) -> None:
+        """A file was chosen in a file dialog."""
+        self._change(replace(self._draft, folder=path.parent))
+        several = is_folder(self._draft.what, format_of(path.suffix))
+        self.set_name(path.stem if several else path.name)
+
+    # What it comes to
+
+    @property
+    def formats(self) -> tuple[Format, ...]:
+        return FORMATS[self._draft.what]
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether several files are written into a folder."""
+        return is_folder(self._draft.what, self._draft.format)
+
+    @property
+    def own_bits(self) -> int:
+        """The photo's bits a channel."""
+        document = self._editor.committed
+        return 8 if document is None else 8 * document.photo.pixels.dtype.itemsize
+
+    @property
+    def bits(self) -> int:
+        """Bits a channel of what will be written."""
+        draft = self._draft
+        if draft.what is What.DEPTH:
+            return 16
+        if not self.has_bits:
+            return 8
+        return draft.bits or self.own_bits
+
+    @property
+    def has_bits(self) -> bool:
+        """Whether there is a choice of bit depth."""
+        return self._draft.format.has_16_bits and self._draft.what not in (What.MASK, What.DEPTH)
+
+    @property
+    def has_quality(self) -> bool:
+        """Whether there is a choice between size and truth."""
+        return self._draft.format.has_quality and self._draft.what is not What.VIDEO
+
+    @property
+    def quality(self) -> int:
+        draft = self._draft
+        return draft.webp_quality if draft.format is Format.WEBP else draft.quality
+
+    @property
+    def path(self) -> Path:
+        """The file, or the folder."""
+        draft = self._draft
+        name = Path(draft.name.strip())
+        typed = draft.folder / (name.expanduser() if name.parts[:1] == ("~",) else name)
+        if self.is_folder or not typed.name or format_of(typed.suffix) is not None:
+            return typed
+        return typed.with_name(typed.name + draft.format.endings[0])
+
+    @property
+    def is_replacing(self) -> bool:
+        """Whether the next click replaces a file that is there."""
+        return self._replacing is not None and self._replacing == self.path
+
+    @property
+    def label(self) -> str:
+        """What the button says: what will be written."""
+        name = self.path.name if self._draft.name.strip() else ""
+        return (
+            t("Replace {name}", name=name) if self.is_replacing else t("Export {name}", name=name)
+        )
+
+    @property
+    def problem(self) -> str | None:
+        """Why this cannot be written, one sentence; None where it can be tried."""
+        draft, path = self._draft, self.path
+        ending = Path(draft.name.strip()).suffix
+        if not draft.name.strip():
+            return t("Type a file name")
+        if (reason := self.why_not(draft.what)) is not None:
+            return reason
+        if draft.what is What.VIDEO and (reason := self.why_no_motion(draft.motion)) is not None:
+            return reason
+        if not self.is_folder and _is_other_kind(ending, FORMATS[draft.what]):
+            known = ", ".join(f.value for f in FORMATS[draft.what])
+            return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
+        try:
+            return self._cannot_be_there(path)
+        except (OSError, RuntimeError, ValueError):  # a name that no disk can hold
+            return t("This is no name for a file")
+
+    def confirm(self) -> None:
+        """Exports; asks once more where that replaces a file."""
+        if self.problem is not None:
+            return
+        draft, path = self._draft, self.path
+        if path.exists() and not self.is_replacing:
+            self._replacing = path
+            return
+        self._remember(draft, path)
+        plan = Plan(
+            draft.what, path, self._editor.current, self.bits, self.quality, draft.motion,
+            draft.seconds,
+        )  # fmt: skip
+        self.close()
+        self._start(plan)
+
+    def export_to(self, path: Path) -> None:
+        """The edited photo, or its layers, into a file of the kind that its ending says."""
+        editor, settings = self._editor, self._editor.settings
+        format = format_of(path.suffix)
+        what = What.LAYERS if format is Format.OPENRASTER else What.PHOTO
+        if format is None or format not in FORMATS[what]:
+            editor.complain(
+                t("a photo cannot be written as {ending}; choose {known}",
+                  ending=path.suffix, known=KNOWN)
+            )  # fmt: skip
+        elif self._is_opened(path):
+            editor.complain(t("the export would overwrite the opened photo; choose another name"))
+        else:
+            is_webp = format is Format.WEBP
+            quality = settings.webp_quality if is_webp else settings.quality
+            self._start(Plan(what, path, quality=quality))
+
+    # Inside
+
+    @property
+    def _draft(self) -> Draft:
+        assert self.draft is not None, "the dialog is open"
+        return self.draft
+
+    def _change(self, draft: Draft, is_named: bool = False) -> None:
+        """`is_named`: the name is to be the usual one of what is exported."""
+        draft = self._fitting(draft)
+        self.draft = self._named(draft) if is_named else draft
+        if self._replacing != self.path:
+            self._replacing = None
+
+    def _fitting(self, draft: Draft) -> Draft:
+        """The format is one that can hold it."""
+        known = FORMATS[draft.what]
+        return draft if draft.format in known else replace(draft, format=known[0])
+
+    def _named(self, draft: Draft) -> Draft:
+        document = self._editor.committed
+        stem = Path(document.photo.name).stem if document is not None else "photo"
+        ending = "" if is_folder(draft.what, draft.format) else draft.format.endings[0]
+        return replace(draft, name=f"{stem}-{NAMES[draft.what]}{ending}")
+
+    def _cannot_be_there(self, path: Path) -> str | None:
+        """Why nothing can be written to `path`, or None."""
+        if not path.parent.is_dir():
+            return t("There is no folder {folder}", folder=path.parent)
+        if self._is_opened(path):
+            return t("The export would overwrite the opened photo; choose another name")
+        is_taken = path.is_dir() and (not path.name or not self.is_folder)
+        return t("{name} is a folder", name=path.name or path) if is_taken else None
+
+    def _is_opened(self, path: Path) -> bool:
+        source = self._editor.source
+        return source is not None and path.resolve() == source.resolve()
+
+    def _remember(self, draft: Draft, path: Path) -> None:
+        editor = self._editor
+        editor.settings = replace(
+            editor.settings, export_what=draft.what.value, export_format=draft.format.value,
+            export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
+            export_motion=draft.motion.value, export_seconds=draft.seconds,
+            export_folder=str(path.parent.absolute()),
+        )  # fmt: skip
+
+    def _start(self, plan: Plan) -> None:
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return
+        name = plan.path.name
+        editor.jobs.start(
+            t("Exporting {name}", name=name), write_export, document, plan,
+            done=lambda _: editor.say(t("Exported {name}", name=name)),
+            failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
+            kind=f"{WRITE} {plan.path}",
+        )  # fmt: skip
+
+
+def _is_other_kind(ending: str, formats: tuple[Format, ...]) -> bool:
+    """Whether a typed ending names a file of a kind that is not offered."""
+    if format_of(ending) is not None:
+        return format_of(ending) not in formats
+    return 2 < len(ending) < 6 and ending[1:].isalpha()

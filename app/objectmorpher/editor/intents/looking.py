@@ -1,0 +1,75 @@
+"""The object alone, seen from any side; the document stays as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.rotations import turn_matrix, turn_of
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.placement import with_centre
+
+from ..view import Orbit, ToolName
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+FILLS = 0.8  # x the photo's smaller side, that the object takes while one walks around it
+NEAREST = 0.9  # object diameters, from the camera to its centre
+
+
+class Looking:
+    """What the canvas shows while the Look tool walks around an object."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        # of the last orbit: what is derived from a document is remembered by identity
+        self._made: tuple[Document, int, Orbit, Document] | None = None
+
+    @property
+    def orbit(self) -> Orbit | None:
+        """From where the object alone is shown; None where the photo's view is shown."""
+        view = self._editor.view
+        is_there = view.tool is ToolName.LOOK and self._editor.is_lifted
+        return view.orbit if is_there else None
+
+    @property
+    def document(self) -> Document | None:
+        """What the canvas shows: the edit, or its object alone, turned and in the middle."""
+        editor, orbit = self._editor, self.orbit
+        document, k = editor.document, editor.current
+        if document is None or orbit is None:
+            self._made = None
+            return document
+        made = self._made
+        if made is None or made[0] is not document or made[1:3] != (k, orbit):
+            made = self._made = (document, k, orbit, _alone(document, k, orbit))
+        return made[3]
+
+    def turn(self, orbit: Orbit) -> None:
+        """Looks from there."""
+        self._editor.view.orbit = orbit
+
+    def reset(self) -> None:
+        """The photo's own view again."""
+        self._editor.view.orbit = None
+
+
+def _alone(document: Document, k: int, orbit: Orbit) -> Document:
+    """A document to be shown only: object `k` turned about its centre, before the camera."""
+    item, camera = document.objects[k], document.photo.camera
+    assert item.lifted is not None
+    turn = turn_matrix(orbit.yaw, orbit.pitch, 0.0) @ turn_matrix(*item.placement.turn)
+    placement = Placement(turn=turn_of(turn), scale=item.placement.scale)
+    diameter = item.lifted.diameter * item.lifted.scale * placement.scale
+    width, height = document.photo.size
+    depth = max(camera.focal / (FILLS * min(width, height)), NEAREST) * diameter
+    middle = camera.unproject(np.array([width / 2, height / 2]), depth)
+    placed = replace(
+        item, placement=with_centre(placement, middle, item.lifted, camera), is_visible=True
+    )
+    others = (replace(other, is_visible=False) for other in document.objects)
+    objects = tuple(placed if i == k else other for i, other in enumerate(others))
+    return replace(document, objects=objects, refined=None)

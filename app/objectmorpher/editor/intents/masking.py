@@ -1,0 +1,229 @@
+"""The selection changed by hand: painted, its edge moved or softened, inverted, from a file.
+
+Whatever changes a mask drops the shape that was lifted from it: the object has to be lifted anew.
+Undo brings both back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import U8, Selection
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Photo, Prompt
+from objectmorpher_core.segment import mask_edit
+from objectmorpher_core.segment.mask_painting import MaskPainting
+
+from ...system.texts import t
+from ...tools.pointer import Pointer
+from ...worker import job_functions
+from ...worker.job_error import JobError
+from ..tasks import SELECT, WRITE
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+CHANGE = "change mask"  # kind of job
+READ_MASK = "read mask"
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the whole selection, which the worker makes."""
+
+    label: str
+    function: Callable[[Selection], Selection]
+
+
+class Masking:
+    """The current object's mask, as something to work on."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.painting: MaskPainting | None = None  # the stroke in progress
+        self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
+        self._waiting: list[Change] = []  # the first one is being made
+
+    @property
+    def shown(self) -> Selection | None:
+        """What is selected, with the stroke in progress: changed in place while it lasts."""
+        if self.painting is not None:
+            return self.painting.shown
+        return self._editor.object.selection if self._editor.object else None
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the artist drew any of the edge soft."""
+        thing = self._editor.object
+        return thing is not None and thing.coverage is not None
+
+    # Strokes
+
+    def start_stroke(self, pointer: Pointer, is_erasing: bool) -> None:
+        """The brush is put down; with Shift it comes from where it was last."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        selection = editor.object.selection if editor.object else None
+        brush = editor.view.brush
+        self.painting = MaskPainting(document.photo.size, selection, brush, is_erasing)
+        if pointer.shift and self._last is not None and self._last[0] is document.photo:
+            self.painting.move_to(*map(float, self._last[1]))
+        self.move_stroke(pointer)
+
+    def move_stroke(self, pointer: Pointer) -> None:
+        document = self._editor.document
+        if self.painting is not None and document is not None:
+            xy = self._editor.view.image_from_canvas(pointer.xy)
+            self.painting.move_to(float(xy[0]), float(xy[1]))
+            self._last = document.photo, xy
+
+    def finish_stroke(self, label: str) -> None:
+        """What was painted is one step."""
+        painting, self.painting = self.painting, None
+        if painting is not None and painting.touched:
+            self._apply(label, painting.selection())
+
+    def drop_stroke(self) -> None:
+        """As if nothing had been painted."""
+        self.painting = None
+
+    # Changes of the whole
+
+    def grow(self) -> None:
+        """The selection with what is near it."""
+        self._change(t("Grow selection"), mask_edit.grow)
+
+    def shrink(self) -> None:
+        """The selection without its rim."""
+        self._change(t("Shrink selection"), mask_edit.shrink)
+
+    def smooth(self) -> None:
+        """An edge without teeth."""
+        self._change(t("Smooth selection"), mask_edit.smooth)
+
+    def feather(self) -> None:
+        """A soft edge, which the lifted object keeps."""
+        self._change(t("Feather selection"), mask_edit.feather)
+
+    def fill_holes(self) -> None:
+        """A selection without holes."""
+        self._enqueue(Change(t("Fill holes"), mask_edit.fill_holes))
+
+    def remove_islands(self) -> None:
+        """A selection without small pieces beside the large one."""
+        self._enqueue(Change(t("Remove islands"), mask_edit.remove_islands))
+
+    def invert(self) -> None:
+        """What was not selected is. No click had asked for that: there is no prompt any more."""
+        selection = self.shown
+        if selection is not None:
+            self._apply(t("Invert selection"), mask_edit.invert(selection), Prompt())
+
+    def harden(self) -> None:
+        """The edge is found in the photo again, wherever it was drawn soft."""
+        mask = self._editor.mask
+        if mask is not None and self.is_soft:
+            self._apply(t("Edge from the photo"), mask)
+
+    def _change(self, label: str, function: Callable[..., Selection]) -> None:
+        reach = self._editor.view.selecting.reach
+        self._enqueue(Change(label, partial(function, px=reach)))
+
+    def _enqueue(self, change: Change) -> None:
+        """One after the other: three presses grow the selection three times."""
+        self._waiting.append(change)
+        if len(self._waiting) == 1:
+            self._make_next()
+
+    def _make_next(self) -> None:
+        editor, thing = self._editor, self._editor.object
+        if not self._waiting:
+            return
+        if thing is None or thing.selection is None:
+            self._forget()
+            return
+        change, k = self._waiting[0], editor.current
+
+        def accept(changed: Selection) -> None:
+            if editor.object is not thing or editor.current != k or editor.hand.is_busy:
+                self._forget()
+                return
+            self._apply(change.label, changed)
+            self._waiting.pop(0)
+            self._make_next()
+
+        editor.jobs.start(
+            t("Changing the selection"), job_functions.change_mask,
+            thing.selection, change.function,
+            done=accept, failed=lambda error: self._fail(error, change),
+            cancelled=self._forget, kind=CHANGE,
+        )  # fmt: skip
+
+    def _forget(self) -> None:
+        self._waiting.clear()
+
+    def _fail(self, error: JobError, change: Change) -> None:
+        self._forget()
+        self._editor.complain_of(error.retried_by(lambda: self._enqueue(change)))
+
+    # Files
+
+    def open_file(self, path: Path) -> None:
+        """The picture of a mask, of the photo's size, is the selection: bright is selected."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        photo, k = document.photo, editor.current
+
+        def accept(coverage: U8) -> None:
+            if editor.document is not None and editor.document.photo is photo:
+                editor.current = min(k, len(editor.document.objects))
+                self._apply(t("Import mask"), coverage, Prompt())
+
+        editor.jobs.start(
+            t("Reading {name}", name=path.name), job_functions.read_coverage, path, photo.size,
+            done=accept, failed=editor.complain_of, kind=READ_MASK,
+        )  # fmt: skip
+
+    def write_file(self, path: Path) -> None:
+        """Writes the selection as a grey picture, soft where it is soft."""
+        editor, selection = self._editor, self.shown
+        if path.suffix.lower() != ".png":
+            editor.complain(t("A mask is written as .png, not as {ending}", ending=path.suffix))
+        elif selection is not None:
+            editor.jobs.start(
+                t("Exporting {name}", name=path.name), job_functions.write_coverage,
+                selection, path, failed=editor.complain_of, kind=f"{WRITE} {path}",
+                done=lambda _: editor.say(t("Exported {name}", name=path.name)),
+            )  # fmt: skip
+
+    # Steps
+
+    def _apply(self, label: str, selection: Selection, prompt: Prompt | None = None) -> None:
+        """The selection, changed by hand, is the next step; with a prompt, it is a new one."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        editor.jobs.cancel(SELECT)
+        try:
+            changed = self._changed(document, selection, prompt)
+        except ValueError as error:
+            editor.complain(str(error))
+            return
+        editor.posing.select(None)
+        editor.apply(label, changed)
+
+    def _changed(self, document: Document, selection: Selection, prompt: Prompt | None) -> Document:
+        k = self._editor.current
+        if k == len(document.objects):
+            document = edits.add_object(document)
+        if prompt is None:
+            return edits.change_mask(document, k, selection)
+        return edits.set_mask(document, k, selection, prompt)

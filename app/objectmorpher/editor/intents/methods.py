@@ -1,0 +1,156 @@
+"""Which backend does each stage: what there is to choose from here, and choosing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from objectmorpher_core import compose, lift, segment
+from objectmorpher_core.compose import refine
+
+from ...system.texts import t
+from ...worker import job_functions
+from ...worker.stages import by_stage
+from ..settings import AUTO
+
+if TYPE_CHECKING:
+    from objectmorpher_core.doctor import Stage
+
+    from ...server.address import Server
+    from ...server.offers import Offer, Offers
+    from ..editor import Editor
+
+LOOK = "look at stages"  # kind of job
+KNOWN: dict[str, Iterable[str]] = {
+    "segment": segment.BACKENDS,
+    "lift": lift.BACKENDS,
+    "inpaint": compose.BACKENDS,
+    "refine": refine.BACKENDS,
+}
+NOT_FOR_CLICKS = ("subject",)  # segmenters
+
+
+@dataclass(frozen=True)
+class Method:
+    """One backend of a stage."""
+
+    name: str
+    why_not: str | None = None  # why it cannot run here: one sentence
+
+
+class Methods:
+    """The backends of "segment", "lift", "inpaint" and "refine", and which ones are chosen.
+
+    Where a server does the long jobs, what can run there counts: only it is asked.
+    """
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._stages: dict[str, Stage] = {}  # empty until looked at
+        self._is_asked = self._is_told = False
+        self._served: tuple[Server, Offers] | None = None  # with no offers until it answers
+
+    def forget(self) -> None:
+        """A model came or went: what can run is looked at again, when it is wanted."""
+        self._stages, self._served = {}, None
+        self._is_asked = self._is_told = False
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it was looked at what can run here."""
+        self._look()
+        return self._is_told
+
+    def of(self, stage: str) -> tuple[Method, ...]:
+        """All of a stage, "auto" first; until it was looked at all seem able to run."""
+        self._look()
+        offer, found = self._offer(stage), self._stages.get(stage)
+        why_not = self._absent(stage)
+        names = [AUTO, *(name for name in KNOWN[stage] if name not in NOT_FOR_CLICKS)]
+        able = offer.able if offer is not None else found.able if found is not None else ()
+        names += [name for name in (*able, *why_not) if name not in (*names, *NOT_FOR_CLICKS)]
+        if self.chosen(stage) not in names:  # a model's own id, written into the settings file
+            names.append(self.chosen(stage))
+        return tuple(Method(name, why_not.get(name)) for name in names)
+
+    def taken(self, stage: str) -> str:
+        """The backend that "auto" is; empty while that is not known, or where none can run."""
+        self._look()
+        offer, found = self._offer(stage), self._stages.get(stage)
+        if offer is not None:
+            return offer.auto
+        return found.auto if found is not None else ""
+
+    def why_not(self, stage: str) -> str | None:
+        """Why what is chosen cannot run: one sentence; None while that is not known."""
+        chosen = self.chosen(stage)
+        if chosen == AUTO and not self.taken(stage):
+            if self._offer(stage) is not None:
+                return t("The server has no network for it")
+            if stage in self._stages:
+                return t("No network for it is here: Window > Models… gets one")
+        return next(m.why_not for m in self.of(stage) if m.name == chosen)
+
+    @property
+    def _server(self) -> Server | None:
+        """That is asked; None: this computer does the work."""
+        return self._editor.computing.reached
+
+    def _offer(self, stage: str) -> Offer | None:
+        """What the server says of a stage; a stage that it does not serve is done here."""
+        if self._served is None or self._served[0] != self._server:
+            return None
+        return self._served[1].get(stage)
+
+    def _absent(self, stage: str) -> dict[str, str]:
+        """Backend -> why it cannot run."""
+        offer, found = self._offer(stage), self._stages.get(stage)
+        if offer is None:
+            return dict(found.others) if found is not None else {}
+        reason = t("The server does not have it")
+        return {name: reason for name in KNOWN[stage] if name not in offer.able}
+
+    def chosen(self, stage: str) -> str:
+        """The one that is asked to do it; "auto" where the settings name one that is not known."""
+        name = getattr(self._editor.settings.backends, stage)
+        offer, found = self._offer(stage), self._stages.get(stage)
+        known = {*KNOWN[stage], *(offer.able if offer else ())}
+        known |= {*found.able, *dict(found.others)} if found else set()
+        is_known = segment.is_known(name) if stage == "segment" else name in known
+        return name if is_known else AUTO
+
+    def choose(self, stage: str, name: str) -> None:
+        """Who does it from now on. What is done stays; a photo is read anew for its clicks."""
+        editor = self._editor
+        if name == getattr(editor.settings.backends, stage):
+            return
+        backends = replace(editor.settings.backends, **{stage: name})
+        editor.settings = replace(editor.settings, backends=backends)
+        if stage == "segment":
+            editor.tasks.read_photo()
+
+    def _look(self) -> None:
+        """In the worker, for it may load PyTorch to ask for a GPU; and the server, if there is."""
+        server = self._server
+        if server is not None and (self._served is None or self._served[0] != server):
+            self._served = server, {}
+            self._editor.computing.ask_offers(lambda offers: self._take_offers(server, offers))
+        if self._is_asked:
+            return
+        self._is_asked = True
+        self._editor.jobs.start(
+            "Looking at what can run here", job_functions.look_at_stages,
+            done=self._take, failed=lambda error: self._give_up(), cancelled=self._give_up,
+            kind=LOOK, is_quiet=True,
+        )  # fmt: skip
+
+    def _take(self, stages: tuple[Stage, ...]) -> None:
+        self._stages, self._is_told = by_stage(stages), True
+
+    def _give_up(self) -> None:
+        """All seem able to run: who is asked for it says what is missing."""
+        self._is_told = True
+
+    def _take_offers(self, server: Server, offers: Offers) -> None:
+        self._served = server, offers

@@ -1,0 +1,176 @@
+"""Learned models: which are there, and getting one. None is downloaded without being asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from objectmorpher_core import models
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.models import Added, HubState, State, Weight, shipped
+
+from ...system.texts import t
+from ...worker import job_functions
+from ...worker.job_error import JobError
+from ..feedback import Action
+from .hub_models import HubModels
+from .workers import Workers
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
+ADD = "add model"  # likewise
+DEPTH = "depth"  # the id of the one that users bring
+MODEL_ENDING = ".onnx"
+SELECTING = ("dinov2-vits14", "u2netp")  # what the Select tool does better with, best first
+
+
+@dataclass(frozen=True)
+class Names:
+    """What a model is called for people, and what it is good for."""
+
+    name: str
+    gain: str
+
+
+NAMES = {
+    "dinov2-vits14": Names("DINOv2 ViT-S/14", "A click selects the whole object, not its colour"),
+    "u2netp": Names("U²-Net small", "Select subject, and better outlines"),
+}
+
+
+class Models:
+    """What the window offers about models."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.states: tuple[State, ...] = ()  # empty until they were looked at
+        self.added: tuple[Added, ...] = ()  # what users bring, likewise
+        self.hub = HubModels(editor)  # those of several files
+        self.workers = Workers(editor)  # programs of the user's
+        self.is_open = False  # the window shows the list
+        self._loading = ""
+
+    def look(self) -> None:
+        """Reads anew what is there; a damaged file counts as none."""
+        self._editor.chores.start(
+            "Looking at the models", lambda progress: _looked(),
+            kind=LOOK, done=self._take, failed=lambda error: None, is_quiet=True,
+        )  # fmt: skip
+
+    def open(self) -> None:
+        """Shows the list."""
+        self.is_open = True
+        self.look()
+
+    @property
+    def offered(self) -> Weight | None:
+        """A model that would make selecting better, is not there and was not declined."""
+        declined = self._editor.settings.declined_models
+        missing = {s.weight.id: s.weight for s in self.states if s.state != "ok"}
+        return next((missing[m] for m in SELECTING if m in missing and m not in declined), None)
+
+    @property
+    def downloading(self) -> str | None:
+        """The model on its way."""
+        return self._loading if self._editor.chores.is_busy(DOWNLOAD) else None
+
+    def download(self, id: str) -> None:
+        """Gets a model; the user has clicked the button that says so."""
+        self.run(id, names_of(id).name, lambda progress: models.fetch(id, progress))
+
+    def run(self, id: str, name: str, fetch: Callable[[Progress], Path]) -> None:
+        """Downloads model `id`, called `name`; the worker uses it once it is there."""
+        editor = self._editor
+        self._loading = id
+        editor.message = None
+
+        def accept(_: Path) -> None:
+            self.look()
+            self.use_anew()
+            editor.say(t("{name} is ready", name=name))
+
+        def complain(error: JobError) -> None:
+            # Whatever it was: networks come back, disks are cleared, indexes are mended.
+            again = Action(t("Retry"), lambda: self.run(id, name, fetch))
+            editor.complain(error.sentence, action=again)
+
+        editor.chores.start(
+            t("Downloading {name}", name=name), fetch, kind=DOWNLOAD,
+            done=accept, failed=complain, cancelled=self.look,
+        )  # fmt: skip
+
+    def cancel(self) -> None:
+        """Stops the download; nothing of it stays."""
+        self._editor.chores.cancel(DOWNLOAD)
+
+    def decline(self, id: str) -> None:
+        """Not now: it is not offered again, but stays in the list."""
+        settings = self._editor.settings
+        declined = (*settings.declined_models, id)
+        self._editor.settings = replace(settings, declined_models=declined)
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether a depth model tells the relief of what is lifted, where that is wanted."""
+        return any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
+
+    @property
+    def has_shape(self) -> bool:
+        """Whether the shape network can look at what is lifted."""
+        is_fed = any(s.weight.id == shipped.TOKENS and s.state == "ok" for s in self.states)
+        return is_fed and shipped.is_shipped()
+
+    def add(self, path: Path) -> None:
+        """The user's depth model, tried before it is kept."""
+        editor = self._editor
+        editor.message = None
+
+        def accept(own: Added) -> None:
+            self.look()
+            again = Action(t("Lift it again"), lambda: editor.shaping.say(t("Depth model")))
+            can_follow = editor.is_lifted and editor.shaping.why_fixed is None
+            editor.say(t("{name} is ready", name=own.name), again if can_follow else None)
+
+        editor.jobs.start(
+            t("Trying {name}", name=path.name), job_functions.add_model, DEPTH, path,
+            done=accept, failed=editor.complain_of, kind=ADD,
+        )  # fmt: skip
+
+    def remove(self) -> None:
+        """The depth model's copy is deleted; the user's own file stays where it is."""
+        try:
+            models.remove(DEPTH)
+        except models.ModelError as error:
+            self._editor.complain(str(error))
+        self.look()
+
+    def _take(self, found: Looked) -> None:
+        self.states, self.added, self.hub.states = found
+        self.workers.look()
+        self._editor.methods.forget()
+
+    def use_anew(self) -> None:
+        """The worker chooses its segmenter again, and reads the photo with it."""
+        self._editor.jobs.start(
+            "Changing the model", job_functions.forget_segmenter,
+            done=lambda _: self._editor.tasks.read_photo(), failed=lambda error: None,
+            kind=FORGET, is_quiet=True,
+        )  # fmt: skip
+
+
+Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...]]
+
+
+def _looked() -> Looked:
+    several = tuple(models.look_hub(model.id) for model in models.hub_models())
+    single = tuple(state for state in models.verify() if state.weight.category == "edit")
+    return single, tuple(models.added(kind.id) for kind in models.KINDS), several
+
+
+def names_of(id: str) -> Names:
+    """For people."""
+    return NAMES.get(id) or Names(id, models.weight(id).purpose)

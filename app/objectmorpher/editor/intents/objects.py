@@ -1,0 +1,247 @@
+"""The photo's objects as things in a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document.model import Document
+
+from ...canvas.layers import is_front
+from ...system.texts import t
+from ..tasks import LIFT, SELECT
+from ..view import ToolName
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+
+class Objects:
+    """Adding, choosing, naming, hiding and ordering them."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.renaming: int | None = None  # whose name is being typed
+        self.carried: int | None = None  # whose row is being dragged up or down the list
+
+    def start_another(self) -> None:
+        """The next click selects another object."""
+        editor = self._editor
+        if editor.document is not None:
+            editor.hand.abort(editor)
+            editor.current = len(editor.document.objects)
+            editor.posing.select(None)
+            editor.view.tool = ToolName.SELECT
+
+    def choose(self, k: int) -> None:
+        """The tools change object `k` now."""
+        self._editor.hand.abort(self._editor)
+        self.take(k)
+
+    def take(self, k: int) -> Callable[[], None]:
+        """As `choose`, for a stroke in progress; what is returned takes it back."""
+        editor = self._editor
+        before, selected = editor.current, editor.posing.selected
+
+        def restore() -> None:
+            editor.current = before
+            editor.posing.select(*selected)
+
+        editor.current = k
+        editor.posing.select(None)
+        if not editor.is_lifted:
+            editor.view.tool = ToolName.SELECT
+        return restore
+
+    def follow(self, before: Document) -> None:
+        """After a step back or forth: the tools change the object that the step changed."""
+        editor, now = self._editor, self._editor.document
+        if now is None:
+            return
+        pairs = enumerate(zip(before.objects, now.objects, strict=False))
+        changed = [k for k, (old, new) in pairs if old is not new]
+        if len(now.objects) != len(before.objects):
+            changed = [min(len(before.objects), len(now.objects))]
+        if changed and editor.current not in changed:
+            editor.current = changed[0]
+
+    def toggle_visible(self, k: int) -> None:
+        """Shows or hides object `k`."""
+        editor = self._editor
+        if editor.document is not None:
+            is_visible = not editor.document.objects[k].is_visible
+            label = t("Show object") if is_visible else t("Hide object")
+            editor.apply(label, edits.set_visible(editor.document, k, is_visible))
+
+    def forget_lost(self) -> None:
+        """After a step back: another object is current where the current one is not there."""
+        editor = self._editor
+        self.renaming = self.carried = None
+        is_selecting = editor.view.tool in (ToolName.SELECT, ToolName.MASK)
+        if editor.document is not None and not is_selecting:
+            editor.current = max(min(editor.current, len(editor.document.objects) - 1), 0)
+
+    def rename(self, k: int, name: str) -> None:
+        """Gives object `k` another name; an empty one changes nothing."""
+        editor = self._editor
+        self.renaming = None
+        document = editor.document
+        if document is None or not name.strip() or name.strip() == document.objects[k].name:
+            return
+        editor.apply(t("Rename object"), edits.rename(document, k, name))
+
+    def duplicate(self) -> None:
+        """A copy of the current object, which the tools change from now on."""
+        editor = self._editor
+        if editor.document is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        copied = edits.duplicate(editor.document, editor.current)
+        editor.apply(t("Duplicate object"), copied)
+        self.choose(len(copied.objects) - 1)
+        if editor.view.tool is ToolName.SELECT:  # a click would select anew: the copy's lift goes
+            editor.view.tool = ToolName.PLACE
+        editor.say(t("{name} lies over what it is a copy of", name=copied.objects[-1].name))
+
+    def remove(self) -> None:
+        """The current object is not edited any more: the photo shows it as it was."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or editor.hand.is_busy:
+            return
+        name, k = editor.object.name, editor.current
+        for job in (SELECT, LIFT):  # what they would bring is for an object by its number
+            editor.jobs.cancel(job)
+        left = edits.remove_object(editor.document, k)
+        editor.apply(t("Remove object"), left)
+        self.choose(max(min(k, len(left.objects) - 1), 0))
+        editor.say(t("{name} is not edited any more", name=name))
+
+    def other_at(self, canvas_xy: np.ndarray) -> int | None:
+        """Another lifted object that is in front of all at canvas px; None where the current is."""
+        editor, document = self._editor, self._editor.document
+        order = self.order()
+        if document is None or len(order) < 2:
+            return None
+        for k in reversed(order):
+            if document.objects[k].lifted is None:  # it stays in front, and is nobody's to drag
+                continue
+            is_there = k == editor.current or document.objects[k].is_visible
+            if is_there and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return None if k == editor.current or self._is_over_current(k) else k
+        return None
+
+    def _is_over_current(self, k: int) -> bool:
+        """Whether object `k` is a copy exactly where the current one is: nobody sees which."""
+        editor = self._editor
+        assert editor.document is not None
+        other, own = editor.document.objects[k], editor.object
+        return own is not None and all(
+            (other.lifted is own.lifted, other.pose is own.pose, other.placement == own.placement)
+        )
+
+    def toggle_front(self) -> None:
+        """Keeps the current object in front of what is edited, as it is in the photo, or not."""
+        editor, k = self._editor, self._editor.current
+        document, item = editor.document, editor.object
+        if document is None or item is None or editor.hand.is_busy:
+            return
+        if item.stays_in_front:
+            editor.apply(t("Do not keep in front"), front_edits.let_go(document, k))
+            return
+        editor.jobs.cancel(LIFT)  # what it would bring is to be edited
+        try:
+            editor.apply(t("Keep in front"), front_edits.keep_in_front(document, k))
+        except edits.EditError as error:
+            editor.complain(str(error))
+            return
+        editor.say(t("{name} covers what moves behind it", name=item.name))
+
+    # Which covers which
+
+    def order(self) -> list[int]:
+        """The lifted objects and what stays in front, back to front."""
+        from objectmorpher_core.compose.order import back_to_front
+
+        document = self._editor.committed
+        if document is None:
+            return []
+        objects = document.objects
+        fronts = [k for k in range(len(objects)) if is_front(document, k)]
+        there = [k for k, o in enumerate(objects) if o.lifted or k in fronts]
+        if len(there) < 2:
+            return there
+        posed = partial(self._editor.derived.posed, document)
+        return back_to_front(objects, {k: None if k in fronts else posed(k) for k in there})
+
+    def listed(self) -> list[int]:
+        """All that are selected, as a list shows them: what is in front first."""
+        document = self._editor.document
+        objects = document.objects if document else ()
+        order = [k for k in self.order() if k < len(objects)]
+        others = [k for k, o in enumerate(objects) if o.mask is not None and k not in order]
+        return [*reversed(others), *reversed(order)]
+
+    def why_not_raise(self, steps: int) -> str | None:
+        """Why the current object cannot go so many places to the front, or (negative) back."""
+        order = self.order()
+        if self._editor.current not in order:
+            return t("Lift an object first, or keep it in front")
+        if len(order) < 2:
+            return t("There is no other object")
+        place = order.index(self._editor.current)
+        if steps > 0:
+            return t("It is in front of all others") if place == len(order) - 1 else None
+        return t("It is behind all others") if place == 0 else None
+
+    def raise_by(self, steps: int, label: str) -> None:
+        """Takes the current object past so many others, to the front or (negative) to the back."""
+        order, k = self.order(), self._editor.current
+        self._put(k, min(max(order.index(k) + steps, 0), len(order) - 1), label)
+
+    def _put(self, k: int, place: int, label: str) -> None:
+        """Object `k` to a place of `order`."""
+        from objectmorpher_core.compose.order import reordered
+
+        editor = self._editor
+        if editor.document is None or editor.hand.is_busy:
+            return
+        order = self.order()
+        order.remove(k)
+        order.insert(place, k)
+        document = editor.document
+        posed = partial(editor.derived.posed, document)
+        editor.apply(label, reordered(document, k, order, posed))
+
+    # A row of the list that is dragged
+
+    def carry(self, k: int) -> bool:
+        """Takes up object `k`'s row; whether it has a place among others."""
+        order = self.order()
+        if k in order and len(order) > 1 and not self._editor.hand.is_busy:
+            self.carried = k
+        return self.carried is not None
+
+    def landing(self, gap: int) -> int | None:
+        """Above which row of the list the carried one would land, let go nearest above row `gap`.
+
+        None where nothing is carried, or it would stay where it is.
+        """
+        shown, order = self.listed(), self.order()
+        if self.carried not in order:
+            return None
+        gap = min(max(gap, len(shown) - len(order)), len(shown))  # what has no shape is above
+        return None if gap - shown.index(self.carried) in (0, 1) else gap
+
+    def drop(self, gap: int) -> None:
+        """Lets the carried row go: its object, now the current one, is before those below it."""
+        k, landing = self.carried, self.landing(gap)
+        self.carried = None
+        if k is None:
+            return
+        self.choose(k)
+        if landing is not None:
+            below = [other for other in self.listed()[landing:] if other != k]
+            self._put(k, len(below), t("Change the order"))

@@ -1,0 +1,185 @@
+"""The whole object somewhere else in the photo."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.ground import Ground, GroundError, ground_under
+from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.placement import Hold, centre_of, with_centre
+
+from ...canvas.derived import ObjectFrame
+from ...system.texts import t
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+
+class Placing:
+    """The current object's placement."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+
+    @property
+    def placement(self) -> Placement | None:
+        editor = self._editor
+        return editor.object.placement if editor.is_lifted and editor.object else None
+
+    def frame(self) -> ObjectFrame | None:
+        """The object's outline box in the picture."""
+        editor = self._editor
+        if editor.document is None or not editor.is_lifted:
+            return None
+        return editor.derived.frame(editor.document, editor.current)
+
+    def centre(self) -> np.ndarray:
+        """(3,) world: what the object turns about."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        return centre_of(thing.placement, thing.lifted, document.photo.camera)
+
+    # Holding it
+
+    def hold(self, canvas_xy: np.ndarray | None = None) -> Hold:
+        """The object held by its surface at canvas px, or by its centre; on the ground by what
+        it stands on."""
+        editor = self._editor
+        document, thing = editor.document, editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        camera, lifted, placement = document.photo.camera, thing.lifted, thing.placement
+        ground = self.ground
+        if ground is not None:
+            placement = self.stood(placement)
+            centre = centre_of(placement, lifted, camera)
+            contact = ground.lowest(centre + self._offsets(placement))
+            return Hold(placement, lifted, camera, contact, ground)
+        seen = None if canvas_xy is None else editor.posing.surface_at(canvas_xy)
+        point = self.centre() if seen is None else seen.world
+        return Hold(placement, lifted, camera, np.asarray(point, np.float64))
+
+    def move_to(self, placement: Placement) -> None:
+        """Previews the whole object elsewhere."""
+        editor = self._editor
+        if editor.committed is None or not editor.is_lifted:
+            return
+        try:
+            editor.preview = edits.set_placement(editor.committed, editor.current, placement)
+        except ValueError as error:
+            editor.preview = None
+            editor.complain(str(error))
+
+    def move_away(self, depth: float) -> None:
+        """Previews the object at a depth, in diameters from where it was; on the ground it slides
+        there."""
+        placement = self.placement
+        if placement is None:
+            return
+        if self.ground is None:
+            self.move_to(replace(placement, depth=depth))
+        else:
+            self.move_to(self.hold().moved(np.zeros(2), depth - placement.depth))
+
+    # The ground
+
+    @property
+    def horizon(self) -> float:
+        """Px, the row of the photo that the horizon is in."""
+        document = self._editor.document
+        assert document is not None
+        return document.photo.size[1] / 2 if document.horizon is None else document.horizon
+
+    @property
+    def ground(self) -> Ground | None:
+        """What the object is to stand on; None where it need not, or cannot."""
+        return self._find_ground()[0] if self._editor.view.is_grounded else None
+
+    @property
+    def why_no_ground(self) -> str | None:
+        """Why the object cannot stand on the ground, if it cannot."""
+        return self._find_ground()[1]
+
+    def _find_ground(self) -> tuple[Ground | None, str | None]:
+        document, thing = self._editor.document, self._editor.object
+        if document is None or thing is None or thing.lifted is None:
+            return None, t("Lift an object first")
+        points = thing.lifted.world_points(thing.lifted.body.means)
+        try:
+            return ground_under(points, document.photo.camera, self.horizon), None
+        except GroundError:
+            return None, t("The object's lowest point is above the horizon, so it cannot stand")
+
+    def stood(self, placement: Placement) -> Placement:
+        """`placement`, moved up or down so that the object stands on the ground, if it is to."""
+        document, thing, ground = self._editor.document, self._editor.object, self.ground
+        if ground is None or document is None or thing is None or thing.lifted is None:
+            return placement
+        camera = document.photo.camera
+        try:
+            centre = centre_of(placement, thing.lifted, camera)
+        except ValueError:  # behind the camera, as `move_to` will say
+            return placement
+        standing = ground.stood(centre, self._offsets(placement))
+        return with_centre(placement, standing, thing.lifted, camera)
+
+    def _offsets(self, placement: Placement) -> np.ndarray:
+        """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        rest = replace(placement, move=(0.0, 0.0), depth=0.0)
+        linear = rest.matrix(thing.lifted, document.photo.camera)[:3, :3]
+        points = self._editor.derived.body_points(document, self._editor.current)
+        return (thing.lifted.world_points(points) - thing.lifted.centre) @ linear.T
+
+    def toggle_ground(self) -> None:
+        """The object stands on the ground while it is moved, or not any more."""
+        view = self._editor.view
+        view.is_grounded = not view.is_grounded
+        self.say_why_no_ground()
+
+    def say_why_no_ground(self) -> None:
+        reason = self.why_no_ground
+        if self._editor.view.is_grounded and reason is not None:
+            self._editor.say(reason)
+
+    def drag_horizon(self, row: float) -> None:
+        """Previews the horizon in another row of the photo, px."""
+        editor = self._editor
+        if editor.committed is not None:
+            editor.preview = edits.set_horizon(editor.committed, row)
+
+    # Steps
+
+    def nudge(self, dx: float, dy: float, depth: float = 0.0) -> None:
+        """Moves the object by image px, and by its diameters away; one step each."""
+        editor = self._editor
+        if self.placement is not None and not editor.hand.is_busy:
+            self.move_to(self.hold().moved(np.array([dx, dy]), depth))
+            editor.commit(t("Nudge object"))
+
+    def reset(self) -> None:
+        """Back to where it was in the photo."""
+        if self.placement is not None and not self.placement.is_identity:
+            self.move_to(Placement())
+            self._editor.commit(t("Back to where it was"))
+
+    def reset_position(self) -> None:
+        self._reset(t("Reset position"), move=(0.0, 0.0), depth=0.0)
+
+    def reset_turn(self) -> None:
+        self._reset(t("Reset turn"), turn=(0.0, 0.0, 0.0))
+
+    def reset_size(self) -> None:
+        self._reset(t("Reset size"), scale=1.0)
+
+    def _reset(self, label: str, **parts: object) -> None:
+        placement = self.placement
+        if placement is not None:
+            changed = replace(placement, **parts)  # type: ignore[arg-type]
+            if changed != placement:
+                self.move_to(changed)
+                self._editor.commit(label)

@@ -1,0 +1,309 @@
+"""Dragging and turning points of the lifted object, and what holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.rotations import turned_by
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.pose import turn_at
+
+from ...canvas.derived import Spot
+from ...system.texts import t
+from .mirroring import Mirroring
+
+if TYPE_CHECKING:
+    from objectmorpher_core.deform.puppet import SurfacePoint
+
+    from ..editor import Editor
+
+AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
+# Of a drag's frame, for the solver: a compact object lags by less than a pixel, a slender one is
+# given longer. While the pointer holds still there is more time.
+DRAG = {"seconds": 0.007, "tolerance": 3e-3}
+REST = {"seconds": 0.012}
+
+
+class Posing:
+    """The current object's handles and pose."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.mirroring = Mirroring(editor)
+        self.readout = ""  # of the turn in progress: "34°"
+        self._selected: tuple[int, ...] = ()
+        self._restless: Document | None = None  # the preview, as long as its pose is not at rest
+
+    # What there is
+
+    def surface_at(self, canvas_xy: np.ndarray) -> SurfacePoint | None:
+        """The point of the object's surface that is seen at canvas px."""
+        editor = self._editor
+        if editor.document is None or not editor.is_lifted:
+            return None
+        return editor.derived.surface_at(editor.document, editor.current, editor.view, canvas_xy)
+
+    def positions(self) -> F64:
+        """Where the handles' targets are seen: (H, 2) image px."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or not editor.object.handles:
+            return np.empty((0, 2))
+        targets = np.array([h.target for h in editor.object.handles])
+        return editor.derived.project(editor.document, editor.current, targets)
+
+    def spot(self, handle: int) -> Spot:
+        """Where a handle's target is seen, and how far away."""
+        editor = self._editor
+        assert editor.document is not None
+        assert editor.object is not None
+        target = editor.object.handles[handle].target
+        return editor.derived.spot(editor.document, editor.current, target)
+
+    def line(self, handle: int) -> tuple[F64, F64]:
+        """A handle's target (3,) and the surface's normal (3,) there, both world."""
+        editor = self._editor
+        assert editor.document is not None and editor.object is not None
+        own = editor.object.handles[handle]
+        place = editor.derived.world(editor.document, editor.current, own.target)
+        return place, editor.derived.facts.normal_at(editor.document, editor.current, own.point)
+
+    def turn_of(self, handle: int) -> F64:
+        """The rotation vector (3,) of a handle, object frame: its own, or as it comes."""
+        editor = self._editor
+        assert editor.object is not None
+        own, pose = editor.object.handles[handle], editor.object.pose
+        return turn_at(pose, own.control_point) if own.turn is None else own.turn
+
+    def forget(self) -> None:
+        """The document is closed."""
+        self._restless = None
+
+    @property
+    def is_restless(self) -> bool:
+        """Whether the previewed pose still moves towards its rest."""
+        return self._restless is not None and self._restless is self._editor.preview
+
+    # Selecting
+
+    @property
+    def selected(self) -> tuple[int, ...]:
+        """The handles that keys and fields change, in the order in which they were selected."""
+        thing = self._editor.object
+        count = 0 if thing is None else len(thing.handles)
+        return tuple(h for h in self._selected if h < count)
+
+    @property
+    def handle(self) -> int | None:
+        """The handle that was selected last."""
+        return self.selected[-1] if self.selected else None
+
+    def select(self, *handles: int | None) -> None:
+        """These handles, the last of them the current one; None is no handle."""
+        self._selected = tuple(dict.fromkeys(h for h in handles if h is not None))
+
+    def toggle(self, handle: int) -> None:
+        """Adds a handle to the selection, or takes it out."""
+        others = tuple(h for h in self.selected if h != handle)
+        self.select(*(others if handle in self.selected else (*others, handle)))
+
+    def select_all(self) -> None:
+        thing = self._editor.object
+        self.select(*range(len(thing.handles) if thing else 0))
+
+    def select_box(self, low: np.ndarray, high: np.ndarray, is_added: bool) -> None:
+        """The handles seen between two corners (2,) image px; added to the others or instead."""
+        positions = self.positions()
+        inside = np.flatnonzero(((positions >= low) & (positions <= high)).all(1)).tolist()
+        self.select(*(self.selected if is_added else ()), *inside)
+
+    def forget_lost(self) -> None:
+        """Deselects what the document does not have any more."""
+        self._selected = self.selected
+
+    # Strokes
+
+    def start_handle(
+        self, canvas_xy: np.ndarray, is_pin: bool, is_added: bool = False
+    ) -> int | None:
+        """Previews a new handle on the surface; its index, or None beside the object.
+
+        It is selected instead of the others, or with them.
+        """
+        editor = self._editor
+        seen = self.surface_at(canvas_xy)
+        if seen is None or editor.document is None or editor.object is None:
+            return None
+        k, item = editor.current, editor.object
+        assert item.lifted is not None
+        others = self.selected if is_added else ()
+        nearest = edits.nearest_control_point(item.lifted, seen.rest)
+        for h, other in enumerate(item.handles):
+            if other.control_point == nearest:  # one control point, one handle
+                self.select(*others, h)
+                editor.preview = editor.document
+                return h
+        if item.rig.is_held(nearest):
+            editor.say(_frozen())
+            return None
+        target = editor.derived.unplaced(editor.document, k, seen.world)
+        changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
+        added = len(item.handles)
+        self.change(self.mirroring.followed(changed, (added,)))
+        self.select(*others, added)
+        return added
+
+    def unpin(self, handle: int) -> None:
+        """Previews a pin as a handle: it is dragged."""
+        editor = self._editor
+        if editor.document is not None:
+            changed = edits.set_pin(editor.document, editor.current, handle, False)
+            editor.preview = self.mirroring.followed(changed, (handle,))
+
+    def drag(self, handle: int, spot: Spot) -> None:
+        """Previews the handle at another place of the picture."""
+        self.drag_all({handle: spot})
+
+    def drag_all(self, spots: Mapping[int, Spot]) -> None:
+        """Previews handles at other places of the picture."""
+        editor = self._editor
+        if editor.document is None:
+            return
+        camera = editor.document.photo.camera
+        self.move_all({h: camera.unproject(s.xy, s.depth) for h, s in spots.items()})
+
+    def move_all(self, places: Mapping[int, F64]) -> None:
+        """Previews handles at other places of the world, (3,) each."""
+        editor = self._editor
+        changed, k = editor.document, editor.current
+        if changed is None or editor.object is None:
+            return
+        places = {h: place for h, place in places.items() if not self._is_frozen(h)}
+        if not places:
+            return
+        try:
+            for h, place in places.items():
+                target = editor.derived.unplaced(changed, k, place)
+                changed = edits.move_handle(changed, k, h, target)
+        except ValueError as error:
+            editor.complain(str(error))
+            return
+        self.change(self.mirroring.followed(changed, tuple(places)))
+
+    def turn(self, handle: int, start: F64, turn: F64) -> None:
+        """Previews the handle turned from `start` (3,), object frame, by `turn` (3,), world."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or self._is_frozen(handle):
+            return
+        k = editor.current
+        own = editor.derived.facts.turn_of(editor.document, k).T @ turn
+        changed = edits.turn_handle(editor.document, k, handle, turned_by(start, own))
+        self.change(self.mirroring.followed(changed, (handle,)))
+
+    def _is_frozen(self, handle: int) -> bool:
+        """Whether a handle is on a frozen part, which moves for nobody; says so."""
+        thing = self._editor.object
+        is_frozen = thing is not None and thing.rig.is_held(thing.handles[handle].control_point)
+        if is_frozen:
+            self._editor.say(_frozen())
+        return is_frozen
+
+    def change(self, changed: Document) -> None:
+        """Previews the handles of `changed`, solved for from the pose that is shown."""
+        editor = self._editor
+        assert editor.object is not None
+        start = editor.object.pose
+        solved = editor.derived.solved(changed, editor.current, start, **DRAG)
+        editor.preview = self._restless = solved
+
+    def relax(self) -> None:
+        """Goes on with a drag's solve: for a frame in which the pointer holds still."""
+        if not self.is_restless:
+            return
+        editor = self._editor
+        document, self._restless = self._restless, None
+        assert document is not None
+        before = document.objects[editor.current].pose
+        after = editor.derived.solved(document, editor.current, before, **REST)
+        changed = after.objects[editor.current]
+        assert before is not None and changed.pose is not None and changed.lifted is not None
+        editor.preview = after
+        motion = np.abs(changed.pose.points - before.points).max()
+        if motion > AT_REST * changed.lifted.diameter:
+            self._restless = after
+
+    def settle(self) -> None:
+        """Lets the preview's pose come to rest: at the end of a stroke that changed something."""
+        editor = self._editor
+        preview = editor.preview
+        if preview is not None and preview is not editor.committed and editor.object is not None:
+            editor.preview = editor.derived.solved(preview, editor.current, editor.object.pose)
+
+    # Steps
+
+    def finish(self, label: str) -> None:
+        """What is previewed becomes one step."""
+        self.settle()
+        self._editor.commit(label)
+
+    def nudge(self, dx: float, dy: float, depth: float = 0.0) -> None:
+        """Moves the selected handles by image px, and by object diameters away; one step each."""
+        if self.selected and not self._editor.hand.is_busy:
+            delta = np.array([dx, dy])
+            self.drag_all({h: self.spot(h).moved(delta, depth) for h in self.selected})
+            self.finish(t("Nudge point"))
+
+    def remove(self, handle: int | None = None) -> None:
+        """Removes a handle, or all selected ones; the object relaxes to what is left."""
+        editor = self._editor
+        gone = self.selected if handle is None else (handle,)
+        if not gone or editor.document is None or editor.object is None or editor.hand.is_busy:
+            return
+        is_pin = all(editor.object.handles[h].is_pin for h in gone)
+        label = t("Remove pin") if is_pin else t("Remove handle")
+        if len(gone) > 1:
+            label = t("Remove {count} handles", count=len(gone))
+        changed = editor.document
+        for h in sorted(gone, reverse=True):
+            changed = edits.remove_handle(changed, editor.current, h)
+        left = [h for h in self.selected if h not in gone]
+        self.select(*(h - sum(g < h for g in gone) for h in left))
+        editor.apply(label, editor.derived.solved(changed, editor.current, None))
+
+    def send_back(self, handles: tuple[int, ...], label: str) -> None:
+        """These handles to where their points were in the photo; all but pins free to turn."""
+        editor = self._editor
+        if editor.document is None or editor.object is None or not handles:
+            return
+        changed, k = editor.document, editor.current
+        for h in handles:
+            own = editor.object.handles[h]
+            changed = edits.move_handle(changed, k, h, own.point)
+            changed = edits.turn_handle(changed, k, h, np.zeros(3) if own.is_pin else None)
+        changed = self.mirroring.followed(changed, handles)
+        editor.apply(label, editor.derived.solved(changed, k, None))
+
+    def set_auto_anchors(self, has_auto_anchors: bool) -> None:
+        """Whether the far side of the object holds still by itself."""
+        editor = self._editor
+        if editor.document is not None and editor.is_lifted:
+            changed = edits.set_auto_anchors(editor.document, editor.current, has_auto_anchors)
+            solved = editor.derived.solved(changed, editor.current, None)
+            editor.apply(t("Hold far side") if has_auto_anchors else t("Free far side"), solved)
+
+    def reset(self) -> None:
+        """The object's shape as it was in the photo, without handles."""
+        editor = self._editor
+        document, thing = editor.document, editor.object
+        if document is None or thing is None or not (thing.handles or thing.pose):
+            return
+        self.select(None)
+        editor.apply(t("Reset pose"), edits.reset_pose(document, editor.current))
+
+
+def _frozen() -> str:
+    return t("This part is frozen: erase that with the Freeze brush before moving it")

@@ -1,0 +1,239 @@
+"""Which object is meant: clicks, a box, a line around it, the subject."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.arrays import Selection as SelectionMask
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import LEVELS, Click, Document, Prompt
+from objectmorpher_core.segment import Found, mask_edit
+
+from ...system.texts import t
+from ..tasks import SELECT, Combine, Question
+from ..view import ToolName
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or less around it
+
+
+class Selection:
+    """The current object's mask, and what was said to get it.
+
+    A selection that a prompt made is told better by each further click; what was changed of it by
+    hand meanwhile stays, see `edits.answer_prompt`. One that was made by hand alone (a line, a
+    brush, a file) has no prompt: there a click adds the object that it is on, or takes it away.
+    """
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.path: list[np.ndarray] | None = None  # the line being drawn, canvas px (2,) each
+        self._told: tuple[Mask | None, float | None] = None, None  # a mask, and how sure it was
+
+    # What there is
+
+    @property
+    def pending(self) -> Prompt | None:
+        """What is being segmented now; shown at once, in the document when the mask is there."""
+        question = self._editor.tasks.question
+        return question.prompt if question and question.k == self._editor.current else None
+
+    @property
+    def prompt(self) -> Prompt:
+        """What the user said about the current object, asked or answered."""
+        if self.pending is not None:
+            return self.pending
+        thing = self._editor.object
+        return thing.prompt if thing else Prompt()
+
+    @property
+    def share(self) -> float:
+        """How much of the photo is selected, in [0, 1]."""
+        mask = self._editor.mask
+        return 0.0 if mask is None else self._editor.derived.share(mask)
+
+    @property
+    def confidence(self) -> float | None:
+        """How much what is selected is expected to overlap with what is meant (IoU), in [0, 1].
+
+        None where nobody can tell: it was changed by hand, put together, or is an older step.
+        """
+        mask, told = self._told
+        return told if mask is not None and mask is self._editor.mask else None
+
+    @property
+    def level(self) -> str:
+        """How much around a click is meant: the selection's own, or a new one's."""
+        prompt = self.prompt
+        return prompt.level if prompt.clicks else self._editor.view.selecting.level
+
+    # Saying what is meant
+
+    def add_click(self, x: float, y: float, is_foreground: bool) -> None:
+        """A point of the photo, image px, that belongs to the object or does not."""
+        editor = self._editor
+        size = editor.photo_size
+        if size is None or not (0 <= x < size[0] and 0 <= y < size[1]):
+            return
+        question = editor.tasks.question if self.pending is not None else None
+        before, click = self.prompt, Click(x, y, is_foreground)
+        if question is None and before.is_empty and editor.mask is not None:
+            self._combine_click(click, Prompt())
+        elif question is not None and question.combine in (Combine.ADDED, Combine.REMOVED):
+            self._combine_click(click, before)
+        elif before.is_empty and not is_foreground:
+            editor.say(t("Click the object first; then right-click what does not belong to it"))
+        elif is_foreground and self._is_repeated(before, click):
+            self.set_level(LEVELS[LEVELS.index(before.level) - 1])  # the part first, then the group
+        else:
+            label = _label(Combine.ADDED if is_foreground else Combine.REMOVED)
+            level = before.level if before.clicks else editor.view.selecting.level
+            self._ask(replace(before, clicks=(*before.clicks, click), level=level), label)
+
+    def set_box(
+        self, box: tuple[float, float, float, float], combine: Combine = Combine.ANEW
+    ) -> None:
+        """The object is inside a box x0, y0, x1, y1 image px: a selection made anew, or more."""
+        self._ask(Prompt(box=box), _label(combine), combine)
+
+    def set_outline(self, outline: np.ndarray, combine: Combine = Combine.ANEW) -> None:
+        """All that is inside a closed line (N, 2) image px."""
+        editor = self._editor
+        if editor.document is None or editor.photo_size is None:
+            return
+        inside = mask_edit.enclosed(outline, editor.photo_size)
+        question = Question(Prompt(), t("Draw around"), editor.current, combine)
+        if inside.any():
+            editor.jobs.cancel(SELECT)
+            self._apply(question, inside, editor.document)
+
+    def select_subject(self) -> None:
+        """The photo's main subject."""
+        self._ask(Prompt(is_subject=True), t("Select subject"), Combine.ANEW)
+
+    def set_level(self, level: str) -> None:
+        """How much around a click is meant: of this selection, and of the next ones."""
+        prompt = self.prompt
+        self._editor.view.selecting.level = level
+        if prompt.clicks and prompt.level != level:
+            self._ask(replace(prompt, level=level), _LEVEL_LABELS[level]())
+
+    def clear(self) -> None:
+        """Nothing is selected of the current object."""
+        editor = self._editor
+        editor.jobs.cancel(SELECT)
+        if editor.document is not None and editor.mask is not None:
+            cleared = edits.set_mask(editor.document, editor.current, None, Prompt())
+            editor.posing.select(None)
+            editor.view.tool = ToolName.SELECT
+            editor.apply(t("Clear selection"), cleared)
+
+    # Answers
+
+    def take(self, question: Question, found: Found, asked: Prompt | None = None) -> None:
+        """The answer of a question is the next step; `asked`: what was answered, if another."""
+        editor, document = self._editor, self._editor.document
+        if document is None or question.k > len(document.objects):
+            return
+        before, k = editor.mask, question.k
+        base = document.objects[k].selection if k < len(document.objects) else None
+        self._apply(question, found.mask, document.with_backend("segment", found.backend))
+        if editor.mask is before:
+            return
+        if question.combine in (Combine.ANEW, Combine.REFINED):
+            self._told = editor.mask, found.confidence
+        if not found.is_final:
+            editor.closer_look.begin(question, base, asked or question.prompt)
+
+    def improve(self, question: Question, base: SelectionMask | None, found: Found) -> None:
+        """A better answer takes the place of the one that is shown, in the same step.
+
+        `base` (H, W): what was selected before the step.
+        """
+        editor = self._editor
+        assert editor.history is not None
+        try:
+            document = _changed(editor.history.document, question, found.mask, base)
+        except ValueError:  # such as all of the photo: then the first answer stays
+            return
+        editor.history.amend(document)
+        if question.combine in (Combine.ANEW, Combine.REFINED):
+            self._told = editor.mask, found.confidence
+
+    def _apply(self, question: Question, mask: Mask, document: Document) -> None:
+        editor, k = self._editor, question.k
+        if k == len(document.objects):
+            document = edits.add_object(document)
+        try:
+            changed = _changed(document, question, mask, document.objects[k].selection)
+        except ValueError as error:
+            editor.complain(str(error))
+            return
+        editor.posing.select(None)
+        if editor.view.tool is not ToolName.MASK:
+            editor.view.tool = ToolName.SELECT
+        editor.apply(question.label, changed)
+
+    # Questions
+
+    def _ask(self, prompt: Prompt, label: str, combine: Combine = Combine.REFINED) -> None:
+        editor = self._editor
+        question = Question(prompt, label, editor.current, combine)
+        if not editor.candidates.take(question):
+            editor.tasks.segment(question)
+
+    def _combine_click(self, click: Click, before: Prompt) -> None:
+        """The object that a click is on, besides a selection that no prompt made, or not in it.
+
+        `before`: the same, asked and not answered yet.
+        """
+        question = self._editor.tasks.question
+        combine = Combine.ADDED if click.is_foreground else Combine.REMOVED
+        is_same = before.clicks and question is not None and question.combine is combine
+        clicks = (*before.clicks, replace(click, is_foreground=True)) if is_same else ()
+        prompt = Prompt(clicks or (replace(click, is_foreground=True),), level=self.level)
+        self._ask(prompt, _label(combine), combine)
+
+    def _is_repeated(self, before: Prompt, click: Click) -> bool:
+        """Whether a click is on the only one before it."""
+        if len(before.clicks) != 1 or before.box is not None:
+            return False
+        last, view = before.clicks[0], self._editor.view
+        gap = float(np.hypot(click.x - last.x, click.y - last.y)) * view.zoom
+        return last.is_foreground and gap <= SAME_PLACE * view.scale
+
+
+def _changed(
+    document: Document, question: Question, mask: Mask, base: SelectionMask | None
+) -> Document:
+    """The document in which a question has that answer (H, W). Raises ValueError.
+
+    `base` (H, W): what was selected of the object before, for an answer that is put to it.
+    """
+    k = question.k
+    if question.combine is Combine.ADDED:
+        return edits.change_mask(document, k, mask_edit.united(base, mask))
+    if question.combine is Combine.REMOVED:
+        return edits.change_mask(document, k, mask_edit.without(base, mask))
+    if question.combine is Combine.REFINED:
+        return edits.answer_prompt(document, k, mask, question.prompt)
+    return edits.set_mask(document, k, mask, question.prompt)
+
+
+def _label(combine: Combine) -> str:
+    if combine is Combine.REMOVED:
+        return t("Remove from selection")
+    return t("Add to selection") if combine is Combine.ADDED else t("Select by box")
+
+
+_LEVEL_LABELS = {
+    "part": lambda: t("Select the part"),
+    "object": lambda: t("Select the object"),
+    "group": lambda: t("Select the group"),
+}

@@ -1,0 +1,351 @@
+"""The current object's shape: its thickness, its other side, what hides it, or a file's instead.
+
+What is said about a shape before it is lifted is kept for the lift. Afterwards each word is a step:
+the worker lifts the object anew, and its handles go over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import F32, Mask
+from objectmorpher_core.base.brush import Brush, Stroke
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import (
+    AS_SEEN,
+    Document,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Placement,
+)
+
+from ...canvas.layers import Layer
+from ...system.texts import t
+from ...worker import job_functions
+from ..view import Painted
+
+if TYPE_CHECKING:
+    from objectmorpher_core.lift.registration.importing import Import, Scene
+    from objectmorpher_core.lift.registration.placement import Proposal
+
+    from ..editor import Editor
+
+IMPORT = "import"  # kind of job
+DETAIL = 512  # px, longer side of the map of what is nearer
+STEP = 0.06  # x the object's size, that one stroke brings nearer
+DEEPEST = 0.6  # x the object's size: no stroke goes on beyond
+GRAIN = 2  # canvas px per px of the tint
+NEARER, FARTHER, HIDDEN = (0xFF, 0xB0, 0x00), (0x5A, 0xA9, 0xFF), (0xB4, 0x8C, 0xFF)
+FULL_TINT = 0.2  # of nearness, that is shown at full strength
+TINT = 170  # of 255, its strength
+
+
+@dataclass(frozen=True, eq=False)
+class Fitting:
+    """An object from a file, and the poses that were proposed for it."""
+
+    name: str
+    mask: Mask
+    found: Import
+    chosen: Proposal
+
+
+class Shaping:
+    """What is said about a shape, and what comes of it."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._stroke: Stroke | None = None
+        self._painted, self._is_inverse = Painted.DEPTH, False
+        self._fitting: Fitting | None = None
+        self._trust: float | None = None  # while it is dragged
+
+    @property
+    def settings(self) -> LiftSettings:
+        thing = self._editor.object
+        return thing.shape if thing is not None else AS_SEEN
+
+    @property
+    def why_fixed(self) -> str | None:
+        """Why nothing can be said about the shape, or None."""
+        thing = self._editor.object
+        if thing is not None and thing.lifted is not None and thing.lifted.middle is None:
+            return t("A shape out of a file is as it is there")
+        return None
+
+    # Words
+
+    def preview_thickness(self, thickness: float) -> None:
+        """Shows the object thicker or thinner; `Editor.commit` makes it a step."""
+        editor, document = self._editor, self._editor.committed
+        if document is None or not editor.is_lifted or editor.hand.is_busy or self.why_fixed:
+            return
+        k = editor.current
+        if document.objects[k].shape.thickness == thickness:
+            editor.preview = None
+            return
+        try:
+            changed = edits.set_thickness(document, k, thickness)
+            editor.preview = editor.derived.solved(changed, k, None)
+        except ValueError as error:
+            editor.complain(str(error))
+
+    @property
+    def trust(self) -> float:
+        """In the shape network, as it is or as it is dragged."""
+        return self.settings.trust if self._trust is None else self._trust
+
+    def preview_trust(self, trust: float) -> None:
+        """Another trust is shown as a number; `end_trust` lifts the object with it."""
+        self._trust = trust
+
+    def end_trust(self) -> None:
+        trust, self._trust = self.trust, None
+        if trust != self.settings.trust:
+            self.say(t("Trust"), trust=trust)
+
+    def say(self, label: str, **words: object) -> None:
+        """A word about the shape: fields of `LiftSettings`."""
+        self._take(label, replace(self.settings, **words))
+
+    def _take(self, label: str, shape: LiftSettings) -> None:
+        editor, document = self._editor, self._editor.committed
+        thing = editor.object
+        if document is None or thing is None or self.why_fixed is not None:
+            return
+        if thing.lifted is None:
+            editor.apply(label, edits.set_shape(document, editor.current, shape))
+        else:
+            editor.tasks.lift(shape, label)
+
+    # Strokes
+
+    def start_stroke(self, is_inverse: bool) -> bool:
+        """A brush is put down on the photo; False where it cannot paint."""
+        editor, document = self._editor, self._editor.document
+        if document is None or editor.mask is None:
+            editor.say(t("Select an object first"))
+            return False
+        if (reason := self.why_fixed) is not None:
+            editor.say(reason)
+            return False
+        self._painted, self._is_inverse = editor.view.selecting.painted, is_inverse
+        size, brush = document.photo.size, editor.view.brush
+        if self._painted is Painted.DEPTH:
+            scale = _scale(size)
+            size = _reduced(size)
+            brush = Brush(max(brush.radius * scale, 1.0), brush.hardness)
+        self._stroke = Stroke(size, brush)
+        return True
+
+    def paint(self, canvas_xy: np.ndarray) -> None:
+        """The brush moves to canvas px (2,)."""
+        document = self._editor.document
+        if self._stroke is None or document is None:
+            return
+        scale = _scale(document.photo.size) if self._painted is Painted.DEPTH else 1.0
+        x, y = self._editor.view.image_from_canvas(canvas_xy) * scale
+        self._stroke.move_to(float(x), float(y))
+
+    def end_stroke(self) -> None:
+        """What was painted is a word about the shape."""
+        stroke, document = self._stroke, self._editor.document
+        if stroke is None or document is None:
+            return
+        if self._painted is Painted.DEPTH:
+            label = t("Farther") if self._is_inverse else t("Nearer")
+            nearness = self._nearness(document.photo.size)
+            self.say(label, nearness=nearness if nearness.any() else None)
+        else:
+            hidden = self._hidden(document.photo.size)
+            label = t("Not hidden here") if self._is_inverse else t("Hidden here")
+            self.say(label, hidden=hidden if hidden.any() else None)
+        self.drop_stroke()
+
+    def drop_stroke(self) -> None:
+        """As if nothing had been painted."""
+        self._stroke = None
+
+    def clear_painted(self) -> None:
+        """What was painted with the brush that is chosen is gone."""
+        if self._editor.view.selecting.painted is Painted.HIDDEN:
+            self.say(t("Nothing is hidden"), hidden=None)
+        else:
+            self.say(t("Depth as it was"), nearness=None)
+
+    def _nearness(self, size: tuple[int, int]) -> F32:
+        """(h, w) with the stroke in progress."""
+        now = self.settings.nearness
+        width, height = _reduced(size)
+        now = np.zeros((height, width), np.float32) if now is None else now
+        if self._stroke is None or self._painted is not Painted.DEPTH:
+            return now
+        step = -STEP if self._is_inverse else STEP
+        return np.clip(now + step * self._stroke.coverage, -DEEPEST, DEEPEST).astype(np.float32)
+
+    def _hidden(self, size: tuple[int, int]) -> Mask:
+        """(H, W) with the stroke in progress."""
+        now = self.settings.hidden
+        now = np.zeros(size[::-1], bool) if now is None else now
+        if self._stroke is None or self._painted is not Painted.HIDDEN:
+            return now
+        covered = self._stroke.coverage >= 0.5
+        return now & ~covered if self._is_inverse else now | covered
+
+    def painted_layer(self) -> Layer | None:
+        """What is painted about the shape, as a tint over the canvas."""
+        editor, document = self._editor, self._editor.document
+        painted = editor.view.selecting.painted
+        if document is None or painted is Painted.SELECTION:
+            return None
+        size = document.photo.size
+        if painted is Painted.DEPTH:
+            field, scale = self._nearness(size), _scale(size)
+        else:
+            field, scale = self._hidden(size).astype(np.float32) * FULL_TINT, 1.0
+        if not field.any():
+            return None
+        view = editor.view
+        shape = (max(view.width // GRAIN, 1), max(view.height // GRAIN, 1))
+        step = GRAIN / view.zoom * scale
+        start = [edge * scale + step / 2 - 0.5 for edge in (view.left, view.top)]
+        matrix = np.array([[step, 0, start[0]], [0, step, start[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        seen = cv2.warpAffine(field, matrix, shape, flags=flags)
+        alpha = np.clip(np.abs(seen) / FULL_TINT, 0, 1)[..., None]
+        up = HIDDEN if painted is Painted.HIDDEN else NEARER
+        ink = np.where(seen[..., None] > 0, np.array(up, np.float32), np.array(FARTHER, np.float32))
+        strength = alpha * (TINT / 255)
+        rgba = np.dstack([ink * strength, 255 * strength]).astype(np.uint8)
+        box = (0.0, 0.0, float(shape[0] * GRAIN), float(shape[1] * GRAIN))
+        return Layer(box, rgba, is_coarse=True, is_tint=True)
+
+    # Objects out of files
+
+    @property
+    def fitting(self) -> Fitting | None:
+        """The poses proposed for the current object, which came out of a file."""
+        fitting, thing = self._fitting, self._editor.object
+        is_own = fitting is not None and thing is not None and thing.mask is fitting.mask
+        return fitting if is_own and self.why_fixed is not None else None
+
+    def open_file(self, path: Path) -> None:
+        """A 3D object out of a file takes the place of what is selected."""
+        editor, scene = self._editor, self._scene()
+        if scene is None:
+            editor.say(t("Select what the 3D object stands for first"))
+            return
+        document, mask, k = editor.document, editor.mask, editor.current
+        assert document is not None and mask is not None
+
+        def accept(answer: tuple[Import, Matte, LiftedObject]) -> None:
+            found, matte, lifted = answer
+            fitting = Fitting(path.name, mask, found, found.registration.best)
+            self._take_import(k, fitting, matte, lifted, t("Use 3D file"))
+
+        editor.message = None
+        editor.jobs.start(
+            t("Fitting {name} to the photo", name=path.name), job_functions.import_object,
+            path, scene, document.seed, done=accept, failed=editor.complain_of, kind=IMPORT,
+        )  # fmt: skip
+
+    def choose(self, proposal: Proposal) -> None:
+        """Another of the poses that were proposed."""
+        editor, fitting, scene = self._editor, self.fitting, self._scene()
+        document = editor.document
+        if fitting is None or scene is None or document is None or proposal is fitting.chosen:
+            return
+        k, chosen = editor.current, replace(fitting, chosen=proposal)
+
+        def accept(answer: tuple[Matte, LiftedObject]) -> None:
+            self._take_import(k, chosen, *answer, t("Another pose"))
+
+        editor.jobs.start(
+            t("Placing the object"), job_functions.place_object,
+            scene, fitting.found.gaussians, proposal, document.seed,
+            done=accept, failed=editor.complain_of, kind=IMPORT,
+        )  # fmt: skip
+
+    def fit_again(self) -> None:
+        """The pose that agrees best with the photo near to where the object was placed by hand."""
+        editor, scene = self._editor, self._scene()
+        document, thing, mask = editor.document, editor.object, editor.mask
+        if document is None or thing is None or thing.lifted is None or scene is None:
+            return
+        assert mask is not None
+        k, body = editor.current, thing.lifted.body
+        moved = thing.placement.matrix(thing.lifted, document.photo.camera)
+        start, name = moved @ thing.lifted.world_from_object, thing.name
+
+        def accept(answer: tuple[Import, Matte, LiftedObject]) -> None:
+            found, matte, lifted = answer
+            fitting = Fitting(name, mask, found, found.registration.best)
+            self._take_import(k, fitting, matte, lifted, t("Fit to photo"))
+
+        editor.jobs.start(
+            t("Fitting the object to the photo"), job_functions.fit_object,
+            scene, body, start, document.seed,
+            done=accept, failed=editor.complain_of, kind=IMPORT,
+        )  # fmt: skip
+
+    def _scene(self) -> Scene | None:
+        """The photo and the mask that an object stands for."""
+        from objectmorpher_core.lift.registration.importing import Scene
+
+        editor, document = self._editor, self._editor.document
+        thing = editor.object
+        if document is None or thing is None or thing.selection is None:
+            return None
+        photo = document.photo
+        is_alone = not any(o.lifted for o in document.objects if o is not thing)
+        is_guess = photo.camera == Camera.from_fov(*photo.size)
+        return Scene(photo.pixels, photo.camera, thing.selection, is_alone and is_guess)
+
+    def _take_import(
+        self, k: int, fitting: Fitting, matte: Matte, lifted: LiftedObject, label: str
+    ) -> None:
+        editor = self._editor
+
+        def change(document: Document) -> Document | None:
+            if k >= len(document.objects) or document.objects[k].mask is not fitting.mask:
+                return None
+            try:
+                changed = edits.set_camera(document, fitting.chosen.camera, k)
+            except ValueError as error:
+                editor.complain(str(error))
+                return None
+            changed = edits.set_lifted(changed, k, matte, lifted)
+            return edits.set_placement(changed, k, Placement())
+
+        def show(changed: Document) -> None:
+            if not editor.hand.is_busy:
+                self._show_import(fitting, changed, label)
+
+        editor.tasks.make_ready(k, change, t("Placing the object"), show)
+
+    def _show_import(self, fitting: Fitting, changed: Document, label: str) -> None:
+        editor = self._editor
+        editor.posing.select(None)
+        editor.apply(label, changed)
+        self._fitting = fitting
+        share = f"{100 * fitting.chosen.iou:.0f}"
+        sentence = t("Its outline agrees with the photo by {share} %", share=share)
+        found = fitting.found.registration
+        editor.say(f"{sentence}. {found.reason}" if found.is_ambiguous else sentence)
+
+
+def _scale(size: tuple[int, int]) -> float:
+    """Px of the map of what is nearer per px of a photo of `size` (width, height)."""
+    return min(1.0, DETAIL / max(size))
+
+
+def _reduced(size: tuple[int, int]) -> tuple[int, int]:
+    scale = _scale(size)
+    return max(1, round(size[0] * scale)), max(1, round(size[1] * scale))

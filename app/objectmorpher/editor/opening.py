@@ -1,0 +1,85 @@
+"""Reads what the user opens: a photo or a session; everything else is a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from objectmorpher_core.base.limits import FILE_BYTES as MAX_BYTES
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.model import Document
+
+SESSION_ENDING = ".omorph"
+PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
+OBJECT_ENDINGS = (".ply", ".splat", ".spz", ".obj", ".glb", ".gltf", ".stl", ".off")
+ZIP_MAGIC = b"PK\x03\x04"
+BLOCK = 1 << 24  # bytes read at a time
+
+
+class OpeningError(ValueError):
+    """The file cannot be opened; one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What a file held."""
+
+    document: Document
+    is_session: bool
+
+
+def is_object(path: Path) -> bool:
+    """Whether the file's name is that of a 3D object."""
+    return path.suffix.lower() in OBJECT_ENDINGS
+
+
+def read_document(path: Path, fov: float | None, seed: int, progress: Progress) -> Opened:
+    """The document in a file; `fov` (degrees) and `seed` are for photos. Raises OpeningError."""
+    if path.is_dir():
+        raise OpeningError(f"{path.name} is a folder; choose a photo in it")
+    if is_object(path):
+        raise OpeningError(
+            f"{path.name} is a 3D object: open a photo, select what it stands for, then drop it"
+        )
+    try:
+        _check(path)
+        with path.open("rb") as file:
+            if file.read(len(ZIP_MAGIC)) == ZIP_MAGIC:
+                from objectmorpher_core.session.file import read_session
+
+                progress(0.1, "")
+                return Opened(read_session(file), is_session=True)
+        data = _read(path, progress)
+        progress(0.35, "")
+        from objectmorpher_core.pipeline import open_photo
+
+        return Opened(open_photo(data, path.name, fov=fov, seed=seed), is_session=False)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OpeningError(f"{path.name} cannot be opened: {reason}") from error
+    except MemoryError as error:
+        raise OpeningError(f"{path.name} does not fit into the memory") from error
+    except ValueError as error:
+        raise OpeningError(f"{path.name} cannot be opened: {error}") from error
+
+
+def _check(path: Path) -> None:
+    """It is a file that ends, and not too large. Raises OpeningError, OSError."""
+    size = path.stat().st_size
+    if not path.is_file():
+        raise OpeningError(f"{path.name} is no file")
+    if size > MAX_BYTES:
+        raise OpeningError(
+            f"{path.name} is {size / (1 << 30):.1f} GiB, more than the {MAX_BYTES >> 30} GiB "
+            "that can be opened"
+        )
+
+
+def _read(path: Path, progress: Progress) -> bytes:
+    """The file's bytes."""
+    size, parts = path.stat().st_size, []
+    with path.open("rb") as file:
+        while block := file.read(BLOCK):
+            parts.append(block)
+            progress(0.3 * min(len(parts) * BLOCK / max(size, 1), 1.0), "")
+    return b"".join(parts)

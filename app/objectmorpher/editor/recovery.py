@@ -1,0 +1,147 @@
+"""What editors that crashed have left: a list, and opening or discarding what is in it."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.model import Document
+from objectmorpher_core.session.journal import DOCUMENT, Journal, read_about, read_journal
+from objectmorpher_core.session.tree import SessionError
+
+from ..canvas.shape import Shapes, build_ready
+from ..system.file_lock import FileLock
+from ..system.texts import t
+from ..worker.job_error import JobError
+from .autosave import LOCK, Held, recovery_root
+
+if TYPE_CHECKING:
+    from .editor import Editor
+
+log = logging.getLogger(__name__)
+
+STALE = 24 * 3600  # s; a folder without a document that is older holds nothing and never will
+RECOVER = "recover"  # kind of chores
+
+
+@dataclass(frozen=True)
+class Left:
+    """Unsaved work of an editor that crashed."""
+
+    folder: Path
+    name: str = ""  # of the photo
+    edited: datetime | None = None
+    objects: int = 0
+    path: Path | None = None  # of the session
+    source: Path | None = None  # of the photo's file
+    problem: str = ""  # why it cannot be recovered, one sentence
+
+
+class Recovery:
+    """What there is to recover."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.left: tuple[Left, ...] = ()  # newest first
+
+    def look(self) -> None:
+        """Reads the list anew; cheap, the documents are not read."""
+        found = []
+        root = recovery_root()
+        for folder in sorted(root.iterdir()) if root.is_dir() else ():
+            try:
+                left = _left_in(folder)
+            except OSError as error:
+                log.warning("%s cannot be looked into: %s", folder, error)
+                continue
+            found += [left] if left is not None else []
+        found.sort(key=lambda left: left.edited or datetime.min, reverse=True)
+        self.left = tuple(found)
+
+    def recover(self, left: Left) -> None:
+        """Opens it, unsaved as it was; its folder is this editor's from then on."""
+        self._editor.filing.guard(lambda: self._recover(left))
+
+    def discard(self, left: Left) -> None:
+        """Deletes it for good."""
+        self._forget(left)
+        lock = FileLock.take(left.folder / LOCK) if left.folder.is_dir() else None
+        if lock is not None:
+            Held(Journal(left.folder), lock).remove()
+
+    def _recover(self, left: Left) -> None:
+        editor = self._editor
+        lock = FileLock.take(left.folder / LOCK) if left.folder.is_dir() else None
+        if lock is None:
+            self._forget(left)
+            editor.complain(t("{name} was recovered elsewhere already", name=left.name))
+            return
+
+        def read(progress: Progress) -> tuple[Document, Shapes]:
+            progress(0.2, "")
+            document = read_journal(left.folder)
+            return document, build_ready(document)
+
+        def accept(answer: tuple[Document, Shapes]) -> None:
+            document, shapes = answer
+            self._forget(left)
+            editor.start(document, shapes)
+            editor.path, editor.source = left.path, left.source
+            assert editor.history is not None
+            editor.history.mark_unsaved()
+            editor.autosave.adopt(Held(Journal(left.folder), lock))
+            editor.say(t("Recovered {name} as it was at {time}", name=left.name,
+                         time=when(left.edited)))  # fmt: skip
+
+        def fail(error: JobError) -> None:
+            lock.release()
+            sentence = t("{name} cannot be recovered: {reason}", name=left.name,
+                         reason=error.sentence)  # fmt: skip
+            broken = Left(left.folder, left.name, left.edited, left.objects, problem=sentence)
+            self.left = tuple(broken if other is left else other for other in self.left)
+            editor.complain(sentence, error.trace)
+
+        editor.chores.start(
+            t("Recovering {name}", name=left.name), read, kind=RECOVER,
+            done=accept, failed=fail, cancelled=lock.release,
+        )  # fmt: skip
+
+    def _forget(self, left: Left) -> None:
+        self.left = tuple(other for other in self.left if other.folder != left.folder)
+
+
+def _left_in(folder: Path) -> Left | None:
+    """What a crashed editor left in its folder; None where there is nothing, or one runs."""
+    if not (folder / DOCUMENT).exists():
+        if time.time() - folder.stat().st_mtime > STALE:
+            shutil.rmtree(folder, ignore_errors=True)
+        return None
+    lock = FileLock.take(folder / LOCK)
+    if lock is None:
+        return None
+    lock.release()
+    try:
+        about = read_about(folder)
+        path, source = about.get("path"), about.get("source")
+        return Left(
+            folder, str(about["name"]), datetime.fromisoformat(about["edited"]),
+            int(about["objects"]), Path(path) if path else None, Path(source) if source else None,
+        )  # fmt: skip
+    except (SessionError, KeyError, TypeError, ValueError) as error:
+        log.warning("%s cannot be recovered: %s", folder, error)
+        return Left(folder, problem=t("It is damaged and cannot be recovered"))
+
+
+def when(edited: datetime | None) -> str:
+    """The time of today, or day and time of earlier."""
+    if edited is None:
+        return ""
+    if datetime.now() - edited < timedelta(hours=18):
+        return f"{edited:%H:%M}"
+    return f"{edited:%d %b %Y, %H:%M}"

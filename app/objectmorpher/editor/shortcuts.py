@@ -1,0 +1,89 @@
+"""Which keys run which command: the usual ones, and those the user has chosen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..commands import COMMANDS, keys_of
+from ..system.texts import t
+from .editor import Editor
+
+# What has a meaning everywhere.
+FIXED = (
+    "Escape", "Enter", "Left", "Right", "Up", "Down", "PageUp", "PageDown", "X", "Space", "?",
+    "Tab", "F6", "F10",
+)  # fmt: skip
+
+
+class Shortcuts:
+    """Looks commands up by their keys, and gives them others."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.recording: str | None = None  # the command whose new keys are awaited
+        self._settled: dict[str, str] | None = None  # the user's keys that `_by_keys` is made of
+        self._by_keys: dict[str, str] = {}
+
+    @property
+    def changed(self) -> set[str]:
+        """The commands with keys of the user's own."""
+        return self._editor.settings.shortcuts.keys() & COMMANDS.keys()
+
+    def command_of(self, keys: str) -> str | None:
+        """The command that a chord ("Ctrl+S") runs."""
+        chosen = self._editor.settings.shortcuts
+        if chosen is not self._settled:
+            self._settled, self._by_keys = chosen, self._index()
+        return self._by_keys.get(keys)
+
+    def _index(self) -> dict[str, str]:
+        """Commands by keys; the shown ones go before others that do the same."""
+        found: dict[str, str] = {}
+        for name, command in COMMANDS.items():
+            found |= {keys: name for keys in command.other_keys}
+        found |= {keys_of(self._editor, name): name for name in COMMANDS}
+        found.pop("", None)
+        return found
+
+    def take(self, keys: str) -> bool:
+        """A chord was pressed; whether it was awaited as a command's new keys."""
+        name, self.recording = self.recording, None
+        if name is None:
+            return False
+        if keys == "Escape":
+            return True
+        if keys.removeprefix("Shift+").removeprefix("Alt+") in FIXED:
+            self._editor.complain(t("{keys} has a fixed meaning; choose other keys", keys=keys))
+            return True
+        self.choose(name, keys)
+        return True
+
+    def choose(self, name: str, keys: str) -> None:
+        """`keys` run command `name` from now on, and no other command."""
+        editor = self._editor
+        chosen = {n: k for n, k in editor.settings.shortcuts.items() if n in COMMANDS}
+        for other in COMMANDS:
+            if other != name and keys_of(editor, other) == keys:
+                chosen[other] = ""
+                label = t(COMMANDS[other].label)
+                editor.say(
+                    t("{keys} was for “{label}”, which has none now", keys=keys, label=label)
+                )
+        chosen[name] = keys
+        self._use(chosen)
+
+    def reset(self, name: str) -> None:
+        """The usual keys of a command; whoever has them now loses them."""
+        chosen = {n: k for n, k in self._editor.settings.shortcuts.items() if n != name}
+        self._use(chosen)
+        if COMMANDS[name].keys:
+            self.choose(name, COMMANDS[name].keys)
+
+    def reset_all(self) -> None:
+        """The usual keys of all commands."""
+        self._use({})
+
+    def _use(self, chosen: dict[str, str]) -> None:
+        """Remembers what differs from the usual."""
+        kept = {name: keys for name, keys in chosen.items() if keys != COMMANDS[name].keys}
+        self._editor.settings = replace(self._editor.settings, shortcuts=kept)

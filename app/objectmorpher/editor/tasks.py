@@ -1,0 +1,375 @@
+"""The editor's long steps: what is asked of the worker, and how its answers are taken in.
+
+An answer is dropped where the question does not stand any more, which `is` tells: the photo and
+the mask of a document never change, they are replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.model import (
+    Document,
+    EditObject,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Photo,
+    Plate,
+    Prompt,
+)
+from objectmorpher_core.segment import Found
+
+from ..canvas.layers import Rendered, Request
+from ..canvas.memo import same
+from ..canvas.shape import Shape, build_ready_shape, rehearse
+from ..system.texts import t
+from ..worker import job_functions
+from ..worker.job_error import JobError
+from ..worker.job_functions import Choice, Cut
+from .feedback import Action
+from .view import ToolName
+
+if TYPE_CHECKING:
+    from objectmorpher_core.compose.light.lighting import Lit
+
+    from .editor import Editor
+
+REHEARSE, READY = "rehearse", "ready"  # kinds of what runs in a thread
+READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
+FRONT = "front"
+
+
+Wanted = tuple[Mask | Hint | None, ...]  # what a background depends on: masks, then hints
+
+
+class Combine(Enum):
+    """What an answer is to the selection that is there."""
+
+    ANEW = "anew"  # instead of it
+    REFINED = "refined"  # the same, told better
+    ADDED = "added"
+    REMOVED = "removed"
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is meant, and of which object."""
+
+    prompt: Prompt
+    label: str  # of the step
+    k: int
+    combine: Combine = Combine.REFINED
+
+
+class Tasks:
+    """Segmenting, lifting, inpainting, writing."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self.question: Question | None = None  # asked, not answered yet
+        self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
+        self._no_plate: Wanted | None = None  # asked or failed for
+        # What stays in front, as it was asked for last: its mask, and the answer
+        self._front: tuple[Mask | None, Matte | None] | None = None
+        self._unreadable: Photo | None = None  # reading it has ended the worker
+        editor.jobs.restarted = self._read_again
+
+    def forget(self) -> None:
+        """Another document is opened."""
+        self.question = self._plate = self._no_plate = self._front = None
+
+    def read_photo(self, is_quiet: bool = False) -> None:
+        """Lets the worker look at a photo that was opened, before the first click."""
+        self._read(lambda: None, is_quiet)
+
+    def _read(self, cancelled: Callable[[], None], is_quiet: bool, is_spare: bool = False) -> None:
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+
+        def fail(error: JobError) -> None:
+            self._unreadable = document.photo
+
+        editor.jobs.start(
+            t("Reading the photo"), job_functions.read_photo, document.photo.pixels,
+            editor.settings.backends.segment,
+            done=lambda _: None, failed=fail, cancelled=cancelled, kind=READ,
+            is_quiet=is_quiet, is_spare=is_spare,
+        )  # fmt: skip
+
+    def _read_again(self) -> None:
+        """The worker was started anew; the next click is not to wait for what it has forgotten.
+
+        Nor is what needs no reading, such as saving: the reading gives way, and is done later.
+        """
+        document = self._editor.committed
+        if document is not None and document.photo is not self._unreadable:
+            self._read(self._read_again, is_quiet=True, is_spare=True)
+
+    def segment(self, question: Question) -> None:
+        """Asks for the mask of a prompt; what was said before it is in it."""
+        editor, document = self._editor, self._editor.document
+        if document is None:
+            return
+        editor.jobs.promote(READ, READ)  # this waits for it: it does not give way
+        editor.message = None
+        self.question = question
+        photo = document.photo
+
+        def accept(found: Found) -> None:
+            self.question = None
+            current = editor.document
+            if current is not None and current.photo is photo and not editor.hand.is_busy:
+                editor.selection.take(question, found)
+
+        editor.jobs.start(
+            t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
+            Choice(editor.settings.backends.segment, document.seed),
+            done=accept, failed=lambda error: self._fail_segment(error, question),
+            cancelled=self._drop_question, kind=SELECT,
+        )  # fmt: skip
+
+    def _fail_segment(self, error: JobError, question: Question) -> None:
+        self._drop_question()
+        self._editor.complain_of(error.retried_by(lambda: self.segment(question)))
+
+    def _drop_question(self) -> None:
+        self.question = None
+
+    def lift(self, shape: LiftSettings | None = None, label: str = "") -> None:
+        """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
+        editor, document = self._editor, self._editor.document
+        thing, k = editor.object, editor.current
+        if document is None or thing is None or thing.selection is None:
+            return
+        editor.message = None
+        photo, settings, mask = document.photo, editor.settings, thing.mask
+        wanted = replace(shape or thing.shape, count=settings.gaussians, horizon=document.horizon)
+
+        def changed(current: Document, answer: tuple[Matte, LiftedObject]) -> Document | None:
+            if k >= len(current.objects) or current.objects[k].mask is not mask:
+                return None
+            if shape is None:
+                return edits.set_lifted(current, k, *answer, wanted)
+            return edits.reshape(current, k, *answer, wanted)
+
+        def accept(answer: tuple[Matte, LiftedObject]) -> None:
+            self.make_ready(k, lambda current: changed(current, answer), title, show)
+
+        def show(document: Document) -> None:
+            if shape is None:
+                self._take_lift(document, k)
+            elif not editor.hand.is_busy:
+                editor.posing.select(None)
+                editor.apply(label, editor.derived.solved(document, k, None))
+
+        title = t("Lifting the object")
+        editor.jobs.start(
+            title, job_functions.lift,
+            Cut(photo.pixels, photo.camera, thing.selection),
+            Choice(settings.backends.lift, document.seed), wanted,
+            done=accept, failed=editor.complain_of, kind=LIFT,
+        )  # fmt: skip
+
+    def make_ready(
+        self,
+        k: int,
+        change: Callable[[Document], Document | None],
+        title: str,
+        show: Callable[[Document], None],
+    ) -> None:
+        """Shows a document in which object `k` is another one, when that can be drawn at once.
+
+        What drawing and dragging it take is made in a thread, under `title`. `change` is asked for
+        the document now and again then: much may have happened, and None means that it is too late.
+        """
+        editor, before = self._editor, self._editor.document
+        changed = None if before is None else change(before)
+        if before is None or changed is None:
+            return
+        camera, thing = changed.photo.camera, changed.objects[k]
+
+        def accept(shape: Shape) -> None:
+            now = editor.document
+            changed = None if now is None else change(now)
+            if now is None or changed is None:
+                return
+            if now.objects[k] is before.objects[k]:
+                editor.derived.remember(changed.objects[k], shape)
+            show(changed)
+
+        editor.chores.start(
+            title, lambda progress: build_ready_shape(camera, thing),
+            kind=f"{READY} {k}", done=accept, failed=editor.complain_of,
+        )  # fmt: skip
+
+    @property
+    def is_lifting(self) -> bool:
+        """Whether the current object is on its way."""
+        editor = self._editor
+        is_asked = editor.jobs.is_busy(LIFT)
+        return is_asked or editor.chores.is_busy(f"{READY} {editor.current}")
+
+    def _take_lift(self, changed: Document, k: int) -> None:
+        editor, lifted = self._editor, changed.objects[k].lifted
+        assert lifted is not None
+        editor.posing.select(None)
+        editor.apply(t("Lift object"), changed)
+        editor.view.tool = ToolName.POSE
+        count = f"{len(lifted.gaussians):,}"
+        editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
+
+    def rehearse(self) -> None:
+        """Sees to it that the current object can be dragged at once; each frame."""
+        editor, document = self._editor, self._editor.committed
+        if document is None or editor.current >= len(document.objects):
+            return
+        camera, thing = document.photo.camera, document.objects[editor.current]
+        if thing.lifted is None or editor.chores.is_busy(REHEARSE):
+            return
+        shape = editor.derived.shape(document.photo, thing)
+        if shape.is_rehearsed:
+            return
+        shape.is_rehearsed = True
+        editor.chores.start(
+            "Getting ready", lambda progress: rehearse(shape, camera, thing.placement),
+            kind=REHEARSE, done=lambda _: None, failed=editor.complain_of, is_quiet=True,
+        )  # fmt: skip
+
+    def ensure_fronts(self) -> bool:
+        """Sees to it that what stays in front is cut out; each frame."""
+        document = self._editor.document
+        objects = document.objects if document else ()
+        for k, item in enumerate(objects):
+            if item.stays_in_front and item.matte is None and item.mask is not None:
+                return self._ensure_front(k, item)
+        return False
+
+    def _ensure_front(self, k: int, item: EditObject) -> bool:
+        editor, document, mask = self._editor, self._editor.document, item.mask
+        assert document is not None
+        if self._front is not None and self._front[0] is mask:
+            matte = self._front[1]
+            if matte is None:  # asked, or failed
+                return False
+            self._amend(lambda now: front_edits.keep_in_front(now, k, matte))
+            return True
+
+        def accept(matte: Matte) -> None:
+            self._front = (mask, matte)
+
+        self._front = (mask, None)
+        editor.jobs.start(
+            t("Cutting it out"), job_functions.cut_front, document.photo.pixels, item.selection,
+            done=accept, failed=editor.complain_of, kind=FRONT,
+        )  # fmt: skip
+        return True
+
+    def ensure_plate(self) -> bool:
+        """Sees to it that lifted objects have a background behind them; each frame."""
+        document = self._editor.document
+        if document is None or document.plate is not None:
+            return False
+        # A fill is of these masks, and of the hints that are in force.
+        wanted = (*(o.mask for o in document.objects), *document.hints)
+        if not any(o.lifted for o in document.objects):
+            return False
+        if self._plate is not None and same(self._plate[0], wanted):
+            self._add_plate(self._plate[1])
+            return True
+        if self._no_plate is not None and same(self._no_plate, wanted):
+            return False
+        self._no_plate = wanted
+        self._ask_plate(document, wanted)
+        return True
+
+    def _ask_plate(self, document: Document, wanted: Wanted) -> None:
+        from objectmorpher_core.compose.plate.plate import plate_cover
+
+        editor = self._editor
+
+        def accept(plate: Plate) -> None:
+            self._plate = (wanted, plate)
+
+        def say_so() -> None:
+            if self._no_plate is not None and same(self._no_plate, wanted):
+                fill_in = Action(t("Fill in"), self.fill_background)
+                editor.say(t("The background behind the object is not filled in"), fill_in)
+
+        def forget() -> None:
+            """Another question took its place: where this one comes up again, it is asked again."""
+            if self._no_plate is wanted:
+                self._no_plate = None
+
+        def fail(error: JobError) -> None:
+            """Nothing else leads to a background: whatever it was, there is another try."""
+            retry = None if error.is_expected else self.fill_background
+            editor.complain_of(replace(error, retry=retry))
+
+        editor.jobs.start(
+            t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
+            plate_cover(document),
+            Choice(editor.settings.backends.inpaint, document.seed, document.hints),
+            done=accept, failed=fail, cancelled=say_so, replaced=forget, kind=PLATE,
+        )  # fmt: skip
+
+    def fill_background(self) -> None:
+        """Asks again for a background that was cancelled or failed."""
+        self._no_plate = None
+
+    def _add_plate(self, plate: Plate) -> None:
+        self._amend(lambda document: edits.set_plate(document, plate))
+
+    def _amend(self, change: Callable[[Document], Document]) -> None:
+        """A computed addition to the current step, not a step of its own."""
+        editor = self._editor
+        assert editor.history is not None
+        editor.history.amend(change(editor.history.document))
+        if editor.preview is not None:
+            editor.preview = change(editor.preview)
+
+    def render_exact(self, request: Request, accept: Callable[[Rendered], None]) -> None:
+        """Asks for an exact picture of the view, which shows a draft meanwhile."""
+        self._editor.jobs.start(
+            "Drawing", job_functions.render_exact, request,
+            done=accept, failed=lambda error: None, kind=f"draw {request.part}", is_quiet=True,
+        )  # fmt: skip
+
+    def light(self, k: int, work: Callable[[], Lit], accept: Callable[[Lit], None]) -> None:
+        """Computes the exact light and shadow of object `k` in a thread."""
+        self._editor.chores.start(
+            "Casting the shadow", lambda progress: work(), kind=f"light {k}",
+            done=accept, failed=self._editor.complain_of, is_quiet=True,
+        )  # fmt: skip
+
+    def save(self, path: Path, then: Callable[[], None] | None = None) -> None:
+        """Writes the session, and goes on with `then` when it is on the disk."""
+        editor, history = self._editor, self._editor.history
+        if history is None:
+            return
+        document = history.document
+
+        def accept(_: None) -> None:
+            if editor.history is history:
+                history.mark_saved(document)
+                editor.path = path
+                editor.settings = editor.settings.with_recent(path)
+                editor.say(t("Saved {name}", name=path.name))
+                if then is not None:
+                    then()
+
+        def fail(error: JobError) -> None:
+            editor.complain_of(error.retried_by(lambda: self.save(path, then)))  # as it is by then
+
+        editor.jobs.start(
+            t("Saving {name}", name=path.name), job_functions.write_session, document, path,
+            done=accept, failed=fail, kind=f"{WRITE} {path}",
+        )  # fmt: skip

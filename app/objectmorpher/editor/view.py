@@ -1,0 +1,201 @@
+"""What the user looks at: zoom, pan, tool and toggles. Neither saved nor undone.
+
+Canvas px: the part of the window that shows the photo, x right, y down, from its left top corner,
+in framebuffer px. Image px: the photo's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from objectmorpher_core.base.brush import Brush
+from objectmorpher_core.base.camera import Camera
+
+from .pose_view import PoseView
+
+MARGIN = 24.0  # points between the fitted photo and the canvas's edge
+MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px
+PIXELS_FROM = 8.0  # canvas px per image px, from which on single pixels are looked at
+STEEPEST = 89.0  # degrees that an orbit goes up or down
+KEEP_VISIBLE = 48.0  # px of the photo that panning leaves on the canvas
+
+
+class ToolName(Enum):
+    """The tools, in the order of the tool strip."""
+
+    SELECT = "Select"
+    MASK = "Refine mask"
+    POSE = "Pose"
+    PLACE = "Place"
+    LOOK = "Look"
+    COMPOSE = "Compose"
+
+
+class SelectMode(Enum):
+    """How the Select tool is told what is meant."""
+
+    CLICK = "Click"
+    BOX = "Box"
+    LASSO = "Lasso"
+
+
+class Painted(Enum):
+    """What the Mask tool's brush paints."""
+
+    SELECTION = "Selection"
+    DEPTH = "Depth"
+    HIDDEN = "Hidden"
+
+
+@dataclass(eq=False)
+class Selecting:
+    """What the Select and the Mask tool are set to."""
+
+    mode: SelectMode = SelectMode.CLICK
+    level: str = "object"  # of document.LEVELS: what a new click means
+    reach: float = 4.0  # px of the photo, by which an edge is moved, smoothed or softened
+    is_erasing: bool = False  # the brush takes away
+    painted: Painted = Painted.SELECTION
+
+
+class Shown(Enum):
+    """What the canvas shows of the edit, in the order of the View menu."""
+
+    COMPOSITE = "Composite"
+    OBJECT = "Object only"
+    DEPTH = "Depth"
+    NORMALS = "Normals"
+    PROVENANCE = "Provenance"
+    STRAIN = "Strain"
+
+
+class Popup(Enum):
+    """Panels over the window, one at a time."""
+
+    SHORTCUTS = "Keyboard and pointer…"
+    PREFERENCES = "Preferences…"
+    ABOUT = "About ObjectMorpher"
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """From where the object is looked at, degrees; it is the object that turns."""
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    def turned(self, yaw: float, pitch: float) -> Orbit:
+        """Farther by so much; never over the top."""
+        return Orbit(self.yaw + yaw, float(np.clip(self.pitch + pitch, -STEEPEST, STEEPEST)))
+
+
+class Composed(Enum):
+    """What a drag of the Compose tool does to the background that is shown alone."""
+
+    REPAIR = "Repair"
+    TAKE = "Take from"
+
+
+@dataclass(eq=False)
+class ComposeView:
+    """What the Compose tool shows."""
+
+    is_bare: bool = False  # the background alone, without the objects
+    drag: Composed = Composed.REPAIR
+
+
+@dataclass(eq=False)
+class View:
+    """Mutable: the tools and panels write it, the window reads it each frame."""
+
+    width: int = 1  # canvas px
+    height: int = 1
+    scale: float = 1.0  # canvas px per point
+    zoom: float = 1.0  # canvas px per image px
+    left: float = 0.0  # image px at the canvas's left edge
+    top: float = 0.0
+    is_fitted: bool = True  # follows the canvas's size until the user zooms
+    tool: ToolName = ToolName.SELECT
+    is_before: bool = False  # X is held: the photo as it was
+    split: float | None = None  # share of the canvas left of the before/after line
+    has_points: bool = False  # control points and links are shown
+    has_history: bool = False  # the list of steps is shown
+    shown: Shown = Shown.COMPOSITE
+    popup: Popup | None = None
+    is_grounded: bool = False  # moving an object slides it over the ground
+    orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
+    color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
+    brush: Brush = field(default_factory=Brush)  # of every tool that paints
+    pose: PoseView = field(default_factory=PoseView)
+    selecting: Selecting = field(default_factory=Selecting)
+    compose: ComposeView = field(default_factory=ComposeView)
+
+    @property
+    def is_at_pixels(self) -> bool:
+        """Whether single pixels of the photo are looked at."""
+        return self.zoom >= PIXELS_FROM
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """What a picture on the canvas depends on: it is the same where this is."""
+        return (self.left, self.top, self.zoom, self.width, self.height)
+
+    def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:
+        """Canvas px (..., 2) of image px (..., 2)."""
+        return (np.asarray(xy, dtype=np.float64) - (self.left, self.top)) * self.zoom
+
+    def image_from_canvas(self, xy: np.ndarray | tuple[float, float]) -> np.ndarray:
+        """Image px (..., 2) of canvas px (..., 2)."""
+        return np.asarray(xy, dtype=np.float64) / self.zoom + (self.left, self.top)
+
+    def resize(self, size: tuple[int, int], scale: float, photo: tuple[int, int] | None) -> None:
+        """The canvas is `size` px now; a fitted photo of `photo` px stays fitted."""
+        if size == (self.width, self.height) and scale == self.scale:
+            return
+        centre = self.image_from_canvas((self.width / 2, self.height / 2))
+        (self.width, self.height), self.scale = size, scale
+        if photo is not None and self.is_fitted:
+            self.fit(photo)
+        else:
+            self._centre_on(centre)
+
+    def fit(self, photo: tuple[int, int]) -> None:
+        """The whole photo, with a margin; a small photo is enlarged at most four times."""
+        margin = 2 * MARGIN * self.scale
+        across = max(self.width - margin, 1) / photo[0]
+        down = max(self.height - margin, 1) / photo[1]
+        self.zoom = float(np.clip(min(across, down, 4 * self.scale), MIN_ZOOM, MAX_ZOOM))
+        self._centre_on(np.array(photo) / 2)
+        self.is_fitted = True
+
+    def set_zoom(self, zoom: float, around: tuple[float, float], photo: tuple[int, int]) -> None:
+        """Magnifies so that the image point under canvas px `around` stays there."""
+        fixed = self.image_from_canvas(around)
+        self.zoom = float(np.clip(zoom, MIN_ZOOM, MAX_ZOOM))
+        self.left, self.top = fixed - np.array(around) / self.zoom
+        self.is_fitted = False
+        self._keep_visible(photo)
+
+    def pan(self, dx: float, dy: float, photo: tuple[int, int]) -> None:
+        """Moves the picture by (dx, dy) canvas px."""
+        self.left -= dx / self.zoom
+        self.top -= dy / self.zoom
+        self.is_fitted = False
+        self._keep_visible(photo)
+
+    def camera(self, photo_camera: Camera, box: tuple[int, int, int, int] | None = None) -> Camera:
+        """The photo's camera seen through the canvas, or through `box` x0, y0, x1, y1 of it."""
+        x0, y0, x1, y1 = box or (0, 0, self.width, self.height)
+        left, top = self.left + x0 / self.zoom, self.top + y0 / self.zoom
+        return photo_camera.windowed(left, top, x1 - x0, y1 - y0, self.zoom)
+
+    def _centre_on(self, image_xy: np.ndarray) -> None:
+        self.left, self.top = image_xy - np.array([self.width, self.height]) / 2 / self.zoom
+
+    def _keep_visible(self, photo: tuple[int, int]) -> None:
+        rest = KEEP_VISIBLE * self.scale / self.zoom
+        self.left = float(np.clip(self.left, rest - self.width / self.zoom, photo[0] - rest))
+        self.top = float(np.clip(self.top, rest - self.height / self.zoom, photo[1] - rest))

@@ -1,0 +1,1 @@
+"""Dialogs, popups and the start screen."""

@@ -1,0 +1,212 @@
+"""What to export, how, and where to; the button says what will be written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from imgui_bundle import imgui
+
+from ...editor.editor import Editor
+from ...editor.export_plan import LENGTHS, LOSSLESS, Format, Motion, What
+from ...editor.filing import Dialog
+from ...editor.intents.exporting import Exporting
+from ...system.texts import t
+from ..widgets.modal import modal
+from ..widgets.segmented import Choice, segmented
+from ..widgets.theme import FIELD, PRIMARY, theme
+from ..widgets.widgets import (
+    FILL,
+    Kind,
+    bold_text,
+    button,
+    fitted,
+    note,
+    shortened,
+    shown_path,
+    tooltip,
+)
+from ..window.landmarks import mark
+
+WIDTH = 480.0  # points
+LABELS = 88.0  # width of the names left of the fields
+BROWSE = 96.0
+DEPTHS = (8, 16)  # bits a channel
+ABOUT = {
+    What.PHOTO: "The whole photo with the edit in it.",
+    What.CUTOUT: "The current object alone, where it is now, on nothing.",
+    What.MASK: "The current object's selection in the opened photo, white on black.",
+    What.DEPTH: "How near the objects are: the nearest point white, twice as far half as bright.",
+    What.BACKGROUND: "The photo with its objects painted out.",
+    What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
+    What.VIDEO: "A film that can be played again and again, at most 1280 px wide.",
+}
+
+
+def draw_export(editor: Editor) -> None:
+    """While the editor has an export to decide on."""
+    exporting, title = editor.exporting, t("Export")
+    if exporting.draft is None and not imgui.is_popup_open(title):
+        return
+    with modal(title, WIDTH) as is_shown:
+        if not is_shown:
+            return
+        if exporting.draft is not None:
+            is_unfolded = imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id)
+            _draw_what(exporting)
+            _draw_how(exporting)
+            is_entered = _draw_where(editor)
+            _draw_foot(exporting, is_entered, is_unfolded)
+        # Its document may also have been closed, by a file that was dropped on the window.
+        if exporting.draft is None or editor.filing.wanted is not None:
+            imgui.close_current_popup()
+
+
+def _draw_what(exporting: Exporting) -> None:
+    assert exporting.draft is not None
+    _name(t("What"))
+    if (chosen := _choice("what", What, exporting.draft.what, exporting)) is not None:
+        exporting.choose_what(chosen)
+    imgui.set_cursor_pos_x(_field())
+    note(t(ABOUT[exporting.draft.what]))
+    imgui.dummy(theme.size(0, 0))
+
+
+def _draw_how(exporting: Exporting) -> None:
+    assert exporting.draft is not None
+    _name(t("Format"))
+    choices = tuple(Choice(format, format.value) for format in exporting.formats)
+    format = segmented("format", choices, exporting.draft.format)
+    if format is not exporting.draft.format:
+        exporting.choose_format(format)
+    if exporting.has_bits:
+        _name(t("Depth"))
+        depths = tuple(Choice(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
+        bits = segmented("bits", depths, exporting.bits)
+        if bits != exporting.bits:
+            exporting.choose_bits(0 if bits == exporting.own_bits else bits)
+    elif exporting.draft.what is What.VIDEO:
+        _draw_motion(exporting)
+    elif exporting.has_quality:
+        _name(t("Quality"))
+        imgui.set_next_item_width(FILL)
+        is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
+        shown = t("lossless") if is_lossless else "%d"
+        is_changed, quality = imgui.slider_int("##quality", exporting.quality, 50, 100, shown)
+        if is_changed:
+            exporting.choose_quality(quality)
+        tooltip(t("Higher is larger and truer. Below lossless, every pixel changes a little."))
+    imgui.dummy(theme.size(0, 0))
+
+
+def _draw_motion(exporting: Exporting) -> None:
+    """What a video shows, and for how long."""
+    draft = exporting.draft
+    assert draft is not None
+    _name(t("Motion"))
+    choices = tuple(
+        Choice(motion, t(motion.value), why_not=exporting.why_no_motion(motion))
+        for motion in Motion
+    )
+    motion = segmented("motion", choices, draft.motion)
+    if motion is not draft.motion:
+        exporting.choose_motion(motion)
+    _name(t("Length"))
+    imgui.set_next_item_width(FILL)
+    shortest, longest = LENGTHS
+    is_changed, seconds = imgui.slider_float(
+        "##seconds", draft.seconds, shortest, longest, "%.1f s"
+    )
+    if is_changed:
+        exporting.choose_seconds(round(2 * seconds) / 2)
+
+
+def _draw_where(editor: Editor) -> bool:
+    """Name and folder; True when Enter was pressed in the name."""
+    exporting = editor.exporting
+    assert exporting.draft is not None
+    _name(t("Folder") if exporting.is_folder else t("Name"))
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    imgui.set_next_item_width(FILL)
+    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+    name = exporting.draft.name
+    is_entered, typed = imgui.input_text_with_hint("##name", t("name or path"), name, flags)
+    mark(t("Name"))
+    if typed != name:
+        exporting.set_name(typed)
+    _name(t("In"))
+    imgui.align_text_to_frame_padding()
+    room = imgui.get_content_region_avail().x - theme.pt(BROWSE + 8)
+    folder = shown_path(exporting.path.parent)
+    imgui.text_colored(theme.vec("secondary"), shortened(folder, room))
+    tooltip(folder)
+    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BROWSE))
+    if button(t("Browse…"), width=BROWSE):
+        editor.filing.wanted = Dialog.EXPORT
+    return is_entered
+
+
+def _draw_foot(exporting: Exporting, is_entered: bool, is_unfolded: bool) -> None:
+    """What is wrong, or what will be replaced; Cancel and the button that does it.
+
+    `is_unfolded`: a list was when the frame began, and Esc is for it.
+    """
+    problem = exporting.problem
+    imgui.dummy(theme.size(0, 4))
+    warning = t("{name} is there already.", name=exporting.path.name)
+    text = problem or (warning if exporting.is_replacing else "")
+    imgui.push_style_color(imgui.Col_.text, theme.vec("warning"))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(text or " ")
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+    top = imgui.get_cursor_pos_y()
+    imgui.set_cursor_pos_y(top + theme.pt((PRIMARY - FIELD) / 2))
+    is_cancelled = button(t("Cancel"), width=BROWSE)
+    imgui.same_line()
+    imgui.set_cursor_pos_y(top)
+    room = imgui.get_content_region_avail().x - 2 * imgui.get_style().frame_padding.x
+    with bold_text():
+        label = f"{fitted(exporting.label, room)}###go"
+    is_pressed = button(label, Kind.PRIMARY, problem)
+    # The key that opened it is still down in its first frame.
+    # Where the ring is around a control, it is pressed.
+    is_free = not imgui.is_window_appearing() and not imgui.get_io().nav_visible
+    is_enter = is_free and any(
+        imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
+    )
+    is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
+    if is_cancelled or (is_escape and not is_unfolded):
+        exporting.close()
+    elif is_pressed or is_entered or (is_enter and not imgui.is_any_item_active()):
+        exporting.confirm()
+
+
+def _name(text: str) -> None:
+    """Left of a field."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), text)
+    imgui.same_line(_field())
+
+
+def _field() -> float:
+    """Where the fields begin, window units."""
+    return theme.pt(20 + LABELS)
+
+
+def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporting) -> What | None:
+    """A list that unfolds; what cannot be chosen says why. What was chosen, or None."""
+    found = None
+    imgui.set_next_item_width(FILL)
+    if imgui.begin_combo(f"##{name}", t(chosen.value)):
+        for choice in choices:
+            reason = exporting.why_not(choice)
+            flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
+            if imgui.selectable(t(choice.value), choice is chosen, flags)[0]:
+                found = choice
+            if reason:
+                tooltip(reason)
+        if imgui.is_key_pressed(imgui.Key.escape):
+            imgui.close_current_popup()
+        imgui.end_combo()
+    return found

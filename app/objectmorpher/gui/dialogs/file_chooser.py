@@ -1,0 +1,167 @@
+"""A file dialog of our own, for desktops that have none: a path to type and a list of files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+
+from ...editor.editor import Editor
+from ...editor.filing import Dialog
+from ...system.texts import t
+from ..widgets.modal import modal
+from ..widgets.theme import Icon, theme
+from ..widgets.widgets import FILL, Kind, button, icon_button, note, shortened, shown_path
+
+WIDTH, HEIGHT = 640.0, 480.0  # points
+ROW = 28.0
+VERBS = {
+    Dialog.OPEN: "Open", Dialog.SAVE: "Save", Dialog.EXPORT: "Choose",
+    Dialog.MASK_OPEN: "Import", Dialog.SHAPE_OPEN: "Use", Dialog.MASK_SAVE: "Export",
+    Dialog.MODEL_OPEN: "Use", Dialog.MODEL_FOLDER: "Use",
+}  # fmt: skip
+
+
+class FileChooser:
+    """One dialog at a time."""
+
+    def __init__(self) -> None:
+        self.is_open = False
+        self._dialog = Dialog.OPEN
+        self._folder = Path.home()
+        self._endings: tuple[str, ...] = ()
+        self._name = ""
+        self._is_first = False
+        self._entries: list[Path] = []
+        self._replacing: Path | None = None  # asked whether it may be overwritten
+
+    def open(self, dialog: Dialog, suggestion: Path, endings: tuple[str, ...]) -> None:
+        """`suggestion`: a folder, or a file's path."""
+        self._dialog, self._endings = dialog, endings
+        is_folder = suggestion.is_dir()
+        self._enter(suggestion if is_folder else suggestion.parent)
+        self._name = "" if is_folder else suggestion.name
+        self.is_open = self._is_first = True
+        self._replacing = None
+
+    def draw(self, editor: Editor) -> None:
+        if not self.is_open:
+            return
+        endings = ", ".join(sorted({e[1:].upper().replace("JPEG", "JPG") for e in self._endings}))
+        about = t("{endings}. Type a name or a whole path, or choose below.", endings=endings)
+        with modal(t(self._dialog.value), WIDTH, about, HEIGHT) as is_shown:
+            if is_shown:
+                self._draw(editor)
+
+    def _draw(self, editor: Editor) -> None:
+        is_entered = self._draw_path()
+        chosen = self._draw_list()
+        is_confirmed, is_cancelled = self._draw_foot()
+        self._is_first = False
+        if is_cancelled or imgui.is_key_pressed(imgui.Key.escape):
+            self._close()
+            editor.filing.cancel_dialog()
+        elif chosen is not None or is_entered or is_confirmed:
+            self._choose(editor, chosen or self._typed())
+
+    def _draw_path(self) -> bool:
+        """The field; True when Enter was pressed in it."""
+        if self._is_first:
+            imgui.set_keyboard_focus_here()
+        imgui.set_next_item_width(FILL)
+        is_entered, self._name = imgui.input_text_with_hint(
+            "##path", t("name or path"), self._name, imgui.InputTextFlags_.enter_returns_true
+        )
+        return is_entered and bool(self._name)
+
+    def _draw_list(self) -> Path | None:
+        """Folders and files; a file that was double-clicked."""
+        if icon_button(Icon.UP, "up", t("One folder up")):
+            self._enter(self._folder.parent)
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        room = imgui.get_content_region_avail().x
+        imgui.text_colored(theme.vec("secondary"), shortened(shown_path(self._folder), room))
+        imgui.push_style_color(imgui.Col_.child_bg, theme.vec("surround"))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(6, 6))
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(8, 2))
+        foot = theme.pt(56)
+        flags = imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.nav_flattened
+        imgui.begin_child("##files", ImVec2(0, -foot), flags)
+        chosen = None
+        for entry in self._entries:
+            chosen = self._draw_entry(entry) or chosen
+        if not self._entries:
+            note(t("No such files here."))
+        imgui.end_child()
+        imgui.pop_style_var(2)
+        imgui.pop_style_color()
+        return chosen
+
+    def _draw_entry(self, entry: Path) -> Path | None:
+        is_folder = entry.is_dir()
+        icon = Icon.FOLDER if is_folder else Icon.IMAGE
+        flags = imgui.SelectableFlags_.allow_double_click
+        height = ImVec2(0, theme.pt(ROW))
+        is_current = entry.name == self._name
+        imgui.push_style_var(imgui.StyleVar_.selectable_text_align, ImVec2(0, 0.5))
+        label = f"{icon}   {entry.name}"
+        is_clicked = imgui.selectable(label, is_current, flags, height)[0]
+        imgui.pop_style_var()
+        if not is_clicked:
+            return None
+        if is_folder:
+            self._enter(entry)
+        else:
+            self._name, self._replacing = entry.name, None
+            if imgui.is_mouse_double_clicked(0):
+                return entry
+        return None
+
+    def _draw_foot(self) -> tuple[bool, bool]:
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
+        if self._replacing is not None:
+            imgui.align_text_to_frame_padding()
+            text = t("{name} exists. Press again to replace it.", name=self._replacing.name)
+            imgui.text_colored(theme.vec("warning"), text)
+            imgui.same_line()
+        verb = t("Replace") if self._replacing is not None else t(VERBS[self._dialog])
+        right = imgui.get_window_width() - theme.pt(20 + 120 + 8 + 96)
+        imgui.same_line(right)
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(54))
+        is_cancelled = button(t("Cancel"), width=96)
+        imgui.same_line()
+        imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
+        why_not = None if self._name else t("Type a name or choose a file")
+        return button(verb, Kind.PRIMARY, why_not, width=120), is_cancelled
+
+    def _typed(self) -> Path:
+        return self._folder / Path(self._name.strip()).expanduser()
+
+    def _choose(self, editor: Editor, path: Path) -> None:
+        """Enters a folder, asks before replacing, else gives the file to the editor."""
+        if path.is_dir():
+            self._enter(path)
+            self._name = "" if self._dialog.is_opening else self._name
+            return
+        is_asking = self._dialog in (Dialog.SAVE, Dialog.MASK_SAVE)  # an export asks by itself
+        if is_asking and path.exists() and path != self._replacing:
+            self._replacing = path
+            return
+        self._close()
+        editor.filing.choose(self._dialog, path)
+
+    def _close(self) -> None:
+        self.is_open = False
+        imgui.close_current_popup()
+
+    def _enter(self, folder: Path) -> None:
+        """Lists a folder: folders first, then the files that can be chosen."""
+        try:
+            entries = [e for e in folder.iterdir() if not e.name.startswith(".")]
+            folders = sorted((e for e in entries if e.is_dir()), key=lambda e: e.name.lower())
+            files = [e for e in entries if e.suffix.lower() in self._endings and e.is_file()]
+        except OSError:
+            return
+        self._folder = folder.resolve()
+        self._entries = folders + sorted(files, key=lambda e: e.name.lower())

@@ -1,0 +1,139 @@
+"""Lines and marks on the canvas, every one with its dark outer line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from ...editor.editor import Editor
+from ..widgets.theme import theme
+from ..window.layout import Rect
+
+DARK = "#0B0C0E"
+WHITE = "#FFFFFF"
+ACCENT = "#5AA9FF"  # of marks on the photo, in either theme
+WARM = "#F2695C"
+
+
+class Canvas:
+    """Draws on the canvas of one frame. Places are image px or window positions (ImVec2)."""
+
+    def __init__(self, editor: Editor, rect: Rect, pixel_ratio: float) -> None:
+        """`pixel_ratio`: canvas px per window unit."""
+        self.editor, self.rect, self.ratio = editor, rect, pixel_ratio
+        self.draw = imgui.get_background_draw_list()
+
+    # Places
+
+    def at(self, image_xy: np.ndarray) -> list[Any]:
+        """Window positions of image px (N, 2)."""
+        return self.on_canvas(self.editor.view.canvas_from_image(image_xy))
+
+    def on_photo(self, image_xy: np.ndarray) -> list[Any]:
+        """Window positions of those image px (N, 2) that are on the photo."""
+        size = self.editor.photo_size
+        assert size is not None
+        return self.at(image_xy[((image_xy >= 0) & (image_xy <= size)).all(1)])
+
+    def on_canvas(self, canvas_xy: np.ndarray) -> list[Any]:
+        """Window positions of canvas px (N, 2)."""
+        xy = np.atleast_2d(canvas_xy) / self.ratio + (self.rect.x, self.rect.y)
+        return [ImVec2(x, y) for x, y in xy.tolist()]
+
+    # Marks; measures in points
+
+    def line(
+        self, start: ImVec2, end: ImVec2, color: str, width: float = 1.5, alpha: float = 0.9
+    ) -> None:
+        self.draw.add_line(start, end, theme.u32(DARK, 0.6 * alpha), theme.pt(width + 2))
+        self.draw.add_line(start, end, theme.u32(color, alpha), theme.pt(width))
+
+    def polyline(
+        self,
+        points: list[Any],
+        color: str,
+        width: float = 2.0,
+        is_closed: bool = True,
+        alpha: float = 1.0,
+    ) -> None:
+        flags = int(imgui.ImDrawFlags_.closed) if is_closed else 0
+        self.draw.add_polyline(points, theme.u32(DARK, 0.7 * alpha), theme.pt(width + 2), flags)
+        self.draw.add_polyline(points, theme.u32(color, alpha), theme.pt(width), flags)
+
+    def dashes(
+        self, points: list[Any], color: str = ACCENT, is_closed: bool = True, on: float = 6.0
+    ) -> None:
+        """A dashed line, `on` points on and two thirds of it off."""
+        places = [np.array([p.x, p.y]) for p in points]
+        following = places[1:] + (places[:1] if is_closed else [])
+        step, left = theme.pt(on) * 5 / 3, 0.0  # `left`: of the pattern, at the piece's start
+        for start, end in zip(places, following, strict=False):
+            length = float(np.linalg.norm(end - start))
+            along = (end - start) / max(length, 1e-6)
+            for dash in np.arange(-left, length, step):
+                near, far = max(dash, 0.0), min(dash + theme.pt(on), length)
+                if far > near:
+                    a, b = ImVec2(*(start + along * near)), ImVec2(*(start + along * far))
+                    self.draw.add_line(a, b, theme.u32(DARK, 0.6), theme.pt(3))
+                    self.draw.add_line(a, b, theme.u32(color), theme.pt(1.5))
+            left = (left + length) % step
+
+    def disc(self, at: ImVec2, radius: float, fill: str) -> None:
+        """A filled disc with a white and a dark ring."""
+        self.draw.add_circle_filled(at, theme.pt(radius + 3), theme.u32(DARK, 0.8))
+        self.draw.add_circle_filled(at, theme.pt(radius + 2), theme.u32(WHITE))
+        self.draw.add_circle_filled(at, theme.pt(radius), theme.u32(fill))
+
+    def dot(self, at: ImVec2, radius: float, alpha: float = 0.9) -> None:
+        """A small white dot; `radius` is not rounded to whole pixels."""
+        r = theme.scale * radius
+        self.draw.add_circle_filled(at, 1.5 * r, theme.u32(DARK, 0.55 * alpha), 8)
+        self.draw.add_circle_filled(at, r, theme.u32(WHITE, alpha), 8)
+
+    def ring(self, at: ImVec2, radius: float, color: str) -> None:
+        self.draw.add_circle(at, theme.pt(radius), theme.u32(DARK, 0.6), 0, theme.pt(4))
+        self.draw.add_circle(at, theme.pt(radius), theme.u32(color), 0, theme.pt(2))
+
+    def diamond(self, at: ImVec2, radius: float, fill: str, alpha: float = 1.0) -> None:
+        outer = theme.pt(radius + 2)
+        self.draw.add_ngon_filled(at, outer, theme.u32(DARK, 0.8 * alpha), 4)
+        self.draw.add_ngon_filled(at, theme.pt(radius), theme.u32(fill, alpha), 4)
+
+    def hollow_diamond(self, at: ImVec2, radius: float) -> None:
+        self.draw.add_ngon(at, theme.pt(radius), theme.u32(DARK, 0.5), 4, theme.pt(3))
+        self.draw.add_ngon(at, theme.pt(radius), theme.u32(WHITE, 0.6), 4, theme.pt(1.4))
+
+    def square(self, at: ImVec2, half: float, fill: str) -> None:
+        for grow, color in ((1.5, theme.u32(DARK, 0.8)), (0.0, theme.u32(fill))):
+            reach = theme.pt(half + grow)
+            low, high = ImVec2(at.x - reach, at.y - reach), ImVec2(at.x + reach, at.y + reach)
+            self.draw.add_rect_filled(low, high, color, theme.pt(2))
+
+    def brush(self, is_erasing: bool = False) -> None:
+        """The brush's outline around the pointer: where it covers half. An eraser has a minus."""
+        pointer, view = self.editor.pointer, self.editor.view
+        if pointer is None:
+            return
+        at, reach = self.on_canvas(pointer.xy)[0], view.zoom / self.ratio
+        half = view.brush.radius * (1 + view.brush.hardness) / 2
+        for radius, alpha in ((half, 1.0), (view.brush.radius, 0.45)):
+            self.circle(at, max(radius * reach, 1.5), WARM if is_erasing else WHITE, alpha)
+        if is_erasing:
+            arm = theme.pt(4)
+            self.line(ImVec2(at.x - arm, at.y), ImVec2(at.x + arm, at.y), WARM, alpha=1.0)
+
+    def circle(self, at: ImVec2, radius: float, color: str, alpha: float = 1.0) -> None:
+        """A thin one; `radius` in window units."""
+        self.draw.add_circle(at, radius, theme.u32(DARK, 0.7 * alpha), 0, theme.pt(3))
+        self.draw.add_circle(at, radius, theme.u32(color, alpha), 0, theme.pt(1.2))
+
+    def label(self, text: str, x: float, y: float, side: float = 0.0) -> None:
+        """White on dark, at a window position; `side`: 0 begins at x, 0.5 centred, 1 ends there."""
+        size = imgui.calc_text_size(text)
+        pad_x, pad_y = theme.pt(8), theme.pt(4)
+        left = x - side * (size.x + 2 * pad_x)
+        low, high = ImVec2(left, y), ImVec2(left + size.x + 2 * pad_x, y + size.y + 2 * pad_y)
+        self.draw.add_rect_filled(low, high, theme.u32(DARK, 0.75), theme.pt(4))
+        self.draw.add_text(ImVec2(left + pad_x, y + pad_y), theme.u32(WHITE), text)

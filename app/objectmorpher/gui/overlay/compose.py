@@ -1,0 +1,55 @@
+"""For the Compose tool: the brush, and that the background is shown alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import ImVec2
+
+from objectmorpher_core.document.hint import Hint
+
+from ...editor.view import Composed
+from ...system.texts import t
+from ..widgets.theme import theme
+from .canvas import ACCENT, WHITE, Canvas
+
+BARB = 10.0  # points, of an arrow
+
+
+def draw_compose(canvas: Canvas) -> None:
+    """What the Compose tool shows over the photo."""
+    editor = canvas.editor
+    if not editor.view.compose.is_bare:
+        return
+    text = editor.composing.trouble or t("Background alone")
+    if editor.composing.is_repairing:
+        text = t("Repairing…")
+    x = canvas.rect.x + canvas.rect.width / 2
+    canvas.label(text, x, canvas.rect.y + theme.pt(12), side=0.5)
+    if editor.pointer is not None and editor.is_on_photo(editor.pointer.xy):
+        canvas.brush()
+    if editor.view.compose.drag is Composed.TAKE:
+        for hint in editor.hinting.shown:
+            _draw_hint(canvas, hint, 0.75)
+        if editor.hinting.dragged is not None:
+            _draw_hint(canvas, editor.hinting.dragged, 1.0)
+
+
+def _draw_hint(canvas: Canvas, hint: Hint, alpha: float) -> None:
+    """A full circle around what is taken, a dashed one where it is wanted, an arrow between."""
+    source, to = canvas.at(np.array([hint.source, hint.to]))
+    radius = hint.radius * canvas.editor.view.zoom / canvas.ratio
+    along = np.array([to.x - source.x, to.y - source.y])
+    length = float(np.hypot(*along))
+    canvas.circle(source, radius, WHITE, alpha)
+    if length < 1:
+        return
+    turns = np.linspace(0, 2 * np.pi, 25)
+    spots = [ImVec2(to.x + radius * np.cos(a), to.y + radius * np.sin(a)) for a in turns]
+    for k in range(0, len(spots) - 1, 2):
+        canvas.line(spots[k], spots[k + 1], ACCENT, alpha=alpha)
+    along /= length
+    side = np.array([-along[1], along[0]])
+    canvas.line(source, to, ACCENT, alpha=alpha)
+    for turn in (-1, 1):
+        barb = theme.pt(BARB) * (0.5 * turn * side - along)
+        canvas.line(ImVec2(to.x + barb[0], to.y + barb[1]), to, ACCENT, alpha=alpha)

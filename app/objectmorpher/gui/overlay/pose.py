@@ -1,0 +1,166 @@
+"""Handles, pins, anchors, and the control points that they move."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from objectmorpher_core.document.model import EditObject
+
+from ...editor.pose_view import PoseMode
+from ..widgets.fade import fades
+from ..widgets.theme import theme
+from ..window.landmarks import mark_on_canvas
+from .canvas import ACCENT, DARK, WHITE, Canvas
+from .other import draw_other
+from .rig import draw_brush, draw_regions
+from .ring import draw_ring
+from .select import draw_rubber
+
+MAX_LINKED = 3  # links drawn from each control point
+APART = 11.0  # points between two marks of anchors
+MOVES = 0.02  # of the handle's way: what follows less is not marked
+COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the influence
+
+
+def draw_pose(canvas: Canvas) -> None:
+    """For the Pose tool."""
+    editor = canvas.editor
+    document, thing = editor.document, editor.object
+    if document is None or thing is None or thing.lifted is None:
+        return
+    pose, is_dragging = editor.view.pose, editor.view.pose.mode is PoseMode.DRAG
+    if pose.is_mirrored:
+        _draw_mirror(canvas)
+    if pose.has_influence and editor.posing.handle is not None:
+        _draw_influence(canvas, editor.posing.handle)
+    if pose.has_regions or not is_dragging:
+        draw_regions(canvas)
+    is_hinting = not thing.handles and editor.hover.surface is None and is_dragging
+    hinting, share = fades.shown("hint points", thing.lifted if is_hinting else None)
+    if hinting is thing.lifted:
+        _draw_hint_points(canvas, share)
+    if thing.handles:
+        _draw_handles(canvas, thing)
+    if not is_dragging:
+        draw_brush(canvas)
+    draw_other(canvas)
+    if editor.hover.surface is not None and not editor.hand.is_busy:
+        _draw_surface_point(canvas)
+    if editor.rubber is not None:
+        draw_rubber(canvas)
+
+
+def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
+    """Anchors, how far the points went, the handles, the ring."""
+    editor = canvas.editor
+    document = editor.document
+    assert document is not None
+    pose = editor.view.pose
+    if pose.has_anchors:
+        for at in _apart(canvas.on_photo(editor.derived.anchors(document, editor.current))):
+            canvas.hollow_diamond(at, 4)
+    rests = np.array([h.point for h in thing.handles])
+    starts = canvas.at(editor.derived.project(document, editor.current, rests))
+    ends = canvas.at(editor.posing.positions())
+    for start, end in zip(starts, ends, strict=True):
+        _draw_pull(canvas, start, end)
+    current = editor.posing.handle
+    if current is not None and pose.has_ring and pose.mode is PoseMode.DRAG:
+        draw_ring(canvas, ends[current])
+    for h, end in enumerate(ends):
+        is_hovered = h == editor.hover.handle
+        is_selected = h in editor.posing.selected
+        _draw_handle(canvas, end, thing.handles[h].is_pin, is_selected, is_hovered)
+        mark_on_canvas(f"Handle {h + 1}", end, end)
+
+
+def _apart(places: list[ImVec2]) -> list[ImVec2]:
+    """As many of them as do not touch: on a small object they would be one white patch."""
+    least, kept = theme.pt(APART) ** 2, list[tuple[float, float]]()
+    for x, y in ((at.x, at.y) for at in places):
+        if all((x - a) * (x - a) + (y - b) * (y - b) >= least for a, b in kept):
+            kept.append((x, y))
+    return [ImVec2(x, y) for x, y in kept]
+
+
+def _draw_mirror(canvas: Canvas) -> None:
+    """Where the mirror plane meets the object."""
+    way = canvas.editor.posing.mirroring.outline()
+    if len(way) > 1:
+        canvas.dashes(canvas.at(way), WHITE, is_closed=False)
+
+
+def _draw_influence(canvas: Canvas, handle: int) -> None:
+    """How much each control point goes along: larger and warmer dots."""
+    editor = canvas.editor
+    assert editor.document is not None
+    shares = editor.derived.facts.influence(editor.document, editor.current, handle)
+    shown = editor.derived.facts.seen(editor.document, editor.current) & (shares >= MOVES)
+    picture = editor.derived.control_points(editor.document, editor.current)
+    shown &= ((picture >= 0) & (picture <= editor.document.photo.size)).all(1)
+    places = canvas.at(picture[shown])
+    for at, share in zip(places, np.clip(shares[shown], 0, 1).tolist(), strict=True):
+        r, g, b = ((1 - share) * COLD + share * HOT).tolist()
+        color = imgui.color_convert_float4_to_u32(ImVec4(r, g, b, 0.85))
+        radius = theme.scale * (1.2 + 3.0 * share)
+        canvas.draw.add_circle_filled(at, radius + theme.scale, theme.u32(DARK, 0.4), 12)
+        canvas.draw.add_circle_filled(at, radius, color, 12)
+
+
+def draw_control_points(canvas: Canvas) -> None:
+    """The control points and their strongest links."""
+    editor = canvas.editor
+    assert editor.document is not None
+    links = editor.derived.links(editor.document, editor.current, MAX_LINKED)
+    is_there = ((links >= 0) & (links <= editor.document.photo.size)).all((1, 2))
+    ends = canvas.at(links[is_there].reshape(-1, 2))
+    dark, white = theme.u32(DARK, 0.25), theme.u32(WHITE, 0.4)
+    for start, end in zip(ends[::2], ends[1::2], strict=True):
+        canvas.draw.add_line(start, end, dark, 2.5)
+        canvas.draw.add_line(start, end, white, 1.0)
+    for at in canvas.on_photo(editor.derived.control_points(editor.document, editor.current)):
+        canvas.dot(at, 1.8, alpha=0.8)
+
+
+def _draw_hint_points(canvas: Canvas, share: float) -> None:
+    """The control points, quietly, while there is no handle: here is something to drag."""
+    editor = canvas.editor
+    assert editor.document is not None
+    for at in canvas.on_photo(editor.derived.control_points(editor.document, editor.current)):
+        canvas.dot(at, 1.7, alpha=0.9 * share)
+
+
+def _draw_surface_point(canvas: Canvas) -> None:
+    """Where a click would take the surface."""
+    editor = canvas.editor
+    surface = editor.hover.surface
+    assert surface is not None
+    assert editor.document is not None
+    at = canvas.at(editor.document.photo.camera.project(surface.world))[0]
+    if editor.hover.is_pin:
+        canvas.diamond(at, 7, WHITE, 0.75)
+        return
+    canvas.ring(at, 7, ACCENT)
+    canvas.draw.add_circle_filled(at, theme.pt(1.6), theme.u32(WHITE))
+
+
+def _draw_pull(canvas: Canvas, start: ImVec2, end: ImVec2) -> None:
+    """From where the point was in the photo to where it must be."""
+    if np.hypot(end.x - start.x, end.y - start.y) < theme.pt(3):
+        return
+    canvas.line(start, end, WHITE)
+    canvas.draw.add_circle_filled(start, theme.pt(3), theme.u32(DARK, 0.7))
+    canvas.draw.add_circle_filled(start, theme.pt(2), theme.u32(WHITE))
+
+
+def _draw_handle(
+    canvas: Canvas, at: ImVec2, is_pin: bool, is_selected: bool, is_hovered: bool
+) -> None:
+    if is_selected:
+        canvas.ring(at, 12, ACCENT)
+    grow = 1.0 if is_hovered else 0.0
+    if is_pin:
+        canvas.diamond(at, 8 + grow, WHITE)
+    else:
+        canvas.disc(at, 5.5 + grow, ACCENT)

@@ -1,0 +1,102 @@
+"""The regions that were painted, and the brush that paints them: each kind has its own hatch."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import ImVec2
+
+from objectmorpher_core.base.arrays import F64, I32
+
+from ...editor.intents.rigging import Region
+from ...editor.pose_view import BRUSHES, PoseMode
+from ..widgets.theme import theme
+from .canvas import ACCENT, DARK, WARM, WHITE, Canvas
+from .hatching import hatch
+
+YELLOW = "#F2B84B"
+STEP = 7.0  # points between hatch lines
+SPREAD = 0.9  # x the spacing of control points: the disc of each
+LEAST = 5.0  # points, of that disc
+HATCHES: dict[PoseMode, tuple[tuple[float, ...], str]] = {  # angles of the lines, colour
+    PoseMode.FREEZE: ((45.0, -45.0), WHITE),
+    PoseMode.STIFFEN: ((0.0,), YELLOW),
+    PoseMode.BODY: ((-60.0,), ACCENT),
+}
+
+
+def draw_regions(canvas: Canvas) -> None:
+    """On the side that is seen."""
+    editor = canvas.editor
+    document = editor.document
+    assert document is not None
+    for region in editor.rigging.regions():
+        if region.kind in HATCHES:
+            _draw_hatched(canvas, region.kind, region.nodes)
+        else:
+            _draw_seam(canvas, region)
+
+
+def draw_brush(canvas: Canvas) -> None:
+    """What the stroke in progress marks, and the brush itself."""
+    editor = canvas.editor
+    mode, rigging = editor.view.pose.mode, editor.rigging
+    if mode in HATCHES and len(rigging.painted):
+        _draw_hatched(canvas, mode, rigging.painted)
+    if mode in (PoseMode.CUT, PoseMode.GLUE) and len(rigging.drawn) > 1:
+        color = WARM if mode is PoseMode.CUT else ACCENT
+        places = canvas.at(rigging.drawn)
+        if mode is PoseMode.GLUE:
+            canvas.line(places[0], places[-1], color)
+        else:
+            canvas.polyline(places, color, is_closed=False)
+    if mode in BRUSHES or mode is PoseMode.GLUE:
+        canvas.brush()
+
+
+def _visible(canvas: Canvas, nodes: I32) -> F64:
+    """Where these control points are seen, (n, 2) window units; those behind are left out."""
+    editor = canvas.editor
+    assert editor.document is not None
+    seen = editor.derived.facts.seen(editor.document, editor.current)
+    picture = editor.derived.control_points(editor.document, editor.current)
+    xy = editor.view.canvas_from_image(picture[nodes[seen[nodes]]])
+    return xy / canvas.ratio + (canvas.rect.x, canvas.rect.y)
+
+
+def _draw_hatched(canvas: Canvas, kind: PoseMode, nodes: I32) -> None:
+    editor = canvas.editor
+    assert editor.document is not None
+    spacing = editor.derived.facts.spacing(editor.document, editor.current)
+    radius = max(SPREAD * spacing * editor.view.zoom / canvas.ratio, theme.pt(LEAST))
+    places = _visible(canvas, nodes)
+    angles, color = HATCHES[kind]
+    dark, light = theme.u32(DARK, 0.45), theme.u32(color, 0.85)
+    for angle in angles:
+        ends = hatch(places, radius, angle, theme.pt(STEP))
+        lines = [(ImVec2(*a), ImVec2(*b)) for a, b in ends.tolist()]
+        for start, end in lines:
+            canvas.draw.add_line(start, end, dark, 3.0 * theme.scale)
+        for start, end in lines:
+            canvas.draw.add_line(start, end, light, 1.2 * theme.scale)
+
+
+def _draw_seam(canvas: Canvas, region: Region) -> None:
+    """A cut: crosses along it; glue: lines from side to side."""
+    rigging = canvas.editor.rigging
+    seam = rigging.rig.seams[region.seam]
+    first, second = _visible(canvas, seam.first), _visible(canvas, seam.second)
+    if len(first) == 0 or len(second) == 0:
+        return
+    gaps = np.linalg.norm(first[:, None] - second[None], axis=2)
+    if seam.is_glued:
+        for a, b in zip(first, second[gaps.argmin(1)], strict=True):
+            canvas.line(ImVec2(*a), ImVec2(*b), ACCENT, width=1.2)
+        return
+    # The cut itself runs midway between two points that are nearest to each other across it.
+    there, back = gaps.argmin(1), gaps.argmin(0)
+    middles = 0.5 * (first + second[there])
+    near = back[there] == np.arange(len(first))
+    arm = theme.pt(3)
+    for x, y in middles[near].tolist():
+        canvas.line(ImVec2(x - arm, y - arm), ImVec2(x + arm, y + arm), WARM)
+        canvas.line(ImVec2(x - arm, y + arm), ImVec2(x + arm, y - arm), WARM)

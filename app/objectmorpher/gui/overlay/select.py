@@ -1,0 +1,78 @@
+"""The selection: its edge, the clicks and the box that made it."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import ImVec2
+
+from ..widgets.fade import fades
+from ..widgets.theme import theme
+from .canvas import ACCENT, DARK, WARM, Canvas
+
+DOTS = 6.0  # points between the dots of a dotted line
+DOT = 1.4  # points, their radius
+
+
+def draw_selection(canvas: Canvas) -> None:
+    """For the Select tool."""
+    editor = canvas.editor
+    draw_edge(canvas)
+    candidate, share = fades.shown("candidate", editor.candidates.shown)
+    document = editor.document
+    if candidate is not None and document is not None and candidate.photo is document.photo:
+        for outline in editor.derived.contours(candidate.mask):
+            _draw_dots(canvas, outline, share)
+    prompt = editor.selection.prompt
+    if prompt.box is not None:
+        x0, y0, x1, y1 = prompt.box
+        canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
+    for click in prompt.clicks:
+        _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
+    if editor.rubber is not None:
+        draw_rubber(canvas)
+    if editor.selection.path is not None:
+        _draw_lasso(canvas, editor.selection.path)
+
+
+def draw_edge(canvas: Canvas) -> None:
+    """The outline of what is selected."""
+    editor = canvas.editor
+    if editor.mask is not None:
+        for outline in editor.derived.contours(editor.mask):
+            canvas.polyline(canvas.at(outline), ACCENT)
+
+
+def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:
+    """A dotted closed line (N, 2) image px: what a click would select."""
+    corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))
+    along = np.concatenate([[0.0], np.linalg.norm(np.diff(corners, axis=0), axis=1).cumsum()])
+    places = np.arange(0, along[-1], theme.pt(DOTS) * canvas.ratio)
+    dots = np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])
+    for at in canvas.on_canvas(dots):
+        canvas.dot(at, DOT, alpha=0.9 * share)
+
+
+def draw_rubber(canvas: Canvas) -> None:
+    """The box that is being drawn."""
+    assert canvas.editor.rubber is not None
+    x0, y0, x1, y1 = canvas.editor.rubber
+    low, high = canvas.on_canvas(np.array([[x0, y0], [x1, y1]]))
+    canvas.draw.add_rect_filled(low, high, theme.u32(ACCENT, 0.12))
+    canvas.draw.add_rect(low, high, theme.u32(ACCENT), thickness=theme.pt(1.5))
+
+
+def _draw_lasso(canvas: Canvas, path: list[np.ndarray]) -> None:
+    """The line that is being drawn around something, canvas px (2,) each; its end is dashed."""
+    points = canvas.on_canvas(np.array(path))
+    if len(points) > 1:
+        canvas.polyline(points, ACCENT, 1.5, is_closed=False)
+        canvas.dashes([points[-1], points[0]], is_closed=False)
+
+
+def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
+    """A disc with + or -: shape and colour both tell."""
+    canvas.disc(at, 6, ACCENT if is_foreground else WARM)
+    arm, dark, width = theme.pt(3), theme.u32(DARK), theme.pt(2)
+    canvas.draw.add_line(ImVec2(at.x - arm, at.y), ImVec2(at.x + arm, at.y), dark, width)
+    if is_foreground:
+        canvas.draw.add_line(ImVec2(at.x, at.y - arm), ImVec2(at.x, at.y + arm), dark, width)

@@ -1,0 +1,236 @@
+"""The Compose tool's settings: background, shadow, light, edge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+
+from objectmorpher_core import compose
+from objectmorpher_core.document.joining import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    MOST_SHADOW,
+    USUAL_DEFOCUS,
+    USUAL_GRAIN,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+)
+
+from ...commands import run
+from ...commands.compose import not_moved
+from ...editor.editor import Editor
+from ...editor.view import Composed
+from ...system.texts import t
+from ...tools.place_tool import wrapped
+from ...worker.job_functions import Variant
+from ..widgets.command_button import command_button
+from ..widgets.dial import SIDE, dial
+from ..widgets.method_choice import draw_method
+from ..widgets.pictures import pictures
+from ..widgets.segmented import Choice, segmented
+from ..widgets.theme import RADIUS, theme
+from ..widgets.widgets import (
+    GAP,
+    LABEL_WIDTH,
+    Change,
+    Number,
+    checkbox,
+    drawn_button,
+    half_width,
+    heading,
+    note,
+    number_field,
+    rule,
+    tooltip,
+)
+from ..window.landmarks import mark
+from .brush import draw_brush_fields, draw_radius
+from .network import draw_network
+
+REFINERS = {"none": "None", "harmonise": "Harmonise"}
+DEGREES = 72.0  # points, width of the direction's field
+THUMB_SHAPE = 3 / 4  # height of a thumbnail by its width
+
+
+def draw_compose(editor: Editor) -> None:
+    if not editor.is_lifted:
+        note(t("Lift an object first."))
+        return
+    _draw_background(editor)
+    rule()
+    _draw_shadow(editor)
+    rule()
+    _draw_light(editor)
+    rule()
+    draw_network(editor)
+    rule()
+    _draw_edge(editor)
+
+
+def _draw_background(editor: Editor) -> None:
+    heading(t("Background"))
+    is_bare = checkbox(t("Show it alone"), editor.view.compose.is_bare)
+    tooltip(t("Without the objects, to repair it by painting (B)"))
+    if is_bare != editor.view.compose.is_bare:
+        run(editor, "bare")
+    if (trouble := editor.composing.trouble) is not None:
+        note(trouble)
+    draw_method(editor, "inpaint")
+    half = half_width()
+    command_button(editor, "fill_again", width=half)
+    imgui.same_line()
+    command_button(editor, "variants", width=half)
+    _draw_variants(editor)
+    if is_bare and editor.document is not None and editor.document.plate is not None:
+        _draw_brush(editor)
+
+
+def _draw_brush(editor: Editor) -> None:
+    """What a drag on the background does."""
+    compose_view = editor.view.compose
+    choices = tuple(Choice(way, t(way.value)) for way in Composed)
+    compose_view.drag = segmented("composed", choices, compose_view.drag)
+    if compose_view.drag is Composed.TAKE:
+        draw_radius(editor)
+        command_button(editor, "forget_sources", width=-1)
+        note(t("Drag from what should be there to where it is wanted. Alt-click forgets it."))
+        return
+    draw_brush_fields(editor)
+    note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
+
+
+def _draw_variants(editor: Editor) -> None:
+    """Thumbnails; the one that is shown has the accent's edge."""
+    variants = editor.composing.variants
+    if not variants:
+        return
+    room = imgui.get_content_region_avail().x
+    width = (room - (len(variants) - 1) * theme.pt(GAP)) / len(variants)
+    for k, variant in enumerate(variants):
+        if k:
+            imgui.same_line(0, theme.pt(GAP))
+        _draw_variant(editor, k, variant, ImVec2(width, width * THUMB_SHAPE))
+
+
+def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> None:
+    start, draw = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
+    end = ImVec2(start.x + size.x, start.y + size.y)
+    if drawn_button(f"##variant{k}", size):
+        editor.composing.choose_variant(variant)
+    is_hovered = imgui.is_item_hovered()
+    tooltip(t("Variant {number}", number=k + 1))
+    texture, zero, one = pictures.texture(variant.thumb), ImVec2(0, 0), ImVec2(1, 1)
+    white, corner = theme.u32("#FFFFFF"), theme.pt(RADIUS - 2)
+    draw.add_image_rounded(texture, start, end, zero, one, white, corner)
+    is_chosen = editor.document is not None and editor.document.plate is variant.plate
+    if is_chosen or is_hovered:
+        role = "accent" if is_chosen else "secondary"
+        draw.add_rect(start, end, theme.u32(role), corner, thickness=theme.pt(2))
+
+
+def _draw_shadow(editor: Editor) -> None:
+    heading(t("Shadow"))
+    if (reason := not_moved(editor)) is not None:
+        note(f"{reason}.")
+        return
+    assert editor.object is not None
+    command_button(editor, "take_shadow", width=-1)
+    shadow, preview = editor.object.shadow, editor.composing.preview_shadow
+    number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
+    change = number_field(number, 100 * shadow.strength)
+    changed = replace(shadow, strength=change.value / 100)
+    _take(editor, change, lambda: preview(changed), t("Shadow's strength"))
+    if shadow.strength == 0 and not change.is_changed:
+        note(t("Strength adds a shadow on the ground."))
+        return
+    shares = (
+        (Number(t("Length"), "%.2f ×", 0.005, 0.1, 0.6, 0.0, MOST_SHADOW), "length", 1.0),
+        (Number(t("Softness"), "%.0f %%", 0.5, 5.0, 40.0, 0.0, 100.0), "softness", 100.0),
+        (Number(t("Contact"), "%.0f %%", 0.5, 5.0, 70.0, 0.0, 100.0), "contact", 100.0),
+    )
+    for number, name, unit in shares:
+        change = number_field(number, unit * getattr(shadow, name))
+        changed = replace(shadow, **{name: change.value / unit})
+        _take(editor, change, lambda changed=changed: preview(changed), t("Shape of shadow"))
+    usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
+    number = Number(t("Ground"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
+    change = number_field(number, usual if ground is None else ground)
+    tooltip(t("How steeply one looks down on the ground: 0° along it, 90° from above"))
+    ground = None if change.value == usual else change.value
+    changed = replace(shadow, ground=ground)
+    _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
+    _draw_direction(editor)
+
+
+def _draw_direction(editor: Editor) -> None:
+    """Name, dial, and the number beside it."""
+    assert editor.object is not None
+    shadow, top = editor.object.shadow, imgui.get_cursor_pos_y()
+    drop = theme.pt((SIDE - 28) / 2)
+    imgui.set_cursor_pos_y(top + drop)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), t("Falls to"))
+    imgui.same_line(theme.pt(LABEL_WIDTH))
+    imgui.set_cursor_pos_y(top)
+    change = dial("direction", shadow.direction, t("Where the shadow falls; Shift: steps of 15°"))
+    changed = replace(shadow, direction=change.value)
+    _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
+    imgui.same_line(0, theme.pt(12))
+    imgui.set_cursor_pos_y(top + drop)
+    imgui.align_text_to_frame_padding()
+    imgui.set_next_item_width(theme.pt(DEGREES))
+    is_changed, turned = imgui.drag_float("##degrees", change.value, 0.5, 0.0, 0.0, "%.0f°")
+    mark(t("Falls to"))
+    is_done = imgui.is_item_deactivated_after_edit()
+    if is_changed or is_done:
+        change = Change(wrapped(turned), is_changed, is_done)
+        changed = replace(shadow, direction=change.value)
+        _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
+    imgui.set_cursor_pos_y(top + theme.pt(SIDE + 4))
+    imgui.dummy(ImVec2(0, 0))
+
+
+def _draw_light(editor: Editor) -> None:
+    heading(t("Light"))
+    if (reason := not_moved(editor)) is not None:
+        note(f"{reason}.")
+        return
+    assert editor.object is not None
+    choices = tuple(Choice(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
+    editor.composing.choose_refiner(segmented("refiner", choices, editor.composing.refiner))
+    if editor.composing.refiner == "none":
+        note(t("Harmonise gives the object the light of its new place and of how it is turned."))
+        return
+    item, composing = editor.object, editor.composing
+    rows = (
+        (t("Place"), 100 * USUAL_HARMONY, item.harmony, composing.preview_harmony),
+        (t("Turning"), 100 * USUAL_RELIGHT, item.relight, composing.preview_relight),
+        (t("Grain"), 100 * USUAL_GRAIN, item.grain, composing.preview_grain),
+        (t("Focus"), 100 * USUAL_DEFOCUS, item.defocus, composing.preview_defocus),
+    )
+    for name, usual, share, preview in rows:
+        change = number_field(Number(name, "%.0f %%", 0.5, 5.0, usual, 0.0, 100.0), 100 * share)
+        _take(editor, change, lambda p=preview, c=change: p(c.value / 100), t("Adjust light"))
+    note(t("Light around its new place; light that stays where it was while it turns."))
+    note(t("Grain: the photo's own, where moving the object has smoothed it."))
+    note(t("Focus: nearer or farther, as blurred as the photo is there."))
+
+
+def _draw_edge(editor: Editor) -> None:
+    heading(t("Edge"))
+    assert editor.document is not None
+    number = Number(t("Blend"), "%.2f ×", 0.005, 0.25, 1.0, LEAST_FEATHER, MOST_FEATHER)
+    change = number_field(number, editor.document.feather)
+    preview = editor.composing.preview_feather
+    _take(editor, change, lambda: preview(change.value), t("Blend of edge"))
+    note(t("How wide the edit fades into the photo."))
+
+
+def _take(editor: Editor, change: Change, preview: Callable[[], None], label: str) -> None:
+    """Shows a change, and makes it a step when it is complete."""
+    if change.is_changed:
+        preview()
+    if change.is_done:
+        editor.commit(label)

@@ -1,0 +1,72 @@
+"""The panel at the right: objects, the tool's settings, the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from imgui_bundle import ImVec2, imgui
+
+from ...commands import next_step, run, why_not
+from ...editor.editor import Editor
+from ...editor.view import ToolName
+from ..widgets.panes import INSPECTOR, edge, pane
+from ..widgets.theme import PRIMARY, theme
+from ..widgets.widgets import Kind, button, rule
+from ..window.layout import Rect
+from .compose import draw_compose
+from .history_list import draw_history
+from .look import draw_look
+from .mask import draw_mask
+from .object_list import draw_objects
+from .place import draw_place
+from .pose import draw_pose
+from .select import draw_select
+
+
+class _Scroll:
+    """Whether the panel had more than there is room for when it was drawn last."""
+
+    is_needed = False
+
+
+_scroll = _Scroll()
+
+
+def draw_inspector(editor: Editor, rect: Rect) -> None:
+    with pane(INSPECTOR, rect):
+        foot = theme.pt(PRIMARY + 24)
+        bar = imgui.get_style().scrollbar_size if _scroll.is_needed else 0.0
+        across = imgui.get_content_region_avail().x + bar  # the bar stands in the padding
+        size = ImVec2(across, rect.height - foot - theme.pt(12))
+        imgui.begin_child("##scroll", size, imgui.ChildFlags_.nav_flattened)
+        draw_objects(editor)
+        rule()
+        _PANELS[editor.view.tool](editor)
+        draw_history(editor)
+        _scroll.is_needed = imgui.get_scroll_max_y() > 0
+        imgui.end_child()
+        if _scroll.is_needed:
+            top = rect.y + rect.height - foot + 0.5
+            edge((rect.x, top), (rect.x + rect.width, top))
+        _draw_foot(editor, rect, foot)
+        edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
+
+
+def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
+    """The one primary button: the next sensible step."""
+    imgui.set_cursor_pos(ImVec2(theme.pt(12), rect.height - foot + theme.pt(12)))
+    label, command = next_step(editor)
+    if command is None:
+        button(label, Kind.WAITING)
+    elif button(label, Kind.PRIMARY, why_not=why_not(editor, command)):
+        run(editor, command)
+
+
+_PANELS: dict[ToolName, Callable[[Editor], None]] = {
+    ToolName.SELECT: draw_select,
+    ToolName.MASK: draw_mask,
+    ToolName.POSE: draw_pose,
+    ToolName.PLACE: draw_place,
+    ToolName.LOOK: draw_look,
+    ToolName.COMPOSE: draw_compose,
+}

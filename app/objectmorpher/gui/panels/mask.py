@@ -1,0 +1,73 @@
+"""The Mask tool's settings: the brush, and the selection's edge."""
+
+from __future__ import annotations
+
+from ...editor.editor import Editor
+from ...editor.view import Painted
+from ...system.texts import t
+from ..widgets.command_button import command_button
+from ..widgets.segmented import Choice, segmented
+from ..widgets.theme import Icon
+from ..widgets.widgets import gap, heading, note
+from .brush import draw_brush_fields
+from .edge import draw_command, draw_edge, draw_lift_warning
+
+
+def draw_mask(editor: Editor) -> None:
+    heading(t("Brush"))
+    selecting = editor.view.selecting
+    selecting.painted = segmented("painted", _kinds(), selecting.painted)
+    selecting.is_erasing = segmented("brush", _ways(selecting.painted), selecting.is_erasing)
+    draw_brush_fields(editor)
+    if selecting.painted is not Painted.SELECTION:
+        _draw_shape_facts(editor)
+        return
+    if editor.view.brush.hardness >= 1:
+        note(t("A fully hard brush leaves the edge to the photo."))
+    draw_lift_warning(editor)
+    gap(12)
+    draw_edge(editor)
+    gap(12)
+    draw_command(editor, "clear")
+
+
+def _kinds() -> tuple[Choice[Painted], ...]:
+    return (
+        Choice(Painted.SELECTION, t("Selection"), t("What belongs to the object")),
+        Choice(Painted.DEPTH, t("Depth"), t("Which parts of it are nearer than it looks")),
+        Choice(Painted.HIDDEN, t("Hidden"), t("Where it goes on behind something else")),
+    )
+
+
+def _ways(painted: Painted) -> tuple[Choice[bool], Choice[bool]]:
+    if painted is Painted.DEPTH:
+        return (
+            Choice(False, t("Nearer"), t("The brush brings a part nearer"), icon=Icon.UP),
+            Choice(True, t("Farther"), t("The brush pushes a part back"), icon=Icon.DOWN),
+        )
+    if painted is Painted.HIDDEN:
+        return (
+            Choice(False, t("Paint"), t("The object goes on here, unseen"), icon=Icon.BRUSH),
+            Choice(True, t("Erase"), t("It does not go on here"), icon=Icon.ERASE),
+        )
+    return (
+        Choice(False, t("Paint"), t("The brush adds to the selection"), icon=Icon.BRUSH),
+        Choice(True, t("Erase"), t("The brush takes away from the selection"), icon=Icon.ERASE),
+    )
+
+
+def _draw_shape_facts(editor: Editor) -> None:
+    """What the two brushes that tell about the shape are for."""
+    is_depth = editor.view.selecting.painted is Painted.DEPTH
+    if (reason := editor.shaping.why_fixed) is not None:
+        note(f"{reason}.")
+        return
+    if is_depth:
+        note(t("An arm before a body: paint it nearer. Each stroke brings it a little nearer; its "
+               "edges follow the photo's."))  # fmt: skip
+    else:
+        note(t("Paint on, where something stands before the object: it is completed there, in 3D "
+               "and in colour."))  # fmt: skip
+    if not editor.is_lifted:
+        note(t("It counts when the object is lifted."))
+    command_button(editor, "clear_painted")

@@ -1,0 +1,140 @@
+"""The Place tool's numbers: position, turn, scale, and what the object stands on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from imgui_bundle import imgui
+
+from objectmorpher_core.document.model import Placement
+
+from ...commands import COMMANDS, run, why_not
+from ...editor.editor import Editor
+from ...system.texts import t
+from ..widgets.command_button import command_button
+from ..widgets.theme import SMALL_SIZE, Icon, theme
+from ..widgets.widgets import (
+    FILL,
+    Number,
+    checkbox,
+    gap,
+    heading,
+    icon_button,
+    note,
+    number_field,
+    tooltip,
+)
+
+RESET = 24.0  # points, side of the button that resets a group
+DEPTHS = (-1.5, 3.0)  # object diameters, ends of the slider
+DONE = {
+    "Right": "Move object", "Down": "Move object", "Away": "Move object in depth",
+    "Yaw": "Turn object", "Pitch": "Turn object", "Roll": "Roll object", "Scale": "Scale object",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers that are reset together."""
+
+    title: str
+    command: str  # that resets them
+    numbers: tuple[Number, ...]
+
+
+GROUPS = (
+    Group("Position", "reset_position", (
+        Number("Right", "%.1f px", 0.5, 1.0),
+        Number("Down", "%.1f px", 0.5, 1.0),
+        Number("Away", "%.2f ×", 0.005, 0.05),
+    )),
+    Group("Turn", "reset_turn", (
+        Number("Yaw", "%.1f°", 0.25, 1.0),
+        Number("Pitch", "%.1f°", 0.25, 1.0),
+        Number("Roll", "%.1f°", 0.25, 1.0),
+    )),
+    Group("Size", "reset_size", (
+        Number("Scale", "%.1f %%", 0.25, 1.0, rest=100.0, low=2.0, high=5000.0),
+    )),
+)  # fmt: skip
+
+
+def draw_place(editor: Editor) -> None:
+    placement = editor.placing.placement
+    if placement is None:
+        note(t("Lift an object first"))
+        return
+    _draw_ground(editor)
+    gap(12)
+    values = dict(zip(_names(), _values(placement), strict=True))
+    for group in GROUPS:
+        _draw_title(editor, group)
+        for number in group.numbers:
+            shown = replace(number, name=t(number.name))
+            change = number_field(shown, values[number.name])
+            values[number.name] = change.value
+            if change.is_changed:
+                _change(editor, group, _placement(placement, values))
+            if change.is_done:
+                editor.commit(t(DONE[number.name]))
+        if group.title == "Position":
+            _draw_depth(editor, placement)
+        gap(12)
+    label = t(COMMANDS["reset_place"].label)
+    command_button(editor, "reset_place", f"{Icon.RESET}  {label}")
+
+
+def _draw_ground(editor: Editor) -> None:
+    is_on = checkbox(t("Stand on the ground"), editor.view.is_grounded)
+    tooltip(t("Moving the object slides it over the ground; its size follows the distance (G)"))
+    if is_on != editor.view.is_grounded:
+        run(editor, "ground")
+    if is_on:
+        text = editor.placing.why_no_ground
+        note(text or t("Drag the dashed line to the photo's horizon."))
+
+
+def _draw_title(editor: Editor, group: Group) -> None:
+    """The group's name, and at the right the button that resets it."""
+    top = imgui.get_cursor_pos_y()
+    imgui.align_text_to_frame_padding()
+    heading(t(group.title))
+    imgui.same_line(imgui.get_content_region_avail().x + imgui.get_cursor_pos_x() - theme.pt(RESET))
+    imgui.set_cursor_pos_y(top)
+    name, command = group.command, COMMANDS[group.command]
+    imgui.push_font(None, SMALL_SIZE - 2)
+    if icon_button(Icon.RESET, name, t(command.label), why_not(editor, name), RESET):
+        run(editor, name)
+    imgui.pop_font()
+
+
+def _draw_depth(editor: Editor, placement: Placement) -> None:
+    """Nearer on the left, farther on the right."""
+    imgui.set_next_item_width(FILL)
+    low, high = min(DEPTHS[0], placement.depth), max(DEPTHS[1], placement.depth)
+    is_changed, depth = imgui.slider_float("##depth", placement.depth, low, high, "")
+    tooltip(t("Nearer or farther, in diameters of the object"))
+    if is_changed:
+        editor.placing.move_away(depth)
+    if imgui.is_item_deactivated_after_edit():
+        editor.commit(t("Move object in depth"))
+
+
+def _change(editor: Editor, group: Group, placement: Placement) -> None:
+    """Numbers of the position count as they are; what is turned or scaled stays on the ground."""
+    is_position = group.title == "Position"
+    editor.placing.move_to(placement if is_position else editor.placing.stood(placement))
+
+
+def _names() -> list[str]:
+    return [number.name for group in GROUPS for number in group.numbers]
+
+
+def _values(p: Placement) -> tuple[float, ...]:
+    return (*p.move, p.depth, *p.turn, 100 * p.scale)
+
+
+def _placement(placement: Placement, values: dict[str, float]) -> Placement:
+    right, down, away, yaw, pitch, roll, scale = (values[name] for name in _names())
+    turn, move = (yaw, pitch, roll), (right, down)
+    return replace(placement, move=move, depth=away, turn=turn, scale=scale / 100)

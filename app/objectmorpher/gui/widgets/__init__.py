@@ -1,0 +1,1 @@
+"""Buttons, fields and colours that everything else in the window is made of."""

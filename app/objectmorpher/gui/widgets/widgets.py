@@ -1,0 +1,277 @@
+"""Buttons, fields and texts that the panels are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+
+from ...system.texts import t
+from ..window.landmarks import mark
+from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
+
+LABEL_WIDTH = 72.0  # points, of the names left of the fields
+GAP = 8.0  # between two that stand side by side
+TIP_GAP = 8.0  # points between a control that the keyboard reached and its tooltip
+STEPPER = 24.0  # points, width of a field's - and + buttons
+FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it ends a pixel before
+
+
+class Kind(Enum):
+    """How much a button asks for attention."""
+
+    PRIMARY = "primary"
+    PRIMARY_SMALL = "primary, as high as the others"
+    WAITING = "waiting"  # a primary button while the next step is the user's, in the photo
+    PLAIN = "plain"
+    QUIET = "quiet"  # no frame until hovered
+
+
+@contextmanager
+def small_text() -> Iterator[None]:
+    imgui.push_font(None, SMALL_SIZE)
+    yield
+    imgui.pop_font()
+
+
+@contextmanager
+def bold_text(size: float = 0.0) -> Iterator[None]:
+    imgui.push_font(theme.bold, size)
+    yield
+    imgui.pop_font()
+
+
+def tooltip(text: str) -> None:
+    """For the last item, shown after a moment; over greyed-out items too.
+
+    Where the keyboard has come to the item, it is shown at once, beside the item.
+    """
+    flags = imgui.HoveredFlags_.allow_when_disabled | imgui.HoveredFlags_.for_tooltip
+    is_reached = imgui.is_item_focused() and imgui.get_io().nav_visible
+    if is_reached:
+        _place_tooltip()
+    if is_reached or imgui.is_item_hovered(flags):
+        imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(10, 8))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, theme.pt(RADIUS))
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(theme.pt(260))
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+        imgui.pop_style_var(2)
+
+
+def _place_tooltip() -> None:
+    """Below the last item, above it in the window's lower half; it ends where the item ends where
+    that is at the right."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    room = imgui.get_io().display_size
+    is_low, is_right = high.y > room.y / 2, high.x > room.x / 2
+    gap = theme.pt(TIP_GAP)
+    at = ImVec2(high.x if is_right else low.x, low.y - gap if is_low else high.y + gap)
+    imgui.set_next_window_pos(at, imgui.Cond_.always, ImVec2(float(is_right), float(is_low)))
+
+
+def button(
+    label: str, kind: Kind = Kind.PLAIN, why_not: str | None = None, width: float = -1.0
+) -> bool:
+    """A text button; `why_not` greys it out and is its tooltip. `width` in points, -1 fills."""
+    is_tall = kind in (Kind.PRIMARY, Kind.WAITING)
+    height = PRIMARY if is_tall else FIELD
+    across = theme.pt(width) if width > 0 else FILL
+    roles = _ROLES[kind]
+    columns = ("button", "button_hovered", "button_active", "text")
+    for column, role in zip(columns, roles, strict=True):
+        alpha = 0.0 if role == "none" else 1.0
+        shown = theme.vec("panel" if role == "none" else role, alpha)
+        imgui.push_style_color(getattr(imgui.Col_, column), shown)
+    imgui.begin_disabled(why_not is not None)
+    if is_tall:
+        imgui.push_font(theme.bold, 0.0)
+    is_pressed = imgui.button(label, ImVec2(across, theme.pt(height)))
+    mark(label)
+    if is_tall:
+        imgui.pop_font()
+    imgui.end_disabled()
+    imgui.pop_style_color(len(columns))
+    if why_not is not None:
+        tooltip(why_not)
+    return is_pressed
+
+
+_ROLES = {
+    Kind.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
+    Kind.PRIMARY_SMALL: ("accent", "accent_hovered", "accent", "on_accent"),
+    Kind.WAITING: ("raised", "raised", "raised", "secondary"),
+    Kind.PLAIN: ("raised", "hovered", "pressed", "text"),
+    Kind.QUIET: ("none", "hovered", "pressed", "text"),
+}
+
+
+def icon_button(
+    icon: str, name: str, hint: str, why_not: str | None = None, side: float = FIELD
+) -> bool:
+    """A square button with an icon; `name` is its id, `hint` its tooltip."""
+    imgui.push_style_color(imgui.Col_.button, theme.vec("panel", 0.0))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    imgui.begin_disabled(why_not is not None)
+    is_pressed = imgui.button(f"{icon}##{name}", theme.size(side, side))
+    mark(hint.partition("\n")[0])
+    imgui.end_disabled()
+    imgui.pop_style_var()
+    imgui.pop_style_color()
+    tooltip(hint if why_not is None else f"{hint}\n{why_not}")
+    return is_pressed
+
+
+def drawn_button(name: str, size: ImVec2) -> bool:
+    """A button that its caller draws; `size` in window units. Tab reaches it, too."""
+    return imgui.invisible_button(name, size, imgui.ButtonFlags_.enable_nav)
+
+
+def half_width() -> float:
+    """Points, of each of two buttons side by side."""
+    return (imgui.get_content_region_avail().x / theme.scale - GAP) / 2
+
+
+def shortened(text: str, room: float) -> str:
+    """The text's end, as much as fits; `room` in window units."""
+    if imgui.calc_text_size(text).x <= room:
+        return text
+    while text and imgui.calc_text_size(f"…{text}").x > room:
+        text = text[1:]
+    return f"…{text}"
+
+
+def fitted(name: str, room: float) -> str:
+    """As much of a file's name as has room (window units); its ending tells most, so it stays."""
+    if imgui.calc_text_size(name).x <= room:
+        return name
+    for kept in range(len(name) - 2, 1, -1):
+        shown = f"{name[: kept - kept // 3]}…{name[len(name) - kept // 3 :]}"
+        if imgui.calc_text_size(shown).x <= room:
+            return shown
+    return "…"
+
+
+def shown_path(path: Path) -> str:
+    """As it is read: what is in the user's home folder begins with ~."""
+    home = Path.home()
+    return str(Path("~", path.relative_to(home))) if path.is_relative_to(home) else str(path)
+
+
+def heading(text: str) -> None:
+    """The title of a group in a panel."""
+    with bold_text():
+        imgui.text_unformatted(text)
+
+
+def note(text: str) -> None:
+    """Secondary text, wrapped."""
+    imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+    imgui.pop_style_color()
+
+
+def gap(points: float) -> None:
+    """Vertical space between groups, on top of the item spacing."""
+    imgui.dummy(ImVec2(0, theme.pt(max(points - 8, 0))))
+
+
+def rule() -> None:
+    """A line between groups, 12 points above and below."""
+    gap(8)
+    top = imgui.get_cursor_screen_pos()
+    width = imgui.get_content_region_avail().x
+    pad = imgui.get_style().window_padding.x
+    line = theme.u32("line")
+    imgui.get_window_draw_list().add_line(
+        ImVec2(top.x - pad, top.y + 0.5), ImVec2(top.x + width + pad, top.y + 0.5), line, 1.0
+    )
+    imgui.dummy(ImVec2(0, theme.pt(4)))
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that a field shows."""
+
+    name: str
+    format: str  # "%.1f°"
+    speed: float  # per point that the pointer is dragged
+    step: float  # of the - and + buttons
+    rest: float = 0.0  # what a double-click on the name goes back to
+    low: float = 0.0  # no limits where low == high
+    high: float = 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a field did in this frame."""
+
+    value: float
+    is_changed: bool = False
+    is_done: bool = False  # the change is complete: one step for undo
+
+
+def number_field(number: Number, value: float) -> Change:
+    """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
+    is_nothing = not any(digit in "123456789" for digit in number.format % value)
+    shown = 0.0 if is_nothing else value  # not "-0.00"
+    changed = Change(value)
+    imgui.push_id(number.name)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("secondary"), number.name)
+    if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
+        changed = Change(number.rest, is_changed=value != number.rest, is_done=True)
+    tooltip(t("Double-click resets it"))
+    imgui.same_line(theme.pt(LABEL_WIDTH))
+    field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
+    imgui.set_next_item_width(field)
+    flags = imgui.SliderFlags_.always_clamp if number.low < number.high else 0
+    is_changed, new = imgui.drag_float(
+        "##value", shown, number.speed, number.low, number.high, number.format, int(flags)
+    )
+    mark(number.name)
+    if is_changed or imgui.is_item_deactivated_after_edit():
+        changed = Change(new, is_changed, imgui.is_item_deactivated_after_edit())
+    for sign, icon in ((-1, Icon.MINUS), (1, Icon.PLUS)):
+        imgui.same_line(0, theme.pt(2))
+        if _stepper(icon):
+            stepped = value + sign * number.step
+            if number.low < number.high:
+                stepped = min(max(stepped, number.low), number.high)
+            changed = Change(stepped, True, True)
+    imgui.pop_id()
+    return changed
+
+
+def _stepper(icon: str) -> bool:
+    size = ImVec2(theme.pt(STEPPER), imgui.get_frame_height())
+    padding = ImVec2(0, imgui.get_style().frame_padding.y)  # as the field's: one baseline
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, padding)
+    imgui.push_font(None, SMALL_SIZE - 3)
+    is_pressed = imgui.button(icon, size)
+    imgui.pop_font()
+    imgui.pop_style_var()
+    return is_pressed
+
+
+def checkbox(label: str, is_on: bool) -> bool:
+    """A small box with a label; whether it is on now."""
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(2, 1))
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, theme.pt(1) if not is_on else 0.0)
+    imgui.push_style_color(imgui.Col_.border, theme.vec("secondary", 0.8))
+    for column in ("frame_bg_hovered", "frame_bg_active"):  # or the check would be white on grey
+        role = "accent_hovered" if is_on else "hovered"
+        imgui.push_style_color(getattr(imgui.Col_, column), theme.vec(role))
+    is_on = imgui.checkbox(label, is_on)[1]
+    mark(label)
+    imgui.pop_style_color(3)
+    imgui.pop_style_var(2)
+    return is_on

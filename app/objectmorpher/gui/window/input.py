@@ -1,0 +1,251 @@
+"""From ImGui's mouse and keys, and the keys' own crosshair, to pointers, strokes, commands."""
+
+from __future__ import annotations
+
+import logging
+import math
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from ...commands import next_step, run, take_next_step
+from ...editor.editor import Editor
+from ...editor.feedback import Hover
+from ...editor.shortcuts import Shortcuts
+from ...editor.view import ToolName
+from ...system.texts import t
+from ...tools import navigate
+from ...tools.pointer import Button, Pointer, Shape, Tool
+from ...tools.pose_strokes import DEPTH_STEP
+from ...tools.registry import TOOLS
+from .crosshair import FAR, STRIDE, Crosshair
+from .focus import ANY_POPUP, Focus
+from .layout import Rect
+
+log = logging.getLogger(__name__)
+
+ARROWS = {"Left": (-1, 0), "Right": (1, 0), "Up": (0, -1), "Down": (0, 1)}
+HELP = "?"
+DEPTHS = {"PageUp": 1, "PageDown": -1}
+PACES = {(): 1.0, ("Shift",): 10.0, ("Alt",): 0.1}  # px that an arrow nudges, by what is held
+STRIDES = {(): STRIDE, ("Shift",): FAR, ("Alt",): 0.0}  # points of the crosshair; 0: one px
+
+
+class Input:
+    """One frame's input to the editor; remembers only what the pointer looks like."""
+
+    def __init__(self, shortcuts: Shortcuts) -> None:
+        self._shortcuts = shortcuts
+        self.shape = Shape.ARROW
+        self.crosshair, self.focus = Crosshair(), Focus()
+        self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
+        self._pressed: list[str] = []  # chords since the last frame, in their order
+        self._last: tuple[float, float] | None = None
+        self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
+
+    def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
+        """`rect`: the canvas, window units; `ratio`: canvas px per window unit."""
+        io = imgui.get_io()
+        mouse = io.mouse_pos
+        is_mouse_used = any(io.mouse_down) or io.mouse_wheel != 0
+        self.crosshair.follow_mouse((mouse.x, mouse.y), is_mouse_used)
+        if editor.document is None:
+            self.crosshair.hide()
+        self.crosshair.is_down &= editor.hand.is_busy
+        self.focus.check(editor)
+        self._run_keys(editor)
+        pointer = Pointer(
+            (mouse.x - rect.x) * ratio,
+            (mouse.y - rect.y) * ratio,
+            is_down=True,
+            shift=io.key_shift,
+            alt=io.key_alt,
+            ctrl=io.key_ctrl,
+            space=imgui.is_key_down(imgui.Key.space),
+            wheel=io.mouse_wheel,
+        )
+        is_over = rect.contains(mouse.x, mouse.y) and not io.want_capture_mouse
+        if self.crosshair.is_shown:
+            pointer, is_over = self.crosshair.pointer(), not imgui.is_popup_open("", ANY_POPUP)
+        with _guarded(editor):
+            self._point(editor, pointer, is_over)
+
+    def _point(self, editor: Editor, pointer: Pointer, is_over: bool) -> None:
+        """Hovering, beginning, going on: whichever it is."""
+        editor.pointer = pointer if is_over or editor.hand.is_busy else None
+        if editor.hand.is_busy:
+            self._go_on(editor, pointer)
+        elif editor.document is not None and is_over:
+            self._begin(editor, pointer)
+        else:
+            self.shape = Shape.ARROW
+            editor.hover, self._hovered = Hover(), None
+
+    def hint(self, editor: Editor) -> str:
+        if editor.document is None:
+            return t("Open a photo, drop one here, or try a sample")
+        return TOOLS[editor.view.tool].hint(editor)
+
+    def take_key(self, keys: str) -> None:
+        """A key went down, or repeats: "Ctrl+Shift+S"."""
+        self._waiting.append((imgui.get_current_context().input_events_next_event_id, keys))
+
+    def _take_waiting(self) -> None:
+        """Chords go after the pointer's events that came before them and that ImGui still holds."""
+        queue = imgui.get_current_context().input_events_queue
+        first = queue[0].event_id if len(queue) else math.inf
+        while self._waiting and self._waiting[0][0] <= first:
+            self._pressed.append(self._waiting.pop(0)[1])
+
+    def _run_keys(self, editor: Editor) -> None:
+        """What was pressed since the last frame; nothing while a field or a dialog has the keys."""
+        self._take_waiting()
+        pressed, self._pressed = self._pressed, []
+        if pressed and self._shortcuts.take(pressed[-1]):
+            return
+        if imgui.get_io().want_text_input or imgui.is_popup_open("", ANY_POPUP):
+            editor.view.is_before = False
+            return
+        editor.view.is_before = editor.document is not None and imgui.is_key_down(imgui.Key.x)
+        for keys in pressed:
+            if not self.focus.take(editor, keys):
+                self._run_key(editor, keys)
+
+    def _run_key(self, editor: Editor, keys: str) -> None:
+        *held, key = keys.split("+")
+        is_step = (key in ARROWS or key in DEPTHS) and tuple(held) in PACES
+        is_free = editor.view.popup is None
+        if keys == "Escape" and editor.view.popup is not None:
+            editor.view.popup = None
+        elif keys == "Escape":
+            editor.escape()
+        elif keys in ("Enter", "Space", "Shift+Space", "Shift+Enter") and is_free:
+            self._press_key(editor, keys)
+        elif keys == HELP:
+            run(editor, "shortcuts")
+        elif is_step and is_free:
+            self._step(editor, key, tuple(held))
+        elif (name := self._shortcuts.command_of(keys)) is not None:
+            run(editor, name)
+
+    def _step(self, editor: Editor, key: str, held: tuple[str, ...]) -> None:
+        """An arrow moves what is chosen, else the crosshair."""
+        (dx, dy), depth = ARROWS.get(key, (0, 0)), DEPTHS.get(key, 0)
+        tool, pace = editor.view.tool, PACES[held]
+        is_placing = tool is ToolName.PLACE and editor.is_lifted
+        is_posing = tool is ToolName.POSE and bool(editor.posing.selected)
+        if (is_placing or is_posing) and not self.crosshair.is_down:
+            nudge = editor.placing.nudge if is_placing else editor.posing.nudge
+            nudge(dx * pace, dy * pace, depth * pace * DEPTH_STEP)
+        elif depth == 0:
+            stride = STRIDES[held] * editor.view.scale or max(editor.view.zoom, 1.0)
+            self.crosshair.move(editor, dx * stride, dy * stride)
+
+    def _press_key(self, editor: Editor, keys: str) -> None:
+        """At the crosshair Space clicks, and Shift+Enter takes hold or lets go.
+
+        Enter is the next step; where that is the user's own, in the photo, it clicks too.
+        """
+        is_pose = editor.view.tool is ToolName.POSE and editor.is_lifted
+        is_awaited = next_step(editor)[1] is None and (is_pose or editor.is_click_awaited)
+        with _guarded(editor):
+            if self.crosshair.is_down:
+                self._let_go(editor)
+            elif keys == "Enter" and not (self.crosshair.is_shown and is_awaited):
+                take_next_step(editor)
+            elif self.crosshair.is_shown and not editor.hand.is_busy:
+                self._press(editor, Button.RIGHT if keys == "Shift+Space" else Button.LEFT)
+                if keys != "Shift+Enter":
+                    self._let_go(editor)
+
+    def _press(self, editor: Editor, button: Button) -> None:
+        """A button goes down at the crosshair."""
+        pointer, tool = self.crosshair.pointer(button), TOOLS[editor.view.tool]
+        if editor.view.is_before:
+            return
+        self.shape = tool.hover(editor, pointer)
+        editor.message = None
+        is_split = navigate.is_on_split(editor, pointer)
+        stroke = (navigate.drag_split if is_split else tool.press)(editor, pointer)
+        self.crosshair.is_down = True
+        editor.hand.press(stroke, button)
+        self._last = (pointer.x, pointer.y)
+
+    def _let_go(self, editor: Editor) -> None:
+        """It goes up where the crosshair is now."""
+        self.crosshair.is_down = False
+        pointer = self.crosshair.pointer()
+        if self._last != (pointer.x, pointer.y):
+            editor.hand.move(pointer)
+        editor.hand.move(replace(pointer, is_down=False))
+
+    def _begin(self, editor: Editor, pointer: Pointer) -> None:
+        """The pointer hovers, zooms, or starts a stroke."""
+        if pointer.wheel:
+            navigate.zoom(editor, pointer)
+        tool = TOOLS[editor.view.tool]
+        for button in Button:
+            if imgui.is_mouse_clicked(button.value):
+                clicks = imgui.get_mouse_clicked_count(button.value)
+                pressed = replace(pointer, button=button, clicks=clicks)
+                if navigate.wants_pan(pressed):
+                    stroke = navigate.pan(editor, pressed)
+                elif navigate.is_on_split(editor, pressed):
+                    stroke = navigate.drag_split(editor, pressed)
+                elif button is Button.MIDDLE or editor.view.is_before:
+                    continue
+                else:
+                    editor.message = None
+                    stroke = tool.press(editor, pressed)
+                editor.hand.press(stroke, button)
+                self._last = (pointer.x, pointer.y)
+                if not imgui.is_mouse_down(button.value):  # pressed and released in one frame
+                    editor.hand.move(replace(pointer, is_down=False))
+                return
+        if pointer.space:
+            self.shape = Shape.HAND
+        elif navigate.is_on_split(editor, pointer):
+            self.shape = Shape.SPLIT
+        else:
+            self._hover(tool, editor, pointer)
+
+    def _hover(self, tool: Tool, editor: Editor, pointer: Pointer) -> None:
+        """Looks under the pointer anew only where it, the view or the document changed."""
+        view = editor.view
+        place = (view.left, view.top, view.zoom)
+        key = (tool, pointer, editor.document, editor.current, view.tool, *place)
+        if self._hovered is None or any(
+            a is not b and a != b for a, b in zip(key, self._hovered, strict=True)
+        ):
+            self.shape = tool.hover(editor, pointer)
+            self._hovered = key
+
+    def _go_on(self, editor: Editor, pointer: Pointer) -> None:
+        """A stroke goes on or ends."""
+        button = editor.hand.button
+        is_down = self.crosshair.is_down
+        is_down = is_down or (button is not None and imgui.is_mouse_down(button.value))
+        if imgui.get_io().app_focus_lost:
+            editor.hand.abort(editor)
+            return
+        if self._last != (pointer.x, pointer.y) or pointer.wheel != 0:
+            self._last = (pointer.x, pointer.y)
+            editor.hand.move(pointer)  # before the release: both may come in one slow frame
+        else:
+            editor.posing.relax()
+        if not is_down:
+            editor.hand.move(replace(pointer, is_down=False))
+
+
+@contextmanager
+def _guarded(editor: Editor) -> Iterator[None]:
+    """A stroke that fails is taken back, and the user is told."""
+    try:
+        yield
+    except Exception as error:
+        log.exception("The stroke failed")
+        editor.hand.abort(editor)
+        editor.complain(str(error) or type(error).__name__, traceback.format_exc())

@@ -1,0 +1,47 @@
+"""Where the window's parts are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..widgets.theme import INSPECTOR, MENU, STATUS, STRIP, theme
+
+
+@dataclass(frozen=True)
+class Rect:
+    """Window units: x right, y down."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def contains(self, x: float, y: float) -> bool:
+        return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The parts of the window; with no photo the canvas is all between menu and status."""
+
+    menu: Rect
+    strip: Rect
+    canvas: Rect
+    inspector: Rect
+    status: Rect
+
+
+def lay_out(width: float, height: float, has_photo: bool) -> Layout:
+    """For a window of that size, window units."""
+    menu, status = theme.pt(MENU), theme.pt(STATUS)
+    strip = theme.pt(STRIP) if has_photo else 0.0
+    inspector = theme.pt(INSPECTOR) if has_photo else 0.0
+    middle = max(height - menu - status, 1.0)
+    across = max(width - strip - inspector, 1.0)
+    return Layout(
+        menu=Rect(0, 0, width, menu),
+        strip=Rect(0, menu, strip, middle),
+        canvas=Rect(strip, menu, across, middle),
+        inspector=Rect(width - inspector, menu, inspector, middle),
+        status=Rect(0, height - status, width, status),
+    )

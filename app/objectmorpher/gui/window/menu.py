@@ -1,0 +1,133 @@
+"""The menu bar: menus left, the file's name and undo right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+
+from ...commands import COMMANDS, keys_of, run
+from ...editor.editor import Editor
+from ...editor.view import Shown
+from ...system.texts import t
+from ..widgets.theme import Icon, theme
+from ..widgets.widgets import fitted, icon_button, tooltip
+from .landmarks import mark
+from .layout import Rect
+
+MENUS: dict[str, tuple[str, ...]] = {
+    "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
+    "Edit": (
+        "undo", "redo", "-", "select_handles", "remove_handle", "reset_handle", "reset_handles",
+        "-", "reset_pose", "reset_place",
+    ),
+    "Select": (
+        "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",
+        "remove_islands", "-", "import_mask", "export_mask",
+    ),
+    "Object": (
+        "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "remove_object", "-",
+        "keep_in_front", "forward", "backward", "to_front", "to_back", "-", "ground", "-",
+        "bare", "take_from", "forget_sources", "fill_again", "shadow", "take_shadow",
+    ),
+    "Tool": ("select", "mask", "pose", "place", "look", "compose"),
+    "View": (
+        "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
+        *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
+    ),
+    "Window": ("history", "models", "preferences"),
+    "Help": ("shortcuts", "about"),
+}  # fmt: skip
+
+
+def draw_menu(editor: Editor, rect: Rect) -> None:
+    """Along the top of the window."""
+    across = (rect.height - imgui.get_font_size()) / 2
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(theme.pt(8), across))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(16, 8))
+    for background in (imgui.Col_.window_bg, imgui.Col_.menu_bar_bg):
+        imgui.push_style_color(background, 0)  # the window is cleared in it
+    imgui.begin_main_menu_bar()
+    imgui.pop_style_color(2)
+    imgui.pop_style_var(2)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, theme.size(8, 8))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, theme.size(12, 10))
+    for title, names in MENUS.items():
+        is_open = imgui.begin_menu(f"{t(title)}##{title}")
+        mark(f"Menu: {t(title)}")
+        if is_open:
+            _draw_items(editor, names)
+            if imgui.is_key_pressed(imgui.Key.escape):
+                imgui.close_current_popup()
+            imgui.end_menu()
+    imgui.pop_style_var(2)
+    _draw_right(editor, rect)
+    line = theme.u32("line")
+    bottom = rect.y + rect.height - 0.5
+    imgui.get_window_draw_list().add_line(ImVec2(0, bottom), ImVec2(rect.width, bottom), line, 1.0)
+    imgui.end_main_menu_bar()
+
+
+def _draw_items(editor: Editor, names: tuple[str, ...]) -> None:
+    for name in names:
+        if name == "-":
+            imgui.separator()
+        elif name == "recent":
+            _draw_recent(editor)
+        else:
+            _draw_command(editor, name)
+
+
+def _draw_command(editor: Editor, name: str) -> None:
+    command = COMMANDS[name]
+    reason = command.why_not(editor)
+    label = t(command.label)
+    if name == "undo" and editor.history and editor.history.undo_label:
+        label = t("Undo: {label}", label=editor.history.undo_label)
+    if name == "redo" and editor.history and editor.history.redo_label:
+        label = t("Redo: {label}", label=editor.history.redo_label)
+    is_on = command.is_on is not None and command.is_on(editor)
+    if imgui.menu_item(f"{label}##{name}", keys_of(editor, name), is_on, reason is None)[0]:
+        run(editor, name)
+    mark(label)
+    if reason is not None:
+        tooltip(reason)
+
+
+def _draw_recent(editor: Editor) -> None:
+    if imgui.begin_menu(t("Open recent"), bool(editor.settings.recent)):
+        for path in editor.settings.recent:
+            if imgui.menu_item(f"{Path(path).name}##{path}", "", False)[0]:
+                editor.filing.open(Path(path))
+            tooltip(path)
+        imgui.end_menu()
+
+
+def _draw_right(editor: Editor, rect: Rect) -> None:
+    """File name and state, undo and redo."""
+    if editor.document is None:
+        return
+    side = rect.height - theme.pt(4)
+    buttons = 2 * side + theme.pt(4 + 12)
+    name = editor.path.name if editor.path else editor.document.photo.name
+    state = "" if editor.is_saved else t("edited")
+    name = fitted(name, rect.width * 0.28)
+    text = imgui.calc_text_size(name).x
+    state_width = imgui.calc_text_size(f"{state}   ").x if state else 0.0
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))
+    imgui.text_unformatted(name)
+    if state:
+        imgui.same_line(0, theme.pt(8))
+        imgui.text_colored(theme.vec("secondary"), state)
+    imgui.same_line()
+    imgui.set_cursor_pos_x(rect.width - buttons)
+    points = side / theme.scale
+    for i, (icon, name) in enumerate(((Icon.UNDO, "undo"), (Icon.REDO, "redo"))):
+        if i:
+            imgui.same_line(0, theme.pt(4))
+        imgui.set_cursor_pos_y(theme.pt(2))
+        command = COMMANDS[name]
+        hint = f"{t(command.label)} ({keys_of(editor, name)})"
+        if icon_button(icon, name, hint, command.why_not(editor), points):
+            run(editor, name)

@@ -1,0 +1,52 @@
+"""Which overlays the canvas shows now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from imgui_bundle import ImVec2
+
+from ...editor.editor import Editor
+from ...editor.view import ToolName
+from ..overlay.canvas import Canvas
+from ..overlay.compare import draw_comparison
+from ..overlay.compose import draw_compose
+from ..overlay.legend import Legend
+from ..overlay.look import draw_look, draw_pixel_grid
+from ..overlay.mask import draw_mask
+from ..overlay.place import draw_frame
+from ..overlay.pose import draw_control_points, draw_pose
+from ..overlay.select import draw_selection
+from .landmarks import mark_on_canvas
+from .layout import Rect
+
+DRAWN: dict[ToolName, Callable[[Canvas], None]] = {
+    ToolName.SELECT: draw_selection,
+    ToolName.MASK: draw_mask,
+    ToolName.POSE: draw_pose,
+    ToolName.PLACE: draw_frame,
+    ToolName.LOOK: draw_look,
+    ToolName.COMPOSE: draw_compose,
+}
+ON_ANYTHING = (ToolName.SELECT, ToolName.MASK)  # the other tools are for lifted objects
+
+
+def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
+    """Over the photo; `rect`: the canvas, `pixel_ratio`: canvas px per window unit."""
+    view, canvas = editor.view, Canvas(editor, rect, pixel_ratio)
+    end = ImVec2(rect.x + rect.width, rect.y + rect.height)
+    canvas.draw.push_clip_rect(ImVec2(rect.x, rect.y), end, True)
+    if editor.photo_size is not None:
+        mark_on_canvas("Photo", *canvas.at(np.array([(0, 0), editor.photo_size], np.float64)))
+    draw_pixel_grid(canvas)
+    if not view.is_before:
+        if view.has_points and editor.is_lifted and editor.looking.orbit is None:
+            draw_control_points(canvas)
+        if editor.is_lifted or view.tool in ON_ANYTHING:
+            DRAWN[view.tool](canvas)
+        Legend(editor, rect).draw()
+    is_split = view.split is not None and editor.looking.orbit is None
+    if view.is_before or is_split:
+        draw_comparison(canvas)
+    canvas.draw.pop_clip_rect()

@@ -1,0 +1,135 @@
+"""From the editor to what the renderer draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from objectmorpher_core.document.model import Document
+
+from ...canvas.layers import Layer, is_front
+from ...canvas.painter import shown_now
+from ...editor.editor import Editor
+from ...editor.view import Shown, ToolName
+from ...render.scene import Hatch, Scene, SplatObject
+from ..widgets.theme import theme
+
+VEIL = 0.25  # share of black outside the selection, while selecting
+PAINTED_VEIL = 0.45  # while it is painted: a stroke in progress has no outline
+MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that are not there yet
+LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
+INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
+REFINED = Hatch((0.0, 0.85, 0.75), slant=0.0)
+OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
+BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
+
+
+def build_scene(editor: Editor, renderer: str) -> Scene | None:
+    """The canvas's picture, or None while no photo is open. `renderer`: "gl" or "tiles"."""
+    document, view = editor.looking.document, editor.view
+    if document is None:
+        return None
+    photo, surround = document.photo.pixels, theme.rgb("surround")
+    shown = shown_now(document, view)
+    if view.tool is ToolName.COMPOSE and view.compose.is_bare and not view.is_before:
+        return _bare_scene(editor, document)
+    if shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO:
+        return _selecting(editor, document)
+    if editor.looking.orbit is not None and not view.is_before:
+        return _alone(editor, document, renderer)
+    is_edited = any(o.is_moved for o in document.objects)
+    if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
+        return Scene(photo, surround)
+    if shown is Shown.DEPTH and editor.preview is None:
+        editor.derived.painter.measure(document)
+    layers = editor.derived.layers.draw(document, view, shown) if renderer == "tiles" else ()
+    objects = _objects(editor, document, shown) if renderer == "gl" else ()
+    split = view.split or 0.0
+    if shown in BARE:
+        paper = _paper(shown)
+        return Scene(photo, surround, layers=layers, objects=objects, paper=paper, split=split)
+    plate = editor.derived.plate(document) if is_edited else None
+    mask, hatch = None, None
+    if document.plate is None and is_edited:
+        mask, hatch = editor.derived.moved_mask(document), MISSING
+    elif shown is Shown.PROVENANCE:
+        mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
+    shades = editor.derived.lights.layers(document, view)
+    if shown in (Shown.COMPOSITE, Shown.PROVENANCE):  # the other views tell what is below it
+        refined = editor.derived.refined.layers(document, view, shown is Shown.PROVENANCE)
+        if renderer == "gl":
+            objects = (*objects, *refined)
+        else:
+            layers = (*layers, *refined)
+    return Scene(
+        photo, surround, plate, shades, layers, objects, mask,
+        hatch=hatch, marks=LIFTED, refined=REFINED, blend=editor.derived.blend(document, view),
+        split=split,
+    )  # fmt: skip
+
+
+def _alone(editor: Editor, document: Document, renderer: str) -> Scene:
+    """The object from somewhere else, on a checker: the photo does not show what is behind."""
+    photo, surround, shown = document.photo.pixels, theme.rgb("surround"), editor.view.shown
+    shown = Shown.OBJECT if shown is Shown.COMPOSITE else shown
+    if shown is Shown.DEPTH and not editor.hand.is_busy:
+        editor.derived.painter.measure(document)
+    layers = editor.derived.layers.draw(document, editor.view, shown) if renderer == "tiles" else ()
+    objects = _objects(editor, document, shown) if renderer == "gl" else ()
+    paper = _paper(shown)
+    return Scene(photo, surround, layers=layers, objects=objects, paper=paper, marks=LIFTED)
+
+
+def _selecting(editor: Editor, document: Document) -> Scene:
+    """The photo as it was, veiled where it is not selected."""
+    selection, painting = editor.masking.shown, editor.masking.painting
+    is_veiled = selection is not None and not editor.view.is_before
+    is_painted = editor.view.tool is ToolName.MASK
+    strength = PAINTED_VEIL if is_painted else VEIL
+    tint = editor.shaping.painted_layer() if is_painted else None
+    return Scene(
+        document.photo.pixels, theme.rgb("surround"), layers=() if tint is None else (tint,),
+        mask=selection,
+        touched=painting.touched if painting else (), veil=strength if is_veiled else 0.0,
+    )  # fmt: skip
+
+
+def _bare_scene(editor: Editor, document: Document) -> Scene:
+    """The background alone, and what of it is being repaired."""
+    photo, surround, split = document.photo.pixels, theme.rgb("surround"), editor.view.split or 0.0
+    mask = editor.derived.lights.hidden(document) if document.plate is None else None
+    fronts = [
+        editor.derived.fronts.layer(item, editor.view)
+        for k, item in enumerate(document.objects)
+        if is_front(document, k)
+    ]
+    found = (*fronts, editor.composing.painted_layer())
+    layers = tuple(layer for layer in found if layer is not None)
+    hatch = None if mask is None else MISSING
+    return Scene(photo, surround, document.plate, (), layers, (), mask, hatch=hatch, split=split)
+
+
+def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """A checker says that nothing is there; under colours that mean something it would disturb."""
+    panel = theme.rgb("panel")
+    is_plain = shown not in (Shown.DEPTH, Shown.NORMALS)
+    return panel, theme.rgb("raised") if is_plain else panel
+
+
+def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject | Layer, ...]:
+    camera, photo, derived = document.photo.camera, document.photo, editor.derived
+    found: list[SplatObject | Layer] = []
+    for part in derived.layers.parts(document, shown):
+        if is_front(document, part.k):
+            layer = derived.fronts.layer(document.objects[part.k], editor.view)
+            found += [] if layer is None else [layer]
+            continue
+        splats = derived.painter.painted(document, part.k, part.look)
+        texture = derived.shape(photo, document.objects[part.k]).texture
+        is_tint = part.look is Shown.STRAIN
+        item = SplatObject(splats, texture, camera, is_marked=part.is_marked, is_tint=is_tint)
+        if not part.is_painted:
+            look = derived.lights.of(document, part.k)
+            light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
+            item = replace(item, **light, blur=look.blur)
+        found.append(item)
+    return tuple(found)

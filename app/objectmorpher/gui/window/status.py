@@ -1,0 +1,166 @@
+"""The line at the bottom: hint or message left; job, zoom and size right."""
+
+from __future__ import annotations
+
+import time
+
+from imgui_bundle import ImVec2, imgui
+
+from ...editor.editor import Editor
+from ...editor.feedback import Message
+from ...editor.intents.models import DOWNLOAD
+from ...system.private import without_names
+from ...system.texts import t
+from ...worker.jobs import Job
+from ...worker.threads import Chore
+from ..widgets.fade import fades
+from ..widgets.panes import STATUS, edge, pane
+from ..widgets.theme import Icon, theme
+from ..widgets.widgets import icon_button, small_text, tooltip
+from .landmarks import mark
+from .layout import Rect
+
+JOB_DELAY = 0.15  # s; a job that is faster shows no bar
+BAR = 120.0  # points
+BAR_HEIGHT = 6.0
+
+
+def draw_status(editor: Editor, rect: Rect, hint: str) -> None:
+    with pane(STATUS, rect, padding=(12, 0)), small_text():
+        imgui.set_cursor_pos_y((rect.height - imgui.get_font_size()) / 2)
+        right = rect.width - theme.pt(12) - _facts_width(editor)
+        _draw_facts(editor, rect, right)
+        right = _draw_job(editor, rect, right)
+        _draw_text(editor, rect, hint, right)
+        edge((rect.x, rect.y + 0.5), (rect.x + rect.width, rect.y + 0.5))
+
+
+def _line_y(rect: Rect) -> float:
+    return (rect.height - imgui.get_font_size()) / 2
+
+
+def _facts(editor: Editor) -> str:
+    size = editor.photo_size
+    if size is None:
+        return ""
+    zoom = editor.view.zoom * 100
+    megapixels = size[0] * size[1] / 1e6
+    return f"{_pixel(editor)}{zoom:.0f} %   ·   {size[0]} × {size[1]}   ·   {megapixels:.1f} MP"
+
+
+def _pixel(editor: Editor) -> str:
+    """Place and colour of the pixel under the pointer, where single pixels are looked at."""
+    color, pointer = editor.view.color, editor.pointer
+    if color is None or pointer is None:
+        return ""
+    x, y = editor.view.image_from_canvas(pointer.xy)
+    code = "".join(f"{value:02X}" for value in color)
+    return f"{int(x)}, {int(y)}   #{code}   ·   "
+
+
+def _facts_width(editor: Editor) -> float:
+    return imgui.calc_text_size(_facts(editor)).x
+
+
+def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_colored(theme.vec("secondary"), _facts(editor))
+
+
+def _shown_job(editor: Editor) -> Job | Chore | None:
+    """What the user waits for most: what opens, before what is computed."""
+    chore, job = editor.chores.shown, editor.jobs.current
+    if chore is not None and (chore.kind != DOWNLOAD or job is None or job.is_quiet):
+        return chore
+    return None if job is None or job.is_quiet else job
+
+
+def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
+    """Name, bar, share and Cancel; the left end of what it drew."""
+    job = _shown_job(editor)
+    if job is None or time.monotonic() - job.started < JOB_DELAY:
+        return right
+    side = rect.height - theme.pt(4)
+    text = job.title if not job.note else f"{job.title}: {job.note}"
+    share = f"{100 * job.fraction:.0f} %"
+    gap = theme.pt(8)
+    x = right - theme.pt(16) - side
+    imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
+    if icon_button(Icon.CLOSE, "cancel", t("Cancel the job"), None, side / theme.scale):
+        (editor.jobs if isinstance(job, Job) else editor.chores).cancel(job.kind)
+    x -= imgui.calc_text_size("100 %").x + gap
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_unformatted(share)
+    x -= theme.pt(BAR) + gap
+    middle = rect.y + rect.height / 2
+    _draw_bar(rect.x + x, middle, job.fraction)
+    x -= imgui.calc_text_size(text).x + gap
+    imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
+    imgui.text_unformatted(text)
+    return x - 2 * gap
+
+
+def _draw_bar(x: float, middle: float, fraction: float) -> None:
+    draw = imgui.get_window_draw_list()
+    half = theme.pt(BAR_HEIGHT) / 2
+    width = theme.pt(BAR)
+    top, bottom = middle - half, middle + half
+    draw.add_rect_filled(ImVec2(x, top), ImVec2(x + width, bottom), theme.u32("pressed"), half)
+    filled = max(width * min(max(fraction, 0.0), 1.0), 2 * half)
+    draw.add_rect_filled(ImVec2(x, top), ImVec2(x + filled, bottom), theme.u32("accent"), half)
+
+
+def _draw_text(editor: Editor, rect: Rect, hint: str, right: float) -> None:
+    """The message until something else is done, else the hint."""
+    message, share = fades.shown("message", editor.message)
+    imgui.push_clip_rect(ImVec2(rect.x, rect.y), ImVec2(rect.x + right, rect.y + rect.height), True)
+    imgui.set_cursor_pos(ImVec2(theme.pt(12), _line_y(rect)))
+    if message is None:
+        shown = _whole_parts(hint, right - theme.pt(12))
+        imgui.text_colored(theme.vec("secondary"), shown)
+        mark(shown)
+    else:
+        role = "error" if message.is_error else "text"
+        icon = Icon.WARNING if message.is_error else Icon.INFO
+        imgui.text_colored(theme.vec(role if message.is_error else "accent", share), icon)
+        imgui.same_line(0, theme.pt(6))
+        imgui.text_colored(theme.vec(role, share), message.text)
+        if message is editor.message and (message.is_error or message.action is not None):
+            _draw_buttons(editor, message)
+    imgui.pop_clip_rect()
+
+
+def _whole_parts(hint: str, room: float) -> str:
+    """As many of a hint's parts as have room (window units), or of the first one's words."""
+    while imgui.calc_text_size(hint).x > room and " · " in hint:
+        hint = hint.rpartition(" · ")[0]
+    if imgui.calc_text_size(hint).x <= room:
+        return hint
+    words = hint.split(" ")
+    while words and imgui.calc_text_size(" ".join(words) + "…").x > room:
+        words.pop()
+    return " ".join(words) + "…" if words else ""
+
+
+def _draw_buttons(editor: Editor, message: Message) -> None:
+    """What can be done about the message: what mends it first."""
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(8, 2))
+    imgui.same_line(0, theme.pt(12))
+    top = imgui.get_cursor_pos_y() - theme.pt(2)  # the buttons' texts stand on the line
+    if message.action is not None:
+        imgui.set_cursor_pos_y(top)
+        if imgui.button(message.action.label):
+            editor.message = None
+            message.action.run()
+        imgui.same_line(0, theme.pt(8))
+    if message.details:
+        imgui.set_cursor_pos_y(top)
+        if imgui.button(t("Details")):
+            imgui.set_clipboard_text(without_names(message.details))
+            editor.say(t("The details are in the clipboard"))
+        tooltip(t("Copies this:") + "\n" + message.details[-600:])
+        imgui.same_line(0, theme.pt(8))
+    imgui.set_cursor_pos_y(top)
+    if imgui.button(t("Dismiss")) and editor.message is message:
+        editor.message = None
+    imgui.pop_style_var()

@@ -1,0 +1,149 @@
+"""Draws rendered objects, premultiplied, over the photo."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import moderngl
+import numpy as np
+
+from ..canvas.layers import Layer
+from ..editor.view import View
+from .blend_texture import BLEND, blend_cells
+from .grain_textures import GrainTextures
+from .photo_pass import hatch_uniforms
+from .scene import Scene, SplatObject
+from .shaders import Programs, set_uniforms
+
+if TYPE_CHECKING:
+    from objectmorpher_core.compose.light.relight import Relit
+
+    from .splat_pass import SplatPicture
+
+LAYER, MARKS, RELIT, AMOUNTS, NOISE, DEVIATIONS = (0, 1, 2, 4, 5, 6)  # texture units
+_UNITS = {
+    "layer": LAYER, "marks": MARKS, "relit": RELIT, "blend": BLEND,
+    "amounts": AMOUNTS, "grain": NOISE, "deviations": DEVIATIONS,
+}  # fmt: skip
+TINT = 0.6  # opacity
+
+
+class LayerPass:
+    """One rectangle an object. Textures are replaced when the layer is not the last one."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
+        self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
+        self._factors: moderngl.Texture | None = None
+        self._grain = GrainTextures(context)
+
+    def draw(self, scene: Scene, view: View) -> None:
+        """Into the current viewport, which is the canvas."""
+        between = tuple(item for item in scene.objects if isinstance(item, Layer))
+        self._forget(scene.shades + scene.layers + between)
+        for layer in scene.shades + scene.layers:
+            self.draw_layer(layer, scene, view)
+
+    def draw_layer(self, layer: Layer, scene: Scene, view: View) -> None:
+        """One of them, over what is there."""
+        for unit, texture in self._textures(layer).items():
+            texture.use(unit)
+        is_over = layer.is_tint or layer.is_weighed
+        marks = scene.refined if layer.is_weighed else scene.marks
+        defines = _defines(scene, marks is not None and layer.invented is not None, is_over)
+        program, quad = self._programs(*defines)
+        set_uniforms(program, box=layer.box, **_appearance(layer), **hatch_uniforms(marks, view))
+        self._render(program, quad, scene, view)
+
+    def draw_picture(
+        self, picture: SplatPicture, item: SplatObject, scene: Scene, view: View
+    ) -> None:
+        """A picture of the whole canvas that is on the GPU already."""
+        picture.color.use(LAYER)
+        is_marked = item.is_marked and picture.detail is not None and scene.marks is not None
+        if picture.detail is not None:
+            picture.detail.use(MARKS)
+        defines = ["DETAIL", *_defines(scene, is_marked, item.is_tint)]
+        values = _appearance(item) | hatch_uniforms(scene.marks, view)
+        if item.relit is not None:
+            defines.append("HAS_RELIT")
+            values["relit_box"] = self._use_factors(item.relit, view)
+        if item.grain is not None:
+            defines.append("HAS_GRAIN")
+            values |= self._grain.use(item.grain, view, (AMOUNTS, NOISE, DEVIATIONS))
+        program, quad = self._programs(*defines)
+        set_uniforms(program, box=(0, 0, view.width, view.height), **values)
+        self._render(program, quad, scene, view)
+
+    def _use_factors(self, relit: Relit, view: View) -> tuple[float, float, float, float]:
+        """Uploads them, with nothing around them; where on the canvas they lie."""
+        factors = np.pad(relit.factor, 1)
+        if self._factors is not None:
+            self._factors.release()
+        self._factors = self._upload(factors[..., None])
+        self._factors.filter = moderngl.LINEAR, moderngl.LINEAR
+        self._factors.repeat_x = self._factors.repeat_y = False
+        self._factors.use(RELIT)
+        corner = np.array([relit.left, relit.top]) - relit.pitch
+        low = view.canvas_from_image(corner)
+        high = view.canvas_from_image(corner + relit.pitch * np.array(factors.shape[::-1]))
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    def _render(
+        self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: View
+    ) -> None:
+        set_uniforms(
+            program,
+            canvas=(view.width, view.height),
+            photo_box=photo_box(scene, view),
+            cells=blend_cells(scene),
+            split=scene.split * view.width,
+        )
+        self._context.enable(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        quad.render(moderngl.TRIANGLE_STRIP, 4)
+        self._context.disable(moderngl.BLEND)
+
+    def _forget(self, layers: tuple[Layer, ...]) -> None:
+        """Releases what is not shown any more."""
+        kept = {id(layer.rgba) for layer in layers}
+        for key in [key for key in self._uploaded if key not in kept]:
+            for texture in self._uploaded.pop(key)[1].values():
+                texture.release()
+
+    def _textures(self, layer: Layer) -> dict[int, moderngl.Texture]:
+        """The layer's textures by their unit."""
+        key = id(layer.rgba)  # it stays the same where the light changes
+        if key not in self._uploaded:
+            textures = {LAYER: self._upload(layer.pixels)}
+            if layer.invented is not None:
+                textures[MARKS] = self._upload(layer.invented[..., None])
+            near = moderngl.LINEAR if layer.is_coarse else moderngl.NEAREST
+            for texture in textures.values():
+                texture.filter = near, near
+                texture.repeat_x = texture.repeat_y = False
+            self._uploaded[key] = (layer, textures)
+        return self._uploaded[key][1]
+
+    def _upload(self, pixels: np.ndarray) -> moderngl.Texture:
+        height, width, channels = pixels.shape
+        kind, data = "f1" if pixels.dtype == np.uint8 else "f4", np.ascontiguousarray(pixels)
+        return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
+
+
+def _appearance(thing: Layer | SplatObject) -> dict[str, Any]:
+    return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
+
+
+def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:
+    """What of the shaders is needed: a tint lies over photo and edit alike."""
+    defines = ["HAS_MARKS"] if is_marked else []
+    return defines + (["HAS_BLEND"] if scene.blend is not None and not is_over else [])
+
+
+def photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
+    """The photo on the canvas: what lies beyond it is not exported."""
+    height, width = scene.photo.shape[:2]
+    (x0, y0), (x1, y1) = view.canvas_from_image(np.array([[0, 0], [width, height]]))
+    return float(x0), float(y0), float(x1), float(y1)

@@ -1,0 +1,168 @@
+"""Gaussians onto the screen, once each: shaders/splat_project.vert by transform feedback.
+
+What does not change lies on the GPU; of a frame come the table of control points, a few matrices
+and, where the Gaussians have to be sorted, their order. The results are the instances that the
+other passes draw.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.deform.binding import Binding
+from objectmorpher_core.deform.jacobians import LEAST_STRETCH, MOST_STRETCH
+from objectmorpher_core.deform.skinning import Motion, Skin, Skinned, nodes_of
+from objectmorpher_core.raster import posed
+from objectmorpher_core.raster.posed import PosedSplats, RestSplats
+from objectmorpher_core.raster.rules import RULES
+
+from .gpu_memory import Stream, Uploads
+from .instances import Columns, Instances
+from .shaders import buffer_layout, build_feedback, set_uniforms
+
+PLAIN: Columns = (("p_centre", "4f"), ("p_kernel", "4f"), ("p_axes", "4f"), ("p_color", "4f"))
+LAYERED: Columns = (
+    *PLAIN, ("p_depth", "4f"), ("p_shift", "4f"), ("p_slope", "4f"), ("p_edge", "2f"),
+)  # fmt: skip
+
+GEOMETRY = (("place", "4f"), ("quat", "4f"), ("size", "4f"), ("normal", "4f"), ("look", "3f"))
+PAINT = (("paint", "4f"),)
+NODES = (("control_points", "4i"),)
+SHARES = tuple((f"share{c}", "4f") for c in range(4))
+GIVEN = (("shift_at", "3f"), ("grown0", "3f"), ("grown1", "3f"), ("grown2", "3f"))
+
+Uniforms = dict[str, Any]
+
+
+class ProjectPass:
+    """Projects one object after the other."""
+
+    def __init__(self, context: moderngl.Context, uploads: Uploads) -> None:
+        self._context, self._uploads = context, uploads
+        self._programs: dict[tuple[str, bool], moderngl.Program] = {}
+        self._order, self._given = Stream(context), Stream(context)
+        self._nodes = context.texture((2, 1), 4, dtype="f4")
+        self._plain, self._layered = Instances(context, PLAIN), Instances(context, LAYERED)
+
+    def draw(
+        self, splats: PosedSplats, camera: Camera, photo_camera: Camera, order: np.ndarray | None
+    ) -> Instances:
+        """All Gaussians, or the rows `order` (M,) u32 in that order, without what layers need."""
+        count = len(splats) if order is None else len(order)
+        instances = self._layered if order is None else self._plain
+        output = instances.reserve(count)
+        if count == 0:
+            return instances
+        motion = splats.motion
+        name = "skin" if isinstance(motion, Skin) else "none" if motion is None else "given"
+        program = self._program(name, order is None)
+        uniforms = _uniforms(splats, camera, photo_camera)
+        content = self._rest(program, splats.rest, photo_camera)
+        if isinstance(motion, Skin):
+            content += self._bound(program, motion.binding)
+            uniforms |= self._moved(motion.motion)
+        elif isinstance(motion, Skinned):
+            self._given.write(_table_given(splats.rest, motion))
+            content.append(buffer_layout(program, self._given.buffer, GIVEN))
+        set_uniforms(program, **uniforms)
+        if order is not None:
+            self._order.write(order)
+        index = None if order is None else self._order.buffer
+        array = self._context.vertex_array(program, content, index_buffer=index)
+        array.transform(output, moderngl.POINTS, vertices=count)
+        array.release()
+        return instances
+
+    def _program(self, motion: str, is_layered: bool) -> moderngl.Program:
+        key = (motion, is_layered)
+        if key not in self._programs:
+            names = [name for name, _ in (LAYERED if is_layered else PLAIN)]
+            self._programs[key] = build_feedback(
+                self._context, "splat_project.vert", names, MOTION=f"motion_{motion}.glsl"
+            )
+            stretches = (LEAST_STRETCH, MOST_STRETCH)
+            set_uniforms(self._programs[key], **RULES._asdict(), nodes=0, stretches=stretches)
+        return self._programs[key]
+
+    def _rest(self, program: moderngl.Program, rest: RestSplats, photo: Camera) -> list[Any]:
+        """What does not depend on the motion. A painted object shares all but its colours."""
+        uploads, buffer = self._uploads, self._context.buffer
+        geometry = uploads("geometry", rest.means, lambda: buffer(_table_geometry(rest, photo)))
+        paint = uploads("paint", rest, lambda: buffer(_table_paint(rest)))
+        return [
+            buffer_layout(program, geometry, GEOMETRY),
+            buffer_layout(program, paint, PAINT),
+        ]
+
+    def _bound(self, program: moderngl.Program, binding: Binding) -> list[Any]:
+        uploads, buffer = self._uploads, self._context.buffer
+        nodes = uploads("nodes", binding, lambda: buffer(binding.control_points))
+        shares = uploads("shares", binding, lambda: buffer(_table_shares(binding)))
+        return [buffer_layout(program, nodes, NODES), buffer_layout(program, shares, SHARES)]
+
+    def _moved(self, motion: Motion) -> Uniforms:
+        """The table of control points is uploaded."""
+        table, frame = nodes_of(motion)
+        if self._nodes.height != len(table):
+            self._nodes.release()
+            self._nodes = self._context.texture((2, len(table)), 4, dtype="f4")
+            self._nodes.filter = moderngl.NEAREST, moderngl.NEAREST
+        self._nodes.write(np.ascontiguousarray(table, np.float32))
+        self._nodes.use(0)
+        return {"centre": tuple(frame[0]), "drift": tuple(frame[1])}
+
+
+def _uniforms(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Uniforms:
+    """Kind of asset, cameras, and the placement as what it adds to the rest."""
+    rest, kind = splats.rest, splats.rest.splatting
+    at_rest, placed = rest.world_from_object, splats.world_from_object
+    added = placed - at_rest
+    return {
+        **kind._asdict(), "low_pass": kind.filter, "is_layered": splats.is_layered,
+        "rest_linear": _columns(at_rest), "rest_offset": tuple(at_rest[:3, 3]),
+        "linear": _columns(placed), "turn": _columns(added), "slide": tuple(added[:3, 3]),
+        "scale": splats.scale, "nearest": RULES.near * splats.gap,
+        "view": (camera.focal, camera.cx, camera.cy), "photo_focal": photo_camera.focal,
+        "limits": posed.view_limits(photo_camera),
+    }  # fmt: skip
+
+
+def _columns(matrix: np.ndarray) -> tuple[float, ...]:
+    """The linear part of a (4, 4) matrix as GLSL takes it, column by column."""
+    return tuple(matrix[:3, :3].T.ravel().tolist())
+
+
+def _table_geometry(rest: RestSplats, photo_camera: Camera) -> F32:
+    """(N, 19), see GEOMETRY."""
+    gaussians, texture = rest.lifted.gaussians, rest.lifted.texture
+    seen_at = photo_camera.project(rest.lifted.world_points(rest.means))
+    return np.column_stack(
+        [
+            rest.means, gaussians.opacities, gaussians.quats, gaussians.scales, rest.cosines,
+            gaussians.normals, texture.visibility, texture.u0 - seen_at, texture.solidity,
+        ]
+    ).astype(np.float32)  # fmt: skip
+
+
+def _table_paint(rest: RestSplats) -> F32:
+    """(N, 4), see PAINT."""
+    return np.column_stack([rest.lifted.gaussians.colors, rest.zoom]).astype(np.float32)
+
+
+def _table_shares(binding: Binding) -> F32:
+    """(N, 16), see SHARES."""
+    shares = np.concatenate([binding.weights[:, :, None], binding.weight_gradients], axis=2)
+    return shares.reshape(len(shares), -1).astype(np.float32)
+
+
+def _table_given(rest: RestSplats, motion: Skinned) -> F32:
+    """(N, 12), see GIVEN."""
+    grown = (motion.linear - np.eye(3)).transpose(0, 2, 1)
+    return np.concatenate(
+        [motion.points - rest.means, grown.reshape(len(grown), 9)], axis=1
+    ).astype(np.float32)  # fmt: skip

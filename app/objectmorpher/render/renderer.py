@@ -1,0 +1,163 @@
+"""The passes in their order."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+from objectmorpher_core.base.arrays import U8
+
+from ..canvas.layers import Layer
+from ..editor.view import View
+from .blend_texture import BlendTexture
+from .defocus_pass import DefocusPass
+from .kept_canvas import KeptCanvas, Place
+from .layer_pass import LayerPass
+from .photo_pass import PhotoPass
+from .scene import Colour, Scene, SplatObject
+from .still_view import StillView
+from .textures import PictureTexture
+
+if TYPE_CHECKING:
+    from .splat_pass import SplatPass, SplatPicture
+
+log = logging.getLogger(__name__)
+
+Viewport = tuple[int, int, int, int]  # left, bottom, width, height of the canvas, framebuffer px
+
+SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")
+
+
+class Renderer:
+    """Draws scenes into the canvas's part of the window whose GL context is current."""
+
+    def __init__(self, wanted: str) -> None:
+        """`wanted`: "gl", "tiles" or "auto" (tiles where OpenGL is emulated)."""
+        context = moderngl.create_context(require=330)
+        self.gl_name = str(context.info["GL_RENDERER"])
+        self._is_emulated = any(word in self.gl_name.lower() for word in SOFTWARE)
+        self.kind = ("tiles" if self._is_emulated else "gl") if wanted == "auto" else wanted
+        self._context = context
+        self._blend = BlendTexture(context)
+        self._photo_pass = PhotoPass(context)
+        self._layer_pass = LayerPass(context)
+        self._defocus_pass = DefocusPass(context)
+        self._splat_pass: SplatPass | None = None
+        self._kept, self._still = KeptCanvas(context), StillView()
+        self._target = context.screen
+        self._surround: Colour = (0.0, 0.0, 0.0)
+        self._size = (1, 1)
+        log.info("OpenGL by %s; objects drawn by %s", self.gl_name, self.kind)
+
+    def rehearse(self) -> None:
+        """Loads what the first drag needs; in a thread, it touches no OpenGL."""
+        if self._is_emulated:
+            from .flattening import rehearse
+
+            rehearse()
+
+    def begin(self, color: Colour, size: tuple[int, int]) -> None:
+        """Begins a frame of `size` px; `color` is the window's where no scene is."""
+        self._surround, self._size = color, size
+        self._target = self._context.screen
+
+    def clear(self) -> None:
+        """The whole window in its colour."""
+        self._use((0, 0, self._size[0], self._size[1]))
+        self._target.clear(*self._surround, 1.0)
+
+    def draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+        """The whole window: the scene in `viewport`, its colour around it."""
+        kept = self._kept
+        place = (self._surround, self._size, viewport, view.place, view.scale)
+        if not kept.shows(scene, place):
+            if (flat := self._flat(scene, view, viewport, place)) is not None:
+                kept.write(flat, viewport)
+            else:
+                self._target = kept.begin(self._size, self._surround)
+                self._draw(scene, view, viewport)
+                self._target = self._context.screen
+        assert kept.buffer is not None
+        self._context.copy_framebuffer(self._target, kept.buffer)
+        self._use(viewport)
+
+    def _flat(self, scene: Scene, view: View, viewport: Viewport, place: Place) -> U8 | None:
+        """The canvas by the processor, where that is faster; None where it is not."""
+        if not self._is_emulated:
+            return None
+        return self._still.flat(
+            scene, view, place, lambda under: self._read_canvas(under, view, viewport)
+        )
+
+    def _read_canvas(self, scene: Scene, view: View, viewport: Viewport) -> U8:
+        """A scene drawn by the shaders, (h, w, 4) u8, upright."""
+        buffer = self._target = self._kept.begin(self._size, self._surround)
+        self._draw(scene, view, viewport)
+        self._target = self._context.screen
+        data = buffer.read(viewport=viewport, components=4, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(view.height, view.width, 4)[::-1].copy()
+
+    def _draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+        """Into the target."""
+        self._use(viewport)
+        self._blend.use(scene)
+        self._photo_pass.draw(scene, view)
+        self._layer_pass.draw(scene, view)
+        for item in scene.objects:
+            if isinstance(item, Layer):
+                self._layer_pass.draw_layer(item, scene, view)
+                continue
+            picture = self._render(item, view)
+            if picture is not None:
+                if item.blur > 0 and not item.is_marked:
+                    picture = self._defocus_pass.draw(picture, item.blur * view.zoom)
+                self._use(viewport)
+                self._blend.use(scene)
+                self._layer_pass.draw_picture(picture, item, scene, view)
+        if self._splat_pass is not None:
+            self._splat_pass.sweep()
+
+    def _render(self, item: SplatObject, view: View) -> SplatPicture | None:
+        """The object's picture on the GPU; from the first failure on the processor makes them."""
+        if self.kind != "gl":
+            return None
+        try:
+            camera = view.camera(item.camera)
+            return self._splats().draw(item.splats, item.texture, camera, item.camera)
+        except moderngl.Error as error:
+            self.kind = "tiles"
+            reason = str(error).strip().partition("\n")[0]
+            log.error("OpenGL cannot draw the object: %s; the processor does from now on", reason)
+            return None
+
+    def picture(self, pixels: np.ndarray) -> PictureTexture:
+        """A picture for the interface, on the GPU; see `PictureTexture.upload`."""
+        picture = PictureTexture(self._context)
+        picture.upload(pixels)
+        return picture
+
+    def read(self, size: tuple[int, int]) -> np.ndarray:
+        """The window's pixels, (h, w, 3) u8, upright."""
+        data = self._context.screen.read(viewport=(0, 0, *size), components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
+
+    def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
+        """One of the window's pixels, u8."""
+        data = self._context.screen.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
+        return data[0], data[1], data[2]
+
+    def _use(self, viewport: Viewport) -> None:
+        self._target.use()
+        self._context.viewport = viewport
+        self._context.enable_only(moderngl.NOTHING)
+
+    def _splats(self) -> SplatPass:
+        """Made for the first object: its module needs the compiler."""
+        if self._splat_pass is None:
+            from .splat_pass import SplatPass
+
+            self._splat_pass = SplatPass(self._context)
+        return self._splat_pass

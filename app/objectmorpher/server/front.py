@@ -1,0 +1,210 @@
+"""The server's HTTP side: who may ask, how much, and for what. It runs nothing itself.
+
+    GET  /v1/hello           what is served, as JSON
+    PUT  /v1/blobs/SHA256    a large array, once
+    POST /v1/jobs/NAME       the arguments; the answer is lines of JSON while the job waits and
+                             runs, and after {"state": "done", "bytes": N} the N bytes of the answer
+
+A line comes at least every BEAT seconds, so that both sides notice within a moment that the other
+one is gone: then the job is stopped, or done elsewhere. Closing the connection is how one cancels.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import queue
+import threading
+from dataclasses import dataclass
+from functools import partial
+from http import HTTPStatus
+from typing import Any, ClassVar
+
+from objectmorpher_core.base.limits import CONNECTIONS as MOST_CONNECTIONS
+from objectmorpher_core.base.limits import KEPT_BYTES as BLOB_LIMIT
+from objectmorpher_core.base.limits import REQUEST_BYTES as BODY_LIMIT
+from objectmorpher_core.base.limits import WAITING_JOBS as MOST_JOBS
+from objectmorpher_core.base.progress import Cancelled
+
+from .. import __version__
+from .address import PROTOCOL
+from .blobs import Blobs
+from .http import Handler, HttpServer, Refusal
+from .message import MessageError, MissingError, decode, digest
+from .offers import told_offers
+from .running import Call, Outcome, Runner
+from .table import Table, types
+from .tokens import check_token, is_same
+
+log = logging.getLogger(__name__)
+
+BEAT = 0.1  # s between two lines
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much one may ask for."""
+
+    body: int = BODY_LIMIT
+    blobs: int = BLOB_LIMIT
+    connections: int = MOST_CONNECTIONS
+    jobs: int = MOST_JOBS
+
+
+class Front(HttpServer):
+    """Serves a table of job functions to whoever has the token."""
+
+    def __init__(
+        self, address: tuple[str, int], token: str, runner: Runner, table: Table,
+        limits: Limits = Limits(),
+    ) -> None:  # fmt: skip
+        """Raises OSError where the address is taken, TokenError."""
+        self.token, self.runner, self.table, self.limits = (
+            check_token(token), runner, table, limits,
+        )  # fmt: skip
+        self.blobs = Blobs(limits.blobs)
+        self.places = threading.BoundedSemaphore(limits.jobs)
+        super().__init__(address, partial(_Handler, self), limits.connections)
+
+
+class _Handler(Handler):
+    more_headers: ClassVar = {"X-Accel-Buffering": "no"}  # nginx hands each line on at once
+
+    def __init__(self, front: Front, *connection: Any) -> None:
+        self.front = front
+        super().__init__(*connection)
+
+    def do_GET(self) -> None:
+        self.answer(self._get)
+
+    def do_PUT(self) -> None:
+        self.answer(self._put)
+
+    def do_POST(self) -> None:
+        self.answer(self._post)
+
+    def admit(self) -> None:
+        """Refuses whoever has not the token."""
+        scheme, _, token = self.headers.get("Authorization", "").partition(" ")
+        # Latin-1 is how http.server reads headers; what is not ASCII cannot be a token.
+        if scheme != "Bearer" or not is_same(token.strip(), self.front.token):
+            raise Refusal(HTTPStatus.UNAUTHORIZED, "the token is missing or wrong")
+
+    def _get(self) -> None:
+        if self.path != "/v1/hello":
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+        self.send_json(HTTPStatus.OK, {
+            "product": "objectmorpher", "version": __version__, "protocol": PROTOCOL,
+            "stages": self.front.runner.stages(), "functions": sorted(self.front.table),
+            "backends": told_offers(self.front.runner.offers()),
+        })  # fmt: skip
+
+    def _put(self) -> None:
+        _, folder, name = ("", *self.path.removeprefix("/v1/").split("/"), "")[:3]
+        if folder != "blobs" or len(name) != 64:
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+        body = self.read_body(self.front.limits.body)
+        if digest(body) != name:
+            raise Refusal(HTTPStatus.BAD_REQUEST, "the bytes are not those of that name")
+        self.front.blobs.add(name, body)
+        self.send_json(HTTPStatus.CREATED, {})
+
+    def _post(self) -> None:
+        name = self.path.removeprefix("/v1/jobs/")
+        served = self.front.table.get(name)
+        if served is None:
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is no such function")
+        body = self.read_body(self.front.limits.body)
+        try:
+            blobs = self._blobs(body)
+            backend = served.backend(served.checked(decode(body, types(), blobs)))
+        except MissingError as error:
+            raise Refusal(HTTPStatus.CONFLICT, str(error), missing=error.digests) from error
+        except MessageError as error:
+            raise Refusal(HTTPStatus.BAD_REQUEST, str(error)) from error
+        if not self.front.places.acquire(blocking=False):
+            raise Refusal(HTTPStatus.SERVICE_UNAVAILABLE, "too many jobs wait already")
+        try:
+            _Conversation(self, Call(name, body, blobs, backend)).hold()
+        finally:
+            self.front.places.release()
+
+    def _blobs(self, body: bytes) -> dict[str, bytes]:
+        """The large arrays that a message names; raises MissingError."""
+        try:
+            decode(body, types())
+        except MissingError as error:
+            found = self.front.blobs.found(error.digests)
+            lacking = tuple(name for name in error.digests if name not in found)
+            if lacking:
+                raise MissingError(lacking) from error
+            return found
+        return {}
+
+
+class _Conversation:
+    """One job: its progress told line by line, its answer, and its end with the connection's."""
+
+    def __init__(self, handler: _Handler, call: Call) -> None:
+        self._handler, self._call = handler, call
+        self._stop = threading.Event()
+        self._said: queue.SimpleQueue[tuple[float, str]] = queue.SimpleQueue()
+        self._outcome: Outcome | None = None
+        self._done = threading.Event()
+
+    def hold(self) -> None:
+        """Until the answer is sent, or nobody listens any more and the job has stopped."""
+        kind, headers = "application/octet-stream", {"Cache-Control": "no-store"}
+        self._handler.send_head(HTTPStatus.OK, kind, headers)
+        thread = threading.Thread(target=self._run, daemon=True)
+        thread.start()
+        try:
+            state: dict[str, Any] = {"state": "waiting"}
+            while not self._done.wait(BEAT):
+                state = self._newest(state)
+                self._line(state)
+                if self._handler.front.is_closing.is_set():
+                    return
+            self._finish()
+        except OSError:
+            log.info("%s: nobody listens any more", self._call.name)
+        finally:
+            self._stop.set()
+            thread.join()  # its place is taken until it has stopped
+
+    def _newest(self, state: dict[str, Any]) -> dict[str, Any]:
+        while not self._said.empty():
+            fraction, note = self._said.get()
+            state = {"state": "running", "fraction": fraction, "note": note}
+        return state
+
+    def _finish(self) -> None:
+        outcome = self._outcome
+        if outcome is None:
+            self._line({"state": "cancelled"})
+        elif outcome.error:
+            is_expected = outcome.is_expected
+            self._line({"state": "failed", "error": outcome.error, "is_expected": is_expected})
+        else:
+            self._line({"state": "done", "bytes": len(outcome.body)})
+            self._handler.wfile.write(outcome.body)
+
+    def _line(self, value: Any) -> None:
+        self._handler.wfile.write(json.dumps(value).encode() + b"\n")
+
+    def _run(self) -> None:
+        front = self._handler.front
+        served = front.table[self._call.name]
+        try:
+            tell = self._tell
+            self._outcome = front.runner.run(self._call, served, tell, self._stop)
+        except Cancelled:
+            pass
+        except Exception as error:
+            log.exception("%s cannot be run", self._call.name)
+            self._outcome = Outcome(error=str(error) or type(error).__name__)
+        finally:
+            self._done.set()
+
+    def _tell(self, fraction: float, note: str) -> None:
+        self._said.put((fraction, note))

@@ -1,0 +1,64 @@
+"""Which backends a server can run, and which of them "auto" is there."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..editor.settings import AUTO
+from ..worker.stages import STAGES, by_stage
+
+MOST_NAMES = 64  # of a stage's backends that a server may name
+MOST_LETTERS = 48
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What can be asked for of a stage."""
+
+    auto: str  # the backend that "auto" is; empty: none can run
+    able: tuple[str, ...]
+
+    def deployed(self, backend: str) -> str:
+        """Whose processes do what `backend` is asked to do: a model's own id is its family's."""
+        from objectmorpher_core.models import hub_models
+
+        families = {model.id: model.family for model in hub_models()}
+        for name in (backend, families.get(backend, "")):
+            if name in self.able:
+                return name
+        return self.auto or AUTO  # which says why it cannot be done
+
+
+Offers = dict[str, Offer]  # by stage
+
+
+def look_at_offers() -> Offers:
+    """Of the machine that this runs on; may load PyTorch, to ask for a GPU."""
+    from objectmorpher_core import doctor
+
+    found = by_stage(doctor.look_at_stages())
+    return {stage: Offer(looked.auto, looked.able) for stage, looked in found.items()}
+
+
+def told_offers(offers: Offers) -> dict[str, Any]:
+    """As JSON."""
+    return {stage: asdict(offer) for stage, offer in offers.items()}
+
+
+def read_offers(told: Any) -> Offers:
+    """What a server says that it can run; what is of another form is left out."""
+    if not isinstance(told, dict):
+        return {}
+    return {stage: _offer(told[stage]) for stage in STAGES if isinstance(told.get(stage), dict)}
+
+
+def _offer(told: dict[str, Any]) -> Offer:
+    auto, able = told.get("auto"), told.get("able")
+    names = able[:MOST_NAMES] if isinstance(able, list) else []
+    fitting = tuple(name for name in names if _is_name(name))
+    return Offer(next((name for name in fitting if name == auto), ""), fitting)
+
+
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and 0 < len(value) <= MOST_LETTERS and value.isprintable()

@@ -1,0 +1,79 @@
+"""What runs a served function for the front: a process of its own, or a cluster."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from objectmorpher_core.base.progress import Cancelled, Progress
+
+from ..editor.settings import AUTO
+from ..worker.job_error import JobError
+from .message import MessageError, decode, encode
+from .offers import Offers
+from .table import Served, types
+
+
+@dataclass(frozen=True)
+class Call:
+    """A request that was looked at, as it came over the wire."""
+
+    name: str  # of the table
+    body: bytes
+    blobs: Mapping[str, bytes]
+    backend: str = AUTO  # which is asked
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The answer's bytes, or why there is none."""
+
+    body: bytes = b""
+    error: str = ""  # one sentence
+    is_expected: bool = False  # the request was at fault, not the server
+
+
+class Runner(Protocol):
+    """Runs one call after the other, or several at a time."""
+
+    def stages(self) -> dict[str, int]:
+        """Stage -> how many calls of it, for one backend, may run at a time."""
+        ...
+
+    def offers(self) -> Offers:
+        """Which backends can run."""
+        ...
+
+    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> Outcome:
+        """Blocks until the outcome is there. Raises Cancelled soon after `stop` is set."""
+        ...
+
+    def close(self) -> None:
+        """Ends what was started."""
+        ...
+
+
+def perform(
+    call: Call, served: Served, tell: Callable[[float, str], None], is_stopped: Callable[[], bool]
+) -> Outcome:
+    """Runs a call here. Raises Cancelled."""
+
+    def progress(fraction: float, note: str) -> None:
+        if is_stopped():
+            raise Cancelled
+        tell(float(fraction), str(note))
+
+    try:
+        arguments: Any = served.checked(decode(call.body, types(), call.blobs))
+        answer = served.function(*arguments, progress=progress)
+        return Outcome(encode(answer, types()).body)
+    except Cancelled:
+        raise
+    except MessageError as error:
+        return Outcome(error=str(error), is_expected=True)
+    except Exception as error:
+        told = JobError.of(error, call.name)
+        told.write_log(call.name)
+        return Outcome(error=told.sentence, is_expected=told.is_expected)

@@ -1,0 +1,89 @@
+"""Work on many machines by Ray Data: each worker takes a job after the other.
+
+A job is JSON, and so is its answer. A worker that is lost has answered nothing, and Ray gives its
+job to another one: a job leaves its results whole or not at all, and one that is done again does
+no harm. Every machine has this program, and sees all files under the same names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from ..cli.terminal import FAILURES, failure_sentence
+
+HERE = "local"  # instead of an address: a Ray is started on this machine
+
+Job = dict[str, Any]  # plain JSON
+Perform = Callable[[Job], dict[str, Any]]  # a function of a module, so that workers find it
+
+
+class SpreadError(RuntimeError):
+    """The cluster is not there or gave up, or a job failed; one sentence."""
+
+
+def spread(perform: Perform, jobs: Sequence[Job], address: str) -> Iterator[dict[str, Any]]:
+    """The answers of `perform` on the cluster at `address`, as they come; "local" starts a Ray.
+
+    Raises SpreadError.
+    """
+    if not jobs:
+        return
+    import ray
+    from ray.exceptions import RayError
+
+    is_ours = not ray.is_initialized()
+    if is_ours:
+        try:
+            _start(address)
+        except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+            raise SpreadError(f"there is no Ray at {address}: {_line(error)}") from error
+    try:
+        for row in _rows(perform, jobs):
+            told = json.loads(row["told"])
+            if "failed" in told:
+                raise SpreadError(told["failed"])
+            yield told["answer"]
+    except RayError as error:
+        raise SpreadError(f"the cluster gave up: {_line(error)}") from error
+    finally:
+        if is_ours:
+            ray.shutdown()
+
+
+def _rows(perform: Perform, jobs: Sequence[Job]) -> Iterator[dict[str, Any]]:
+    import ray.data
+
+    context = ray.data.DataContext.get_current()
+    context.enable_progress_bars = False
+    context.execution_options.preserve_order = False
+    rows = [{"job": json.dumps(job)} for job in jobs]
+    # A block a job: what is lost with a worker is one job, and one is asked for at a time.
+    found = ray.data.from_items(rows, override_num_blocks=len(rows))
+    answered: Any = _answered  # Ray's types know no `fn_args`
+    return iter(found.map(answered, fn_args=(perform,), num_cpus=1).iter_rows())
+
+
+def _answered(row: dict[str, Any], perform: Perform) -> dict[str, Any]:
+    """In a worker: one job."""
+    try:
+        told = {"answer": perform(json.loads(row["job"]))}
+    except FAILURES as error:  # in its own words: Ray's would be a traceback
+        told = {"failed": failure_sentence(error)}
+    return {"told": json.dumps(told)}
+
+
+def _start(address: str) -> None:
+    import ray
+
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    if address == HERE:
+        ray.init(include_dashboard=False, log_to_driver=False)
+    else:
+        ray.init(address=address, log_to_driver=False)
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:300]

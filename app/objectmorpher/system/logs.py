@@ -1,0 +1,67 @@
+"""The log: what an artist would report, in a file beside the settings."""
+
+from __future__ import annotations
+
+import faulthandler
+import logging
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from typing import IO
+
+from ..editor.settings import settings_path
+
+log = logging.getLogger(__name__)
+
+FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+NAME = "objectmorpher.log"
+CRASHES = "objectmorpher-crashes.log"
+SIZE = 1_000_000  # bytes, after which a new file is begun; one old one is kept
+
+
+def log_path() -> Path:
+    """Where the log is."""
+    return settings_path().parent / NAME
+
+
+def start_log(folder: Path) -> None:
+    """Everything into `folder`/objectmorpher.log, warnings to the terminal too."""
+    terminal = logging.StreamHandler()
+    terminal.setLevel(logging.WARNING)
+    logging.basicConfig(format=FORMAT, level=logging.INFO, handlers=[terminal])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = RotatingFileHandler(folder / NAME, maxBytes=SIZE, backupCount=1)
+    except OSError as error:
+        log.warning("There is no log file: %s", error)
+        return
+    file.setFormatter(logging.Formatter(FORMAT))
+    logging.getLogger().addHandler(file)
+    note_crashes(folder)
+
+
+def note_crashes(folder: Path) -> None:
+    """Where this process is ended by a fault of native code, what its threads did is noted.
+
+    In a file of its own: it stays open, and the log's is replaced when it is full. What an
+    environment with PYTHONFAULTHANDLER asked for already is left as it is.
+    """
+    if faulthandler.is_enabled():
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / CRASHES
+        is_full = path.exists() and path.stat().st_size > SIZE
+        file = path.open("w" if is_full else "a", encoding="utf-8")
+    except OSError as error:
+        log.warning("Crashes are not noted: %s", error)
+        return
+    _noted[folder] = file
+    faulthandler.enable(file)
+
+
+def crash_folder() -> Path | None:
+    """Where this process notes crashes, for those that it starts; None if it does not."""
+    return next(iter(_noted), None)
+
+
+_noted: dict[Path, IO[str]] = {}  # open as long as the process: faulthandler has but its number

@@ -1,0 +1,234 @@
+"""The whole object: move, turn, scale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.document.model import Placement
+
+from ..system.texts import t
+from .gizmo import TURNS, Gizmo, gizmo
+from .pointer import SNAP, TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved, ignore, one_axis
+
+if TYPE_CHECKING:
+    from ..editor.editor import Editor
+
+REACH = 10.0  # points around a corner, or beside a ring, where a press takes it
+DEPTH_STEP = 0.05  # object diameters per notch of the wheel
+SCALE_SNAP = 0.1  # with Shift
+MIN_SCALE, MAX_SCALE = 0.02, 50.0
+OTHER = "other"  # another object, which a press takes instead
+SHAPES = {
+    "move": Shape.MOVE, OTHER: Shape.MOVE, "scale": Shape.SIZE, "depth": Shape.SIZE,
+    "horizon": Shape.HAND,
+}  # fmt: skip
+
+Change = Callable[[Pointer, float], Placement]  # of the pointer now, diameters by the wheel
+
+
+class PlaceTool:
+    """Drag an object to move it, a corner to scale, a ring to turn, elsewhere to turn freely."""
+
+    def press(self, editor: Editor, pointer: Pointer) -> Stroke:
+        part = self.part_at(editor, pointer)
+        if part is None or pointer.button is not Button.LEFT:
+            return ignore()
+        editor.hover = replace(editor.hover, part=part)
+        if part == "horizon":
+            return self._drag_horizon(editor, pointer)
+        if part == OTHER:
+            return self._take_other(editor, pointer)
+        return self._drag(editor, pointer, part)
+
+    def _take_other(self, editor: Editor, pointer: Pointer) -> Stroke:
+        """Another object becomes the current one and is moved; Esc takes both back."""
+        other = editor.objects.other_at(pointer.xy)
+        assert other is not None
+        restore = editor.objects.take(other)
+        editor.hover = replace(editor.hover, part="move", other=None)
+        return _with_way_back(self._drag(editor, pointer, "move"), restore)
+
+    def _drag(self, editor: Editor, first: Pointer, part: str) -> Stroke:
+        is_moved, away = False, 0.0
+        editor.placing.say_why_no_ground()
+        change = _CHANGES[part](editor, first)
+        while (pointer := (yield)).is_down:
+            is_moved = is_moved or has_moved(editor, first, pointer) or pointer.wheel != 0
+            away -= pointer.wheel * DEPTH_STEP
+            changed = change(pointer, away)  # also of a slip: which way along a ring it began
+            if is_moved:
+                editor.placing.move_to(changed)
+        editor.commit(_labels()[part] if is_moved else "")
+
+    def _drag_horizon(self, editor: Editor, first: Pointer) -> Stroke:
+        start, is_moved = editor.placing.horizon, False
+        while (pointer := (yield)).is_down:
+            is_moved = is_moved or has_moved(editor, first, pointer)
+            if is_moved:
+                editor.placing.drag_horizon(start + (pointer.y - first.y) / editor.view.zoom)
+        editor.commit(t("Move the horizon") if is_moved else "")
+
+    def part_at(self, editor: Editor, pointer: Pointer) -> str | None:
+        """What a press would take: what is drawn over the object comes before the object."""
+        shown = gizmo(editor)
+        if shown is None:
+            return None
+        reach = REACH * editor.view.scale
+        part = _handle_at(shown, pointer.xy, reach)
+        if part is not None:
+            return part
+        if editor.objects.other_at(pointer.xy) is not None:
+            return OTHER
+        if editor.posing.surface_at(pointer.xy) is not None:
+            return "move"
+        is_horizon = shown.horizon is not None and abs(pointer.y - shown.horizon) <= reach
+        return "horizon" if is_horizon else "turn"
+
+    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+        part = self.part_at(editor, pointer)
+        other = editor.objects.other_at(pointer.xy) if part == OTHER else None
+        editor.hover = replace(editor.hover, part=part, other=other)
+        return Shape.ARROW if part is None else SHAPES.get(part, Shape.TURN)
+
+    def hint(self, editor: Editor) -> str:
+        text = _hints().get(editor.hover.part or "")
+        return text or t("Drag the object to move it, a corner to scale it, a ring to turn it")
+
+
+def _handle_at(shown: Gizmo, xy: np.ndarray, reach: float) -> str | None:
+    """The corner, arrow or ring within reach of canvas px (2,)."""
+    if np.linalg.norm(shown.corners - xy, axis=1).min() <= reach:
+        return "scale"
+    if shown.arrow.gap(xy) <= reach:
+        return "depth"
+    gaps = {part: ring.gap(xy) for part, ring in shown.rings.items()}
+    nearest = min(gaps, key=gaps.__getitem__)
+    return nearest if gaps[nearest] <= reach else None
+
+
+def _with_way_back(stroke: Stroke, restore: Callable[[], None]) -> Stroke:
+    """The stroke; `restore` is called where it is aborted."""
+    is_over = False
+    try:
+        yield from stroke
+        is_over = True
+    finally:
+        if not is_over:
+            restore()
+
+
+def _move(editor: Editor, first: Pointer) -> Change:
+    """What was grabbed stays under the pointer; on the ground, what the object stands on."""
+    hold = editor.placing.hold(first.xy)
+
+    def change(now: Pointer, away: float) -> Placement:
+        delta = one_axis((now.xy - first.xy) / editor.view.zoom, now)
+        return hold.moved(delta, away)
+
+    return change
+
+
+def _depth(editor: Editor, first: Pointer) -> Change:
+    """The grabbed point of the arrow stays under the pointer: f r / z px from the centre."""
+    shown, hold = gizmo(editor), editor.placing.hold()
+    assert shown is not None
+    start = max(shown.arrow.along(first.xy), 1.0)
+
+    def change(now: Pointer, away: float) -> Placement:
+        ratio = start / max(shown.arrow.along(now.xy), 1.0)  # of the depths, now and at first
+        return hold.moved(np.zeros(2), (ratio - 1) * hold.point[2] / hold.unit + away)
+
+    return change
+
+
+def _scale(editor: Editor, first: Pointer) -> Change:
+    """By how much farther from the centre the corner was pulled."""
+    shown, start = gizmo(editor), editor.placing.placement
+    assert shown is not None and start is not None
+    reach = max(float(np.linalg.norm(first.xy - shown.centre)), 1.0)
+
+    def change(now: Pointer, away: float) -> Placement:
+        scale = start.scale * float(np.linalg.norm(now.xy - shown.centre)) / reach
+        if now.shift:
+            scale = round(scale / SCALE_SNAP) * SCALE_SNAP
+        scale = float(np.clip(scale, MIN_SCALE, MAX_SCALE))
+        return editor.placing.stood(replace(start, scale=scale, depth=start.depth + away))
+
+    return change
+
+
+def _along(part: str) -> Callable[[Editor, Pointer], Change]:
+    """Turns about one axis by the angle that the pointer goes along its ring."""
+    axis = TURNS.index(part)
+
+    def begin(editor: Editor, first: Pointer) -> Change:
+        shown, start = gizmo(editor), editor.placing.placement
+        assert shown is not None and start is not None
+        ring = shown.rings[part]
+        begun = last = ring.nearest(first.xy)
+
+        def change(now: Pointer, away: float) -> Placement:
+            nonlocal last
+            last = ring.followed(now.xy, last)
+            turn = list(start.turn)
+            turn[axis] += float(np.degrees(last - begun))
+            if now.shift:
+                turn[axis] = round(turn[axis] / SNAP) * SNAP
+            turn[axis] = wrapped(turn[axis])
+            changed = replace(start, turn=(turn[0], turn[1], turn[2]), depth=start.depth + away)
+            return editor.placing.stood(changed)
+
+        return change
+
+    return begin
+
+
+def _turn(editor: Editor, first: Pointer) -> Change:
+    """What faces the camera follows the pointer: to the right is a negative yaw (DESIGN 6)."""
+    start = editor.placing.placement
+    assert start is not None
+
+    def change(now: Pointer, away: float) -> Placement:
+        delta = one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now)
+        yaw, pitch, roll = start.turn
+        turn = (wrapped(yaw - delta[0]), wrapped(pitch + delta[1]), roll)
+        return editor.placing.stood(replace(start, turn=turn, depth=start.depth + away))
+
+    return change
+
+
+def wrapped(angle: float) -> float:
+    """The same direction in (-180, 180] degrees."""
+    return float(180.0 - (180.0 - angle) % 360.0)
+
+
+_CHANGES: dict[str, Callable[[Editor, Pointer], Change]] = {
+    "move": _move, "depth": _depth, "scale": _scale, "turn": _turn,
+    **{part: _along(part) for part in TURNS},
+}  # fmt: skip
+
+
+def _labels() -> dict[str, str]:
+    """What the steps are called."""
+    turn = t("Turn object")
+    return {
+        "move": t("Move object"), "depth": t("Move object in depth"), "scale": t("Scale object"),
+        "turn": turn, "yaw": turn, "pitch": turn, "roll": t("Roll object"),
+    }  # fmt: skip
+
+
+def _hints() -> dict[str, str]:
+    ring = t("Drag along the ring to turn the object · Shift turns in steps of 15°")
+    return {
+        OTHER: t("Click chooses this object · Drag moves it"),
+        "move": t("Drag moves the object · Wheel moves it in depth · Shift keeps one axis"),
+        "depth": t("Drag the arrow to bring the object nearer or farther"),
+        "scale": t("Drag a corner to scale the object · Shift scales in steps of 10 %"),
+        "yaw": ring, "pitch": ring, "roll": ring,
+        "turn": t("Drag turns the object in 3D · Shift keeps one axis"),
+        "horizon": t("Drag the horizon to where it is in the photo"),
+    }  # fmt: skip

@@ -1,0 +1,151 @@
+"""The Pose tool's strokes on handles: moving, turning, choosing by a box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher.tools.picture_line import along_line
+from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.rotations import turn_about, turn_matrix, vector_from_matrix
+
+from ..system.texts import t
+from .pointer import SNAP, TURN_SPEED, Pointer, Stroke, draw_box, has_moved, one_axis
+
+if TYPE_CHECKING:
+    from ..canvas.derived import Spot
+    from ..editor.editor import Editor
+
+DEPTH_STEP = 0.03  # object diameters per notch of the wheel
+STEADY = 5.0  # points around a handle within which the pointer has no direction
+SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Where the dragged handles were when the stroke began."""
+
+    spots: dict[int, Spot]
+    lines: dict[int, tuple[F64, F64]]  # place and normal (3,) each, world
+
+
+def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
+    """The selected handles follow the pointer, each at its own depth, which the wheel changes.
+
+    Shift keeps one axis of the picture, Alt moves along the surface's normal. A press that does
+    not move is a click: it chooses a handle that was there, or sets a new one.
+    """
+    posing = editor.posing
+    before = posing.selected
+    chosen = _chosen(before, handle, start.shift)
+    posing.select(*chosen)
+    held = Held({h: posing.spot(h) for h in chosen}, {h: posing.line(h) for h in chosen})
+    pointer, is_moved, depth = start, False, 0.0
+    while (pointer := (yield)).is_down:
+        depth -= pointer.wheel * DEPTH_STEP
+        was_moved = is_moved
+        is_moved = is_moved or has_moved(editor, start, pointer) or pointer.wheel != 0
+        if is_moved and not was_moved and is_new and start.alt:
+            posing.unpin(handle)  # Alt and no motion would have been a pin
+        if is_moved:
+            _follow(editor, held, start, pointer, depth)
+    if is_moved:
+        count = len(chosen)
+        posing.finish(t("Drag {count} points", count=count) if count > 1 else t("Drag point"))
+    elif is_new:
+        posing.finish(t("Add pin") if start.alt else t("Add handle"))
+    else:
+        editor.commit("")
+        if start.shift and handle in before:
+            posing.toggle(handle)
+        elif not start.shift:
+            posing.select(handle)
+
+
+def _chosen(before: tuple[int, ...], handle: int, is_added: bool) -> tuple[int, ...]:
+    """What a press on a handle selects: it alone, or the group it is in; the handle last."""
+    if is_added or handle in before:
+        return (*(h for h in before if h != handle), handle)
+    return (handle,)
+
+
+def _follow(editor: Editor, held: Held, start: Pointer, now: Pointer, depth: float) -> None:
+    delta = (now.xy - start.xy) / editor.view.zoom  # (2,) image px
+    if now.alt:
+        assert editor.document is not None
+        camera = editor.document.photo.camera
+        place, normal = list(held.lines.values())[-1]  # of the handle that was taken
+        gone = along_line(camera, place, normal, delta)
+        editor.posing.move_all({h: p + gone * n for h, (p, n) in held.lines.items()})
+        return
+    delta = one_axis(delta, now)
+    editor.posing.drag_all({h: spot.moved(delta, depth) for h, spot in held.spots.items()})
+
+
+def turn(editor: Editor, start: Pointer, handle: int, is_ring: bool) -> Stroke:
+    """The handle turns with the pointer's angle around it.
+
+    On the ring Shift turns in steps; elsewhere Shift turns out of the picture's plane.
+    """
+    posing = editor.posing
+    if handle not in posing.selected:
+        posing.select(handle)
+    assert editor.document is not None
+    frame = editor.derived.facts.turn_of(editor.document, editor.current)
+    first = posing.turn_of(handle)
+    roll = float(np.degrees(turn_about(frame @ first, SIGHT)))
+    centre = editor.view.canvas_from_image(posing.spot(handle).xy)
+    is_moved, swept, last = False, 0.0, start.xy
+    try:
+        while (pointer := (yield)).is_down:
+            is_moved = is_moved or has_moved(editor, start, pointer)
+            swept += _swept(last - centre, pointer.xy - centre, STEADY * editor.view.scale)
+            last = pointer.xy
+            if not is_moved:
+                continue
+            if pointer.shift and not is_ring:
+                posing.turn(handle, first, _tilt(editor, start, pointer))
+                continue
+            angle = roll + swept
+            if pointer.shift:
+                angle = round(angle / SNAP) * SNAP
+            posing.readout = f"{angle:.0f}°"
+            posing.turn(handle, first, np.radians(angle - roll) * SIGHT)
+        if is_moved:
+            posing.finish(t("Turn point"))
+        else:
+            editor.commit(t("Add handle") if editor.preview is not editor.committed else "")
+    finally:
+        posing.readout = ""
+
+
+def _swept(before: F64, after: F64, steady: float) -> float:
+    """Degrees, clockwise, from one place around the handle to the next, (2,) canvas px each."""
+    if min(np.linalg.norm(before), np.linalg.norm(after)) < steady:
+        return 0.0
+    across = before[0] * after[1] - before[1] * after[0]
+    return float(np.degrees(np.arctan2(across, before @ after)))
+
+
+def _tilt(editor: Editor, start: Pointer, now: Pointer) -> F64:
+    """(3,) rotation vector, world: what faces the camera follows the pointer."""
+    across, down = (now.xy - start.xy) / editor.view.scale * TURN_SPEED
+    editor.posing.readout = f"{across:.0f}° · {down:.0f}°"
+    return vector_from_matrix(turn_matrix(-float(across), float(down), 0.0))
+
+
+def box(editor: Editor, start: Pointer, other: int | None = None) -> Stroke:
+    """A box around handles selects them, Shift adds them; a click beside the object deselects.
+
+    A click on the `other` object makes that one the current one.
+    """
+    end = yield from draw_box(editor, start)
+    if end is not None:
+        corners = editor.view.image_from_canvas(np.array([start.xy, end.xy]))
+        editor.posing.select_box(corners.min(0), corners.max(0), start.shift)
+    elif other is not None:
+        editor.objects.take(other)
+    elif not start.shift:
+        editor.posing.select(None)

@@ -1,0 +1,1 @@
+"""The worker process and the threads that do what takes longer than a frame."""

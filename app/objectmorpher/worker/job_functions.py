@@ -1,0 +1,348 @@
+"""What runs in the worker process: plain values in, plain values out.
+
+The heavy modules are imported inside, so that the window, which only names these functions,
+starts without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import RGB, U8, Mask, Pixels, Selection
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.progress import Progress, part
+from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.model import (
+    Document,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Plate,
+    Prompt,
+)
+
+from ..canvas.layers import Rendered, Request, render
+from ..canvas.shape import rehearse_lift
+
+if TYPE_CHECKING:
+    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.refine import Refiner
+    from objectmorpher_core.compose.refine.refinement import CoarseEdit
+    from objectmorpher_core.doctor import Stage
+    from objectmorpher_core.document.gaussians import Gaussians
+    from objectmorpher_core.document.joining import Shadow
+    from objectmorpher_core.document.refinement import Refined
+    from objectmorpher_core.lift.registration.importing import Import, Scene
+    from objectmorpher_core.lift.registration.placement import Proposal
+    from objectmorpher_core.models import Added
+    from objectmorpher_core.pipeline import Reading
+    from objectmorpher_core.scripting.refining import Refining
+    from objectmorpher_core.segment import Found, Segmenter
+
+WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which backend does a stage, its random seed, and what the user has said about a fill."""
+
+    backend: str
+    seed: int = 0
+    hints: tuple[Hint, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A photo and what of it is meant."""
+
+    pixels: Pixels
+    camera: Camera
+    mask: Selection
+
+
+class PhotoMemory:
+    """The worker's memory: its segmenter, and what it has made of the last photo."""
+
+    def __init__(self) -> None:
+        self._backend = ""
+        self._segmenter: Segmenter | None = None
+        self._reading: Reading | None = None
+
+    def forget(self) -> None:
+        """Nothing is remembered."""
+        self._backend, self._segmenter, self._reading = "", None, None
+
+    def reading(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
+        """The photo as the segmenter sees it; at once where it is the last one."""
+        from objectmorpher_core import segment
+        from objectmorpher_core.pipeline import read_photo
+
+        if self._segmenter is None or backend != self._backend:
+            self._backend, self._segmenter = backend, segment.load(backend)
+            self._reading = None
+        if self._reading is None or not _is_same(self._reading.pixels, pixels):
+            self._reading = None  # not two photos at a time
+            self._reading = read_photo(pixels, self._segmenter, progress)
+        return self._reading
+
+
+_memory = PhotoMemory()
+
+
+def _is_same(a: Pixels, b: Pixels) -> bool:
+    return a is b or (a.dtype == b.dtype and np.array_equal(a, b))
+
+
+def read_photo(pixels: Pixels, backend: str, progress: Progress) -> None:
+    """Prepares for clicks on a photo that was just opened."""
+    _memory.reading(pixels, backend, progress)
+
+
+def add_model(id: str, path: Path, progress: Progress) -> Added:
+    """A user's file tried and kept among the models."""
+    from objectmorpher_core import models
+
+    progress(0.1, "trying it")
+    return models.add(id, path)
+
+
+def forget_segmenter(progress: Progress) -> None:
+    """The next photo or click chooses the backend anew: a model was added."""
+    _memory.forget()
+
+
+def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+    """The mask of what the prompt means, by which backend, and how sure that is.
+
+    At a glance, where the backend can tell better by a `closer_look`.
+    """
+    from objectmorpher_core.segment import Quick
+
+    reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
+    rest, segmenter = part(progress, 0.6, 1.0), reading.segmenter
+    if isinstance(segmenter, Quick):
+        return segmenter.glance(reading.rgb, prompt, reading.embedding, rest)
+    return reading.segment(prompt, rest, choice.seed)
+
+
+def closer_look(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+    """As `segment`, whatever time it takes."""
+    reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
+    return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
+
+
+def lift(
+    cut: Cut, choice: Choice, shape: LiftSettings, progress: Progress
+) -> tuple[Matte, LiftedObject]:
+    """The masked object's soft cut-out and its 3D Gaussians."""
+    from objectmorpher_core.pipeline import lift_mask
+
+    stage = part(progress, 0.0, 0.95)
+    matte, lifted = lift_mask(
+        cut.pixels, cut.camera, cut.mask, choice.backend, shape, stage, choice.seed
+    )
+    progress(0.95, "getting ready to pose")
+    rehearse_lift(matte, lifted, cut.camera)  # seconds, once
+    return matte, lifted
+
+
+def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:
+    """The soft cut-out of what stays in front of the edit."""
+    from objectmorpher_core.pipeline import cut_front
+
+    return cut_front(pixels, mask)
+
+
+def import_object(
+    path: Path, scene: Scene, seed: int, progress: Progress
+) -> tuple[Import, Matte, LiftedObject]:
+    """An object's file registered to the photo, and in the best pose textured with it."""
+    from objectmorpher_core.lift.registration.importing import Source, place_import, register_file
+
+    try:
+        found = register_file(Source(path), scene, part(progress, 0.0, 0.8), seed)
+    except OSError as error:
+        from objectmorpher_core.splat_files import SplatFileError
+
+        reason = error.strerror or str(error)
+        raise SplatFileError(f"{path.name} cannot be opened: {reason}") from error
+    best, rest = found.registration.best, part(progress, 0.8, 1.0)
+    return found, *place_import(scene, found.gaussians, best, rest, seed)
+
+
+def place_object(
+    scene: Scene, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
+) -> tuple[Matte, LiftedObject]:
+    """An object's Gaussians in a proposed pose, textured with the photo."""
+    from objectmorpher_core.lift.registration.importing import place_import
+
+    return place_import(scene, gaussians, proposal, progress, seed)
+
+
+def fit_object(
+    scene: Scene, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
+) -> tuple[Import, Matte, LiftedObject]:
+    """The best pose near `start` (4, 4 world from object), textured with the photo."""
+    from objectmorpher_core.lift.registration.importing import fit_near, place_import
+
+    found = fit_near(scene, gaussians, start, part(progress, 0.0, 0.5), seed)
+    rest = part(progress, 0.5, 1.0)
+    return found, *place_import(scene, gaussians, found.registration.best, rest, seed)
+
+
+def candidate(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found | str:
+    """As `segment`; where nothing can be selected, the sentence that says so."""
+    from objectmorpher_core.segment import SelectionError
+
+    try:
+        return segment(pixels, prompt, choice, progress)
+    except SelectionError as error:
+        return str(error)
+
+
+def change_mask(
+    selection: Selection, change: Callable[[Selection], Selection], progress: Progress
+) -> Selection:
+    """The selection, its edge moved, smoothed or softened."""
+    return change(selection)
+
+
+def read_coverage(path: Path, size: tuple[int, int], progress: Progress) -> U8:
+    """The soft mask in a picture file, for a photo of `size` (width, height) px."""
+    from objectmorpher_core.pictures import image
+
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        sentence = f"{path.name} cannot be opened: {error.strerror or error}"
+        raise image.ImageError(sentence) from error
+    return image.read_coverage(data, size)
+
+
+def write_coverage(selection: Selection, path: Path, progress: Progress) -> None:
+    """Writes a mask as an 8-bit grey PNG file."""
+    from objectmorpher_core.base.files import write_all
+    from objectmorpher_core.pictures.image import encode_coverage
+    from objectmorpher_core.segment.mask_edit import as_coverage
+
+    write_all({path: encode_coverage(as_coverage(selection))})
+
+
+def render_exact(request: Request, progress: Progress) -> Rendered:
+    """A layer of the view."""
+    return render(request)
+
+
+def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -> Plate:
+    """The photo without its objects."""
+    from objectmorpher_core.pipeline import make_plate
+
+    return make_plate(pixels, covered, choice.backend, progress, choice.seed, choice.hints)
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A background among others to choose from."""
+
+    plate: Plate
+    thumb: RGB  # (h, w, 3) a small picture of what is filled in, and around it
+
+
+def fill_variants(
+    pixels: Pixels, covered: Mask, choice: Choice, count: int, progress: Progress
+) -> tuple[Variant, ...]:
+    """The photo without its objects, `count` times, each with another seed."""
+    from objectmorpher_core.compose.plate.repair import thumbnail
+    from objectmorpher_core.pipeline import make_plate
+
+    found = []
+    for n in range(count):
+        step = part(progress, n / count, (n + 1) / count)
+        seed = choice.seed + n
+        plate = make_plate(pixels, covered, choice.backend, step, seed, choice.hints)
+        found.append(Variant(plate, thumbnail(pixels, plate)))
+    return tuple(found)
+
+
+def repair(patch: Patch, margin: float, choice: Choice, progress: Progress) -> tuple[Patch, str]:
+    """A part of the background filled in anew where it is painted, and by which backend."""
+    from objectmorpher_core import compose
+    from objectmorpher_core.compose.plate.repair import fill_patch
+
+    inpainter = compose.load(choice.backend)
+    return fill_patch(patch, margin, inpainter, progress, choice.seed), inpainter.name
+
+
+@dataclass(frozen=True, eq=False)
+class Cutout:
+    """An object in its photo, and all that hides the background (H, W)."""
+
+    pixels: Pixels
+    matte: Matte
+    covered: Mask
+    ground: float | None  # degrees above it from which one looks, where that is known
+
+
+def take_shadow(
+    cutout: Cutout, choice: Choice, progress: Progress
+) -> tuple[Shadow | None, Plate] | None:
+    """A shadow like the object's in the photo, and the background without that and its reflection.
+
+    None where neither is sure; a background alone where no shadow is.
+    """
+    from objectmorpher_core import compose
+    from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
+    from objectmorpher_core.compose.shadow.old_traces import find_old_traces
+
+    progress(0.0, "Looking for its shadow and reflection")
+    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
+    if not old.found:
+        return None
+    inpainter = compose.load(choice.backend, bool(choice.hints))
+    step = part(progress, 0.1, 1.0)
+    plate = traceless_plate(
+        cutout.pixels, cutout.covered, old.found, inpainter, step, choice.seed, choice.hints
+    )
+    return (None if old.shadow is None else old.shadow.shadow), plate
+
+
+_refiners: dict[str, Refiner] = {}  # the last one, for its pipeline takes long to load
+
+
+def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
+    """What of the edit a network is to see."""
+    from objectmorpher_core.scripting.refining import coarse_edit
+
+    return coarse_edit(document, progress)
+
+
+def refine(edit: CoarseEdit, how: Refining, progress: Progress) -> Refined:
+    """The edit as a network makes it look."""
+    from objectmorpher_core.compose import refine
+    from objectmorpher_core.compose.refine import refinement
+
+    refiner = refine.load(how.backend)
+    if refiner.name not in _refiners:
+        _refiners.clear()
+        _refiners[refiner.name] = refiner
+    return refinement.refine(edit, _refiners[refiner.name], progress, how.seed, how.strength)
+
+
+def write_session(document: Document, path: Path, progress: Progress) -> None:
+    """Saves the document as an .omorph file."""
+    from objectmorpher_core.session.file import save_session
+
+    progress(0.1, "packing")
+    save_session(document, path)
+
+
+def look_at_stages(progress: Progress) -> tuple[Stage, ...]:
+    """What each stage's backends can do on this machine; may load PyTorch, to ask for a GPU."""
+    from objectmorpher_core import doctor
+
+    return doctor.look_at_stages()

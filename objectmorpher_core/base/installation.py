@@ -1,0 +1,76 @@
+"""How this copy of the program is installed: by pip, or as a whole by an installer.
+
+An installer's copy holds its own Python, in which nothing can be installed; its folder may be read
+only, or another one at every start (AppImage).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import platformdirs
+
+BUILD = "build.txt"  # in an installer's copy: a name of all its sources
+LOCATOR = "objectmorpher_core.base.kernel_cache.InstalledLocator"
+KERNELS = "OBJECTMORPHER_KERNELS"  # environment variable: where compiled kernels are kept
+
+
+def is_frozen() -> bool:
+    """Whether an installer brought this copy, with a Python of its own."""
+    return bool(getattr(sys, "frozen", False))
+
+
+def extra(name: str) -> str:
+    """The command after which there is a copy with the optional packages `name`."""
+    return f"{'pipx' if is_frozen() else 'pip'} install 'objectmorpher[{name}]'"
+
+
+def kernel_folder() -> Path:
+    """Where an installer's copy keeps the kernels that were compiled for this processor."""
+    if named := os.environ.get(KERNELS):
+        return Path(named)
+    return platformdirs.user_cache_path("objectmorpher", appauthor=False) / "kernels"
+
+
+def prepare(inside: Path) -> None:
+    """For this process and those that it starts: an installer's copy is in the folder `inside`.
+
+    numba keeps what it compiles beside the sources, or under a name made of their folder: neither
+    would be found again by a copy that is read only, or in another folder every time.
+    """
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_folder()))
+    os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", LOCATOR)
+    os.environ["OBJECTMORPHER_INSIDE"] = str(inside)
+
+
+def inside() -> Path:
+    """The folder of an installer's copy; that of a checkout or wheel elsewhere."""
+    named = os.environ.get("OBJECTMORPHER_INSIDE")
+    return Path(named) if named else Path(__file__).parents[1]
+
+
+def build_name(folder: Path) -> str:
+    """The name of the sources below `folder`, hexadecimal: of their names and all they hold.
+
+    A kernel is compiled together with those that it calls: any change of any file may be one of it.
+    """
+    digest = hashlib.sha256()
+    for path in _sources(folder):
+        name = path.relative_to(folder).as_posix().encode()
+        content = path.read_bytes()
+        digest.update(b"%d %d " % (len(name), len(content)) + name + content)
+    return digest.hexdigest()
+
+
+def _sources(folder: Path) -> Iterator[Path]:
+    for package in ("app", "objectmorpher_core"):
+        yield from sorted((folder / package).rglob("*.py"))
+
+
+def written_build(folder: Path) -> str:
+    """The name that was written when the copy in `folder` was built. Raises OSError."""
+    return (folder / BUILD).read_text(encoding="ascii").strip()

@@ -1,0 +1,1 @@
+"""Light, grain and focus of a moved object."""

@@ -1,0 +1,201 @@
+"""Defocus where an object has come nearer, or gone farther: as blurred as the photo is there.
+
+The photo tells it by its ground: in the row where the ground is as far away as the object is now,
+beside the object, edges are so and so wide; and likewise where the object was. The object brings
+its own blur along, enlarged as it is. What is missing is added, to colour and alpha alike, where
+all of this is sure: both places have edges enough, and the object is as sharp as the ground that
+it stood on. Nothing is sharpened. What stays where it was, if only in part, keeps its focus.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64, U8, Mask, Pixels
+from ...base.camera import Camera
+from ...base.pixels import crop
+from ...document.model import Matte
+from ...raster.posed import PosedSplats
+from ..plate.plate import hole_margin
+from .sharpness import measure_blur
+
+LEAST_CHANGE = 0.04  # natural logarithm of depth: less is no other depth
+FIRST = 10  # percentile of an object's points that must have changed so much
+BANDS = 40  # of the photo's height, in which blur is measured: so many rows of them
+BESIDE = 1.5  # x the object's width, how far beside it the ground is asked
+LEAST_BESIDE = 0.08  # x the photo's width
+ALIKE = 1.6  # x: blurs farther apart are not of the same depth
+UNSURE = 0.7  # px that a blur may be off by, whatever it is
+LEAST = 0.5  # px of blur: less is not seen
+MOST = 0.02  # x the photo's longer side
+RIM = 3  # px around an object in which its outline's edges are
+REACH = 3.0  # x the blur, where it ends
+GUESSED_ROWS = 2.0  # bands that two ways to find the ground may be apart where no horizon is known
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The plane that an object stands on."""
+
+    normal: F64  # (3,) world, unit, down
+    is_known: bool  # by the horizon, or by the artist
+
+
+class Focus:
+    """How blurred one photo is, place by place; measured once each."""
+
+    def __init__(self, photo: Pixels, covered: Mask) -> None:
+        """`covered` (H, W): objects, which do not belong to the ground."""
+        height, width = covered.shape
+        self._photo = photo
+        self.pitch = max(height / BANDS, 1.0)  # rows of a band, px
+        rim = 2 * round(hole_margin(width, height) / 4) + 3
+        self._free = cv2.erode((~covered).astype(np.uint8), np.ones((rim, rim), np.uint8)) > 0
+        self._found: dict[tuple[int, int, int], float | None] = {}
+        self._objects: dict[int, tuple[Matte, float | None]] = {}  # by its id
+
+    def beside(self, row: float, left: float, right: float) -> float | None:
+        """Px, the photo's blur around a `row`, beside the columns left..right of an object.
+
+        None where it does not tell.
+        """
+        height, width = self._free.shape
+        if not 0 <= row < height:
+            return None
+        reach = max(BESIDE * (right - left), LEAST_BESIDE * width)
+        step = LEAST_BESIDE * width / 2  # so that a drag asks for the same place again
+        x0, x1 = (round(x / step) for x in (left - reach, right + reach))
+        key = (int(row / self.pitch), x0, x1)
+        if key not in self._found:
+            first, last = (int((key[0] + d) * self.pitch) for d in (-0.5, 1.5))
+            rows = slice(max(first, 0), min(last + 1, height))
+            columns = slice(max(int(x0 * step), 0), min(int(x1 * step) + 1, width))
+            self._found[key] = self._measured(rows, columns)
+        return self._found[key]
+
+    def of_object(self, matte: Matte) -> float | None:
+        """Px, the blur of an object as the photo shows it, its outline's among it."""
+        kept = self._objects.get(id(matte))
+        if kept is None:
+            x0, y0, x1, y1 = matte.box
+            height, width = self._free.shape
+            box = max(x0 - RIM, 0), max(y0 - RIM, 0), min(x1 + RIM, width), min(y1 + RIM, height)
+            own = (crop(matte.alpha, matte.box, box) > 0.5).astype(np.uint8)
+            near = cv2.dilate(own, np.ones((2 * RIM - 1, 2 * RIM - 1), np.uint8)) > 0
+            part = self._photo[box[1] : box[3], box[0] : box[2]]
+            kept = self._objects[id(matte)] = (matte, measure_blur(part, near))
+        return kept[1]
+
+    def _measured(self, rows: slice, columns: slice) -> float | None:
+        """The sharper half's, where both halves tell."""
+        middle = (columns.start + columns.stop) // 2
+        halves = slice(columns.start, middle), slice(middle, columns.stop)
+        blurs = [measure_blur(self._photo[rows, h], self._free[rows, h]) for h in halves]
+        told = [blur for blur in blurs if blur is not None]
+        return min(told) if told else None
+
+
+def find_defocus(
+    splats: PosedSplats, rest: PosedSplats, matte: Matte, ground: Ground, focus: Focus,
+    camera: Camera,
+) -> float:  # fmt: skip
+    """Px of the photo, standard deviation: how much a moved object is to be blurred.
+
+    0 where it has kept its depth, where it is at least as blurred as the photo there, and where
+    the photo does not tell. `rest`: its Gaussians as they were.
+    """
+    if len(rest.means) != len(splats.means):
+        return 0.0
+    seen = (rest.means[:, 2] > 0) & (splats.means[:, 2] > 0)
+    solid = seen & (rest.rest.lifted.texture.solidity > 0.5)
+    if not solid.any():
+        return 0.0
+    before, now = rest.means[solid], splats.means[solid]
+    ratio = np.log(now[:, 2] / before[:, 2])
+    middle = float(np.median(ratio))
+    if np.percentile(ratio * np.sign(middle), FIRST) < LEAST_CHANGE:
+        return 0.0
+    was = _shown(before, camera)
+    is_now = _shown(now, camera)
+    old = focus.beside(was.foot, was.left, was.right)
+    own = focus.of_object(matte)
+    if old is None or (own is not None and not _are_alike(own, old)):
+        return 0.0
+    size = splats.scale / rest.scale * float(np.exp(-middle))
+    brought = size * max(own or 0.0, old)
+    wanted = _blur_there(before, middle, was, is_now, ground, focus, camera)
+    if wanted is None or wanted < max(ALIKE * brought, brought + UNSURE):
+        return 0.0
+    missing = float(np.sqrt(wanted**2 - brought**2))
+    most = MOST * max(camera.width, camera.height)
+    return 0.0 if missing < LEAST else min(missing, most)
+
+
+def _are_alike(one: float, other: float) -> bool:
+    return max(one, other) <= ALIKE * min(one, other) + UNSURE
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """Where an object is seen, px of the photo."""
+
+    foot: float  # row of its lowest part
+    left: float
+    right: float
+
+
+def _shown(means: F64, camera: Camera) -> _Shown:
+    x, y = camera.project(means).T
+    left, right = np.percentile(x, (1, 99))
+    return _Shown(float(np.percentile(y, 99.5)), float(left), float(right))
+
+
+def _blur_there(
+    before: F64, change: float, was: _Shown, now: _Shown, ground: Ground, focus: Focus,
+    camera: Camera,
+) -> float | None:  # fmt: skip
+    """The photo's blur at the depth where the object is now; the lesser where there is doubt."""
+    rows = camera.project(before)[:, 1]
+    foot = before[np.argmin(np.abs(rows - was.foot))]
+    depth = float(foot[2]) * float(np.exp(change))
+    nx, ny, nz = (float(v) for v in ground.normal)
+    if abs(ny) < 1e-6:
+        return None
+    middle = ((now.left + now.right) / 2 - camera.cx) / camera.focal
+    slope = (float(ground.normal @ foot) / depth - nz - nx * middle) / ny
+    row = camera.cy + slope * camera.focal
+    found = focus.beside(row, now.left, now.right)
+    if ground.is_known or found is None:
+        return found
+    if abs(row - now.foot) > GUESSED_ROWS * focus.pitch:
+        return None  # where the ground is is a guess, and the object is not on it
+    other = focus.beside(now.foot, now.left, now.right)
+    return None if other is None else min(found, other)
+
+
+def attenuation(blur: float, frequency: np.ndarray) -> np.ndarray:
+    """What a blur, px, leaves of the power at frequencies, per px."""
+    return np.exp(-((2 * np.pi * blur * frequency) ** 2))
+
+
+def reach_of(blur: float) -> int:
+    """Px that a blur reaches."""
+    return int(np.ceil(REACH * blur))
+
+
+def blurred(picture: F32, blur: float) -> F32:
+    """A premultiplied picture (h, w) or (h, w, c), out of focus by so many of its px."""
+    if blur <= 0:
+        return picture
+    side = 2 * reach_of(blur) + 1
+    border = cv2.BORDER_REPLICATE
+    soft = cv2.GaussianBlur(picture, (side, side), blur, borderType=border)
+    return np.asarray(soft, np.float32)
+
+
+def blurred_rgba(rgba: U8, blur: float) -> U8:
+    """The same of a picture (h, w, 4) u8."""
+    return (blurred(rgba.astype(np.float32), blur) + 0.5).astype(np.uint8)

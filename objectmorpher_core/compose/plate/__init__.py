@@ -1,0 +1,1 @@
+"""The plate: the photo with the hole behind its objects filled in."""

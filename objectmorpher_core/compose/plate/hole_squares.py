@@ -1,0 +1,144 @@
+"""Holes filled by a network that sees squares of one size, and the photo around them untouched.
+
+Each hole, or group of near ones, gets a square of the photo around it: as many of the photo's own
+pixels as the network sees, or more for a large hole, which are then shrunk. What comes back has no
+finer detail than the network saw; it is continued by the photo's own, from where the photo looks
+like what was invented.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, Mask, Pixels
+from ...base.pixels import pixels_from_unit, unit_pixels
+from ...base.progress import Progress, part, silent
+from .. import InpaintError
+from .completion import smooth, sources_like
+from .patch_detail import with_detail
+
+SURROUNDINGS = 2.0  # x a hole's longer side: the side of the square around it
+APART = 4  # cells of an eighth of the square: holes that are no farther apart are one
+FINER = 1.02  # x what the network saw: with less there is no detail to be continued
+
+Fill = Callable[[F32, Mask, Progress, int], F32]
+"""fill(picture (n, n, 3) in [0, 1], hole (n, n), progress, seed) -> (n, n, 3), filled.
+
+In the hole the picture is a smooth guess.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Square:
+    """What is filled at once."""
+
+    box: tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo; smaller than square at frames
+    own: Mask  # (h, w) of the box: the hole that is filled here
+
+
+def squares(hole: Mask, side: int) -> tuple[Square, ...]:
+    """Around each group of holes (H, W), for a network that sees `side` px."""
+    height, width = hole.shape
+    cell = max(side // 8, 1)
+    rows, columns = -(-height // cell), -(-width // cell)
+    padded = np.pad(hole, ((0, rows * cell - height), (0, columns * cell - width)))
+    cells = np.asarray(padded.reshape(rows, cell, columns, cell).any((1, 3)), np.uint8)
+    near = cv2.dilate(cells, np.ones((APART + 1, APART + 1), np.uint8))
+    count, groups = cv2.connectedComponents(near, connectivity=8)
+    labels = np.kron(groups, np.ones((cell, cell), groups.dtype))[:height, :width]
+    found = []
+    for group in range(1, count):
+        own = hole & (labels == group)
+        box = _box(own, side)
+        found.append(Square(box, own[box[1] : box[3], box[0] : box[2]]))
+    return tuple(found)
+
+
+def fill_squares(
+    rgb: Pixels, hole: Mask, side: int, fill: Fill, progress: Progress = silent, seed: int = 0
+) -> Pixels:
+    """`rgb` (H, W, 3) with its hole filled by a network that sees (side, side).
+
+    Raises InpaintError where the hole is everything; the same bytes outside.
+    """
+    if hole.all():
+        raise InpaintError("the hole covers everything: there is nothing to fill it from")
+    filled, rest = rgb.copy(), hole.copy()
+    if not hole.any():
+        return filled
+    progress(0.0, "Filling the background")
+    found = squares(hole, side)
+    for k, square in enumerate(found):
+        step = part(progress, k / len(found), (k + 1) / len(found))
+        x0, y0, x1, y1 = square.box
+        window = slice(y0, y1), slice(x0, x1)
+        # Of other holes in it, those that are filled count as known.
+        new = _filled(filled[window], rest[window], side, fill, step, seed)
+        np.copyto(filled[window], new, where=square.own[..., None])
+        rest[window] &= ~square.own
+    progress(1.0, "Filled the background")
+    return filled
+
+
+def _box(own: Mask, side: int) -> tuple[int, int, int, int]:
+    """Of the square around a hole, as far as the photo reaches."""
+
+    def reach(there: Mask, wanted: int) -> tuple[int, int]:
+        inside, size = np.flatnonzero(there), len(there)
+        wanted = min(wanted, size)
+        start = int(np.clip((inside[0] + inside[-1] + 1 - wanted) // 2, 0, size - wanted))
+        return start, start + wanted
+
+    rows, columns = np.asarray(own.any(1)), np.asarray(own.any(0))
+    longer = max(np.ptp(np.flatnonzero(rows)), np.ptp(np.flatnonzero(columns))) + 1
+    wanted = max(side, round(SURROUNDINGS * float(longer)))
+    (y0, y1), (x0, x1) = reach(rows, wanted), reach(columns, wanted)
+    return x0, y0, x1, y1
+
+
+def _filled(
+    crop: Pixels, hole: Mask, side: int, fill: Fill, progress: Progress, seed: int
+) -> Pixels:
+    """A crop (h, w, 3), its whole hole filled."""
+    if hole.all():  # other holes have left nothing of it
+        raise InpaintError("nothing around the hole is known: there is nothing to fill it from")
+    height, width = hole.shape
+    longer = max(height, width)
+    above, before = (longer - height) // 2, (longer - width) // 2
+    rims = (above, longer - height - above), (before, longer - width - before)
+    picture, known = unit_pixels(crop), (~hole).astype(np.float32)
+    # What lies beyond the photo's frame is its mirror image.
+    picture = np.pad(picture * known[..., None], (*rims, (0, 0)), mode="symmetric")
+    known = np.pad(known, rims, mode="symmetric")
+    seen, share = _resized(picture, side), _resized(known, side)
+    is_known = share > 1 - 1e-4 if share.min() < share.max() else share >= share.max()
+    if not is_known.any():
+        is_known = share >= share.max()
+    mean = np.asarray(seen / np.maximum(share, 1e-6)[..., None] * is_known[..., None], np.float32)
+    guess = np.clip(smooth(mean, is_known.astype(np.float32)), 0, 1).astype(np.float32)
+    answer = fill(guess, ~is_known, part(progress, 0.0, 0.9), seed)
+    progress(0.9, "Copying the details")
+    if longer <= FINER * side:
+        whole = _resized(answer, longer)[above : above + height, before : before + width]
+        return np.where(hole[..., None], pixels_from_unit(whole, crop.dtype), crop)
+    scale = side / longer
+    top, left = round(above * scale), round(before * scale)
+    inner = (
+        slice(top, top + max(1, round(height * scale))),
+        slice(left, left + max(1, round(width * scale))),
+    )
+    invented = np.where(is_known[..., None], guess, answer)[inner] * np.float32(255)
+    sources = sources_like(invented, ~is_known[inner], seed, part(progress, 0.9, 1.0))
+    return with_detail(crop, hole, invented, sources, low_pass=1)
+
+
+def _resized(picture: F32, side: int) -> F32:
+    """(side, side) or (side, side, C) of a square."""
+    kind = cv2.INTER_AREA if side < len(picture) else cv2.INTER_CUBIC
+    if picture.ndim == 2 and side > len(picture):
+        kind = cv2.INTER_LINEAR  # shares stay in [0, 1]
+    return np.asarray(cv2.resize(picture, (side, side), interpolation=kind), np.float32)

@@ -1,0 +1,129 @@
+"""Fills holes by LaMa (Suvorov et al. 2021) or MI-GAN (Sargsyan et al. 2023), by onnxruntime.
+
+What a file takes tells which export it is:
+
+- LaMa: `image` (1, 3, h, w) in [0, 1] and `mask` (1, 1, h, w), 1 in the hole; or both in one of
+  four channels, the hole of the picture black. What comes out is in [0, 1] or in [0, 255].
+- MI-GAN: image (1, 3, h, w) and mask (1, 1, h, w), 0 in the hole and 255 elsewhere, of bytes; or
+  one float of four channels: what is known less a half, and the picture in [-1, 1], 0 in the hole.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import models
+from ...base.arrays import F32, Mask, Pixels
+from ...base.progress import Progress
+from ...models import ModelError
+from ...models.onnx_session import open_session
+from .. import InpaintError
+from .hole_squares import fill_squares
+
+SIDE = 512  # px that both were trained with, where a file does not say
+BYTES = 16.0  # x the picture's brightness; what comes out brighter is in [0, 255]
+NAMES = {"lama": "LaMa", "migan": "MI-GAN"}
+
+
+class OnnxInpainter:
+    """One network, on the CPU; a fill is nothing but what the photo says."""
+
+    is_random = False
+    context = SIDE  # px around a hole that it looks at where the photo has them
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def missing(self) -> str | None:
+        """See `Inpainter`."""
+        try:
+            is_here = models.place(self.name) is not None
+        except ModelError as error:
+            return str(error)
+        how = f"`objectmorpher models get {self.name}`"
+        return None if is_here else f"{NAMES[self.name]} is not here: {how}"
+
+    def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
+        """See `Inpainter`. The seed changes nothing."""
+        progress(0.0, "opening the model")
+        try:
+            found = [p for p in models.files(self.name) if p.suffix == ".onnx"]
+            if not found:
+                raise ModelError(self.missing() or f"{self.name} vanished")
+            network = OnnxNetwork(found[0], self.name)
+            return fill_squares(rgb, hole, network.side, network.fill, progress)
+        except ModelError as error:
+            raise InpaintError(str(error)) from error
+
+
+class OnnxNetwork:
+    """The network in a file. Costly to open."""
+
+    def __init__(self, path: Path, family: str) -> None:
+        """Raises ModelError: one sentence."""
+        try:
+            self._session: Any = open_session(path, is_foreign=True)
+        except Exception as error:  # onnxruntime has a type of its own for everything
+            raise ModelError(f"{path.name} is not an ONNX network that can be opened") from error
+        self._family = family
+        self._name = path.name
+        inputs = {len(i.shape) == 4 and i.shape[1]: i for i in self._session.get_inputs()}
+        if not ({3, 1} == inputs.keys() or {4} == inputs.keys()):
+            given = [f"{i.name} {i.shape}" for i in self._session.get_inputs()]
+            raise ModelError(f"{path.name} takes {', '.join(given)}: no known {NAMES[family]}")
+        self._inputs = inputs
+        first = inputs.get(3) or inputs[4]
+        fixed = [n for n in first.shape[2:] if isinstance(n, int) and n > 0]
+        if len(set(fixed)) > 1:
+            raise ModelError(f"{path.name} sees {fixed[1]} x {fixed[0]} px, not a square")
+        self.side = fixed[0] if fixed else SIDE
+
+    def fill(self, picture: F32, hole: Mask, progress: Progress, seed: int) -> F32:
+        """See `hole_squares.Fill`. Raises ModelError."""
+        progress(0.0, "inventing what is behind")
+        known = (~hole).astype(np.float32)[None, None]
+        image = np.ascontiguousarray(picture.transpose(2, 0, 1)[None])
+        try:
+            answer = np.asarray(self._session.run(None, self._given(image, known))[0])
+        except Exception as error:
+            raise ModelError(f"{self._name} cannot look at {self.side} px") from error
+        if answer.shape != image.shape or not np.isfinite(answer).all():
+            raise ModelError(f"{self._name} gives {answer.shape}, not a picture of its size")
+        return np.clip(self._unit(answer, image * known)[0].transpose(1, 2, 0), 0, 1)
+
+    def _given(self, image: F32, known: F32) -> dict[str, np.ndarray]:
+        """What the network is shown."""
+        if 4 in self._inputs:
+            if self._family == "migan":
+                both = np.concatenate([known - 0.5, (image * 2 - 1) * known], 1)
+            else:
+                both = np.concatenate([image * known, 1 - known], 1)
+            return {self._inputs[4].name: both.astype(np.float32)}
+        names = self._inputs[3].name, self._inputs[1].name
+        if self._inputs[3].type == "tensor(uint8)":
+            shown = np.rint(image * 255), known * 255
+            return {name: a.astype(np.uint8) for name, a in zip(names, shown, strict=True)}
+        return dict(zip(names, (image, 1 - known), strict=True))
+
+    def _unit(self, answer: np.ndarray, seen: F32) -> F32:
+        """The answer in [0, 1]; what is `seen` tells in which numbers it comes."""
+        if answer.dtype == np.uint8:
+            return np.asarray(answer, np.float32) / np.float32(255)
+        if self._family == "migan":
+            return ((answer + 1) / 2).astype(np.float32)
+        is_seen = seen > 0
+        bright = float(np.median(answer[is_seen] / seen[is_seen])) if is_seen.any() else 255.0
+        return np.asarray(answer / (255 if bright > BYTES else 1), np.float32)
+
+
+def lama() -> OnnxInpainter:
+    """LaMa: large holes, textures that repeat."""
+    return OnnxInpainter("lama")
+
+
+def migan() -> OnnxInpainter:
+    """MI-GAN: a thirtieth of LaMa's time."""
+    return OnnxInpainter("migan")

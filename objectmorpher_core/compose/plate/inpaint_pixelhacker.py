@@ -1,0 +1,124 @@
+"""Fills holes by PixelHacker, the paper's own inpainter (3.3), by PyTorch."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from ... import models
+from ...base.arrays import F32, Mask, Pixels
+from ...base.progress import Progress, part
+from ...models import ModelError, device
+from .. import InpaintError
+from .hole_squares import fill_squares
+
+ID = "pixelhacker"
+PACKAGES = ("torch", "diffusers", "safetensors")
+CODEC = "vae"  # folder of the autoencoder
+WORK = 1_800_000_000  # bytes beside the weights at half precision; the decoder needs most of it
+CODEC_PARAMETERS = 84_000_000  # always in float32
+
+Key = tuple[Path, int, str]  # weights, when they were written (ns), the device that is asked for
+
+
+class PixelHackerInpainter:
+    """Nineteen steps of a diffusion in each square; another seed invents something else."""
+
+    name = "pixelhacker"
+    is_random = True
+    context = 512  # px around a hole that it looks at where the photo has them
+    # Kept in a process, as they take long to read: the tiers that are left, network, autoencoder.
+    _tiers: tuple[Key, tuple[device.Plan, ...]] | None = None
+    _opened: tuple[Key, device.Plan, Any, Any] | None = None
+
+    def missing(self) -> str | None:
+        """See `Inpainter`."""
+        try:
+            is_here = models.place(ID) is not None
+        except ModelError as error:
+            return str(error)
+        lacks = [] if all(find_spec(name) for name in PACKAGES) else [f"`{models.EXTRA}`"]
+        lacks += [] if is_here else [f"`objectmorpher models get {ID}`"]
+        return f"PixelHacker is not here: {', then '.join(lacks)}" if lacks else None
+
+    def is_slow(self) -> bool:
+        """Whether a fill takes minutes here. Imports torch."""
+        try:
+            return device.devices()[0] == "cpu"
+        except ModelError:
+            return True
+
+    def inpaint(self, rgb: Pixels, hole: Mask, progress: Progress, seed: int = 0) -> Pixels:
+        """See `Inpainter`. The same bytes on one device; raises InpaintError, too, if it fails."""
+        from .pixelhacker.sampler import sample
+
+        progress(0.0, "opening the model")
+        try:
+            weights, codec = _files()
+            key = weights, weights.stat().st_mtime_ns, os.environ.get(device.DEVICE, "")
+            side = _side(weights, codec)
+
+            def attempt(plan: device.Plan) -> Pixels:
+                network, decoder = self._open(key, codec, plan)
+
+                def fill(picture: F32, inside: Mask, step: Progress, seed: int) -> F32:
+                    return sample(network, decoder, picture, inside, step, seed)
+
+                return fill_squares(rgb, hole, side, fill, part(progress, 0.05, 1.0), seed)
+
+            return device.run(self._plans(key), attempt)
+        except ModelError as error:
+            raise InpaintError(str(error)) from error
+        except OSError as error:
+            raise InpaintError(f"PixelHacker cannot be read: {error.strerror or error}") from error
+
+    def _plans(self, key: Key) -> tuple[device.Plan, ...]:
+        """Where it can run: as long as it stays open, what it takes itself does not count."""
+        known = PixelHackerInpainter._tiers
+        if known is None or known[0] != key:
+            parameters = key[0].stat().st_size // 4 + 2 * CODEC_PARAMETERS
+            known = key, device.plans(device.Need(parameters, WORK))
+            PixelHackerInpainter._tiers = known
+        return known[1]
+
+    def _open(self, key: Key, codec: Path, plan: device.Plan) -> tuple[Any, Any]:
+        """The network and the autoencoder where the plan wants them."""
+        import torch
+
+        from .pixelhacker.network import load, load_codec
+
+        known = PixelHackerInpainter._opened
+        if known is None or known[:2] != (key, plan):
+            PixelHackerInpainter._opened = known = None
+            network = load(key[0], plan.device, getattr(torch, plan.number))
+            known = key, plan, network, load_codec(codec, plan.device)
+            PixelHackerInpainter._opened = known
+            tiers = self._plans(key)
+            PixelHackerInpainter._tiers = key, tiers[tiers.index(plan) :]
+        return known[2], known[3]
+
+
+def _files() -> tuple[Path, Path]:
+    """The network's weights, and the folder of the autoencoder. Raises ModelError."""
+    at = models.place(ID)
+    if at is None:
+        raise ModelError(f"PixelHacker is not here: `objectmorpher models get {ID}`")
+    found = [p for p in models.files(ID) if p.suffix == ".safetensors" and p.parent.name != CODEC]
+    if len(found) != 1:
+        raise ModelError(f"{at.name} holds {len(found)} networks, not one of PixelHacker's")
+    return found[0], at / CODEC
+
+
+def _side(weights: Path, codec: Path) -> int:
+    """px of the square that it sees. Raises ModelError."""
+    from .pixelhacker.network import read_config
+
+    try:
+        said = json.loads((codec / "config.json").read_text(encoding="utf-8"))
+        shrink = 2 ** (len(said["block_out_channels"]) - 1)
+        return int(read_config(weights.parent)["sample_size"]) * shrink
+    except (ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{codec.name}/config.json does not describe an autoencoder") from error

@@ -1,0 +1,208 @@
+"""The photo behind its objects: what is invented, and how it joins what is true.
+
+The inpainter fills a hole that reaches well past the object, so that it never copies the object's
+rim. Of the fill only what the object covers is kept, and a narrow seam: beyond, the photo is
+true. Where the two meet, the fill takes on the photo's colour (a membrane, as in Poisson image
+editing, Perez et al. 2003), so that no line shows where the object was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, Mask, Pixels
+from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...base.progress import Progress, part, silent
+from ...document.hint import Hint
+from ...document.model import Document, Matte, Plate
+from .. import Inpainter, LooksFar, TakesHints
+
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
+
+HOLE_MARGIN = 0.01  # x the photo's diagonal: the hole reaches this far past the object
+MIN_HOLE_MARGIN = 4.0  # px
+SEAM = 0.45  # x hole margin, width of the seam around the object
+REACH = 3.0  # x hole margin: the fill's colour is corrected about so far into the hole
+COARSE = 4.0  # px of hole margin at which the correction is computed
+SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0)  # coarse px; each weighs a hundredth of the one before
+CONTEXT = 1.0  # x the hole's longer side, kept around it for the inpainter to copy from
+LEAST_CONTEXT = 64  # px
+STRIP = 256  # rows that are joined at a time: of 100 megapixels all at once take 10 GB
+
+
+def hole_margin(width: int, height: int) -> float:
+    """How far, in px, the hole in a photo of this size reaches past the object."""
+    return max(MIN_HOLE_MARGIN, HOLE_MARGIN * float(np.hypot(width, height)))
+
+
+def plate_cover(document: Document) -> Mask:
+    """(H, W) True where an object hides the background, be it ever so little."""
+    width, height = document.photo.size
+    covered = np.zeros((height, width), bool)
+    for item in document.objects:
+        if item.matte is not None:
+            shared = overlap(item.matte.box, (0, 0, width, height))
+            if shared is not None:
+                own = cut(item.matte.alpha, item.matte.box, shared)
+                cut(covered, (0, 0, width, height), shared)[own > 0] = True
+        elif item.mask is not None:
+            covered |= item.mask
+    return covered
+
+
+def build_plate(
+    pixels: Pixels,
+    covered: Mask,
+    inpainter: Inpainter,
+    progress: Progress = silent,
+    seed: int = 0,
+    hints: tuple[Hint, ...] = (),
+) -> Plate:
+    """The photo (H, W, 3) without what hides it at `covered` (H, W), which must not be empty.
+
+    `Plate.hole` is where anything is invented. Hints are for inpainters that take them.
+    """
+    height, width = covered.shape
+    margin = hole_margin(width, height)
+    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    hole = away < margin
+    rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
+    x0, y0, x1, y1 = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+    context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    if isinstance(inpainter, LooksFar):
+        context = max(context, inpainter.context)
+    if hints:  # from anywhere
+        context = max(width, height)
+    top, left = max(y0 - context, 0), max(x0 - context, 0)
+    window = (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width)))
+    cut_out, step = (pixels[window], hole[window]), part(progress, 0.0, 0.9)
+    if hints and isinstance(inpainter, TakesHints):
+        moved = tuple(hint.moved(-left, -top) for hint in hints)
+        filled = inpainter.inpaint_from(*cut_out, moved, step, seed)
+    else:
+        filled = inpainter.inpaint(*cut_out, step, seed)
+    progress(0.9, "joining it to the photo")
+    inner = (slice(y0, y1), slice(x0, x1))
+    fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
+    weight = away[inner]  # of the fill; in place, as all that is as large as the photo
+    np.subtract(SEAM * margin, weight, out=weight)
+    weight /= 0.6 * SEAM * margin
+    np.clip(weight, 0, 1, out=weight)
+    is_invented = weight > 0
+    ring = hole[inner] & ~is_invented  # filled, and true
+    difference = np.zeros(photo.shape, np.float32)
+    strips = [slice(first, first + STRIP) for first in range(0, len(photo), STRIP)]
+    for strip in strips:
+        difference[strip] = unit_pixels(photo[strip]) - unit_pixels(fill[strip])
+        difference[strip] *= ring[strip, :, None]
+    small = _coarse_correction(difference, ring, margin)
+    del difference
+    change, joined = _enlarged(small, ring.shape), np.empty_like(photo)
+    for strip in strips:
+        true, new = unit_pixels(photo[strip]), unit_pixels(fill[strip])
+        mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
+        mixed = pixels_from_unit(mixed, pixels.dtype)
+        joined[strip] = np.where(is_invented[strip, :, None], mixed, photo[strip])
+    return Plate(int(x0), int(y0), joined, is_invented, inpainter.name, seed)
+
+
+def correction(difference: F32, ring: Mask, margin: float) -> F32:
+    """(h, w, 3) to add to the fill: `difference` (h, w, 3) at the ring, less and less inwards."""
+    return _enlarged(_coarse_correction(difference * ring[..., None], ring, margin), ring.shape)
+
+
+def _coarse_correction(difference: F32, ring: Mask, margin: float) -> F32:
+    """`correction` of what is 0 beside the ring (h, w, 3), as coarse as the margin allows.
+
+    Shepard's interpolation with a heavy-tailed kernel.
+    """
+    height, width = ring.shape
+    if not ring.any():
+        return np.zeros((1, 1, 3), np.float32)
+    scale = min(COARSE / margin, 1.0)
+    size = (max(round(width * scale), 1), max(round(height * scale), 1))
+    known = cv2.resize(ring.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    values = cv2.resize(difference, size, interpolation=cv2.INTER_AREA)
+    total, mean = np.zeros_like(known), np.zeros_like(values)
+    for n, sigma in enumerate(SIGMAS):
+        share = 100.0**-n
+        total += share * cv2.GaussianBlur(known, (0, 0), sigma)
+        mean += share * cv2.GaussianBlur(values, (0, 0), sigma)
+    mean /= np.maximum(total, 1e-12)[..., None]
+    away = cv2.distanceTransform((known <= 0).astype(np.uint8), cv2.DIST_L2, 5)
+    mean *= np.exp(-away / (REACH * margin * scale))[..., None]
+    return np.asarray(mean, np.float32)
+
+
+def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
+    size = (shape[1], shape[0])
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None:
+    """The document's plate, invented only where what stood in these `holes` is gone.
+
+    Around objects that are still there it is the photo, except where it was repaired by hand.
+    """
+    plate = document.plate
+    rest = [o for o in document.objects if o.mask is not None and o.matte not in holes]
+    if plate is None or not rest:
+        return plate
+    covered = np.zeros(plate.hole.shape, bool)
+    for matte in holes:
+        covered |= crop(matte.alpha, matte.box, plate.box) > 0
+    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    is_shown, painted = away < SEAM * hole_margin(*document.photo.size), plate.painted
+    if painted is not None:
+        painted = painted.copy()
+        for item in rest:
+            if item.matte is not None:
+                painted &= (crop(item.matte.alpha, item.matte.box, plate.box) <= 0) | covered
+        is_shown |= painted
+    hole = plate.hole & is_shown
+    x0, y0, x1, y1 = plate.box
+    pixels = np.where(hole[..., None], plate.pixels, document.photo.pixels[y0:y1, x0:x1])
+    return replace(plate, pixels=pixels, hole=hole, painted=painted)
+
+
+def plate_picture(document: Document) -> Pixels:
+    """(H, W, 3) the photo with its objects painted out, but for what stays in front."""
+    plate, photo = document.plate, document.photo.pixels
+    assert plate is not None, "make the plate first"
+    width, height = document.photo.size
+    result = plate_crop(photo, plate, (0, 0, width, height))
+    for item in document.objects:
+        box = overlap(plate.box, item.matte.box) if item.matte is not None else None
+        if box is not None and item.matte is not None and item.stays_in_front:
+            own, is_invented = item.matte, cut(plate.hole, plate.box, box)[..., None]
+            alpha = cut(own.alpha, own.box, box)[..., None]
+            behind = cut(result, (0, 0, width, height), box)
+            mixed = alpha * cut(own.foreground, own.box, box) + (1 - alpha) * unit_pixels(behind)
+            np.copyto(behind, pixels_from_unit(mixed, photo.dtype), where=is_invented)
+    return result
+
+
+def plate_crop(photo: Pixels, plate: Plate, box: Box) -> Pixels:
+    """The photo in `box` with its objects painted out."""
+    x0, y0, x1, y1 = box
+    result = photo[y0:y1, x0:x1].copy()
+    inner = overlap(plate.box, box)
+    if inner is not None:
+        hole, pixels = (cut(part, plate.box, inner) for part in (plate.hole, plate.pixels))
+        np.copyto(cut(result, box, inner), pixels, where=hole[..., None])
+    return result
+
+
+def overlap(one: Box, other: Box) -> Box | None:
+    """The box that two boxes share; None where they share nothing."""
+    x0, y0 = max(one[0], other[0]), max(one[1], other[1])
+    x1, y1 = min(one[2], other[2]), min(one[3], other[3])
+    return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
+
+
+def cut(image: np.ndarray, own: Box, box: Box) -> np.ndarray:
+    """The part `box` of an image that covers the box `own` around it; not a copy."""
+    return image[box[1] - own[1] : box[3] - own[1], box[0] - own[0] : box[2] - own[0]]

@@ -1,0 +1,198 @@
+"""Repairs of the plate by hand: what is painted is filled in anew, or is the photo's again.
+
+Both touch the painted pixels only, whatever the inpainter does. A repair is shown in the edit
+wherever it was painted, also far from the objects: the shadow that an object has left behind can
+be painted out. Where masks change, the plate is made anew, and its repairs are gone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, RGB, Mask, Pixels
+from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...base.progress import Progress, part, silent
+from ...document.model import Document, Plate
+from ...pictures.image import to_u8
+from .. import Inpainter
+from .plate import Box, correction, cut, hole_margin, plate_crop
+
+RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
+CONTEXT = 0.6  # x the painted box's longer side, kept around it for the inpainter to copy from
+LEAST_CONTEXT = 48  # px
+THUMB = (168, 126)  # px, width and height of a thumbnail
+AROUND = 1.15  # x what is filled in, that a thumbnail shows
+WHOLLY = 0.999  # painted: nothing of what was there is left
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A part of the plate, and where it is painted."""
+
+    left: int  # px, corner in the photo
+    top: int
+    pixels: Pixels  # (h, w, 3) of the plate's picture
+    coverage: F32  # (h, w) in [0, 1]
+
+    @property
+    def box(self) -> Box:
+        """x0, y0, x1, y1 px in the photo."""
+        height, width = self.coverage.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+def patch_of(document: Document, coverage: F32, box: Box) -> Patch:
+    """What a repair has to know: `coverage` (H, W) is painted, nothing of it outside `box`."""
+    assert document.plate is not None, "make the plate first"
+    x0, y0, x1, y1 = box
+    width, height = document.photo.size
+    context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    left, top = max(x0 - context, 0), max(y0 - context, 0)
+    around = (left, top, min(x1 + context, width), min(y1 + context, height))
+    painted = coverage[around[1] : around[3], left : around[2]].copy()
+    return Patch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
+
+
+def fill_patch(
+    patch: Patch, margin: float, inpainter: Inpainter, progress: Progress = silent, seed: int = 0
+) -> Patch:
+    """The patch filled in anew where it is painted, from what is around it.
+
+    `margin`: the photo's `hole_margin`. Raises InpaintError where all of it is painted.
+    """
+    painted = patch.coverage > 0
+    rim = max(round(RIM * margin), 2)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * rim + 1, 2 * rim + 1))
+    hole = cv2.dilate(painted.astype(np.uint8), kernel) > 0
+    if hole.all():
+        hole = painted
+    filled = inpainter.inpaint(patch.pixels, hole, part(progress, 0.0, 0.9), seed)
+    progress(0.9, "joining it to the photo")
+    old, fill = unit_pixels(patch.pixels), unit_pixels(filled)
+    fill = np.clip(fill + correction(old - fill, hole & ~painted, margin), 0, 1)
+    mixed = pixels_from_unit(old + patch.coverage[..., None] * (fill - old), patch.pixels.dtype)
+    return replace(patch, pixels=np.where(painted[..., None], mixed, patch.pixels))
+
+
+def with_patch(document: Document, patch: Patch, backend: str) -> Plate:
+    """The document's plate with a filled patch in it."""
+    plate = document.plate
+    assert plate is not None, "make the plate first"
+    painted = patch.coverage > 0
+    grown = _grown(plate, document.photo.pixels, _bounds(painted, patch.box))
+    inner = _shared(grown, patch.box)
+    there = cut(painted, patch.box, inner)
+    assert grown.painted is not None
+    np.copyto(cut(grown.pixels, grown.box, inner), cut(patch.pixels, patch.box, inner),
+              where=there[..., None])  # fmt: skip
+    cut(grown.hole, grown.box, inner)[there] = True
+    cut(grown.painted, grown.box, inner)[there] = True
+    return Plate(grown.left, grown.top, grown.pixels, grown.hole, backend, plate.seed + 1,
+                 grown.painted)  # fmt: skip
+
+
+def restored(document: Document, patch: Patch) -> Plate:
+    """The plate with the photo's own pixels where they are painted and no object hides them."""
+    plate = document.plate
+    assert plate is not None, "make the plate first"
+    grown = _grown(plate, document.photo.pixels, plate.box)
+    inner = _shared(grown, patch.box)
+    if inner[0] >= inner[2] or inner[1] >= inner[3]:
+        return plate
+    share = cut(patch.coverage, patch.box, inner) * ~_covered(document, inner)
+    pixels = cut(grown.pixels, grown.box, inner)
+    hole = cut(grown.hole, grown.box, inner)
+    x0, y0, x1, y1 = inner
+    photo = document.photo.pixels[y0:y1, x0:x1]
+    is_own = share > WHOLLY
+    old = unit_pixels(pixels)
+    mixed = pixels_from_unit(old + share[..., None] * (unit_pixels(photo) - old), photo.dtype)
+    np.copyto(pixels, mixed, where=(hole & (share > 0))[..., None])
+    np.copyto(pixels, photo, where=is_own[..., None])
+    hole[is_own] = False
+    assert grown.painted is not None
+    cut(grown.painted, grown.box, inner)[is_own] = False
+    return Plate(grown.left, grown.top, grown.pixels, grown.hole, plate.backend, plate.seed,
+                 grown.painted)  # fmt: skip
+
+
+def thumbnail(photo: Pixels, plate: Plate) -> RGB:
+    """(h, w, 3) what is filled in, with some of the photo around it, in the shape of `THUMB`."""
+    height, width = photo.shape[:2]
+    x0, y0, x1, y1 = plate.box
+    across, down = THUMB
+    scale = max((x1 - x0) / across, (y1 - y0) / down) * AROUND
+    scale = min(scale, width / across, height / down)
+    left = int(np.clip((x0 + x1 - scale * across) / 2, 0, width - scale * across))
+    top = int(np.clip((y0 + y1 - scale * down) / 2, 0, height - scale * down))
+    box = (left, top, left + max(int(scale * across), 1), top + max(int(scale * down), 1))
+    small = cv2.resize(plate_crop(photo, plate, box), THUMB, interpolation=cv2.INTER_AREA)
+    return to_u8(small.astype(photo.dtype))
+
+
+def margin_of(document: Document) -> float:
+    """Px, see `hole_margin`."""
+    return hole_margin(*document.photo.size)
+
+
+@dataclass(eq=False)
+class _Grown:
+    """A plate that is being changed."""
+
+    left: int
+    top: int
+    pixels: Pixels
+    hole: Mask
+    painted: Mask
+
+    @property
+    def box(self) -> Box:
+        height, width = self.hole.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+def _grown(plate: Plate, photo: Pixels, box: Box) -> _Grown:
+    """A copy of the plate that reaches over `box`, too: the photo is there as it was."""
+    x0, y0 = min(plate.left, box[0]), min(plate.top, box[1])
+    x1, y1 = max(plate.box[2], box[2]), max(plate.box[3], box[3])
+    whole = (x0, y0, x1, y1)
+    pixels = photo[y0:y1, x0:x1].copy()
+    cut(pixels, whole, plate.box)[...] = plate.pixels
+    hole = crop(plate.hole, plate.box, whole)
+    painted = np.zeros_like(hole)
+    if plate.painted is not None:
+        painted = crop(plate.painted, plate.box, whole)
+    return _Grown(x0, y0, pixels, hole, painted)
+
+
+def _bounds(there: Mask, box: Box) -> Box:
+    """Px of the photo around what is `there` in the `box`."""
+    rows, columns = np.flatnonzero(there.any(1)), np.flatnonzero(there.any(0))
+    left, top = box[:2]
+    return (
+        left + int(columns[0]), top + int(rows[0]),
+        left + int(columns[-1]) + 1, top + int(rows[-1]) + 1,
+    )  # fmt: skip
+
+
+def _shared(grown: _Grown, box: Box) -> Box:
+    """What of `box` the plate covers."""
+    own = grown.box
+    return (
+        max(own[0], box[0]), max(own[1], box[1]), min(own[2], box[2]), min(own[3], box[3]),
+    )  # fmt: skip
+
+
+def _covered(document: Document, box: Box) -> Mask:
+    """(h, w) where an object hides the background of the box, be it ever so little."""
+    x0, y0, x1, y1 = box
+    covered = np.zeros((y1 - y0, x1 - x0), bool)
+    for item in document.objects:
+        if item.matte is not None:
+            covered |= crop(item.matte.alpha, item.matte.box, box) > 0
+        elif item.mask is not None:
+            covered |= item.mask[y0:y1, x0:x1]
+    return covered

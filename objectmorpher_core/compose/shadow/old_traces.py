@@ -1,0 +1,35 @@
+"""What an object leaves on the ground in the photo: its shadow, and its reflection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...base.arrays import Mask, Pixels
+from ...document.model import Matte
+from .old_reflection import OldReflection
+from .old_shadow import OldShadow
+from .reflection_fit import find_old_reflection
+from .shadow_fit import find_old_shadow
+
+
+@dataclass(frozen=True, eq=False)
+class OldTraces:
+    """Each where it is sure."""
+
+    shadow: OldShadow | None
+    reflection: OldReflection | None
+
+    @property
+    def found(self) -> tuple[OldShadow | OldReflection, ...]:
+        return tuple(trace for trace in (self.shadow, self.reflection) if trace is not None)
+
+
+def find_old_traces(
+    pixels: Pixels, matte: Matte, others: Mask, seen_from: float | None = None
+) -> OldTraces:
+    """As `find_old_shadow` and `find_old_reflection`; what is a reflection is no shadow."""
+    height, width = others.shape
+    reflection = find_old_reflection(pixels, matte, others)
+    if reflection is not None:
+        others = others | reflection.covers((0, 0, width, height))
+    return OldTraces(find_old_shadow(pixels, matte, others, seen_from), reflection)

@@ -1,0 +1,231 @@
+"""The soft shadow of a moved object on the ground: a layer between plate and objects.
+
+The ground is a plane under the object's lowest Gaussians. What is h above it throws its shadow
+h x length x (cos, sin) of the direction from its foot, on the ground: the object's own depth is in
+it, so a thing that turns throws another shadow. The farther from the ground, the more blurred and
+the weaker. Right below what stands on it lies a dark band, the contact.
+
+How steeply one looks down on the ground follows from the photo's horizon, where that is known;
+else the artist says it. Nothing is known of the light: the artist says that, too, or the shadow
+in the photo does (`shadow_fit`).
+
+A shadow multiplies the light that is left. A power of 2.2 stands for sRGB's curve here, for then
+it multiplies the encoded values, too, and a window that blends them shows what is exported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64
+from ...base.camera import Camera
+from ...document.joining import Shadow
+from ..blend import Box
+from ..silhouette import Grid, box_around, sampled
+
+GAMMA = 2.2  # of the encoded values
+USUAL_GROUND = 15.0  # degrees, from which a ground is seen whose horizon is not known
+FINE, COARSE = 176, 64  # cells, longer side of a shadow, and of a sketch of one
+PER_CELL = 1.5  # Gaussians, so that no holes are left
+SPRAY = 0.3  # %, of the Gaussians that may lie below what stands on the ground, or far above all
+COLUMNS = 64  # across an object, in which its lower edge is looked for
+LEVEL = 0.03  # x width, over which the ground's line is smooth
+BLURS = (0.012, 0.07, 0.2)  # x height, at softness 1: near the ground, half up, at the top
+HARDEST = 0.006  # x height, of the least blur
+FADE = 0.5  # of the strength is lost from the ground to the top
+LEAST_SLOPE = 0.05  # of a ground that is seen edge-on
+LAST_BLURS = (0.008, 0.035)  # x height, of all of it, at softness 0 and 1
+BAND = 0.07  # x height, of what touches the ground
+BAND_BLUR = 0.03  # x height
+BAND_DROP = 0.015  # x height that the contact lies below the object
+DARKEST = 0.97  # of the light, at strength 1
+FAINTEST = 1 / 255  # what is weaker is none: the footprint ends somewhere
+
+
+@dataclass(frozen=True, eq=False)
+class Shade:
+    """A shadow as a picture over the photo: `colour` at the opacity `alpha`, sRGB."""
+
+    alpha: F32  # (h, w) in [0, 1]; 0 along its border
+    left: float  # photo px, its corner
+    top: float
+    pitch: float  # photo px per px of it
+    colour: tuple[float, float, float]
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """x0, y0, x1, y1 photo px."""
+        height, width = self.alpha.shape
+        right, bottom = self.left + width * self.pitch, self.top + height * self.pitch
+        return self.left, self.top, right, bottom
+
+    def at(self, box: Box) -> F32:
+        """Its opacity (h, w) at the pixels of a box of the photo."""
+        return sampled(self.alpha, (self.left, self.top), self.pitch, box)
+
+
+def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: float) -> F64:
+    """(3,) world, unit, down: of the ground on which an object stands that is seen at `row` px.
+
+    `horizon`: the row of the photo it lies in, px. What the shadow says of the ground counts more.
+    """
+    below = float(np.arctan2(row - camera.cy, camera.focal))  # radians, of the ray to it
+    if shadow.ground is None and horizon is not None and row > horizon:
+        tilt = float(np.arctan2(camera.cy - horizon, camera.focal))
+    else:
+        seen_from = USUAL_GROUND if shadow.ground is None else shadow.ground
+        tilt = float(np.radians(seen_from)) - below
+    return np.array([0.0, np.cos(tilt), np.sin(tilt)])
+
+
+def cast(shadow: Shadow, standing: Standing, cells: int = FINE) -> Shade | None:
+    """The shadow of an object, of at most so many `cells`; None where there is none."""
+    if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
+        return None
+    far, near = standing.far(shadow, grid), standing.contact(grid)
+    light = np.asarray((1 - far) * (1 - np.float32(shadow.contact) * near), np.float32)
+    return _shade(shadow, light, grid)
+
+
+class Standing:
+    """An object that stands on the ground, or hangs a little above it."""
+
+    def __init__(self, points: F64, normal: F64, camera: Camera) -> None:
+        """Of world points (N, 3) that are spread evenly over it.
+
+        `normal` (3,): of the ground, unit, down; across the picture the ground is level. Raises
+        ValueError without any point.
+        """
+        if not len(points):
+            raise ValueError("an object without a single solid point throws no shadow")
+        above = -(points @ normal)
+        foot, top = np.percentile(above, (SPRAY, 100 - SPRAY))
+        self._height = max(float(top - foot), 1e-9)
+        above = np.maximum(above - foot, 0.0)
+        middle = np.median(points, 0)
+        sine = float(middle @ normal / max(float(np.linalg.norm(middle)), 1e-9))
+        self._above = np.maximum(above - _level(points, above, float(np.clip(sine, 0, 1))), 0.0)
+        self._feet = points + self._above[:, None] * normal
+        self._is_low = self._above <= BAND * self._height
+        self._right = np.array([1.0, 0.0, 0.0])
+        self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
+        self._camera = camera
+        self._size = self._height * camera.focal / max(float(middle[2]), 1e-9)  # photo px
+        # Lengths on the ground, towards the viewer, look so much shorter.
+        self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
+
+    def grid(self, shadow: Shadow, cells: int = FINE) -> Grid | None:
+        """About the whole shadow, at most so many `cells` long; None where none is seen."""
+        points = np.concatenate([self._fallen(shadow), self._feet[self._is_low]])
+        box = box_around(points, self._camera, 0.0)
+        if box is None:
+            return None
+        (left, top), (right, bottom) = box
+        evenly = float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(points)))
+        pitch = max((right - left) / cells, (bottom - top) / cells, evenly, 1.0)
+        blur = max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
+        room = 3 * blur * self._size + 4 * pitch
+        width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
+        return Grid(left - room, top - room, pitch, width, height)
+
+    def far(self, shadow: Shadow, grid: Grid) -> F32:
+        """(h, w) of the light, what the whole object takes, in [0, 1]."""
+        high = self._above / self._height
+        cover, share = _spread(self._fallen(shadow), high, grid, self._camera)
+        share, size = np.clip(share, 0, 1), self._size / grid.pitch
+        mixed = np.zeros_like(cover)
+        for k, blur in enumerate(BLURS):
+            weight = np.clip(1 - np.abs(share * (len(BLURS) - 1) - k), 0, 1) * (1 - FADE * share)
+            mixed += self._smooth(
+                np.asarray(cover * weight, np.float32), max(HARDEST, blur * shadow.softness) * size
+            )
+        return self._smooth(mixed, last_blur(shadow) * size)
+
+    def contact(self, grid: Grid) -> F32:
+        """(h, w) what touches the ground, blurred and a little lower, 1 at its darkest."""
+        low = 1 - self._above[self._is_low] / (BAND * self._height)
+        cover, share = _spread(self._feet[self._is_low], low, grid, self._camera)
+        size = self._size / grid.pitch
+        near = self._smooth(cover * share, BAND_BLUR * size)
+        drop = round(BAND_DROP * size)
+        near[drop:] = near[: len(near) - drop].copy()
+        near[:drop] = 0
+        return near / max(float(near.max()), 1e-6)
+
+    def _fallen(self, shadow: Shadow) -> F64:
+        """(N, 3) where the shadow of each point is, on the ground."""
+        angle = np.radians(shadow.direction)
+        way = shadow.length * (np.cos(angle) * self._right + np.sin(angle) * self._nearer)
+        return np.asarray(self._feet + self._above[:, None] * way, np.float64)
+
+    def _smooth(self, values: F32, sigma: float) -> F32:
+        """Blurred alike in all directions on the ground."""
+        return smooth(values, sigma, sigma * self._slope)
+
+
+def _level(points: F64, above: F64, sine: float) -> F64:
+    """(N,) how far above the lowest point the ground is taken to be, beside each point.
+
+    One photo does not show of what lies flat or is round below that its sides are as far down as
+    its front: the lower edge of what one sees stands on the ground, as far as it would rise of
+    something round that lies there. `sine`: of the angle at which the ground is seen.
+    """
+    most = 0.5 * float(np.ptp(points[:, 0])) * sine * np.sqrt(1 - sine**2)
+    across = points[:, 0] / np.maximum(points[:, 2], 1e-9)
+    low, high = float(across.min()), float(across.max())
+    column = ((across - low) / max(high - low, 1e-9) * (COLUMNS - 1)).astype(np.int64)
+    lower = np.full(COLUMNS, np.inf)
+    np.minimum.at(lower, column, above)
+    there = np.flatnonzero(np.isfinite(lower))
+    held = np.interp(np.arange(COLUMNS), there, np.minimum(lower[there], most))
+    level = cv2.GaussianBlur(held[None], (0, 0), LEVEL * COLUMNS)[0]
+    return np.asarray(level[column], np.float64)
+
+
+def last_blur(shadow: Shadow) -> float:
+    """x the object's height, standard deviation of the blur of the whole shadow."""
+    hard, soft = LAST_BLURS
+    return hard + (soft - hard) * shadow.softness
+
+
+def smooth(values: F32, across: float, down: float | None = None) -> F32:
+    """Three boxes one after the other: nearly a bell, and as quick for any width.
+
+    `across`, `down`: standard deviations, px; both the same where one is given.
+    """
+    size = (2 * round(across) + 1, 2 * round(across if down is None else down) + 1)
+    for _ in range(3):
+        blurred = cv2.blur(values, size, borderType=cv2.BORDER_CONSTANT)
+        values = np.asarray(blurred, np.float32)
+    return values
+
+
+def _spread(points: F64, values: F64, grid: Grid, camera: Camera) -> tuple[F32, F32]:
+    """What world points (N, 3) cover of a grid (h, w) in [0, 1], and the mean of their values."""
+    index, is_there = grid.cells(points, camera)
+    shape, cells = (grid.height, grid.width), grid.width * grid.height
+    count, total = (
+        cv2.blur(
+            np.bincount(index, weight, cells).reshape(shape).astype(np.float32), (3, 3),
+            borderType=cv2.BORDER_CONSTANT,
+        )
+        for weight in (None, values[is_there])
+    )  # fmt: skip
+    usual = float(np.median(count[count > 0])) if len(index) else 1.0
+    cover = np.clip(2 * count / usual, 0, 1)
+    return np.asarray(cover, np.float32), np.asarray(total / np.maximum(count, 1e-6), np.float32)
+
+
+def _shade(shadow: Shadow, light: F32, grid: Grid) -> Shade | None:
+    """Of the light (h, w) that is left, as a picture that ends clear."""
+    alpha = 1 - (1 - DARKEST * shadow.strength * (1 - light)) ** (1 / GAMMA)
+    alpha = np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)
+    rows, columns = np.flatnonzero(alpha.any(1)), np.flatnonzero(alpha.any(0))
+    if not len(rows):
+        return None
+    alpha = np.pad(alpha[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
+    left, top = grid.left + grid.pitch * (columns[0] - 1), grid.top + grid.pitch * (rows[0] - 1)
+    return Shade(alpha, float(left), float(top), grid.pitch, shadow.colour)

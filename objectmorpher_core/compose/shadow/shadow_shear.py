@@ -1,0 +1,134 @@
+"""The shadow of a silhouette: sheared along the ground, from each column's lower edge.
+
+That lower edge, where it is not far above the lowest of all, stands on the ground; what is h above
+it throws its shadow h x length x (cos, sin) of the direction from there, the sine shortened as the
+ground is. It is what a sheet throws that stands along the lower outline. It takes nothing but a
+mask and is sure of the outline, which a body that was made up from one photo is not: shadows in a
+photo are looked for with it (`shadow_fit`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64
+from ...base.pixels import crop
+from ...document.joining import Shadow
+from .shadow import BAND, BAND_BLUR, BAND_DROP, BLURS, FADE, FAINTEST, HARDEST, last_blur, smooth
+
+LIFT = 0.4  # x height: a lower edge that is farther above the lowest does not stand on the ground
+ABOVE = 0.75  # x the object's height above its base: what is higher is no ground
+LEVEL = 0.03  # x width, over which the ground's line is smooth
+SOLID = 0.5  # alpha from which on a pixel belongs to the object
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A silhouette, and where it stands; all in px of its grid."""
+
+    alpha: F32  # (h, w)
+    ground: F64  # (w,) of each column, from the top
+    share: F32  # (w,) 1 where it touches the ground there, 0 where it hangs above it
+    height: float
+    slope: float  # a length on the ground, towards the viewer, looks so much shorter
+
+    @property
+    def base(self) -> float:
+        """The row of its lower end."""
+        return float(self.ground.max())
+
+    @property
+    def above(self) -> float:
+        """How far above its base what one sees is still ground."""
+        return ABOVE * self.height
+
+    def thrown(self, shadow: Shadow) -> F32:
+        """(h, w) on the silhouette's own grid: what of the light its shadow takes, in [0, 1]."""
+        far, left, top = _thrown(shadow, self)
+        return _moved(far, left, top, self.alpha.shape)
+
+    def contact(self) -> F32:
+        """(h, w) likewise of the dark band right below it."""
+        near = _contact(self)
+        return _moved(near, 0, round(BAND_DROP * self.height), near.shape)
+
+
+def stand(alpha: F32, slope: float) -> Sheet:
+    """Where what has that silhouette (h, w) stands, on a ground seen at an angle of that sine.
+
+    Raises ValueError where it has none.
+    """
+    solid = alpha > SOLID
+    rows = np.arange(1, alpha.shape[0] + 1, dtype=np.float64)[:, None]
+    lower = (solid * rows).max(0)  # of each column; 0 where there is none
+    ground, height = float(lower.max()), float(lower.max() - rows[solid.any(1)].min() + 1)
+    share = np.clip((lower - ground) / (LIFT * height) * 2 + 2, 0, 1)  # full for half of LIFT
+    held = np.maximum(lower, ground - LIFT * height)
+    columns = np.arange(alpha.shape[1])
+    there = columns[lower > 0]
+    held = np.interp(columns, there, held[there])
+    level = cv2.GaussianBlur(held[None], (0, 0), max(LEVEL * np.ptp(there), 0.5))[0]
+    return Sheet(alpha, np.asarray(level, np.float64), share.astype(np.float32), height, slope)
+
+
+def _blurred(shadow: Shadow, standing: Sheet) -> F32:
+    """The silhouette, more blurred and weaker the higher above the ground."""
+    share = _above(standing) / np.float32(standing.height)
+    mixed = np.zeros_like(standing.alpha)
+    for k, blur in enumerate(BLURS):
+        weight = np.clip(1 - np.abs(np.clip(share, 0, 1) * (len(BLURS) - 1) - k), 0, 1)
+        sigma = max(HARDEST, blur * shadow.softness) * standing.height
+        mixed += weight * smooth(standing.alpha, sigma)
+    return np.asarray(mixed * (1 - FADE * np.clip(share, 0, 1)), np.float32)
+
+
+def _above(standing: Sheet) -> F32:
+    """(h, w) px above the ground of each pixel's middle."""
+    rows = np.arange(standing.alpha.shape[0], dtype=np.float32)[:, None] + np.float32(0.5)
+    return np.asarray(standing.ground.astype(np.float32) - rows, np.float32)
+
+
+def _contact(standing: Sheet) -> F32:
+    """What touches the ground, blurred, 1 at its darkest."""
+    band = np.clip(1 - np.abs(_above(standing)) / (BAND * standing.height), 0, 1)
+    touching = np.asarray(standing.alpha * band * standing.share, np.float32)
+    near = smooth(touching, BAND_BLUR * standing.height)
+    return near / max(float(near.max()), 1e-6)
+
+
+def _moved(part: F32, left: int, top: int, shape: tuple[int, ...]) -> F32:
+    """A picture at that place of a larger or smaller one (h, w) of zeros."""
+    height, width = shape
+    box, own = (0, 0, width, height), (left, top, left + part.shape[1], top + part.shape[0])
+    return crop(part, own, box)
+
+
+def _thrown(shadow: Shadow, standing: Sheet) -> tuple[F32, int, int]:
+    """Each pixel of the silhouette where its shadow falls; the picture's corner on the grid.
+
+    Pixels that fall on one another are averaged, each weighing what it is: clear ones nothing.
+    """
+    values, angle = _blurred(shadow, standing), np.radians(shadow.direction)
+    across, down = np.cos(angle) * shadow.length, np.sin(angle) * shadow.length * standing.slope
+    fine = int(np.ceil(max(1.0, abs(across), abs(down))))  # so that no gaps are left
+    large = cv2.resize(values, None, fx=1, fy=2 * fine, interpolation=cv2.INTER_LINEAR)
+    rows, columns = np.nonzero(large > FAINTEST / 2)
+    level = standing.ground[columns]
+    height = level - (rows + 0.5) / (2 * fine)
+    x = np.rint(columns + height * across).astype(np.int64)
+    y = np.floor(level + height * down).astype(np.int64)
+    sigma = last_blur(shadow) * standing.height
+    rim = int(np.ceil(3 * sigma)) + 4
+    left, top = int(x.min()) - rim, int(y.min()) - rim
+    size = (int(y.max()) - top + rim + 1, int(x.max()) - left + rim + 1)
+    index, weight = (y - top) * size[1] + x - left, large[rows, columns]
+    sums = [
+        np.bincount(index, weight**power, size[0] * size[1]).reshape(size).astype(np.float32)
+        for power in (1, 2)
+    ]
+    total, squares = (cv2.blur(s, (3, 3), borderType=cv2.BORDER_CONSTANT) for s in sums)
+    mean = squares / np.maximum(total, 1e-6)
+    return smooth(np.asarray(mean, np.float32), sigma), left, top

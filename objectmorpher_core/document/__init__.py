@@ -1,0 +1,1 @@
+"""The document, which is everything that is saved and undone, and its edits."""

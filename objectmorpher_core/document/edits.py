@@ -1,0 +1,396 @@
+"""Every change of the document, as a pure function Document -> Document."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.arrays import Mask, Selection
+from ..base.camera import Camera
+from .hint import Hint
+from .joining import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    USUAL_DEFOCUS,
+    USUAL_GRAIN,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+    Shadow,
+)
+from .model import (
+    DeformSettings,
+    Document,
+    EditObject,
+    Handle,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    Placement,
+    Plate,
+    Pose,
+    Prompt,
+)
+
+SAME_PLACE = 1e-6  # object units: two targets closer than this are one
+
+
+class EditError(ValueError):
+    """The change makes no sense; one sentence."""
+
+
+def add_object(document: Document) -> Document:
+    """A new, empty object at the end of the list."""
+    count = len(document.objects)
+    return document.with_object(count, EditObject(f"Object {count + 1}"))
+
+
+def remove_object(document: Document, k: int) -> Document:
+    """Without object `k`. The plate, which filled its hole, goes too, unless a copy stays."""
+    objects = tuple(o for i, o in enumerate(document.objects) if i != k)
+    mask = document.objects[k].mask
+    is_copy = mask is not None and any(other.mask is mask for other in objects)
+    plate = document.plate if is_copy else None
+    return replace(document, objects=objects, plate=plate, refined=None)
+
+
+def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt) -> Document:
+    """The mask (H, W) of object `k`, bool or soft u8, and what the user said to get it."""
+    return _with_mask(document, k, document.objects[k].with_mask(mask, prompt))
+
+
+def change_mask(document: Document, k: int, mask: Selection) -> Document:
+    """The mask (H, W) of object `k`, bool or soft u8, changed by hand.
+
+    What the prompt had given is kept beside it, so that `answer_prompt` knows what was changed.
+    """
+    item = document.objects[k]
+    found = item.mask if item.found is None and not item.prompt.is_empty else item.found
+    return _with_mask(document, k, item.with_mask(mask, item.prompt, found))
+
+
+def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Document:
+    """The mask (H, W) that was `found` for the prompt of object `k`.
+
+    What was changed by hand since the last answer stays as it is, except where a new click says
+    the contrary: the latest word counts.
+    """
+    from ..segment.corrections import corrected
+
+    item = document.objects[k]
+    if item.found is None or item.mask is None:
+        return set_mask(document, k, found, prompt)
+    mask, without = corrected(item, found, prompt)
+    return _with_mask(document, k, item.with_mask(mask, prompt, without))
+
+
+def _with_mask(document: Document, k: int, changed: EditObject) -> Document:
+    mask = changed.mask
+    if mask is not None:
+        width, height = document.photo.size
+        if mask.shape != (height, width):
+            raise EditError(f"the mask is {mask.shape}, the photo is {(height, width)}")
+        if not mask.any():
+            raise EditError("nothing is selected")
+        if mask.all():
+            raise EditError("the object covers the whole photo, there is no background left")
+    return document.with_object(k, changed)
+
+
+def set_lifted(
+    document: Document,
+    k: int,
+    matte: Matte,
+    lifted: LiftedObject,
+    shape: LiftSettings | None = None,
+) -> Document:
+    """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
+    changed = document.with_object(k, document.objects[k].with_lifted(matte, lifted, shape))
+    return changed.with_backend("lift", lifted.backend)
+
+
+def reshape(
+    document: Document, k: int, matte: Matte, lifted: LiftedObject, shape: LiftSettings
+) -> Document:
+    """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
+    from ..lift.carrying import carried_over
+
+    changed = carried_over(document.objects[k], matte, lifted, shape)
+    return document.with_object(k, changed).with_backend("lift", lifted.backend)
+
+
+def set_thickness(document: Document, k: int, thickness: float) -> Document:
+    """Object `k` as thick as `thickness` times what its silhouette says; no pose."""
+    from ..lift.relief.rethicken import with_thickness
+
+    item = document.objects[k]
+    if item.lifted is None or item.matte is None:
+        raise EditError("lift the object before changing its thickness")
+    shape = replace(item.shape, thickness=thickness)
+    factor = thickness / item.shape.thickness
+    lifted = with_thickness(item.lifted, document.photo.camera, factor)
+    return reshape(document, k, item.matte, lifted, shape)
+
+
+def set_shape(document: Document, k: int, shape: LiftSettings) -> Document:
+    """How object `k`, which is not lifted yet, is to be lifted."""
+    return document.with_object(k, replace(document.objects[k], shape=shape))
+
+
+def set_camera(document: Document, camera: Camera, k: int) -> Document:
+    """The photo was taken by `camera`: its focal length became known from object `k`.
+
+    Raises EditError where other objects were lifted with another one.
+    """
+    if camera == document.photo.camera:
+        return document
+    if any(item.lifted is not None for i, item in enumerate(document.objects) if i != k):
+        raise EditError("the camera cannot change under objects that are lifted already")
+    return replace(document, photo=replace(document.photo, camera=camera))
+
+
+def nearest_control_point(lifted: LiftedObject, point: np.ndarray) -> int:
+    """Index of the control point nearest to a rest surface point (3,), object frame."""
+    return int(((lifted.control_points - point) ** 2).sum(1).argmin())
+
+
+def add_handle(
+    document: Document,
+    k: int,
+    point: np.ndarray,
+    target: np.ndarray | None = None,
+    is_pin: bool = False,
+) -> Document:
+    """A handle on the rest surface `point` (3,) of object `k`; it stays until it is dragged.
+
+    A pin is held as it is turned, too: about points of its front alone a body would roll.
+    Raises EditError where another handle has the same control point and another displacement.
+    """
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before adding points to it")
+    target = np.asarray(point if target is None else target, dtype=np.float64)
+    index = nearest_control_point(item.lifted, point)
+    for other in item.handles:
+        if other.control_point == index:
+            moves = target - point, other.target - other.point
+            if np.linalg.norm(moves[0] - moves[1]) > SAME_PLACE:
+                raise EditError("two points take the same control point to different places")
+            return document
+    handle = Handle(index, np.asarray(point, dtype=np.float64), target).pinned(is_pin, item.pose)
+    return document.with_object(k, replace(item, handles=(*item.handles, handle)))
+
+
+def move_handle(document: Document, k: int, h: int, target: np.ndarray) -> Document:
+    """Handle `h` of object `k` must be at `target` (3,), object frame."""
+    item = document.objects[k]
+    moved = replace(item.handles[h], target=np.asarray(target, dtype=np.float64))
+    handles = tuple(moved if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def remove_handle(document: Document, k: int, h: int) -> Document:
+    """Without handle `h` of object `k`."""
+    item = document.objects[k]
+    handles = tuple(other for i, other in enumerate(item.handles) if i != h)
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def turn_handle(document: Document, k: int, h: int, turn: np.ndarray | None) -> Document:
+    """Handle `h` of object `k` is turned by `turn` (3,), a rotation vector; None: as it comes."""
+    item = document.objects[k]
+    turned = replace(item.handles[h], turn=turn)
+    handles = tuple(turned if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def set_pin(document: Document, k: int, h: int, is_pin: bool) -> Document:
+    """Whether handle `h` of object `k` is there to hold, or to be dragged and to turn freely."""
+    item = document.objects[k]
+    changed = item.handles[h].pinned(is_pin, item.pose)
+    handles = tuple(changed if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def soften_handle(document: Document, k: int, h: int, softness: float) -> Document:
+    """How much handle `h` of object `k` gives way: 0 = not at all."""
+    if not 0 <= softness < np.inf:
+        raise EditError(f"a softness of {softness:g} is not 0 or more")
+    item = document.objects[k]
+    soft = replace(item.handles[h], softness=float(softness))
+    handles = tuple(soft if i == h else other for i, other in enumerate(item.handles))
+    return document.with_object(k, replace(item, handles=handles))
+
+
+def reset_pose(document: Document, k: int) -> Document:
+    """Object `k` in the shape of the photo, without handles; what is frozen is so at rest."""
+    item = document.objects[k]
+    rig = item.rig if item.rig.shifts is None else replace(item.rig, shifts=None)
+    return document.with_object(k, replace(item, handles=(), rig=rig, pose=None))
+
+
+def resample(document: Document, k: int, count: int) -> Document:
+    """Object `k` with `count` control points. Handles and rig go to the new ones; no pose.
+
+    Raises EditError for a count outside 4 to 4,096, and where two handles would have to share a
+    control point.
+    """
+    from scipy.spatial import KDTree  # heavy, and the window imports this module at its start
+
+    from ..deform.control_points import sample_control_points
+
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before choosing its control points")
+    gaussians, old = item.lifted.body, item.lifted.control_points
+    try:
+        points = sample_control_points(gaussians.means, gaussians.opacities, count)
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    lifted = replace(item.lifted, control_points=points)
+    handles = tuple(
+        replace(h, control_point=nearest_control_point(lifted, h.point)) for h in item.handles
+    )
+    if len({h.control_point for h in handles}) < len(handles):
+        raise EditError(f"{count} control points are too few to tell the handles apart")
+    rig = item.rig.moved_to(np.asarray(KDTree(old).query(points)[1]))
+    return document.with_object(
+        k, replace(item, lifted=lifted, handles=handles, rig=rig, pose=None)
+    )
+
+
+def set_pose(document: Document, k: int, pose: Pose | None) -> Document:
+    """Where the control points of object `k` are; None puts it back to rest."""
+    return document.with_object(k, replace(document.objects[k], pose=pose))
+
+
+def set_placement(document: Document, k: int, placement: Placement) -> Document:
+    """Where object `k` is as a whole. Raises EditError behind the camera or for scale <= 0."""
+    item = document.objects[k]
+    if not placement.scale > 0:
+        raise EditError(f"a scale of {placement.scale:g} is not above 0")
+    if item.lifted is not None:
+        try:
+            placement.matrix(item.lifted, document.photo.camera)
+        except ValueError as error:
+            raise EditError(str(error)) from error
+    return document.with_object(k, replace(item, placement=placement))
+
+
+def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
+    """How object `k` deforms; its pose was solved with the old settings and is gone."""
+    return document.with_object(k, replace(document.objects[k], deform=settings, pose=None))
+
+
+def set_auto_anchors(document: Document, k: int, has_auto_anchors: bool) -> Document:
+    """Whether the far end of object `k` is held when one handle is all there is."""
+    item = replace(document.objects[k], has_auto_anchors=has_auto_anchors)
+    return document.with_object(k, item)
+
+
+def set_visible(document: Document, k: int, is_visible: bool) -> Document:
+    """Hides object `k` (its background shows) or shows it."""
+    return document.with_object(k, replace(document.objects[k], is_visible=is_visible))
+
+
+def set_plate(document: Document, plate: Plate | None) -> Document:
+    """The photo without its objects."""
+    changed = replace(document, plate=plate, refined=None)
+    return changed if plate is None else changed.with_backend("inpaint", plate.backend)
+
+
+def set_hints(document: Document, hints: tuple[Hint, ...]) -> Document:
+    """From where the background is to be filled in, from its next filling on."""
+    return replace(document, hints=hints)
+
+
+def set_horizon(document: Document, horizon: float) -> Document:
+    """The horizon is in this row of the photo, px; it may be outside."""
+    if not np.isfinite(horizon):
+        raise EditError(f"a horizon at {horizon:g} px is no row of the photo")
+    return replace(document, horizon=float(horizon), refined=None)
+
+
+def rename(document: Document, k: int, name: str) -> Document:
+    """Object `k` under another name."""
+    name = name.strip()
+    if not name:
+        raise EditError("an object needs a name")
+    return document.with_object(k, replace(document.objects[k], name=name))
+
+
+def duplicate(document: Document, k: int) -> Document:
+    """A copy of object `k` after all others, where the object is; its arrays are shared.
+
+    The plate stays: there is nothing new to fill in.
+    """
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before making a copy of it")
+    copy = replace(item, name=_free_name(item.name, {o.name for o in document.objects}))
+    return replace(document, objects=(*document.objects, copy), refined=None)
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """ "Cat 2", or the next number that nobody has."""
+    stem, _, last = name.rpartition(" ")
+    stem = stem if stem and last.isdigit() else name
+    numbers = (n for n in range(2, len(taken) + 3) if f"{stem} {n}" not in taken)
+    return f"{stem} {next(numbers)}"
+
+
+def set_shadow(document: Document, k: int, shadow: Shadow) -> Document:
+    """The shadow that object `k` casts once it has moved. Raises EditError for nonsense."""
+    try:
+        shadow.check()
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    return document.with_object(k, replace(document.objects[k], shadow=shadow))
+
+
+def set_harmony(document: Document, k: int, harmony: float) -> Document:
+    """How far object `k` takes on the light of where it is now, in [0, 1]."""
+    if not 0 <= harmony <= 1:
+        raise EditError(f"a harmony of {harmony:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], harmony=float(harmony)))
+
+
+def set_relight(document: Document, k: int, relight: float) -> Document:
+    """How far the light on object `k` stays where it was while the object turns, in [0, 1]."""
+    if not 0 <= relight <= 1:
+        raise EditError(f"a relighting of {relight:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], relight=float(relight)))
+
+
+def set_grain(document: Document, k: int, grain: float) -> Document:
+    """How much of the photo's grain object `k` is given where it has lost it, in [0, 1]."""
+    if not 0 <= grain <= 1:
+        raise EditError(f"a grain of {grain:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], grain=float(grain)))
+
+
+def set_defocus(document: Document, k: int, defocus: float) -> Document:
+    """How far object `k` is as blurred as the photo is at its new depth, in [0, 1]."""
+    if not 0 <= defocus <= 1:
+        raise EditError(f"a defocus of {defocus:g} is not between 0 and 1")
+    return document.with_object(k, replace(document.objects[k], defocus=float(defocus)))
+
+
+def harmonised(document: Document, k: int, is_harmonised: bool = True) -> Document:
+    """Object `k` in the light of its new place and of how it is turned, as grainy as the photo,
+    and as blurred as that is there.
+
+    Or as it was in the photo.
+    """
+    share = 1.0 if is_harmonised else 0.0
+    document = set_harmony(document, k, share * USUAL_HARMONY)
+    document = set_relight(document, k, share * USUAL_RELIGHT)
+    document = set_grain(document, k, share * USUAL_GRAIN)
+    return set_defocus(document, k, share * USUAL_DEFOCUS)
+
+
+def set_feather(document: Document, feather: float) -> Document:
+    """Over how wide an edge the edit is blended into the photo, x the usual."""
+    if not LEAST_FEATHER <= feather <= MOST_FEATHER:
+        raise EditError(f"a blend of {feather:g} x is not {LEAST_FEATHER:g} to {MOST_FEATHER:g}")
+    return replace(document, feather=float(feather), refined=None)

@@ -1,0 +1,397 @@
+"""The document: everything that is saved and undone. Immutable; compare parts with `is`.
+
+What a change invalidates is written once, in the `with_*` methods of `EditObject`:
+photo -> everything; mask -> matte, lifted, plate; lifted -> handles, pose. Placement, handles
+and pose invalidate nothing that is stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import F32, F64, U8, Mask, Pixels, Selection, frozen
+from ..base.camera import Camera
+from ..base.rotations import turn_matrix
+from ..pictures.image import Picture
+from .gaussians import Gaussians
+from .hint import Hint
+from .joining import Shadow
+from .pose import Handle, Pose
+from .refinement import Refined
+from .rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """The opened photo: its upright pixels, its camera, and the very bytes of its file."""
+
+    picture: Picture
+    camera: Camera
+    source: bytes  # the file as it was opened; a session carries it
+    name: str  # file name without folder
+
+    @property
+    def pixels(self) -> Pixels:
+        """(H, W, 3) upright RGB, u8 or u16."""
+        return self.picture.pixels
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) px."""
+        return self.picture.pixels.shape[1], self.picture.pixels.shape[0]
+
+
+@dataclass(frozen=True)
+class Click:
+    """A point that belongs to the object, or does not."""
+
+    x: float  # image px
+    y: float
+    is_foreground: bool = True
+
+
+LEVELS = ("part", "object", "group")  # how much around a click is meant, from little to much
+SELECTED = 128  # of 255: from this coverage on a pixel belongs to the mask
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """What the user said about which object is meant. `is_subject`: the photo's salient subject."""
+
+    clicks: tuple[Click, ...] = ()
+    box: tuple[float, float, float, float] | None = None  # x0, y0, x1, y1 px
+    is_subject: bool = False
+    level: str = "object"  # of LEVELS: what a click means
+
+    def __post_init__(self) -> None:
+        if self.level not in LEVELS:
+            raise ValueError(f"a click's level is {self.level!r}, not one of {', '.join(LEVELS)}")
+
+    @property
+    def is_empty(self) -> bool:
+        return not self.clicks and self.box is None and not self.is_subject
+
+
+@dataclass(frozen=True, eq=False)
+class Matte:
+    """Soft cut-out of an object inside a crop of the photo; alpha is 0 outside the crop.
+
+    The crop may reach past the photo's frame where the object does.
+    `foreground` is the object's own colour, freed of the background, and continued beyond the
+    object so that sampling near the edge never meets the background.
+    """
+
+    left: int  # px, crop's corner in the photo
+    top: int
+    alpha: F32  # (h, w) in [0, 1]
+    foreground: F32  # (h, w, 3) sRGB in [0, 1], straight
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "alpha", frozen(self.alpha, np.float32))
+        object.__setattr__(self, "foreground", frozen(self.foreground, np.float32))
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1 px of the crop in the photo."""
+        height, width = self.alpha.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoTexture:
+    """What each Gaussian carries of the photo (DESIGN section 3)."""
+
+    u0: F32  # (N, 2) px, its rest mean in the photo
+    visibility: F32  # (N,) in [0, 1], 1 = its surface was seen in the photo
+    solidity: F32  # (N,) in [0, 1], its alpha where the matte cannot be carried along
+
+    def __post_init__(self) -> None:
+        for name in ("u0", "visibility", "solidity"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+
+
+GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
+BACKS = ("auto", "mirrored", "continued")  # what the side looks like that the photo does not show
+LEAST_THICKNESS, MOST_THICKNESS = 0.05, 3.0  # x what the silhouette says
+
+
+@dataclass(frozen=True, eq=False)
+class LiftSettings:
+    """What the user says about an object's shape; the defaults are what its picture says."""
+
+    count: int = GAUSSIANS
+    thickness: float = 1.0  # x what the silhouette says
+    is_standing: bool = True  # whether it is turned as its feet on the ground tell
+    is_symmetric: bool | None = None  # left and right; None: as it looks
+    back: str = "auto"  # of BACKS
+    hidden: Mask | None = None  # (H, W) of the photo where something stands before the object
+    nearness: F32 | None = None  # (h, w) x its size, towards the camera; stretched over the photo
+    horizon: float | None = None  # px, the row of the photo it lies in; None: not known
+    uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
+    trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone tells the shape
+
+    def __post_init__(self) -> None:
+        if self.back not in BACKS:
+            raise ValueError(f"a back is {self.back!r}, not one of {', '.join(BACKS)}")
+        if not LEAST_THICKNESS <= self.thickness <= MOST_THICKNESS:
+            raise ValueError(
+                f"a thickness of {self.thickness:g} is not between {LEAST_THICKNESS:g} and"
+                f" {MOST_THICKNESS:g}"
+            )
+        if not 0.0 <= self.trust <= 1.0:
+            raise ValueError(f"a trust of {self.trust:g} is not between 0 and 1")
+        if self.hidden is not None:
+            object.__setattr__(self, "hidden", frozen(self.hidden, np.bool_))
+        if self.nearness is not None:
+            object.__setattr__(self, "nearness", frozen(self.nearness, np.float32))
+
+
+AS_SEEN = LiftSettings()
+
+SPLATTINGS = ("surface", "solid", "mip", "classic")  # see raster/rules.py
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedObject:
+    """An object lifted to 3D, registered to the photo."""
+
+    gaussians: Gaussians
+    texture: PhotoTexture
+    control_points: F32  # (M, 3) object frame; saved, because handles name them by index
+    world_from_object: F64  # (4, 4) similarity at rest: the registration to the photo
+    spacing: float  # object units, mean distance of neighbouring Gaussians on the surface
+    backend: str
+    splatting: str = "surface"  # how its Gaussians become a picture: of SPLATTINGS
+    # (N, 3) world: depth of the middle sheet on each Gaussian's ray, and how it changes per px of
+    # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
+    middle: F32 | None = None
+
+    def __post_init__(self) -> None:
+        if self.middle is not None:
+            object.__setattr__(self, "middle", frozen(self.middle, np.float32))
+        object.__setattr__(self, "control_points", frozen(self.control_points, np.float32))
+        object.__setattr__(self, "world_from_object", frozen(self.world_from_object, np.float64))
+        if self.splatting not in SPLATTINGS:
+            raise ValueError(f"splatting is {self.splatting!r}, not one of {', '.join(SPLATTINGS)}")
+
+    @cached_property
+    def diameter(self) -> float:
+        """Largest distance between two control points, object units (paper's D_scene)."""
+        p = self.control_points.astype(np.float64)
+        squares = (p * p).sum(1)
+        gaps = squares[:, None] + squares[None, :] - 2 * p @ p.T
+        return float(np.sqrt(max(gaps.max(), 0.0)))
+
+    @cached_property
+    def body(self) -> Gaussians:
+        """The Gaussians that are the object itself, not its soft edge."""
+        is_solid = self.texture.solidity > 0.5
+        return self.gaussians.select(is_solid) if is_solid.any() else self.gaussians
+
+    @cached_property
+    def scale(self) -> float:
+        """World units per object unit."""
+        return float(np.cbrt(np.linalg.det(self.world_from_object[:3, :3])))
+
+    @cached_property
+    def centre(self) -> F64:
+        """(3,) world; centre of the bounding box in camera axes at rest."""
+        points = self.world_points(self.gaussians.means)
+        return frozen(0.5 * (points.min(0) + points.max(0)))
+
+    def world_points(self, points: np.ndarray) -> F64:
+        """Object-frame points (..., 3) in the world, at rest."""
+        return points @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
+
+    def object_points(self, points: np.ndarray) -> F64:
+        """World points (..., 3) in the object frame, at rest."""
+        shifted = points - self.world_from_object[:3, 3]
+        return shifted @ np.linalg.inv(self.world_from_object[:3, :3]).T
+
+
+UNMOVED = frozen(np.eye(4))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the whole object went (DESIGN section 6): scale, then turn, then move."""
+
+    move: tuple[float, float] = (0.0, 0.0)  # px, of the centre's picture
+    depth: float = 0.0  # object diameters away from the camera
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # degrees: yaw, pitch, roll
+    scale: float = 1.0
+
+    @property
+    def is_identity(self) -> bool:
+        return self == Placement()
+
+    def matrix(self, lifted: LiftedObject, camera: Camera) -> F64:
+        """World-from-world motion (4, 4) of the object that was at rest.
+
+        Raises ValueError where the object would pass behind the camera.
+        """
+        if self.is_identity:  # usual, and asked for a dozen times a frame
+            return UNMOVED
+        centre = lifted.centre
+        depth = centre[2] + self.depth * lifted.diameter * lifted.scale
+        if depth <= 1e-3 * centre[2]:
+            raise ValueError(f"a depth of {self.depth:g} diameters is behind the camera")
+        target = camera.unproject(camera.project(centre) + np.array(self.move), depth)
+        linear = turn_matrix(*self.turn) * self.scale
+        motion = np.eye(4)
+        motion[:3, :3] = linear
+        motion[:3, 3] = target - linear @ centre
+        return motion
+
+
+@dataclass(frozen=True, eq=False)
+class DeformSettings:
+    """How the control points move together. The defaults are ours; the rest are ablations."""
+
+    mode: str = "arap"  # or "laplacian"
+    links: str = "geodesic"  # or "euclidean"
+    is_faithful: bool = False  # the paper as printed: three iterations, Eq. 5
+    stiffness: float = 1.0  # x the usual radius within which control points are linked
+    stretch_limit: float | None = None  # x its length at rest: handles go no farther than that
+    is_splitting: bool = False  # Gaussians that are stretched far become several
+
+
+@dataclass(frozen=True, eq=False)
+class EditObject:
+    """One object of the photo and everything that was done to it."""
+
+    name: str
+    prompt: Prompt = Prompt()
+    mask: Mask | None = None  # (H, W)
+    matte: Matte | None = None
+    lifted: LiftedObject | None = None
+    handles: tuple[Handle, ...] = ()
+    has_auto_anchors: bool = True
+    deform: DeformSettings = field(default_factory=DeformSettings)
+    rig: Rig = field(default_factory=Rig)
+    pose: Pose | None = None  # None: at rest
+    placement: Placement = Placement()
+    is_visible: bool = True
+    layer: int = 0  # in front of all of a lower one; within a layer the nearer is in front
+    coverage: U8 | None = None  # (H, W) where the edge was drawn soft; None: found in the photo
+    found: Mask | None = None  # (H, W) the prompt's answer, where the mask was changed by hand
+    shadow: Shadow = field(default_factory=Shadow)
+    harmony: float = 0.0  # in [0, 1], how far it takes on the light of where it is now
+    relight: float = 0.0  # in [0, 1], how far the light stays where it was while it turns
+    grain: float = 0.0  # in [0, 1], how much of the photo's grain that it has lost it is given
+    defocus: float = 0.0  # in [0, 1], how far it is as blurred as the photo at its new depth
+    shape: LiftSettings = field(default_factory=LiftSettings)
+    stays_in_front: bool = False  # covers what is edited, as it does in the photo
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether the object is anywhere else than in the photo."""
+        return self.lifted is not None and (
+            self.pose is not None or not self.placement.is_identity or not self.is_visible
+        )
+
+    @property
+    def selection(self) -> Selection | None:
+        """The mask, soft where the artist made it so."""
+        return self.mask if self.coverage is None else self.coverage
+
+    def with_mask(
+        self, selection: Selection | None, prompt: Prompt, found: Mask | None = None
+    ) -> EditObject:
+        """A new mask, or coverage: matte, lift, handles, pose and placement are gone."""
+        mask, coverage = None, None
+        if selection is not None:
+            if selection.dtype == np.uint8:
+                mask = frozen(selection >= SELECTED)
+                coverage = frozen(selection) if (selection != mask * np.uint8(255)).any() else None
+            else:
+                mask = frozen(selection, np.bool_)
+        return EditObject(
+            self.name, prompt=prompt, mask=mask, coverage=coverage,
+            found=None if found is None else frozen(found, np.bool_), deform=self.deform,
+            shape=self.shape, stays_in_front=self.stays_in_front,
+        )  # fmt: skip
+
+    def with_lifted(
+        self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
+    ) -> EditObject:
+        """A new lift: handles, rig and pose named the old one's control points and are gone."""
+        fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
+        return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """The photo without its objects: inpainted pixels, and where they are."""
+
+    left: int  # px, crop's corner in the photo
+    top: int
+    pixels: Pixels  # (h, w, 3) the photo's bit depth
+    hole: Mask  # (h, w) True where `pixels` are invented; elsewhere they are the photo's
+    backend: str
+    seed: int = 0  # of the last fill; each new one takes the next
+    painted: Mask | None = None  # (h, w) repaired by hand: shown wherever something has moved
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(self.pixels))
+        object.__setattr__(self, "hole", frozen(self.hole, np.bool_))
+        if self.painted is not None:
+            object.__setattr__(self, "painted", frozen(self.painted, np.bool_))
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1 px of the crop in the photo."""
+        height, width = self.hole.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+
+# Of an object, what its picture depends on; what else changes leaves a refinement as it is.
+SHOWN = (
+    "mask", "coverage", "matte", "lifted", "pose", "placement", "is_visible", "layer", "shadow",
+    "harmony", "relight", "grain", "defocus", "stays_in_front",
+)  # fmt: skip
+
+
+def is_shown_alike(one: EditObject, other: EditObject) -> bool:
+    """Whether two objects look the same; arrays do only where they are one and the same."""
+
+    def is_same(a: object, b: object) -> bool:
+        is_plain = not isinstance(a, np.ndarray) and not isinstance(b, np.ndarray)
+        return a is b or (is_plain and a == b)
+
+    return all(is_same(getattr(one, name), getattr(other, name)) for name in SHOWN)
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """All that is saved and undone."""
+
+    photo: Photo
+    objects: tuple[EditObject, ...] = ()
+    plate: Plate | None = None  # None: not made yet for these masks
+    backends: tuple[tuple[str, str], ...] = ()  # stage -> backend used
+    seed: int = 0
+    horizon: float | None = None  # px, row of the photo in which it is; None: the middle one
+    feather: float = 1.0  # x the usual width over which the edit is blended into the photo
+    hints: tuple[Hint, ...] = ()  # from where the plate is filled
+    refined: Refined | None = None  # None: not asked for, or what it showed has changed since
+
+    def with_object(self, k: int, changed: EditObject) -> Document:
+        """Object `k` replaced; the plate stays only where the mask did.
+
+        The refinement stays only where nothing that is seen has changed.
+        """
+        if k == len(self.objects):
+            return replace(self, objects=(*self.objects, changed), plate=None, refined=None)
+        plate = self.plate if changed.mask is self.objects[k].mask else None
+        refined = self.refined if is_shown_alike(changed, self.objects[k]) else None
+        objects = tuple(changed if i == k else o for i, o in enumerate(self.objects))
+        return replace(self, objects=objects, plate=plate, refined=refined)
+
+    def with_backend(self, stage: str, name: str) -> Document:
+        """Records which backend of a stage made what the document holds."""
+        others = tuple((s, n) for s, n in self.backends if s != stage)
+        return replace(self, backends=(*others, (stage, name)))

@@ -1,0 +1,52 @@
+"""What the user asks of an object's control points, and where they go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.arrays import F64, frozen
+from ..base.rotations import vector_from_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Handle:
+    """A point of the rest surface and where it must be."""
+
+    control_point: int  # nearest control point; two handles never share one
+    point: F64  # (3,) object frame, the surface point that was clicked
+    target: F64  # (3,) object frame; equal to `point` for a pin that was never dragged
+    is_pin: bool = False
+    turn: F64 | None = None  # (3,) rotation vector, radians, any angle; None: as it comes
+    softness: float = 0.0  # 0: met exactly; 1: gives as much as the object itself does
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", frozen(self.point, np.float64))
+        object.__setattr__(self, "target", frozen(self.target, np.float64))
+        if self.turn is not None:
+            object.__setattr__(self, "turn", frozen(self.turn, np.float64))
+
+    def pinned(self, is_pin: bool, pose: Pose | None) -> Handle:
+        """As a pin, which is held as it is turned in `pose`; or to be dragged, as it comes."""
+        if is_pin == self.is_pin:
+            return self
+        turn = turn_at(pose, self.control_point) if self.turn is None else self.turn
+        return replace(self, is_pin=is_pin, turn=turn if is_pin else None)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """The deformed control points: paper's p'_i and R_i."""
+
+    points: F64  # (M, 3) object frame
+    rotations: F64  # (M, 3, 3)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points, np.float64))
+        object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
+
+
+def turn_at(pose: Pose | None, control_point: int) -> F64:
+    """The rotation vector (3,) of a control point; of one at rest without a pose."""
+    return np.zeros(3) if pose is None else vector_from_matrix(pose.rotations[control_point])

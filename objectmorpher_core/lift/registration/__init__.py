@@ -1,0 +1,1 @@
+"""Registration: an object from elsewhere is put where the photo shows it."""

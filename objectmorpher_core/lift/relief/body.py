@@ -1,0 +1,149 @@
+"""A closed body over a silhouette: a front and a back sheet about a middle one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import F64
+from ...base.camera import Camera
+from ...document.model import LiftSettings
+from .bilinear import bilinear
+from .cuts import Cuts
+from .mirror import MirrorAxis
+from .overlaps import Overlaps, overlaps_of
+from .prism import Prism
+from .silhouette import Silhouette
+from .standing import FLAT, Standing, stand
+from .thickness import Thickness
+
+FRONT, BACK, MIDDLE = 1.0, -1.0, 0.0  # a sheet, as the share of the thickness it lies in front
+BLEND = 0.03  # x extent, over which a prism gives way to what sticks out beside it
+MOST_OBLIQUE = 2.0  # x its own thickness, along the line of sight, of what stands obliquely
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Heights are px towards the camera, at a depth at which a px of the photo is as wide."""
+
+    silhouette: Silhouette
+    standing: Standing
+    middle: F64  # (h, w) px, height of the middle sheet
+    front: Thickness
+    back: Thickness
+    detail: F64 | None = None  # (h, w) px, height of the front beyond its thickness; None: 0
+    cuts: Cuts | None = None  # between cells where one part ends before another
+    own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
+
+    @staticmethod
+    def of(
+        silhouette: Silhouette,
+        camera: Camera,
+        settings: LiftSettings,
+        axis: MirrorAxis | None = None,
+    ) -> Body:
+        """`axis`: of an object that looks the same left and right."""
+        standing = stand(silhouette, camera, settings.horizon) if settings.is_standing else FLAT
+        xy = silhouette.photo_xy(silhouette.cells)
+        far = 1 / standing.inverse_depth(xy)
+        middle = camera.focal * (1 - far)
+        inflated = Thickness.of(silhouette)
+        if axis is not None:
+            inflated = inflated.mean_with(silhouette.grid_xy(axis.mirrored(xy)))
+        dy, dx = np.gradient(middle, silhouette.cell)
+        oblique = np.minimum(np.sqrt(1 + dx**2 + dy**2), MOST_OBLIQUE)
+        inflated = inflated.times(oblique * settings.thickness)
+        sides = [inflated, inflated]
+        if standing.prism is not None:
+            halves = camera.focal * far * (1 - 1 / _nearer(standing.prism, xy))
+            share = _share(standing.prism, xy, silhouette.extent)
+            sides = [inflated.mixed(settings.thickness * half, share) for half in halves]
+        return Body(silhouette, standing, middle, sides[0], sides[1])
+
+    def nearer(self, height: F64) -> Body:
+        """With its parts moved towards the camera by `height` (h, w) px."""
+        return replace(self, middle=self.middle + height)
+
+    def sample(self, xy: F64, side: float | F64) -> tuple[F64, F64]:
+        """Height (N,) px and its gradient (N, 2) at photo px (N, 2).
+
+        `side`: FRONT, BACK, or any share (N,) of the thickness in front of the middle sheet.
+        """
+        cell, wanted = self.silhouette.cell, self.silhouette.grid_xy(xy)
+        grid_xy = wanted if self.cuts is None else self.cuts.settled(wanted)
+        fields = bilinear(self._middle_fields, grid_xy)
+        gradient = fields[:, 1:].copy()
+        beyond = grid_xy - np.clip(grid_xy, 0, np.array(self.middle.shape[::-1]) - 1)
+        height = fields[:, 0] + cell * (beyond * gradient).sum(1)  # the sheet goes on
+        share = np.broadcast_to(np.asarray(side, np.float64), len(xy))
+        for thickness, is_there in ((self.front, share > 0), (self.back, share < 0)):
+            half, slope = thickness.sample(grid_xy[is_there], cell)
+            height[is_there] += share[is_there] * half
+            gradient[is_there] += share[is_there, None] * slope
+        if self.detail is not None:
+            self._add_detail(grid_xy, np.maximum(share, 0.0), height, gradient)
+        if self.cuts is not None:
+            height += cell * ((wanted - grid_xy) * gradient).sum(1)
+        return height, gradient
+
+    def height(self, xy: F64, side: float) -> F64:
+        """Height (N,) px of the FRONT or the BACK alone, at photo px (N, 2) inside."""
+        if self.cuts is not None:
+            return self.sample(xy, side)[0]
+        grid_xy = self.silhouette.grid_xy(xy)
+        thickness = self.front if side > 0 else self.back
+        height = bilinear(self.middle, grid_xy) + side * thickness.half(grid_xy)
+        if self.detail is not None and side > 0:
+            height += bilinear(self.detail, grid_xy)
+        return height
+
+    @cached_property
+    def overlaps(self) -> Overlaps | None:
+        """What lies behind parts that are before others; None where none is."""
+        if self.cuts is None:
+            return None
+        outline = self.silhouette
+        at = outline.photo_xy(outline.cells).reshape(-1, 2)
+        front, back = (self.sample(at, side)[0].reshape(outline.shape) for side in (FRONT, BACK))
+        own = np.ones(outline.shape) if self.own is None else self.own
+        thickness = own * (front - back)
+        return overlaps_of(front, back, thickness, self.cuts, outline.inside, outline.extent)
+
+    @cached_property
+    def _middle_fields(self) -> F64:
+        """(h, w, 3) the middle sheet and its gradient."""
+        return np.stack([self.middle, *self._slopes(self.middle)], -1)
+
+    def _slopes(self, field: F64) -> tuple[F64, F64]:
+        """(h, w) each, what `field` (h, w) grows by per px right and down."""
+        if self.cuts is not None:
+            down, right = self.cuts.gradient(field)
+        else:
+            down, right = (np.asarray(slope, np.float64) for slope in np.gradient(field))
+        return right / self.silhouette.cell, down / self.silhouette.cell
+
+    def _add_detail(self, grid_xy: F64, share: F64, height: F64, gradient: F64) -> None:
+        """Adds the front's detail, `share` (N,) of it, to heights (N,) and gradients (N, 2)."""
+        assert self.detail is not None
+        fields = bilinear(np.stack([self.detail, *self._slopes(self.detail)], -1), grid_xy)
+        height += share * fields[:, 0]
+        gradient += share[:, None] * fields[:, 1:]
+
+
+def _nearer(prism: Prism, xy: F64) -> F64:
+    """(2, h, w) how much nearer, and farther, than its middle a prism's front and back are.
+
+    The back is the front turned half around: a box has four sides.
+    """
+    at = prism.plan.foot(xy[..., 0], xy[..., 1], prism.row)
+    turned = prism.columns[0] + prism.columns[-1] - at
+    return np.stack([np.interp(place, prism.columns, prism.nearer) for place in (at, turned)])
+
+
+def _share(prism: Prism, xy: F64, extent: float) -> F64:
+    """(h, w) 1 where the prism is, 0 where something sticks out beside it."""
+    at = prism.plan.foot(xy[..., 0], xy[..., 1], prism.row)
+    beyond = np.maximum(prism.columns[0] - at, at - prism.columns[-1])
+    return np.clip(0.5 - beyond / (BLEND * extent), 0, 1)

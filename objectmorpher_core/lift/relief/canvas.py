@@ -1,0 +1,67 @@
+"""The object's cut-out as finely as the lift needs it: for its axis and for plain colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64, Mask
+from ...base.pixels import crop
+from ...document.model import Matte
+
+LEAST_SIDE = 384  # px that the longer side keeps
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """A crop of the photo on pixels of its own."""
+
+    corner: F64  # (2,) px in the photo
+    step: int  # px of the photo per pixel
+    alpha: F32  # (h, w)
+    foreground: F32  # (h, w, 3)
+    whole: F32  # (h, w) alpha, and 1 where the object is hidden
+
+    @staticmethod
+    def of(matte: Matte, hidden: Mask | None = None, fineness: float = 1.0) -> Canvas:
+        """A crop that holds the matte and what is `hidden` (H, W) in the photo, too.
+
+        `fineness` px of the photo may be one; nothing becomes blurred that is larger.
+        """
+        foreground, alpha, box = matte.foreground, matte.alpha, matte.box
+        whole = alpha
+        if hidden is not None and hidden.any():
+            box, pads = _box_around(matte.box, hidden)
+            alpha = np.pad(alpha, pads)
+            foreground = np.pad(foreground, [*pads, (0, 0)], mode="edge")
+            own = crop(hidden, (0, 0, hidden.shape[1], hidden.shape[0]), box)
+            whole = np.maximum(alpha, own.astype(np.float32))
+        step = max(1, min(int(fineness), max(alpha.shape) // LEAST_SIDE, *alpha.shape))
+        small = [_in_blocks(image, step) for image in (alpha, foreground)]
+        whole = small[0] if whole is alpha else _in_blocks(whole, step)
+        return Canvas(np.array(box[:2], np.float64), step, small[0], small[1], whole)
+
+
+Box = tuple[int, int, int, int]
+
+
+def _box_around(box: Box, hidden: Mask) -> tuple[Box, list[tuple[int, int]]]:
+    """The box of the photo that holds `box` and `hidden` (H, W), and how much is added to it."""
+    rows, columns = np.flatnonzero(hidden.any(1)), np.flatnonzero(hidden.any(0))
+    x0, y0, x1, y1 = box
+    wide = (
+        min(x0, int(columns[0]) - 1), min(y0, int(rows[0]) - 1),
+        max(x1, int(columns[-1]) + 2), max(y1, int(rows[-1]) + 2),
+    )  # fmt: skip
+    return wide, [(y0 - wide[1], wide[3] - y1), (x0 - wide[0], wide[2] - x1)]
+
+
+def _in_blocks(image: F32, step: int) -> F32:
+    """Means over blocks of `step` px; what is left over at the end is left out."""
+    if step == 1:
+        return image
+    height, width = image.shape[0] // step, image.shape[1] // step
+    part = image[: height * step, : width * step]
+    return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), np.float32)

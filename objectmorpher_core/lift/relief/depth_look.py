@@ -1,0 +1,117 @@
+"""What an installed depth network sees of an object: a look at it and at what is around it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from threading import Lock
+from typing import Protocol
+
+import numpy as np
+
+from ... import models
+from ...base.arrays import F32, RGB, Mask, Pixels
+from ...models.depth_net import DepthNet
+from ...pictures.image import to_u8
+from .. import LiftError
+from .depth_prior import Seen
+
+Look = Callable[[Pixels, Mask], Seen | None]
+"""Of a photo (H, W, 3), where a mask (H, W) of it is."""
+DEPTH_ANYTHING = "depth-anything-v2-small"
+PACKAGES = ("torch", "transformers", "safetensors")
+MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
+
+
+def look(pixels: Pixels, mask: Mask) -> Seen | None:
+    """What the network sees where `mask` (H, W) of the photo is; None where none is installed.
+
+    Raises LiftError where the network cannot look at that.
+    """
+    there = installed()
+    if there is None:
+        return None
+    box = box_around(mask)
+    x0, y0, x1, y1 = box
+    rgb = np.ascontiguousarray(to_u8(pixels[y0:y1, x0:x1]))
+    try:
+        return Seen(_memory.look(there, rgb), box)
+    except models.ModelError as error:
+        raise LiftError(f"{error}; without the depth model it can be lifted") from error
+
+
+@dataclass(frozen=True)
+class There:
+    """A depth network on this machine."""
+
+    id: str  # changes with its files
+    at: Path
+    is_onnx: bool
+
+
+def installed() -> There | None:
+    """The network that is looked with: the user's file, else Depth Anything by PyTorch."""
+    own = models.added("depth")
+    if own.state == "ok":
+        return There(own.sha256, own.path, True)
+    at = models.place(DEPTH_ANYTHING)
+    if at is None or any(find_spec(name) is None for name in PACKAGES):
+        return None
+    facts = (at / "model.safetensors").stat() if (at / "model.safetensors").exists() else at.stat()
+    return There(f"{at}:{facts.st_size}:{facts.st_mtime_ns}", at, False)
+
+
+def box_around(mask: Mask) -> tuple[int, int, int, int]:
+    """x0, y0, x1, y1 px of what is looked at."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    longer = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
+    margin, (height, width) = int(np.ceil(MARGIN * longer)), mask.shape
+    return (
+        max(int(columns[0]) - margin, 0), max(int(rows[0]) - margin, 0),
+        min(int(columns[-1]) + 1 + margin, width), min(int(rows[-1]) + 1 + margin, height),
+    )  # fmt: skip
+
+
+class Net(Protocol):
+    """What `DepthNet` and `DepthTorch` do."""
+
+    def inverse_depth(self, rgb: RGB) -> F32:
+        """(h', w') of a picture (h, w, 3)."""
+        ...
+
+
+def _opened(there: There) -> Net:
+    if there.is_onnx:
+        return DepthNet(there.at)
+    from ...models.depth_torch import DepthTorch
+
+    return DepthTorch(there.at)
+
+
+class _Memory:
+    """The network that was opened last, and the last look: another thickness looks no second time.
+
+    What was seen is known by the digest of its pixels, so no photo is held on to.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._net: tuple[str, Net] | None = None  # the network's id
+        self._last: tuple[str, bytes, F32] | None = None  # network's id, picture's hash
+
+    def look(self, there: There, rgb: RGB) -> F32:
+        digest = hashlib.sha256(rgb.data).digest() + bytes(str(rgb.shape), "ascii")
+        with self._lock:
+            if self._last is not None and self._last[:2] == (there.id, digest):
+                return self._last[2]
+            if self._net is None or self._net[0] != there.id:
+                self._net = there.id, _opened(there)
+            depth = self._net[1].inverse_depth(rgb)
+            self._last = there.id, digest, depth
+            return depth
+
+
+_memory = _Memory()

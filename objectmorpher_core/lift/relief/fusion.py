@@ -1,0 +1,160 @@
+"""A body from its silhouette and from what the shape network sees, each as far as it is sure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F64, Mask
+from ...base.camera import Camera
+from ...base.distances import nearest_in
+from ..crop import SIDE, rays
+from .bilinear import bilinear
+from .body import Body
+from .cuts import find_cuts
+from .integration import integrated
+from .shape_look import SeenShape
+from .silhouette import Silhouette
+from .standing import Standing
+from .thickness import Thickness
+
+# How far off the silhouette's body is expected to be: crop units, and per its half-thickness. Both
+# times as much as is known of it: what stands on the ground leans as its feet tell, and of a box
+# the front is known well. Chosen on made-up objects that the network was not trained on; there
+# twice as much is best, but a photograph is not what the network was trained on, either.
+INFLATED_ERROR = (0.02, 0.5)
+FLOATING, STANDING = (4.0, 4.0), (2.0, 4.0)  # x, of the front and of what is behind it
+CYLINDER, BOX = (1.5, 2.0), (0.4, 0.8)
+ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns away; it ends there
+RIM = 0.035  # x extent from the outline, over which a body that is round there closes
+INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
+
+
+class Sheets(NamedTuple):
+    """Heights (h, w) px over a silhouette's cells, and what is known about them."""
+
+    front: F64
+    back: F64
+    front_error: F64  # px, expected
+    back_error: F64
+    facing: F64  # cosine between the front's normal and the ray
+    own: F64  # share of the thickness that is of the part that is seen
+    edge: F64  # probability that the front ends beside a cell
+
+
+def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: float) -> Body:
+    """`body`, whose thickness was multiplied by `thickness`, as `seen` where that is surer.
+
+    `trust` in [0, 1]: 0 leaves the body as it is.
+    """
+    if trust <= 0:
+        return body
+    outline = body.silhouette
+    halves = [_half(side, outline) / thickness for side in (body.front, body.back)]
+    sheets = sheets_of(seen, camera, outline)
+    # How far away it is neither tells: both fronts are, in the mean. Away from the camera all
+    # grows alike, and the picture stays.
+    means = [
+        float(front[outline.inside].mean()) for front in (body.middle + halves[0], sheets.front)
+    ]
+    away = (camera.focal - means[0]) / (camera.focal - means[1])
+    front, back = (camera.focal - away * (camera.focal - side) for side in sheets[:2])
+    sheets = sheets._replace(front=front, back=back)
+    cuts = find_cuts(
+        sheets.front, trust * sheets.edge, outline.inside, outline.cell, outline.extent
+    )
+    if cuts is not None:
+        sharp = (cuts.sharpened(field, outline.inside) for field in (sheets.front, sheets.own))
+        sheets = sheets._replace(**dict(zip(("front", "own"), sharp, strict=True)))
+    inflated = INFLATED_ERROR[0] * seen.crop.side
+    inflated = inflated + INFLATED_ERROR[1] * 0.5 * (halves[0] + halves[1])
+    front_share, back_share = (
+        trust * _share(doubt * inflated, own)
+        for doubt, own in zip(
+            _doubts(body.standing), (sheets.front_error, sheets.back_error), strict=True
+        )
+    )
+    half = 0.5 * (sheets.front - sheets.back)
+    middle = (1 - front_share) * body.middle + front_share * (sheets.front - half)
+    if cuts is not None:
+        body = replace(
+            body, front=replace(body.front, cuts=cuts), back=replace(body.back, cuts=cuts)
+        )
+    sides = [
+        side.towards(thickness * closing(half, sheets.facing, outline, own), back_share)
+        for side, own in zip((body.front, body.back), halves, strict=True)
+    ]
+    own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
+    return replace(body, middle=middle, front=sides[0], back=sides[1], cuts=cuts, own=own)
+
+
+def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
+    """What is seen, over the cells of a silhouette; beyond what is seen as at its nearest pixel."""
+    crop, mask = seen.crop, seen.mask
+    ways = rays(crop.tangents)
+    distance = crop.away - seen.front.astype(np.float64)
+    step = 1 / (SIDE * crop.away)
+    distance = integrated(distance, seen.front_error, seen.normal, seen.edge, ways, mask, step)
+    facing = -(seen.normal * ways).sum(-1)
+    px = crop.side * ways[..., 2]  # of depth along the axis, per crop unit along the ray
+    front = camera.focal - px * distance
+    back = camera.focal - px * (distance + seen.depth)
+    stacked = np.stack(
+        [
+            front, back, crop.side * seen.front_error, crop.side * seen.depth_error, facing,
+            seen.thickness / np.maximum(seen.depth, 1e-4), seen.edge,
+        ], -1,
+    )  # fmt: skip
+    fields = _continued(stacked.astype(np.float64), mask)
+    cells = crop.grid_xy(outline.photo_xy(outline.cells)).reshape(-1, 2)
+    found = bilinear(fields, cells).reshape(*outline.shape, -1)
+    return Sheets(*np.moveaxis(found, -1, 0))
+
+
+def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
+    """(h, w) px: `half`, but falling to 0 at the outline where the front turns away there.
+
+    A pixel is too wide to tell how. There it closes as the silhouette's body does, `inflated`,
+    times as much as `half` is thicker than that farther in.
+    """
+    reach = RIM * outline.extent
+    share = np.clip(outline.depth / reach, 0, 1)
+    weight = share * outline.inside
+    sigma = max(0.5 * reach / outline.cell, 0.5)
+    ratio = np.clip(half / np.maximum(inflated, 1e-3 * outline.extent), 0.0, 4.0)
+    blurred = cv2.GaussianBlur(ratio * weight, (0, 0), sigma)
+    ratio = blurred / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)
+    is_round = np.clip((ROUND[1] - facing) / (ROUND[1] - ROUND[0]), 0, 1)
+    is_round = cv2.GaussianBlur(is_round, (0, 0), sigma)
+    closed = np.minimum(ratio * inflated, half.max())
+    amount = is_round * (1 - share)
+    return np.maximum(half + amount * (closed - half), 0.0)
+
+
+def _doubts(standing: Standing) -> tuple[float, float]:
+    """Of the silhouette's front and thickness, x `INFLATED_ERROR`."""
+    if standing.prism is not None:
+        return CYLINDER if standing.prism.is_round else BOX
+    return STANDING if standing.is_known else FLOATING
+
+
+def _share(error: F64, own: F64) -> F64:
+    """Of what errs by `own` beside what errs by `error`: the sum errs least."""
+    return error**2 / (error**2 + own**2)
+
+
+def _half(side: Thickness, outline: Silhouette) -> F64:
+    """(h, w) px."""
+    return side.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
+
+
+def _continued(fields: F64, mask: Mask) -> F64:
+    """`fields` (s, s, c), outside `mask` (s, s) as at its nearest pixel well inside."""
+    away = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
+    inner = away > INNER
+    if not inner.any():
+        inner = mask
+    return fields.reshape(-1, fields.shape[-1])[nearest_in(inner)]

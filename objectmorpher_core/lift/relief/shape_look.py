@@ -1,0 +1,105 @@
+"""What the shape network sees of an object: how far its front and back are, and where it ends.
+
+The network is ours (`training.train_shape`) and comes with the program; DINOv2, whose tokens it
+reads, is fetched. Without that there is no look, and the silhouette alone tells the shape.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from ... import models
+from ...base.arrays import F32, Mask, Pixels
+from ...base.camera import Camera
+from ...models import shipped
+from ...models.onnx_session import open_session
+from ...segment import dino_tokens
+from ..crop import Crop, planes_of
+
+NO_EDGE = -12.0  # logit
+
+
+@dataclass(frozen=True, eq=False)
+class SeenShape:
+    """Fields (s, s) over the crop's pixels, meaningful where `mask` is, in crop units."""
+
+    crop: Crop
+    mask: Mask
+    front: F32  # how much nearer than height 0 the visible surface is
+    thickness: F32  # to where the ray leaves the part that it sees
+    depth: F32  # to where it leaves the whole object
+    normal: F32  # (s, s, 3) unit, camera axes, towards the camera
+    edge: F32  # probability that the surface ends beside here, before a farther part
+    front_error: F32  # expected
+    depth_error: F32  # expected
+
+    @staticmethod
+    def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
+        """Of what the network says, (9, s, s); see `training.shape_net`."""
+        normal = raw[3:6] / np.maximum(np.linalg.norm(raw[3:6], axis=0), 1e-6)
+        return SeenShape(
+            crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
+            normal.transpose(1, 2, 0), 1 / (1 + np.exp(-np.maximum(raw[6], NO_EDGE))),
+            np.exp(raw[7]), np.exp(raw[8]),
+        )  # fmt: skip
+
+
+def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
+    """What is seen where `mask` (H, W) of a photo is; None where the network cannot run."""
+    if missing() is not None or not mask.any():
+        return None
+    return _memory.look(pixels, mask, Crop.around(mask, camera))
+
+
+def missing() -> str | None:
+    """What the look needs and is not here, as one sentence."""
+    if models.path(shipped.TOKENS) is None:
+        return f"the model {shipped.TOKENS} is not here: `objectmorpher models get`"
+    return None if shipped.is_shipped() else "the shape network is missing from this installation"
+
+
+class ShapeNet:
+    """The network in an ONNX file."""
+
+    def __init__(self, data: bytes) -> None:
+        self._session: Any = open_session(data)
+
+    def look(self, planes: F32, tokens: F32, mask: Mask, crop: Crop) -> SeenShape:
+        """Of planes (7, s, s) and tokens (g, g, c) of a crop."""
+        wanted = {"planes": planes[None], "tokens": tokens.transpose(2, 0, 1)[None]}
+        found = self._session.run(None, {k: np.ascontiguousarray(v) for k, v in wanted.items()})
+        return SeenShape.of(np.asarray(found[0][0], np.float32), mask, crop)
+
+
+class _Memory:
+    """The network, and the last look: another thickness looks no second time.
+
+    What was seen is known by the digest of the crop, so no photo is held on to.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._net: ShapeNet | None = None
+        self._last: tuple[bytes, SeenShape] | None = None
+
+    def look(self, pixels: Pixels, mask: Mask, crop: Crop) -> SeenShape:
+        rgb, seen = crop.seen(pixels), crop.seen_mask(mask)
+        digest = hashlib.sha256(rgb.tobytes() + seen.tobytes() + crop.tangents.tobytes()).digest()
+        digest += bytes(str(crop[:3]), "ascii")
+        with self._lock:
+            if self._last is not None and self._last[0] == digest:
+                return self._last[1]
+            if self._net is None:
+                self._net = ShapeNet(shipped.shape_network())
+            tokens = dino_tokens.shared().inner_tokens(rgb)
+            found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
+            self._last = digest, found
+            return found
+
+
+_memory = _Memory()

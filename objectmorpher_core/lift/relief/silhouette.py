@@ -1,0 +1,203 @@
+"""The silhouette of an object on a grid of its own, in which shapes are found.
+
+The grid covers the mask's box with a ring of cells around it, GRID cells on its longer side. An
+object that leaves the photo goes on a little beyond the frame, where its cut is no outline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F64, Mask
+from ...base.distances import distance_inside
+from ...base.kernel_files import numba
+from ...segment.matting.matte import extended_mask, frame_extension
+from .bilinear import bilinear
+
+GRID = 256  # cells on the longer side of the box
+FINENESS = 4.0  # px to a cell, at least, at which the outline is looked at
+SMOOTHING = 0.4  # cells: the outline is smoothed by so much
+STEEP = 0.9  # growth of the depth per cell, from which a farther disc covers this one
+TOUCHING = 0.03  # x extent: how far above its lower hull an outline still touches the ground
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """Where the object is, coarsely, and how far its outline is."""
+
+    inside: Mask  # (h, w) the outermost ring is outside
+    cell: float  # px of the photo per cell
+    left: float  # px, photo coordinates of the grid's corner
+    top: float
+    extent: float  # px, longer side of the silhouette's box
+    is_open: tuple[bool, bool, bool, bool]  # top, bottom, left, right: it leaves the photo there
+
+    @staticmethod
+    def of(mask: Mask) -> Silhouette:
+        """Of `mask` (H, W), with at least one pixel."""
+        extension = frame_extension(mask)
+        whole = extended_mask(mask, extension)
+        rows, columns = np.flatnonzero(whole.any(1)), np.flatnonzero(whole.any(0))
+        top, left = int(rows[0]), int(columns[0])
+        crop = whole[top : rows[-1] + 1, left : columns[-1] + 1]
+        extent = float(max(crop.shape))
+        cell = max(1.0, extent / GRID)
+        inside = np.pad(_reduced(crop, cell), 1)
+        corner = (left - extension[2] - cell, top - extension[0] - cell)
+        is_open = (
+            bool(mask[0].any()), bool(mask[-1].any()),
+            bool(mask[:, 0].any()), bool(mask[:, -1].any()),
+        )  # fmt: skip
+        return Silhouette(inside, cell, *corner, extent, is_open)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(h, w) cells."""
+        return self.inside.shape[0], self.inside.shape[1]
+
+    @property
+    def cells(self) -> F64:
+        """Grid coordinates (h, w, 2) of all cells."""
+        h, w = self.shape
+        return np.stack(np.meshgrid(np.arange(w), np.arange(h)), -1).astype(np.float64)
+
+    def grid_xy(self, xy: F64) -> F64:
+        """Grid coordinates (..., 2), cell centres at integers, of photo px (..., 2)."""
+        return (xy - [self.left, self.top]) / self.cell - 0.5
+
+    def photo_xy(self, grid_xy: F64) -> F64:
+        """Photo px (..., 2) of grid coordinates (..., 2)."""
+        return (grid_xy + 0.5) * self.cell + [self.left, self.top]
+
+    @cached_property
+    def depth(self) -> F64:
+        """(h, w) px from the outline, 0 outside.
+
+        An open side is no outline: the silhouette is thought to go on there as it is.
+        """
+        reach = max(self.shape)
+        h, w = self.shape
+        box = self.continued(self.inside, reach).astype(np.uint8)
+        far = distance_inside(box)
+        far = far[reach : reach + h, reach : reach + w]
+        return np.where(self.inside, np.maximum(far - 0.5, 0.25), 0.0) * self.cell
+
+    def continued(self, field: np.ndarray, count: int) -> np.ndarray:
+        """`field` (h, w) with `count` cells more on each side.
+
+        Outside the object they are 0. Where it leaves the photo it goes on as it is there.
+        """
+        top, bottom, left, right = (
+            (count + 1, 0) if is_open else (0, count + 1) for is_open in self.is_open
+        )
+        core = field[1:-1, 1:-1]
+        core = np.pad(core, [(top[0], bottom[0]), (left[0], right[0])], mode="edge")
+        return np.pad(core, [(top[1], bottom[1]), (left[1], right[1])])
+
+    @cached_property
+    def radius(self) -> F64:
+        """(h, w) px, of the largest disc in the silhouette that covers a cell; 0 outside."""
+        return _largest_disc(self.depth / self.cell) * self.cell
+
+    @cached_property
+    def contour(self) -> tuple[F64, F64]:
+        """Stretches of the outline: their middles (n, 2) and their ends' offsets (n, 2), photo px.
+
+        Also where the object leaves the photo: there it is sawn off, not hollow.
+        """
+        solid = self.inside.astype(np.uint8)
+        found, _ = cv2.findContours(solid, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        middles, offsets = [], []
+        for ring in found:
+            points = ring[:, 0].astype(np.float64)
+            steps = np.roll(points, -1, axis=0) - points
+            middles.append(points + 0.5 * steps)
+            offsets.append(steps)
+        return self.photo_xy(np.concatenate(middles)), np.concatenate(offsets) * self.cell
+
+    @cached_property
+    def lower_outline(self) -> tuple[F64, F64]:
+        """Columns (n,) px and the lowest row (n,) px of the silhouette in each, ascending."""
+        inside = self.inside
+        j = np.flatnonzero(inside.any(0))
+        i = inside.shape[0] - np.argmax(inside[::-1][:, j], axis=0)  # the cell below the lowest
+        x, y = (j + 0.5) * self.cell + self.left, i * self.cell + self.top
+        return x.astype(np.float64), y.astype(np.float64)
+
+    def outward(self, xy: F64) -> F64:
+        """Unit directions (N, 2) away from the silhouette at photo px (N, 2) outside it."""
+        at, (h, w) = self.grid_xy(xy), self.shape
+        beyond = np.maximum(-at, at - [w - 1, h - 1]).max(initial=0)
+        pad = int(np.ceil(beyond)) + 2
+        distance = distance_inside(~np.pad(self.inside, pad))
+        dy, dx = np.gradient(cv2.GaussianBlur(distance, (0, 0), 1.0))
+        direction = bilinear(np.stack([dx, dy], -1), at + pad)
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        return np.where(length > 1e-6, direction / np.maximum(length, 1e-6), [0.0, -1.0])
+
+
+def lower_hull(x: F64, y: F64) -> list[int]:
+    """Indices of the corners of the hull of (x, y) on the side of large y; x ascending."""
+    hull: list[int] = []
+    for k in range(len(x)):
+        while len(hull) >= 2:
+            a, b = hull[-2], hull[-1]
+            cross = (x[b] - x[a]) * (y[k] - y[a]) - (y[b] - y[a]) * (x[k] - x[a])
+            if cross < 0:
+                break
+            hull.pop()
+        hull.append(k)
+    return hull
+
+
+def _reduced(crop: Mask, cell: float) -> Mask:
+    """The crop (H, W) on cells (h, w) of `cell` px; never empty."""
+    grid = tuple(int(np.ceil(n / cell)) for n in crop.shape)
+    step = max(1, int(cell / FINENESS))
+    size = [(round(n * cell) + 1 + step - 1) // step for n in grid]
+    padded = np.zeros((size[0] * step, size[1] * step), np.uint8)
+    np.multiply(crop, 255, out=padded[: crop.shape[0], : crop.shape[1]], dtype=np.uint8)
+    blocks = cv2.resize(padded, (size[1], size[0]), interpolation=cv2.INTER_AREA)
+    whole = np.asarray(blocks, np.float32) * np.float32(1 / 255)
+    if cell > 1.0:
+        # A block has averaged a little already.
+        spread = np.sqrt((SMOOTHING * cell) ** 2 - (step**2 - 1) / 12) / step
+        whole = cv2.GaussianBlur(whole, (0, 0), float(spread))
+    cell /= step
+    warp = np.array([[1, 0, 0.5], [0, 1, 0.5]]) / cell - [0, 0, 0.5]
+    inside = cv2.warpAffine(whole, warp, (grid[1], grid[0]), flags=cv2.INTER_LINEAR) > 0.5
+    return inside if inside.any() else np.ones(grid, bool)
+
+
+@numba.njit(cache=True)
+def is_covered(depth, i, j):
+    """Whether the disc about a cell, as large as fits, lies in a neighbour's but for a sliver."""
+    height, width = depth.shape
+    for a in range(max(i - 1, 0), min(i + 2, height)):
+        for b in range(max(j - 1, 0), min(j + 2, width)):
+            away = np.sqrt((a - i) ** 2 + (b - j) ** 2)
+            if away > 0 and depth[a, b] - depth[i, j] >= STEEP * away:
+                return True
+    return False
+
+
+@numba.njit(cache=True)
+def _largest_disc(depth):
+    """(h, w) the largest radius of a disc in the silhouette that covers a cell; `depth` cells."""
+    height, width = depth.shape
+    largest = depth.copy()
+    for i in range(height):
+        for j in range(width):
+            r = depth[i, j]
+            if r <= 0 or is_covered(depth, i, j):
+                continue
+            reach = int(r)
+            for a in range(max(i - reach, 0), min(i + reach + 1, height)):
+                for b in range(max(j - reach, 0), min(j + reach + 1, width)):
+                    if (a - i) ** 2 + (b - j) ** 2 < r * r and largest[a, b] < r:
+                        largest[a, b] = r
+    return largest

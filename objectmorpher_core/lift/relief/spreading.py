@@ -1,0 +1,199 @@
+"""Points spread evenly over a body: its front, its back, the walls between, and a brim around.
+
+The brim carries the matte's soft edge. Each sheet is spread apart: in a thin limb the back lies
+closer to the front than one spacing, and at the rim the front is seen edge-on and leaves the brim
+to cover it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F64, Mask
+from ...base.poisson_disk import thin_to_spacing
+from ...base.threads import in_threads
+from .bilinear import bilinear
+from .body import BACK, FRONT, MIDDLE, Body
+from .silhouette import Silhouette
+
+OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
+PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
+BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
+WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
+MIN_SPACING = 1.0  # px: more points than pixels carry nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Points on a closed surface, in relief coordinates: photo px and height in px."""
+
+    xy: F64  # (N, 2) photo px
+    height: F64  # (N,) px towards the camera
+    normals: F64  # (N, 3) outward, relief coordinates (x, y, height), unit
+    is_front: Mask  # (N,) on the side of the camera
+    is_seen: Mask  # (N,) by the photo
+    is_brim: Mask  # (N,) outside the silhouette
+    color_xy: F64  # (N, 2) photo px of which it has the colour
+
+    def select(self, index: np.ndarray) -> Surface:
+        return Surface(*(getattr(self, f.name)[index] for f in fields(self)))
+
+
+def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tuple[Surface, float]:
+    """About `count` points and their mean spacing in px.
+
+    `band`: how far outside the silhouette the matte covers something, px. Candidates are drawn in
+    proportion to the true area, then thinned to one spacing in 3D.
+    """
+    areas = [_area(body, side) for side in (FRONT, BACK)]
+    wall = _wall_area(body)
+    total = sum(area.sum() for area in areas) + wall.sum() + _inner_area(body)
+    spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
+    density = OVERSAMPLING / spacing**2  # candidates per px^2
+    drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
+    around = [
+        _wall(body, wall * density, rng),
+        _brim(body, band + BRIM * spacing, density, rng),
+        *_inner(body, density, rng),
+    ]
+    # Most candidates of the sheets are dropped: their normals are found when that is done.
+    clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
+    clouds += [(surface.xy, surface.height) for surface in around]
+    front, back, *others = _thinned(clouds, spacing, rng)
+    sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
+    sheets += [surface.select(kept) for surface, kept in zip(around, others, strict=True)]
+    return _joined(sheets), spacing
+
+
+def _thinned(
+    clouds: list[tuple[F64, F64]], spacing: float, rng: np.random.Generator
+) -> list[np.ndarray]:  # fmt: skip
+    """Which points of each cloud, xy (N, 2) and height (N,), are kept."""
+    orders = [rng.permutation(len(xy)) for xy, _ in clouds]
+    kept = [np.empty(0, np.int64)] * len(clouds)
+
+    def thin(first: int, last: int) -> None:
+        for k in range(first, last):
+            points = np.column_stack(clouds[k])
+            kept[k] = thin_to_spacing(points, spacing * np.sqrt(PACKING), orders[k])
+
+    in_threads(thin, len(clouds), parts=len(clouds))
+    return kept
+
+
+def _joined(sheets: list[Surface]) -> Surface:
+    return Surface(
+        *(np.concatenate([getattr(sheet, f.name) for sheet in sheets]) for f in fields(Surface))
+    )
+
+
+def _area(body: Body, side: float) -> F64:
+    """(h, w) px^2 of a sheet's true surface over each cell of the silhouette."""
+    outline = body.silhouette
+    rows, columns = np.nonzero(outline.inside)
+    xy = outline.photo_xy(np.column_stack([columns, rows]).astype(np.float64))
+    _, gradient = body.sample(xy, side)
+    area = np.zeros(outline.shape)
+    area[rows, columns] = outline.cell**2 * np.sqrt(1 + (gradient**2).sum(1))
+    return area
+
+
+def _draw(outline: Silhouette, expected: F64, rng: np.random.Generator) -> F64:
+    """Photo px (N, 2) of random points, `expected` (h, w) of them per cell."""
+    counts = np.floor(expected + rng.random(expected.shape)).astype(int)
+    rows, columns = np.nonzero(counts)
+    repeat = counts[rows, columns]
+    cells = np.column_stack([np.repeat(columns, repeat), np.repeat(rows, repeat)])
+    return outline.photo_xy(cells + rng.random((len(cells), 2)) - 0.5)
+
+
+def _sheet(body: Body, xy: F64, side: float) -> Surface:
+    """The front, or the back, at photo px (N, 2)."""
+    height, gradient = body.sample(xy, side)
+    normals = side * np.column_stack([-gradient, np.ones(len(xy))])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    is_front = np.full(len(xy), side == FRONT)
+    return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
+
+
+def _wall_area(body: Body) -> F64:
+    """(n,) px^2 between the sheets at each stretch of the outline."""
+    middles, offsets = body.silhouette.contour
+    front, _ = body.sample(middles, FRONT)
+    back, _ = body.sample(middles, BACK)
+    return np.linalg.norm(offsets, axis=1) * np.maximum(front - back, 0.0)
+
+
+def _wall(body: Body, expected: F64, rng: np.random.Generator) -> Surface:
+    """What joins the sheets where they do not meet at the outline, `expected` (n,) a stretch."""
+    middles, offsets = body.silhouette.contour
+    counts = np.floor(expected + rng.random(len(expected))).astype(int)
+    xy = np.repeat(middles, counts, axis=0)
+    xy = xy + np.repeat(offsets, counts, axis=0) * (rng.random((len(xy), 1)) - 0.5)
+    height, _ = body.sample(xy, rng.uniform(BACK, FRONT, len(xy)))
+    normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
+    no = np.zeros(len(xy), bool)
+    return Surface(xy, height, normals, no, no, no, xy)
+
+
+def _inner_area(body: Body) -> float:
+    """px^2 of what is between parts of the object."""
+    inner = body.overlaps
+    if inner is None:
+        return 0.0
+    cell = body.silhouette.cell
+    walls = cell * float((inner.walls.top - inner.walls.foot).sum())
+    return walls + 2 * cell**2 * int(inner.is_apart.sum())
+
+
+def _inner(body: Body, density: float, rng: np.random.Generator) -> list[Surface]:
+    """Between parts of the object: the sides of near ones, their backs, and what is beneath."""
+    inner, outline = body.overlaps, body.silhouette
+    if inner is None:
+        return []
+    cell, walls = outline.cell, inner.walls
+    expected = density * cell * (walls.top - walls.foot)
+    which = np.repeat(
+        np.arange(len(expected)), np.floor(expected + rng.random(len(expected))).astype(int)
+    )
+    along = walls.step[which][:, ::-1] * (rng.random((len(which), 1)) - 0.5)
+    xy = outline.photo_xy(walls.near[which] + WITHIN * walls.step[which] + along)
+    share = rng.random(len(which))
+    height = walls.foot[which] + share * (walls.top - walls.foot)[which]
+    normals = np.column_stack([walls.step[which], np.zeros(len(which))]).astype(np.float64)
+    no = np.zeros(len(which), bool)
+    behind = outline.photo_xy(walls.near[which] - walls.step[which].astype(np.float64))
+    sheets = [Surface(xy, height, normals, ~no, no, no, behind)]
+    assert body.cuts is not None, "there are overlaps"
+    for field, side in ((inner.own_back, BACK), (inner.beneath, FRONT)):
+        down, right = (slope / cell for slope in body.cuts.gradient(field))
+        area = np.where(inner.is_apart, cell**2 * np.sqrt(1 + down**2 + right**2), 0.0)
+        xy = _draw(outline, area * density, rng)
+        at = outline.grid_xy(xy)
+        near = body.cuts.settled(at)
+        height, dx, dy = bilinear(np.stack([field, right, down], -1), near).T
+        height = height + cell * ((at - near) * np.column_stack([dx, dy])).sum(1)
+        normals = side * np.column_stack([-dx, -dy, np.ones(len(xy))])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        no = np.zeros(len(xy), bool)
+        j, i = np.clip(np.rint(at).astype(int), 0, np.array(field.shape[::-1]) - 1).T
+        source = xy if side == BACK else outline.photo_xy(inner.beside[i, j].astype(np.float64))
+        sheets.append(Surface(xy, height, normals, ~no, no, no, source))
+    return sheets
+
+
+def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) -> Surface:
+    """Around the silhouette, as far as `reach` px, at the height of its middle."""
+    outline = body.silhouette
+    pad = int(np.ceil(reach / outline.cell)) + 1
+    inside = np.pad(outline.inside, pad).astype(np.uint8)
+    distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5) * outline.cell
+    ring = (inside == 0) & (distance < reach)
+    xy = _draw(outline, np.where(ring, density * outline.cell**2, 0.0), rng) - pad * outline.cell
+    height, _ = body.sample(xy, MIDDLE)
+    normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])
+    yes = np.ones(len(xy), bool)
+    return Surface(xy, height, normals, yes, yes, yes, xy)

@@ -1,0 +1,1 @@
+"""Lifters in environments of their own, run as separate programs."""

@@ -1,0 +1,198 @@
+"""Lifting by a program in an environment of its own: the worker protocol (docs/workers.md).
+
+The worker gets a fresh folder: `image.png` (the photo, RGBA, alpha is the soft cut-out), `mask.png`
+(0 or 255), both of the photo's size, and `camera.json`. It leaves `object.ply` (or another file of
+3D Gaussians, or a mesh) there, and, where it knows, `object.json`: how it was seen. What it leaves
+is registered to the photo as an imported file is; the folder is removed.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ...base.arrays import F64
+from ...base.camera import Camera
+from ...base.limits import WORKER_GAUSSIANS as MOST
+from ...base.progress import Progress, part
+from ...base.quoting import reason
+from ...document.gaussians import Gaussians
+from ...document.model import LiftedObject, LiftSettings
+from ...pictures.image import to_u8
+from ...splat_files import FORMATS, MESH_ENDINGS, SplatFileError, read, read_object
+from ...splat_files.splats.ply_table import read_header
+from .. import LiftError, Subject
+from ..registration.imported import lift_imported
+from ..registration.placement import Hints, Proposal, Registrar, register
+from ..registration.view import Target
+from ..trellis.camera import pose_in
+from .answer import VERSION, WRONG, check_similarity, read_told
+from .file import Worker, read_worker
+from .process import run_worker
+
+log = logging.getLogger(__name__)
+OBJECT, SEEN = "object", "object.json"  # what a worker leaves
+LOST = 0.01  # share of Gaussians with values that are no numbers, from which the file is refused
+ELSEWHERE = 0.3  # IoU below which the worker's camera shows the object elsewhere
+SAME = 1e-6  # relative difference of cameras that are one
+POINTS = 2_000  # by which a pose is carried from the worker's camera to the photo's
+UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
+
+
+class ExternalLifter:
+    """A worker as a lifter."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.worker, self.name = worker, worker.name
+
+    def missing(self) -> str | None:
+        """See `Lifter`."""
+        return self.worker.missing()
+
+    def lift(
+        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
+    ) -> LiftedObject:
+        """See `Lifter`. Raises LiftError; Cancelled passes, and the worker has ended then."""
+        with tempfile.TemporaryDirectory(prefix="objectmorpher-", ignore_cleanup_errors=True) as at:
+            folder = Path(at)
+            write_job(folder, subject, settings.count, seed)
+            run_worker(self.worker, folder, part(progress, 0.0, 0.7))
+            progress(0.7, "Reading the object")
+            made, seen = read_answer(folder, self.name, settings.count)
+        target = Target(subject.pixels, subject.mask, subject.camera)
+        best = self._placed(made, seen, target, part(progress, 0.7, 0.9), seed)
+        log.info("%s: registered with an IoU of %.3f", self.name, best.iou)
+        rest = part(progress, 0.9, 1.0)
+        lifted = lift_imported(made, best, subject.matte, None, rest, seed)
+        return replace(lifted, backend=self.name)
+
+    def _placed(
+        self, made: Gaussians, seen: Seen | None, target: Target, progress: Progress, seed: int
+    ) -> Proposal:
+        if seen is None:
+            return register(made, target, Hints(up=UP), progress, seed).best
+        progress(0.0, "Fitting the object")
+        start = seen.pose_for(target.camera, made.means.astype(np.float64), self.name)
+        registrar = Registrar(made, target, seed)
+        best = registrar.improved(registrar.rated(start))
+        if best.iou < ELSEWHERE:
+            raise LiftError(
+                f"the worker {self.name} says that the object is seen elsewhere: its outline and"
+                f" the selection agree by {best.iou:.0%}"
+            )
+        return best
+
+
+class Seen:
+    """How a worker says that its object is seen."""
+
+    def __init__(self, world_from_object: F64, camera: Camera) -> None:
+        self.world_from_object, self.camera = world_from_object, camera
+
+    def pose_for(self, camera: Camera, points: F64, name: str) -> F64:
+        """(4, 4) world from object with which the photo's camera sees `points` (N, 3) so.
+
+        Raises LiftError where no camera in front of the object does.
+        """
+        matrix = self.world_from_object
+        world = points @ matrix[:3, :3].T + matrix[:3, 3]
+        if (world[:, 2] <= 0).any():
+            raise LiftError(f"the worker {name} says that the object is behind the camera")
+        own = np.array([self.camera.focal, self.camera.cx, self.camera.cy])
+        wanted = np.array([camera.focal, camera.cx, camera.cy])
+        if (np.abs(own - wanted) <= SAME * wanted).all():
+            return matrix
+        some = slice(None, None, len(points) // POINTS + 1)
+        found = pose_in(camera, points[some], self.camera.project(world[some]))
+        if found is None:
+            raise LiftError(f"the worker {name} says a camera that the photo cannot have")
+        return found
+
+
+def write_job(folder: Path, subject: Subject, count: int, seed: int) -> None:
+    """What the worker gets."""
+    rgb = to_u8(subject.pixels)
+    alpha = np.zeros(subject.mask.shape, np.uint8)
+    matte, (height, width) = subject.matte, subject.mask.shape
+    x0, y0, x1, y1 = matte.box
+    left, top, right, bottom = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
+    own = matte.alpha[top - y0 : bottom - y0, left - x0 : right - x0]
+    alpha[top:bottom, left:right] = np.rint(255 * own.clip(0, 1))
+    Image.fromarray(np.dstack([rgb, alpha]), "RGBA").save(folder / "image.png", compress_level=1)
+    Image.fromarray(subject.mask.astype(np.uint8) * 255, "L").save(folder / "mask.png")
+    c = subject.camera
+    told = {
+        "version": VERSION, "width": c.width, "height": c.height, "focal": c.focal, "cx": c.cx,
+        "cy": c.cy, "seed": seed, "count": count,
+    }  # fmt: skip
+    (folder / "camera.json").write_text(json.dumps(told), encoding="utf-8")
+
+
+def read_answer(folder: Path, name: str, count: int) -> tuple[Gaussians, Seen | None]:
+    """The Gaussians that a worker left, and how it says they are seen. Raises LiftError."""
+    at = _object_file(folder, name)
+    seen = _seen(folder / SEEN, name)
+    try:
+        declared = _declared(at)
+        if declared is not None and declared > MOST:
+            raise SplatFileError(f"{at.name}: {declared:,} Gaussians are more than {MOST:,}")
+        made = read(at, count)
+        if declared is not None and len(made) < (1 - LOST) * declared:
+            lost = f"{declared - len(made):,} of {declared:,} Gaussians"
+            raise SplatFileError(f"{at.name}: {lost} have values that are not numbers")
+        if seen is None:  # a pose is told of the frame of the file; without one any frame will do
+            made = read_object(at, count)
+    except (SplatFileError, OSError) as error:
+        raise LiftError(f"what the worker {name} made cannot be used: {reason(error)}") from error
+    if len(made) > MOST:
+        raise LiftError(f"the worker {name} made {len(made):,} Gaussians, more than {MOST:,}")
+    return made, seen
+
+
+def _object_file(folder: Path, name: str) -> Path:
+    for ending in (*FORMATS, *MESH_ENDINGS):
+        at = folder / f"{OBJECT}{ending}"
+        if at.is_symlink():
+            raise LiftError(f"the worker {name} left a link, not a file: {at.name}")
+        if at.is_file():
+            return at
+    raise LiftError(f"the worker {name} ended without leaving {OBJECT}.ply or another object")
+
+
+def _declared(at: Path) -> int | None:
+    """How many vertices a .ply says it has; of other files nothing."""
+    if at.suffix != ".ply":
+        return None
+    with at.open("rb") as file:
+        header = read_header(file)
+    vertex = header.element("vertex")
+    return None if vertex is None or header.element("chunk") is not None else vertex.count
+
+
+def _seen(at: Path, name: str) -> Seen | None:
+    """What object.json says. Raises LiftError."""
+    if not at.exists():
+        return None
+    try:
+        told = read_told(at)
+        matrix = np.array(told["world_from_object"], np.float64)
+        focal, cx, cy = (float(told[key]) for key in ("focal", "cx", "cy"))
+        camera = Camera(focal, cx, cy, int(told["width"]), int(told["height"]))
+        check_similarity(matrix, "world_from_object")
+        if not (math.isfinite(camera.cx + camera.cy) and 0 < camera.focal < math.inf):
+            raise ValueError("the camera is none")
+    except WRONG as error:
+        raise LiftError(f"the camera of the worker {name} is of no use: {reason(error)}") from error
+    return Seen(matrix, camera)
+
+
+def load_worker(name: str) -> ExternalLifter:
+    """The worker called `name` as a lifter. Raises LiftError."""
+    return ExternalLifter(read_worker(name))

@@ -1,0 +1,1 @@
+"""Pictures in and out of files, at their own bit depth and with their own profile."""

@@ -1,0 +1,320 @@
+"""Pictures in and out of files: upright, RGB, bit depth, alpha, profile and EXIF kept.
+
+The pixels of a file that is read and written again as PNG, TIFF or WebP are the same, byte for
+byte; only 16-bit pixels that go into JPEG or WebP, which have 8, are rounded.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from PIL import Image, ImageCms
+
+from ..base.arrays import RGB, U8, Mask, Pixels, frozen
+from ..base.limits import PICTURE_PIXELS as MAX_PIXELS
+from . import exif, png, tiff
+
+FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "BMP", "GIF")  # plain pixels, no programs
+ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")  # that can be written
+READ_ENDINGS = (*ENDINGS, ".bmp")  # of what counts as a picture in a folder of pictures
+MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
+WEBP_MAX_SIDE = 16383  # px
+JPEG_MAX_SIDE = 65535  # px
+REASON = 200  # characters of what a decoder says
+LOSSLESS = 100  # quality of WebP that keeps every pixel
+
+Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard, which fires before ours in some formats
+
+
+class ImageError(ValueError):
+    """The bytes are not a picture that can be read, or cannot be written so; one sentence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Upright RGB pixels and everything of the file that must survive the edit."""
+
+    pixels: Pixels  # (H, W, 3) u8 or u16, RGB
+    alpha: np.ndarray | None = None  # (H, W) same dtype, kept aside and never edited
+    is_grey: bool = False  # the file had one colour channel; so will the export
+    icc: bytes | None = None  # colour profile
+    exif: bytes | None = None  # raw EXIF block (a TIFF header first), orientation 1 (upright)
+    focal_35mm: float | None = None  # mm, EXIF's 35-mm equivalent focal length
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(self.pixels))
+        if self.alpha is not None:
+            object.__setattr__(self, "alpha", frozen(self.alpha))
+
+
+def read_picture(data: bytes) -> Picture:
+    """The picture in the bytes of an image file; of several frames the first.
+
+    CMYK and Lab become sRGB through their profile, palettes RGB. Raises ImageError.
+    """
+    if not data:
+        raise ImageError("the image file is empty")
+    try:
+        image = Image.open(io.BytesIO(data), formats=FORMATS)
+    except Image.DecompressionBombError:
+        raise ImageError(f"the image has more than {MAX_PIXELS // 10**6} megapixels") from None
+    except Exception:  # Pillow raises whatever a broken file makes it stumble over
+        image = None  # perhaps a TIFF that only tifffile knows
+    if image is None and data[:4] not in tiff.MARKS:
+        raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP)")
+    if image is not None and image.width * image.height > MAX_PIXELS:
+        raise ImageError(
+            f"the image is {image.width} x {image.height} px, more than "
+            f"{MAX_PIXELS // 10**6} megapixels"
+        )
+    try:
+        return _read_16_bit(data, image) or _read_8_bit(image)
+    except ImageError:
+        raise
+    except MemoryError as error:
+        raise ImageError("the image cannot be read: there is not enough memory for it") from error
+    except Image.DecompressionBombError as error:  # what lies in its blocks, not its size
+        raise ImageError("the image cannot be read: it would unpack to too much") from error
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())[:REASON] or "it is damaged"
+        raise ImageError(f"the image cannot be read: {reason}") from error
+    except Exception as error:  # as above
+        raise ImageError("the image cannot be read: it is damaged or ends early") from error
+
+
+def _read_16_bit(data: bytes, image: Image.Image | None) -> Picture | None:
+    """The picture of a file with 16 bits a channel; None where it has fewer."""
+    if data.startswith(png.SIGNATURE):
+        if png.bit_depth(data) != 16:
+            return None
+        samples, turn = png.read_16_bit(data), None
+    elif data[:4] in tiff.MARKS:
+        found = tiff.read_16_bit(data, MAX_PIXELS)
+        if found is None:
+            return None
+        samples, turn = found
+    else:
+        return None
+    return _picture(samples, image, turn)
+
+
+def _read_8_bit(image: Image.Image | None) -> Picture:
+    """The picture of any file that Pillow decodes to 8 bits a channel."""
+    if image is None:
+        raise ImageError("this kind of TIFF file cannot be read")
+    if image.mode in ("F", "I") or image.mode.startswith("I;"):
+        raise ImageError("only images of 8 or 16 whole-number bits a channel can be read")
+    turn = 1 if image.format == "TIFF" else None  # Pillow turns TIFF files itself
+    if image.mode in ("CMYK", "LAB"):
+        picture = _picture(np.asarray(_through_profile(image)), image, turn)
+        return replace(picture, icc=None)
+    has_alpha = image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info
+    is_grey = image.mode in ("1", "L", "LA", "La")
+    mode = ("LA" if has_alpha else "L") if is_grey else ("RGBA" if has_alpha else "RGB")
+    samples = np.asarray(image.convert(mode))
+    return _picture(samples.reshape(*samples.shape[:2], -1), image, turn)
+
+
+def _through_profile(image: Image.Image) -> Image.Image:
+    """A CMYK or Lab image as sRGB, through its own profile where it has one."""
+    source = ImageCms.createProfile("LAB") if image.mode == "LAB" else None
+    if icc := image.info.get("icc_profile"):
+        source = io.BytesIO(icc)
+    if source is not None:
+        try:
+            target = ImageCms.createProfile("sRGB")
+            turned = ImageCms.profileToProfile(image, source, target, outputMode="RGB")
+            if turned is not None:
+                return turned
+        except ImageCms.PyCMSError:
+            pass  # a broken profile: the plain formula below is better than no picture
+    return image.convert("RGB")
+
+
+def _picture(
+    samples: np.ndarray,
+    image: Image.Image | None,
+    turn: int | None,
+) -> Picture:
+    """Upright Picture of stored samples (H, W, 1..4): grey, grey + alpha, RGB or RGBA.
+
+    `turn` is the EXIF orientation, None to take it from the metadata of `image`.
+    """
+    block = None if image is None else _exif_block(image)
+    if turn is None:
+        turn = exif.orientation(block) if block else 1
+    samples = _upright(samples, turn)
+    channels = samples.shape[2]
+    return Picture(
+        pixels=samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2),
+        alpha=samples[..., -1] if channels in (2, 4) else None,
+        is_grey=channels < 3,
+        icc=image.info.get("icc_profile") or None if image is not None else None,
+        exif=exif.upright(block) if block else None,
+        focal_35mm=exif.focal_35mm(block) if block else None,
+    )
+
+
+def _exif_block(image: Image.Image) -> bytes | None:
+    """The EXIF block without prefix; None where there is none."""
+    if image.format == "TIFF":
+        return tiff.described(image)
+    block = image.info.get("exif")
+    return block.removeprefix(exif.PREFIX) or None if isinstance(block, bytes) else None
+
+
+def _upright(samples: np.ndarray, orientation: int) -> np.ndarray:
+    """Stored samples (H, W, C) turned and mirrored as EXIF orientation 1..8 says."""
+    if orientation >= 5:  # rows are columns
+        samples = samples.transpose(1, 0, 2)
+    if orientation in (2, 3, 6, 7):
+        samples = samples[:, ::-1]
+    if orientation in (3, 4, 7, 8):
+        samples = samples[::-1]
+    return samples
+
+
+def encode_picture(
+    picture: Picture, ending: str, quality: int = 95, webp_quality: int = LOSSLESS
+) -> bytes:
+    """The bytes of an image file of the kind that `ending` (".png", "jpg") names.
+
+    PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for JPEG and WebP. `quality` is
+    JPEG's; WebP is lossless unless `webp_quality` is below 100. Grey stays grey (not in WebP,
+    which has none). Raises ImageError for an unknown ending, and where the format cannot hold
+    the picture.
+    """
+    ending = "." + ending.lower().removeprefix(".")
+    if ending not in ENDINGS:
+        raise ImageError(f"pictures cannot be written as {ending}, only as {', '.join(ENDINGS)}")
+    try:
+        if ending in (".jpg", ".jpeg"):
+            return _encode_jpeg(picture, quality)
+        if ending == ".webp":
+            return _encode_webp(picture, webp_quality)
+        codec = png if ending == ".png" else tiff
+        samples = _Channels(picture)
+        return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
+    except ImageError:
+        raise
+    except (OSError, ValueError, MemoryError, cv2.error) as error:
+        reason = " ".join(str(error).split())[:REASON] or "there is not enough memory"
+        raise ImageError(f"the picture cannot be written as {ending}: {reason}") from error
+
+
+class _Channels:
+    """The channels that a file stores (H, W, 1..4): grey or RGB, then alpha.
+
+    They are put together for the rows that are asked for: a second picture may not fit.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self._picture = picture
+        self.dtype = picture.pixels.dtype
+        channels = (1 if picture.is_grey else 3) + (picture.alpha is not None)
+        self.shape = (*picture.pixels.shape[:2], channels)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        picture = self._picture
+        colours = picture.pixels[rows]
+        if picture.is_grey:
+            colours = _grey(colours)[..., None]
+        if picture.alpha is None:
+            return colours
+        return np.concatenate([colours, picture.alpha[rows][..., None]], axis=2)
+
+
+def _grey(pixels: Pixels) -> np.ndarray:
+    """(H, W) luma; exactly the grey that all three channels share where they do."""
+    return cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
+
+
+def _encode_jpeg(picture: Picture, quality: int) -> bytes:
+    height, width = picture.pixels.shape[:2]
+    if picture.alpha is not None and (picture.alpha != np.iinfo(picture.alpha.dtype).max).any():
+        raise ImageError("JPEG cannot hold transparency; choose .png, .tif or .webp")
+    if max(width, height) > JPEG_MAX_SIDE:
+        raise ImageError(f"JPEG cannot hold {width} x {height} px; choose .png or .tif")
+    pixels = to_u8(picture.pixels)
+    image = Image.fromarray(_grey(pixels) if picture.is_grey else pixels)
+    out = io.BytesIO()
+    profile = _profile_for(picture, 1 if picture.is_grey else 3)
+    block = exif.PREFIX + picture.exif if picture.exif else b""
+    image.save(out, "JPEG", quality=quality, subsampling=0, icc_profile=profile, exif=block)
+    return out.getvalue()
+
+
+def _encode_webp(picture: Picture, quality: int) -> bytes:
+    height, width = picture.pixels.shape[:2]
+    if max(width, height) > WEBP_MAX_SIDE:
+        raise ImageError(f"WebP cannot hold {width} x {height} px; choose .png or .tif")
+    pixels = to_u8(picture.pixels)
+    if picture.alpha is not None:
+        pixels = np.dstack([pixels, to_u8(picture.alpha)])
+    out = io.BytesIO()
+    how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
+    Image.fromarray(pixels).save(
+        out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
+        icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
+    )  # fmt: skip
+    return out.getvalue()
+
+
+def _profile_for(picture: Picture, channels: int) -> bytes | None:
+    """The ICC profile, unless it is one for another number of colours than the file will hold."""
+    space = b"GRAY" if channels < 3 else b"RGB "
+    return picture.icc if picture.icc is not None and picture.icc[16:20] == space else None
+
+
+def to_u8(pixels: np.ndarray) -> RGB:
+    """8-bit values of u8 or u16 pixels of any shape, rounded (65535 / 255 = 257)."""
+    if pixels.dtype == np.uint8:
+        return pixels
+    return cv2.convertScaleAbs(pixels, alpha=1 / 257).astype(np.uint8, copy=False)
+
+
+def resized(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Pixels (H, W[, C]) at another size in px: area means when smaller, Lanczos when larger."""
+    is_smaller = width * height < pixels.shape[0] * pixels.shape[1]
+    method = cv2.INTER_AREA if is_smaller else cv2.INTER_LANCZOS4
+    return cv2.resize(pixels, (width, height), interpolation=method)
+
+
+def at_most(pixels: np.ndarray, longest: int) -> np.ndarray:
+    """Pixels (H, W[, C]), made smaller where their longer side is more than `longest` px."""
+    height, width = pixels.shape[:2]
+    if max(width, height) <= longest:
+        return pixels
+    shrink = longest / max(width, height)
+    return resized(pixels, max(round(width * shrink), 1), max(round(height * shrink), 1))
+
+
+def encode_mask(mask: Mask) -> bytes:
+    """8-bit grey PNG file of a mask (H, W): 0 and 255."""
+    return png.encode(np.where(mask, np.uint8(255), np.uint8(0))[..., None], None, None)
+
+
+def encode_coverage(coverage: U8) -> bytes:
+    """8-bit grey PNG file of a soft mask (H, W)."""
+    return png.encode(coverage[..., None], None, None)
+
+
+def read_mask(data: bytes, size: tuple[int, int]) -> Mask:
+    """Mask (H, W) out of an image file: what `read_coverage` finds at least half covered."""
+    return read_coverage(data, size) > MASK_THRESHOLD
+
+
+def read_coverage(data: bytes, size: tuple[int, int]) -> U8:
+    """Soft mask (H, W) out of an image file: bright and opaque is the object.
+
+    `size` is the photo's (width, height) px. Raises ImageError where the mask has another.
+    """
+    picture = read_picture(data)
+    height, width = picture.pixels.shape[:2]
+    if (width, height) != tuple(size):
+        raise ImageError(f"the mask is {width} x {height} px, the photo {size[0]} x {size[1]} px")
+    coverage = _grey(to_u8(picture.pixels))
+    return coverage if picture.alpha is None else np.minimum(coverage, to_u8(picture.alpha))

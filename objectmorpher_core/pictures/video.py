@@ -1,0 +1,146 @@
+"""Moving pictures in files: WebM and MP4 by OpenCV's encoders, GIF and animated WebP by Pillow.
+
+WebM (VP9) plays in every browser. MP4 holds MPEG-4 Part 2, which players know and browsers do not:
+an H.264 encoder of a free licence comes with no package. GIF has 256 colours.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from itertools import chain
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from ..base.arrays import RGB
+from .image import at_most
+
+CODECS = {".webm": "VP90", ".mp4": "mp4v"}
+PICTURES = (".gif", ".webp")
+ENDINGS = (*CODECS, *PICTURES)
+GIF_LONGEST = 640  # px
+GIF_TICK = 10  # ms, of which a GIF's frames last whole numbers
+WEBP_QUALITY = 85
+
+
+class VideoError(ValueError):
+    """The frames cannot become such a file, or be read from one; one sentence."""
+
+
+def frame_rate(path: Path) -> tuple[float, int]:
+    """Frames a second, and how many there are, as the file says. Raises VideoError."""
+    video = _opened(path)
+    rate, count = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+    video.release()
+    if not rate > 0 or count < 1:
+        raise VideoError(f"{path.name} does not say how many frames it has")
+    return rate, count
+
+
+def read_frames(path: Path, numbers: tuple[int, ...]) -> list[RGB]:
+    """The frames (h, w, 3) of these numbers, from 0. Raises VideoError."""
+    video, found = _opened(path), []
+    try:
+        for number in numbers:
+            video.set(cv2.CAP_PROP_POS_FRAMES, number)
+            is_there, frame = video.read()
+            if not is_there:
+                raise VideoError(f"{path.name} has no frame {number}, or it is damaged")
+            found.append(np.asarray(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB), np.uint8))
+    finally:
+        video.release()
+    return found
+
+
+def _opened(path: Path) -> cv2.VideoCapture:
+    if not path.is_file():
+        raise VideoError(f"there is no video {path}")
+    with _silent_stderr():
+        video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    if not video.isOpened():
+        raise VideoError(f"{path.name} is no video that can be read here")
+    return video
+
+
+def encode_video(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
+    """The file of `frames` (h, w, 3), all of one size, shown `rate` a second, for ever.
+
+    Raises VideoError for an unknown ending, no frames, and where the encoder is not there.
+    """
+    ending = ending.lower()
+    if ending not in ENDINGS:
+        raise VideoError(f"a video cannot be written as {ending}, only as {', '.join(ENDINGS)}")
+    coming = iter(frames)
+    first = next(coming, None)
+    if first is None:
+        raise VideoError("a video needs a frame")
+    everything = chain([first], coming)
+    if ending in CODECS:
+        return _filmed(everything, first.shape, rate, ending)
+    return _pictured(everything, rate, ending)
+
+
+def _filmed(frames: Iterable[RGB], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:  # OpenCV writes to names only
+        path = Path(folder) / f"video{ending}"
+        code, size = cv2.VideoWriter.fourcc(*CODECS[ending]), (shape[1], shape[0])
+        with _silent_stderr():  # FFmpeg tells there that it chooses WebM's tag itself
+            writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate, size)
+        if not writer.isOpened():
+            raise VideoError(f"OpenCV has no encoder for {ending} here; choose .webp or .gif")
+        for frame in frames:
+            writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+        writer.release()
+        return path.read_bytes()
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """What is written to the file that stderr is, by no matter whom, is lost meanwhile."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # a program without a terminal
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(nowhere)
+        os.close(kept)
+
+
+def _pictured(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
+    out = io.BytesIO()
+    if ending == ".webp":
+        images: Iterator[Image.Image] = map(Image.fromarray, frames)
+        first = next(images)
+        first.save(out, "WEBP", save_all=True, append_images=images, loop=0,
+                   duration=round(1000 / rate), quality=WEBP_QUALITY, method=2)  # fmt: skip
+        return out.getvalue()
+    images = map(_palettes(), frames)
+    first = next(images)
+    lasting = max(round(1000 / rate / GIF_TICK), 2) * GIF_TICK  # browsers slow down shorter ones
+    first.save(out, "GIF", save_all=True, append_images=images, loop=0, duration=lasting)
+    return out.getvalue()
+
+
+def _palettes() -> Callable[[RGB], Image.Image]:
+    """Makes pictures of 256 colours, which are the first frame's for all: nothing flickers."""
+    palette: list[Image.Image] = []
+
+    def reduced(frame: RGB) -> Image.Image:
+        image = Image.fromarray(at_most(frame, GIF_LONGEST))
+        if not palette:
+            palette.append(image.quantize(256, Image.Quantize.MEDIANCUT))
+        return image.quantize(palette=palette[0], dither=Image.Dither.FLOYDSTEINBERG)
+
+    return reduced

@@ -1,0 +1,239 @@
+"""What a script says about an object that is lifted: handles, pose, place, light, copies, order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import compose, lift, segment
+from ..base.progress import Progress
+from ..compose import refine
+from ..compose.composite import object_texture
+from ..compose.order import reordered
+from ..deform.puppet import Puppet, puppet_of
+from ..document import edits
+from ..document.joining import Shadow
+from ..document.model import (
+    GAUSSIANS,
+    Click,
+    DeformSettings,
+    Document,
+    LiftSettings,
+    Placement,
+    Prompt,
+)
+from ..pictures.image import read_mask
+from .report import Stopwatch
+from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
+
+
+def refuse_missing(script: EditScript, others: Others = ALONE) -> None:
+    """Raises ScriptError where the script needs a backend that is not there."""
+    for number, own in enumerate((script, *(o.script for o in others.objects)), 1):
+        with told_of(number, others):
+            _refuse_missing(own)
+
+
+def _refuse_missing(script: EditScript) -> None:
+    chosen = (
+        ("segmenter", script.segment, segment.BACKENDS),
+        ("lifter", script.lift, lift.BACKENDS),
+        ("inpainter", script.inpaint, compose.BACKENDS),
+    )
+    for kind, name, known in chosen:  # also where the stage will not run
+        is_sam = known is segment.BACKENDS and segment.is_known(name)  # or one SAM by its id
+        if name != "auto" and name not in known and not is_sam:
+            raise ScriptError(f"there is no {kind} {name!r}; known are {', '.join(known)}")
+    known = (*compose.REFINERS, *refine.BACKENDS)
+    if script.refine not in ("auto", *known):
+        raise ScriptError(f"there is no refiner {script.refine!r}; known are {', '.join(known)}")
+    if script.refine in refine.BACKENDS and (reason := refine.missing(script.refine)) is not None:
+        raise ScriptError(f"--refine {script.refine}: {reason}")
+
+
+def refiner_of(script: EditScript, others: Others = ALONE) -> str | None:
+    """The learned refiner that is asked for; it refines the whole edit. Raises ScriptError."""
+    asked = {own.refine for own in (script, *(o.script for o in others.objects))}
+    found = sorted(asked & set(refine.BACKENDS))
+    if len(found) > 1:
+        raise ScriptError(f"an edit is refined by one refiner, not by {' and '.join(found)}")
+    return found[0] if found else None
+
+
+@contextmanager
+def told_of(number: int, others: Others) -> Iterator[None]:
+    """An error inside says which object it is about, where there are several."""
+    try:
+        yield
+    except ValueError as error:
+        if not others.objects:
+            raise
+        raise ScriptError(f"object {number}: {error}") from error
+
+
+def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
+    """Copies are told about shadow and light what their originals are, unless they say it."""
+    result: list[FurtherObject] = []
+    for wanted in wishes:
+        if wanted.duplicate is not None:
+            of = result[wanted.duplicate - 1].script
+            kept = {name: getattr(of, name) for name in {"shadow", "refine"} - wanted.said}
+            wanted = replace(wanted, script=replace(wanted.script, **kept))
+        result.append(wanted)
+    return result
+
+
+def prompt_of(script: EditScript) -> Prompt:
+    """What the script says about which object is meant."""
+    clicks = [Click(x, y) for x, y in script.click]
+    clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
+    return Prompt(tuple(clicks), script.box, script.subject)
+
+
+def lift_settings(document: Document, script: EditScript) -> LiftSettings:
+    """What the script says about the object's shape. Raises ImageError."""
+    hidden = None
+    if script.hidden is not None:
+        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
+    return LiftSettings(
+        count=script.gaussians or GAUSSIANS,
+        thickness=script.thickness,
+        is_standing=not script.floating,
+        is_symmetric={"auto": None, "yes": True, "no": False}[script.symmetry],
+        back=script.back,
+        hidden=hidden,
+        horizon=document.horizon,
+        uses_depth=not script.no_depth,
+        trust=script.trust,
+    )
+
+
+def with_settings(document: Document, k: int, script: EditScript) -> Document:
+    """Object `k` with the control points and the way of deforming that the script asks for."""
+    if script.nodes is not None:
+        document = edits.resample(document, k, script.nodes)
+    settings = DeformSettings(
+        script.deform,
+        script.links,
+        script.faithful,
+        script.stiffness,
+        script.stretch_limit,
+        script.split,
+    )
+    return edits.set_deform(document, k, settings)
+
+
+def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
+    """Object `k` as a copy of another; what it is not told is as it is there."""
+    assert wanted.duplicate is not None
+    if document.objects[wanted.duplicate - 1].stays_in_front:
+        raise ScriptError(f"object {wanted.duplicate} stays in front and cannot be copied")
+    document = edits.duplicate(document, wanted.duplicate - 1)
+    item = document.objects[k]
+    script, said, place = wanted.script, wanted.said, item.placement
+    if {"handle", "pin"} & said:
+        document = edits.reset_pose(document, k)
+    asked = _placement(script)
+    place = Placement(
+        asked.move if "move" in said else place.move,
+        asked.depth if "move" in said else place.depth,
+        asked.turn if "turn" in said else place.turn,
+        asked.scale if "scale" in said else place.scale,
+    )
+    document = edits.set_placement(document, k, place)
+    document = edits.set_visible(document, k, True)
+    if script.shadow == "none":
+        document = edits.set_shadow(document, k, Shadow())
+    return document
+
+
+def posed(
+    document: Document,
+    k: int,
+    puppet: Puppet,
+    script: EditScript,
+    progress: Progress,
+    stopwatch: Stopwatch,
+) -> tuple[Document, tuple[float, ...]]:
+    """Handles and pins of the script, and the pose they give; the energies of the solve."""
+    energies: tuple[float, ...] = (0.0,)
+    document = _with_handles(document, k, puppet, script)
+    item = document.objects[k]
+    if any(not handle.is_pin for handle in item.handles):
+        progress(0.5, "Linking control points")
+        with stopwatch.stage("graph"):
+            deformer = puppet.deformer
+        progress(0.55, "Deforming")
+        with stopwatch.stage("deform"):
+            solution = deformer.solve(item.handles, item.has_auto_anchors)
+        energies = solution.energies
+        document = edits.set_pose(document, k, solution.pose)
+    return document, energies
+
+
+def placed(document: Document, k: int, script: EditScript) -> Document:
+    """Object `k` where the script wants it, or gone."""
+    document = edits.set_placement(document, k, _placement(script))
+    return edits.set_visible(document, k, False) if script.remove else document
+
+
+def _placement(script: EditScript) -> Placement:
+    move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
+    scale = 1.0 if script.scale is None else script.scale
+    return Placement((move[0], move[1]), move[2], turn, scale)
+
+
+def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript) -> Document:
+    lifted, camera = puppet.lifted, document.photo.camera
+    matte = document.objects[k].matte
+    assert matte is not None
+    texture = object_texture(matte)
+
+    def pick(xy: tuple[float, float], option: str) -> Any:
+        width, height = document.photo.size
+        if not (0 <= xy[0] < width and 0 <= xy[1] < height):
+            raise ScriptError(
+                f"{option} {xy[0]:g},{xy[1]:g} is outside the photo of {width} x {height} px"
+            )
+        point = puppet.pick(xy, None, Placement(), texture)
+        if point is None:
+            raise ScriptError(f"{option} {xy[0]:g},{xy[1]:g} misses the object")
+        return point
+
+    for xy in script.pin:
+        document = edits.add_handle(document, k, pick(xy, "--pin").rest, is_pin=True)
+    for handle in script.handle:
+        point = pick(handle.at, "--handle")
+        depth = point.depth + handle.dz * lifted.diameter * lifted.scale
+        if depth <= 0:
+            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
+        target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
+        document = edits.add_handle(document, k, point.rest, target)
+    return document
+
+
+def ordered(document: Document, others: Others) -> Document:
+    """The document with layers in the script's `order`; what stays in front is before them all.
+
+    Unless the order names it, too.
+    """
+    order = [number - 1 for number in others.order]
+    if len(order) > 1:
+        camera = document.photo.camera
+
+        def posed_of(k: int) -> Any:
+            item = document.objects[k]
+            return puppet_of(item, camera).posed(item.pose, item.placement)
+
+        document = reordered(document, order[0], order, posed_of)
+    top = max(item.layer for item in document.objects)
+    objects = tuple(
+        replace(item, layer=top) if item.stays_in_front and k not in order else item
+        for k, item in enumerate(document.objects)
+    )
+    return replace(document, objects=objects)

@@ -1,0 +1,156 @@
+"""From a hard mask to a soft cut-out: alpha and the object's own colours at its edge.
+
+About the mask's edge each pixel may be a mixture of a colour of the object and one of the
+background: alpha says how much of it is the object (`soft_edge`), and the object's colour is what
+remains when the background's share is taken out (`unmix`). Where the artist drew a soft edge, that
+edge is alpha; what was drawn half covered throughout is seen through (`veil`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.arrays import F32, U8, Mask, Pixels, Selection
+from ...base.pixels import unit_pixels
+from ...document.model import Matte
+from ..mask_edit import FULL, grow, is_selected, is_soft
+from .soft_edge import find_alpha
+from .soft_edge import signed_distance as signed_distance
+from .unmix import Unmixed, unmixed
+from .veil import colour_at, unveiled, veil, veil_colour
+
+BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
+MIN_BAND = 2.0  # px
+REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
+EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
+
+
+def band_width(width: int, height: int) -> float:
+    """Half-width in px of the soft band for a photo of this size."""
+    return max(MIN_BAND, BAND * float(np.hypot(width, height)))
+
+
+def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
+    """How far, in px, an object that leaves the photo is continued: top, bottom, left, right.
+
+    Turned or moved, such an object would show its cut edge. Mirrored at the frame it goes on for
+    a tenth of its size; those pixels are invented, and counted so.
+    """
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    reach = round(EXTENSION * max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1)
+    touches = (rows[0] == 0, rows[-1] == height - 1, columns[0] == 0, columns[-1] == width - 1)
+    limits = (height - 1, height - 1, width - 1, width - 1)
+    top, bottom, left, right = (
+        int(min(reach, limit)) if touch else 0 for touch, limit in zip(touches, limits, strict=True)
+    )
+    return top, bottom, left, right
+
+
+def extended(image: np.ndarray, extension: tuple[int, int, int, int]) -> np.ndarray:
+    """`image` (H, W, ...) continued past its frame by mirroring; no copy where it is not."""
+    if not any(extension):
+        return image
+    top, bottom, left, right = extension
+    pads = [(top, bottom), (left, right)] + [(0, 0)] * (image.ndim - 2)
+    return np.pad(image, pads, mode="reflect")
+
+
+def extended_part(
+    image: np.ndarray, extension: tuple[int, int, int, int], window: tuple[slice, slice]
+) -> np.ndarray:
+    """`extended(image, extension)[window]`, without all the rest of it."""
+    if not any(extension):
+        return image[window]
+    kept, pads, inner = [], [], []
+    for part, before, size in zip(
+        window, (extension[0], extension[2]), image.shape[:2], strict=True
+    ):
+        start, stop = part.start - before, part.stop - before  # px of the image
+        low, high = max(-start, 0), max(stop - size, 0)
+        # What is mirrored is kept, too, however narrow the window.
+        first = max(min(start, size - 1 - high if high else start), 0)
+        last = min(max(stop, low + 1), size)
+        kept.append(slice(first, last))
+        pads.append((low, high))
+        inner.append(slice(start + low - first, stop + low - first))
+    pads += [(0, 0)] * (image.ndim - 2)
+    return np.pad(image[kept[0], kept[1]], pads, mode="reflect")[inner[0], inner[1]]
+
+
+def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Selection:
+    """`mask` (H, W), bool or u8, continued like `extended`, but only where it touches the frame.
+
+    What merely stands near the frame must not come back as its own mirror image.
+    """
+    if not any(extension):
+        return mask
+    top, bottom, left, right = extension
+    whole = extended(mask, extension)
+    height, width = whole.shape
+    for axis, near, far in ((0, top, height - bottom), (1, left, width - right)):
+        turned = np.moveaxis(whole, axis, 0)  # a view: both sides are changed in place
+        turned[:near] = np.minimum.accumulate(turned[near::-1])[:0:-1]
+        turned[far:] = np.minimum.accumulate(turned[far - 1 :])[1:]
+    return whole
+
+
+def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
+    """Soft cut-out of `mask` (H, W) in the photo (H, W, 3), on a crop with `margin` px around it.
+
+    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha.
+    Where the object leaves the photo the crop does so too, see `frame_extension`.
+    Raises ValueError for an empty mask or one that is not the photo's size.
+    """
+    if mask.shape != pixels.shape[:2]:
+        raise ValueError(f"mask is {mask.shape}, photo is {pixels.shape[:2]}")
+    if not is_selected(mask).any():
+        raise ValueError("the mask is empty")
+    band = band_width(mask.shape[1], mask.shape[0])
+    extension = frame_extension(is_selected(mask))
+    mask = extended_mask(mask, extension)
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    left, top = max(columns[0] - margin, 0), max(rows[0] - margin, 0)
+    right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
+    window = (slice(top, bottom), slice(left, right))
+    part = extended_part(pixels, extension, window)
+    alpha, colours = soft_cutout(part, mask[window], band)
+    return Matte(int(left) - extension[2], int(top) - extension[0], alpha, colours.foreground)
+
+
+def soft_cutout(pixels: Pixels, selection: Selection, band: float) -> tuple[F32, Unmixed]:
+    """Alpha (h, w) and the colours of a photo's crop (h, w, 3) in which an object is selected."""
+    drawn = _drawn(selection, band)
+    alpha = find_alpha(pixels, selection, drawn, band, REACH * band)
+    if not drawn.any():
+        return alpha, unmixed(pixels, alpha)
+    # Of an edge that was drawn the photo is no mixture: what is inside it is the object's own.
+    through = veil(selection)
+    is_edge = drawn & ~through
+    share = np.where(is_edge, is_selected(selection), alpha).astype(np.float32)
+    colours = unmixed(pixels, share)
+    return alpha, _unveiled(pixels, selection, through, colours) if through.any() else colours
+
+
+def _unveiled(pixels: Pixels, coverage: U8, through: Mask, colours: Unmixed) -> Unmixed:
+    """`colours` with those of a veil where `through` (h, w)."""
+    small = veil_colour(pixels, coverage, through)
+    there = through[colours.rows, colours.columns]
+    rows, columns = colours.rows[there], colours.columns[there]
+    alpha = coverage[rows, columns] * np.float32(1 / FULL)
+    own = colour_at(small, through.shape, rows, columns)
+    fore, behind = unveiled(unit_pixels(pixels[rows, columns]), alpha, own)
+    foreground, background = colours.foreground, colours.background
+    foreground[rows, columns] = fore
+    background[there] = behind
+    return replace(colours, foreground=foreground, background=background)
+
+
+def _drawn(selection: Selection, band: float) -> Mask:
+    """Where (h, w) the edge is the artist's: what is drawn soft, and the band beside it."""
+    if selection.dtype == np.bool_:
+        return np.zeros(selection.shape, np.bool_)
+    return grow(is_soft(selection), band)

@@ -1,0 +1,1 @@
+"""Selecting by pieces of the photo that keep to its edges."""

@@ -1,0 +1,400 @@
+"""Which region of pieces is meant: by a first click, a box or the subject, and by a correction.
+
+Regions grow around the click; the best has strong contrast across its outline, agrees with the
+subject map, leaves the photo's frame free, and has the click near its middle. A first click on a
+part means the whole; a correction means the part around it that the outline got wrong. What a
+correction means may show better from the other side: what grows around a click that says the
+contrary may have the clearer outline, and the rest is meant. Or it is as far as a walk from the
+clicks gets that may end at any step, where the answer before is trusted (Grady 2005).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64, Mask
+from ...document.model import Click, Prompt
+from ..selection import SelectionError, box_mask
+from .pieces import Pieces
+from .places import centred, depth, extent, only
+from .relabel import islands, touching
+
+CENTRED_WHOLE = 0.3  # exponent: how much a click is in the middle of the whole that it means
+CENTRED_PART = 3.0  # the same of a part, and of a correction
+MINOR_PART = 0.5  # exponent: how much a part is meant to be smaller than its whole
+SMALLEST_PART = 0.01  # x object's area; less is texture
+SMALLEST_PIECES = 2  # the same in pieces
+MINOR_CORRECTION = 0.4  # how much a correction is meant to leave something
+LARGER_CORRECTION = 0.05  # exponent: how much a larger correction is preferred
+MINOR_FINE = 0.2  # the same two of a correction in finer pieces: one clicks the largest error,
+LARGER_FINE = 0.3  # and there are many small things in a window that stand out
+SHARP_WHOLE = 6.0  # exponent: how much more a better region is likely to be meant than another
+SHARP_PART = 20.0
+SHARP_CORRECTION = 6.0
+TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
+KNOWN = 1e4  # the same of a click: a walk that comes there ends
+ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
+AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
+LARGER = 0.03  # exponent: how much a larger region is preferred
+FREE_FRAME = 4.0  # exponent: how much what is not the subject should leave the frame free
+SURE_SALIENCE = 0.9
+SMALLEST_SUBJECT = 0.1  # x area of the subject's largest piece
+LARGER_GROUP = 1.15  # x object's area: what is smaller is still the object
+WORTH_A_GROUP = 0.85  # x object's score: a larger outline that stands out less is no group
+LIKENESS = 0.95  # share of the object's own pieces that are typical of it
+ALIKE = 2.0  # x how far a typical piece is from the object's mean: another is like it
+LIKE_AREA = (0.05, 1.5)  # x object's area: less is a coincidence, more is what it stands on
+SEEDS_IN_BOX = ((0.5, 0.5), (0.5, 0.3), (0.5, 0.7), (0.3, 0.5), (0.7, 0.5))  # x its size
+SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller box
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Pieces that may be meant."""
+
+    pieces: Mask  # (n,)
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Pieces that are meant, and what else might have been."""
+
+    pieces: Mask  # (n,)
+    others: tuple[Region, ...]  # the best first
+
+    @property
+    def relative(self) -> tuple[Region, ...]:
+        """The others, the best of them with the score 1."""
+        best = max(max(region.score for region in self.others), 1e-9)
+        return tuple(Region(region.pieces, region.score / best) for region in self.others)
+
+
+@dataclass(frozen=True)
+class _Taste:
+    """Exponents of what a part leaves of its whole, and of what it takes."""
+
+    minor: float
+    larger: float
+    reach: float = 0.0  # px of all that may be meant, where that is more than what is allowed
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A photo to choose from."""
+
+    pieces: Pieces
+    salience: F32 | None  # (h, w) subject map at the pieces' size
+    is_of_large: bool = False  # of a large photo, or of a tile of one
+    tokens: F32 | None = None  # (r, c, d) of the photo
+
+    def inside(self, prompt: Prompt) -> Mask:
+        """(n,) pieces most of which are in the prompt's box, and those of positive clicks."""
+        pieces = self.pieces
+        if prompt.box is None:
+            return np.ones(pieces.count, bool)
+        shape, photo = pieces.shape, pieces.photo_shape
+        fine = box_mask(photo, prompt).astype(np.float32)
+        small = cv2.resize(fine, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+        inside = pieces.mean(small) > 0.5
+        for click in prompt.clicks:
+            if click.is_foreground:
+                inside[pieces.at(click.x, click.y)] = True
+        return inside
+
+
+def choose(ground: Ground, prompt: Prompt) -> Choice:
+    """What the prompt means before its further clicks: by the first, its box, or the subject."""
+    inside = ground.inside(prompt)
+    first = next((c for c in prompt.clicks if c.is_foreground), None)
+    if prompt.is_subject:
+        return _subjects(ground, inside)
+    if first is None:
+        return _in_box(ground, inside)
+    whole = _around_click(ground, first, inside)
+    if prompt.level == "part":
+        return _part(ground, first, whole)
+    if prompt.level == "group":
+        group = _group(ground, first, whole.pieces) & inside
+        return Choice(group, (*whole.others, Region(group, whole.others[0].score)))
+    return whole
+
+
+def correct(
+    ground: Ground,
+    click: Click,
+    allowed: Mask,
+    walls: tuple[int, ...],
+    reach: float = 0.0,
+    guess: Mask | None = None,
+) -> Choice:
+    """The part of the pieces `allowed` (n,) that a click on a wrong place means.
+
+    It holds none of `walls`, the pieces of clicks that say the contrary. `reach`: px of all that
+    it could mean, where the pieces are a part of that only. `guess` (n,): what it may mean, too.
+    """
+    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    if reach:
+        taste = _Taste(MINOR_FINE, LARGER_FINE, reach)
+    regions = _parts(ground, click, allowed, walls, taste)
+    regions += _left_over(ground, click, allowed, walls, taste)
+    regions += _reached(ground, click, allowed, walls, taste)
+    if guess is not None:
+        regions.append(_guessed(ground, click, allowed, walls, guess, taste))
+    regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
+    return Choice(regions[0].pieces, tuple(regions))
+
+
+def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
+    """The whole object that a click is on."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    growth = pieces.grow(piece)
+    masks = [pieces.region(growth, k) & inside for k in growth.peaks()]
+    subject = _subject_around(ground, piece)
+    if subject is not None:
+        subject = subject * inside
+        masks.append(subject > 0.5)
+    regions = [
+        Region(mask, _score(ground, mask, subject) * centred(pieces, mask, click) ** CENTRED_WHOLE)
+        for mask in masks
+        if mask[piece] and not mask.all()
+    ]
+    if not regions:
+        raise SelectionError("nothing stands out there: draw a box or add clicks")
+    regions = _likeliest(pieces, regions, SHARP_WHOLE)
+    chosen = regions[0].pieces
+    if subject is not None:
+        settled = _settle(pieces, chosen, subject)
+        chosen = settled if settled[piece] else chosen
+    return Choice(chosen, tuple(regions))
+
+
+def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
+    """The part of a whole that a click is on; the whole where it has none."""
+    pieces = ground.pieces
+    least = max(SMALLEST_PART * pieces.share(whole.pieces), SMALLEST_PIECES / pieces.count)
+    regions = _parts(ground, click, whole.pieces, (), _Taste(MINOR_PART, 0.0))
+    regions = [region for region in regions if pieces.share(region.pieces) > least]
+    if not regions:
+        return whole
+    regions = _likeliest(pieces, regions, SHARP_PART)
+    return Choice(regions[0].pieces, tuple(regions))
+
+
+def _parts(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """The parts of `allowed` (n,) around a click."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    allowed = allowed | only(pieces, piece)
+    growth = pieces.grow(piece, allowed, tuple(w for w in walls if w != piece))
+    masks = [pieces.region(growth, k) for k in growth.peaks()]
+    return [_rated(ground, click, allowed, mask, taste) for mask in masks]
+
+
+def _left_over(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """What is left of `allowed` (n,) around a click by each part of it around one of `walls`."""
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    alone = only(pieces, piece)
+    allowed = allowed | alone
+    regions = []
+    for wall in walls:
+        if wall == piece or not allowed[wall]:
+            continue
+        growth = pieces.grow(wall, allowed, (piece,))
+        for k in growth.peaks():
+            rest = touching(pieces, allowed & ~pieces.region(growth, k), alone)
+            if not rest[[w for w in walls if w != piece]].any():
+                regions.append(_rated(ground, click, allowed, rest, taste))
+    return regions
+
+
+def _reached(
+    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
+) -> list[Region]:
+    """The pieces of `allowed` (n,) from which a walk is likelier to end at the click than to stay.
+
+    What is not allowed is, but for what a box leaves out, already what the click says: it draws.
+    """
+    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
+    alone = only(pieces, piece)
+    allowed = allowed | alone
+    regions = []
+    for trust in TRUST:
+        wrong, right = np.where(allowed, 1e-9, trust), np.where(allowed, trust, 1e-9)
+        right[[w for w in walls if w != piece]] = KNOWN
+        wrong[piece], right[piece] = KNOWN, 1e-9
+        found = ((pieces.walk_home(wrong, right) > 0.5) & allowed) | alone
+        regions.append(_rated(ground, click, allowed, touching(pieces, found, alone), taste))
+    return regions
+
+
+def _guessed(
+    ground: Ground,
+    click: Click,
+    allowed: Mask,
+    walls: tuple[int, ...],
+    guess: Mask,
+    taste: _Taste,
+) -> Region:
+    """What of a guess (n,) hangs together with a click and is `allowed` (n,)."""
+    pieces = ground.pieces
+    alone = only(pieces, pieces.at(click.x, click.y))
+    free = guess & allowed
+    free[list(walls)] = False
+    mask = touching(pieces, free | alone, alone)
+    return _rated(ground, click, allowed | alone, mask, taste)
+
+
+def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Taste) -> Region:
+    """Pieces (n,), and how much a click on a place within `allowed` (n,) means just them."""
+    pieces = ground.pieces
+    cut = (mask[pieces.left] != mask[pieces.right]) & allowed[pieces.left] & allowed[pieces.right]
+    share = pieces.area[mask].sum() / max(pieces.area[allowed].sum(), taste.reach)
+    contrast, left = ALL_OF_IT, 1.0
+    if cut.any():
+        contrast = (pieces.gap * pieces.length)[cut].sum() / pieces.length[cut].sum()
+        left = max(1 - share, 1e-3)
+    near = centred(pieces, mask, click) ** CENTRED_PART
+    return Region(mask, float(contrast * near * share**taste.larger * left**taste.minor))
+
+
+def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:
+    """The regions, those first whose overlap (IoU) with what is meant is expected to be largest.
+
+    Each may be meant, the more the better its score: a region like several good ones is a safer
+    answer than the best one that none is like.
+    """
+    masks = np.array([region.pieces for region in regions], np.float64)
+    weights = np.array([region.score for region in regions]) + 1e-12
+    weights = (weights / weights.max()) ** sharpness
+    both = (masks * pieces.area) @ masks.T
+    areas = np.diag(both)
+    overlaps = both / np.maximum(areas[:, None] + areas - both, 1e-9)
+    expected = overlaps @ weights
+    return [regions[k] for k in np.argsort(-expected, kind="stable")]
+
+
+def _group(ground: Ground, click: Click, whole: Mask) -> Mask:
+    """(n,) `whole` with what it stands with, and with what is like it elsewhere in the photo."""
+    pieces = ground.pieces
+    growth = pieces.grow(pieces.at(click.x, click.y))
+    larger = [pieces.region(growth, k) | whole for k in growth.peaks()]
+    larger = [m for m in larger if pieces.share(m) > LARGER_GROUP * pieces.share(whole)]
+    plain = Ground(pieces, None)
+    scored = [(_score(plain, mask, None), k) for k, mask in enumerate(larger) if not mask.all()]
+    best, k = max(scored, default=(0.0, -1))
+    group = larger[k] if best > WORTH_A_GROUP * _score(plain, whole, None) else whole
+    gap = np.square(pieces.features - pieces.features[whole].mean(0)).sum(-1)
+    like = (gap <= ALIKE * np.quantile(gap[whole], LIKENESS)) & ~whole
+    for island in islands(pieces, like):
+        if LIKE_AREA[0] < pieces.share(island) / pieces.share(whole) < LIKE_AREA[1]:
+            group = group | island
+    return group
+
+
+def _subjects(ground: Ground, inside: Mask) -> Choice:
+    """The photo's subject: what hangs together with the inmost place of each of its pieces."""
+    if ground.salience is None or ground.salience.max() <= 0.5:
+        raise SelectionError("no subject stands out in this photo: click the object")
+    salient = (ground.salience > 0.5) & ground.pieces.paint(inside)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(salient.astype(np.uint8))
+    if count == 1:
+        raise SelectionError("no subject stands out in the box: click the object")
+    largest = stats[1:, cv2.CC_STAT_AREA].max()
+    (height, width), (tall, wide) = ground.pieces.shape, ground.pieces.photo_shape
+    choices = []
+    for k in range(1, count):
+        if stats[k, cv2.CC_STAT_AREA] >= SMALLEST_SUBJECT * largest:
+            inmost = depth(labels == k)
+            row, column = np.unravel_index(int(inmost.argmax()), inmost.shape)
+            place = (float(column) + 0.5) * wide / width, (float(row) + 0.5) * tall / height
+            choices.append(_around_click(ground, Click(*place), inside))
+    together = np.any([choice.pieces for choice in choices], axis=0)
+    others = choices[0].others if len(choices) == 1 else (Region(together, 1.0),)
+    return Choice(together, others)
+
+
+def _in_box(ground: Ground, inside: Mask) -> Choice:
+    """The object that a box encloses: it reaches the box's sides and does not go beyond them."""
+    pieces = ground.pieces
+    if not inside.any():
+        raise SelectionError("the box is too small to hold an object: draw a larger one")
+    box = extent(pieces, inside)
+    subject = None if ground.salience is None else pieces.mean(ground.salience) * inside
+    candidates: list[tuple[float, Mask]] = []  # leak, pieces
+    smallest = SMALLEST_IN_BOX * pieces.share(inside)
+    if subject is not None and pieces.share(subject > 0.5) > smallest:
+        candidates.append((0.0, subject > 0.5))
+    else:
+        subject = None
+    for across, down in SEEDS_IN_BOX:
+        place = box[0] + across * (box[2] - box[0]), box[1] + down * (box[3] - box[1])
+        seed = int(pieces.labels[int(place[1]), int(place[0])])
+        for growth in (pieces.grow(seed), pieces.grow(seed, inside | only(pieces, seed))):
+            for k in growth.peaks():
+                region = pieces.region(growth, k)
+                within = region & inside
+                if pieces.share(within) > smallest and not within.all():
+                    leak = 1 - pieces.share(within) / pieces.share(region)
+                    candidates.append((leak, within))
+
+    def score(leak: float, mask: Mask) -> float:
+        left, top, right, bottom = extent(pieces, mask)
+        reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
+        return (1 - leak) * reach**0.5 * _score(ground, mask, subject, is_boxed=True)
+
+    regions = [Region(mask, score(leak, mask)) for leak, mask in candidates]
+    if not regions:
+        return Choice(inside, (Region(inside, 1.0),))
+    regions.sort(key=lambda region: -region.score)
+    chosen = regions[0].pieces
+    if subject is not None:
+        chosen = _settle(pieces, chosen, subject)
+    return Choice(chosen, tuple(regions))
+
+
+def _score(ground: Ground, mask: Mask, subject: F64 | None, is_boxed: bool = False) -> float:
+    """How much pieces (n,) are one whole object. `subject` (n,): the one that was clicked."""
+    pieces = ground.pieces
+    contrast = pieces.contrast(mask)
+    if subject is not None:
+        both = (np.minimum(mask, subject) * pieces.area).sum()
+        either = (np.maximum(mask, subject) * pieces.area).sum()
+        return float(contrast * (both / max(either, 1e-6)) ** AGREEMENT)
+    share, frame = pieces.share(mask), pieces.frame[mask].sum()
+    score = contrast * (1 - frame) ** FREE_FRAME * (1 - share**2) * share**LARGER
+    if ground.salience is not None and not is_boxed:  # another subject is not meant
+        other = pieces.mean(ground.salience) * pieces.area
+        score *= 1 - other[mask].sum() / max(other.sum(), 1.0)
+    return float(score)
+
+
+def _settle(pieces: Pieces, chosen: Mask, subject: F64) -> Mask:
+    """(n,) the chosen pieces, decided anew where the subject map (n,) does not agree."""
+    is_object = chosen & (subject > SURE_SALIENCE)
+    is_ground = ~chosen & (subject < 1 - SURE_SALIENCE)
+    if not (is_object.any() and is_ground.any()):
+        return chosen
+    return pieces.settle(is_object, is_ground) > 0.5
+
+
+def _subject_around(ground: Ground, piece: int) -> F64 | None:
+    """(n,) the subject map without what does not hang together with a piece; None off it."""
+    pieces, salience = ground.pieces, ground.salience
+    here = pieces.labels == piece
+    if salience is None or salience[here].mean() <= 0.5:
+        return None
+    _, labels = cv2.connectedComponents((salience > 0.5).astype(np.uint8))
+    found = np.bincount(labels[here & (labels > 0)])
+    if not found.size:
+        return None
+    own = (labels == found.argmax()).astype(np.uint8)
+    fringe = cv2.dilate(own, np.ones((9, 9), np.uint8)) > 0
+    other = (labels > 0) & (own == 0)
+    return pieces.mean(np.where(fringe & ~other, salience, np.where(other, 0, salience * 0.5)))

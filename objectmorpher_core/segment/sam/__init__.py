@@ -1,0 +1,1 @@
+"""Selecting by Segment Anything models."""

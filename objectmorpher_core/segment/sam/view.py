@@ -1,0 +1,123 @@
+"""A photo, or a crop of it, as a SAM sees it, and what its last prompts meant.
+
+A prompt is answered click by click: the first leaves the choice among three masks, each further
+one is decoded with all clicks and with the answer before it. What was answered is remembered, so
+that a click decodes once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, RGB, Mask
+from ...document.model import Click, Prompt
+from ..matting.edges import enlarge, sharpen_band
+from ..pieces.view import steps_of
+from .choice import at_level
+from .frame import Box, Frame
+from .network import Asked, SamNetwork
+
+REMEMBERED = 16  # answers of a photo
+WORK_SIDE = 1536  # px of a photo in which the edge is found; a larger one follows by its own edges
+UNSURE = 0.8  # px of logits each side of their outline within which the photo's edge decides
+
+
+@dataclass(frozen=True, eq=False)
+class Encoded:
+    """What a SAM has made of a photo or of a crop."""
+
+    model: str  # its id
+    frame: Frame
+    features: tuple[F32, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SamAnswer:
+    """What a prompt means."""
+
+    logits: F32  # (low, low)
+    score: float  # overlap (IoU) with what is meant that the network expects
+
+
+class SamView:
+    """One encoding, and prompts on it."""
+
+    def __init__(self, network: SamNetwork, encoded: Encoded) -> None:
+        self._network, self.encoded = network, encoded
+        self._known: dict[Prompt, SamAnswer] = {}
+
+    @property
+    def frame(self) -> Frame:
+        return self.encoded.frame
+
+    def answer(self, prompt: Prompt, before: F32 | None = None) -> SamAnswer:
+        """To a prompt with clicks or a box, in px of the photo.
+
+        `before` (low, low): logits of what is meant, where another look has found it already.
+        """
+        steps = steps_of(prompt) if before is None else [prompt]
+        known = next((k for k in range(len(steps) - 1, -1, -1) if steps[k] in self._known), -1)
+        answer = self._known[steps[known]] if known >= 0 and before is None else None
+        first = known + 1 if answer is not None else 0
+        for step in steps[first:]:
+            logits = before if answer is None else answer.logits
+            answer = self._decode(step, logits)
+            if before is None:
+                self._known[step] = answer
+                if len(self._known) > REMEMBERED:
+                    self._known.pop(next(iter(self._known)))
+        assert answer is not None, "a prompt has at least one step"
+        return answer
+
+    def _decode(self, prompt: Prompt, logits: F32 | None) -> SamAnswer:
+        points = np.array([(c.x, c.y) for c in prompt.clicks], np.float64).reshape(-1, 2)
+        is_object = np.array([c.is_foreground for c in prompt.clicks], np.bool_)
+        box = None
+        if prompt.box is not None:
+            box = self.frame.points(np.array(prompt.box)).ravel()
+        asked = Asked(self.frame.points(points), is_object, box, logits)
+        is_several = logits is None and box is None and len(points) == 1
+        found = self._network.decode(self.encoded.features, asked, is_several)
+        k = at_level(found, prompt.level if is_several else "object")
+        return SamAnswer(found.logits[k], float(found.scores[k]))
+
+    def mask(self, rgb: RGB, answer: SamAnswer) -> Mask:
+        """(h, w) of the frame's box: an answer at the photo's resolution, along its edges."""
+        left, top, right, bottom = self.frame.box
+        crop = rgb[top:bottom, left:right]
+        height, width = crop.shape[:2]
+        scale = min(1.0, WORK_SIDE / max(width, height))
+        size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        mask = self.frame.unfold(answer.logits, size) > 0
+        band = round(UNSURE * max(size) / answer.logits.shape[0])
+        if band > 0:
+            small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA) if scale < 1 else crop
+            mask = sharpen_band(np.asarray(small, np.uint8), mask, band=band)
+        return enlarge(crop, mask)
+
+    def logits_of(self, mask: Mask, box: Box) -> F32:
+        """(low, low) what a mask (h, w) of another box is in this frame, as logits."""
+        left, top, right, bottom = self.frame.box
+        whole = np.zeros((bottom - top, right - left), np.float32)
+        x0, y0 = max(box[0], left), max(box[1], top)
+        x1, y1 = min(box[2], right), min(box[3], bottom)
+        whole[y0 - top : y1 - top, x0 - left : x1 - left] = mask[
+            y0 - box[1] : y1 - box[1], x0 - box[0] : x1 - box[0]
+        ]
+        soft = cv2.GaussianBlur(whole, (0, 0), max(1.0, 0.5 * max(whole.shape) / self.frame.side))
+        return self.frame.fold(np.asarray((2 * soft - 1) * SURE, np.float32), self._network.low)
+
+
+SURE = 6.0  # logit of what an earlier look has found
+
+
+def inside_box(prompt: Prompt, box: Box) -> Prompt:
+    """The prompt with only the clicks that are in a box of the photo."""
+    left, top, right, bottom = box
+    clicks: tuple[Click, ...] = tuple(
+        c for c in prompt.clicks if left <= c.x < right and top <= c.y < bottom
+    )
+    return replace(prompt, clicks=clicks)

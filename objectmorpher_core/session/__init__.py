@@ -1,0 +1,1 @@
+"""Sessions (.omorph) and the journal that survives a crash."""

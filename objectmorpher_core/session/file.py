@@ -1,0 +1,310 @@
+"""Sessions: a document in a zip file (.omorph), so that reloading shows the same picture.
+
+    document.json       version, every choice, and the SHA-256 of each other member
+    photo/NAME          the opened file's own bytes
+    objects/0/mask.png  masks, and the plate's pixels
+    arrays.npz          every other array, exactly (never pickled)
+    objects/0/*.ply     the Gaussians once more, for other programs; not read back
+
+What is stored follows from the dataclasses of `document.py`: a new field there needs nothing here
+but a default, which is what older sessions get. The same document gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+
+import numpy as np
+
+from ..base.camera import Camera
+from ..base.files import OutputError, reason_of, write_all
+from ..base.limits import SESSION_OBJECTS
+from ..base.quoting import named, shown
+from ..document.joining import LEAST_FEATHER, MOST_FEATHER
+from ..document.model import SELECTED, Document, EditObject, Photo
+from ..pictures.image import ImageError, encode_picture, read_picture
+from .npy import ArrayError, read_npy
+from .tree import Reader, SessionError, Writer
+from .zip import Member, Npy, Pieces, Zip, digest, scratch_file, write_zip
+
+__all__ = ["SessionError", "decode_session", "encode_session", "read_session", "save_session"]
+
+VERSION = 1
+FORMAT = "objectmorpher session"
+DOCUMENT, ARRAYS = "document.json", "arrays.npz"
+MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
+
+
+def save_session(document: Document, path: Path) -> None:
+    """Writes the session file, whole or not at all. Raises OutputError, SessionError."""
+    try:
+        with scratch_file(path.parent) as file:
+            write_session(document, file, path.parent)
+            write_all({path: Pieces(file)})
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {reason_of(error)}") from error
+
+
+def encode_session(document: Document) -> bytes:
+    """The bytes of the document's session file. Raises SessionError for values beyond numbers."""
+    file = io.BytesIO()
+    write_session(document, file)
+    return file.getvalue()
+
+
+def write_session(document: Document, file: IO[bytes], folder: Path | None = None) -> None:
+    """The same into an open file; where it is large, `folder` has room for as much again.
+
+    Raises SessionError, OSError.
+    """
+    from ..splat_files.splats.ply import encode_ply
+
+    members: dict[str, Member] = {}
+    photo = document.photo
+    ending = PurePosixPath(photo.name).suffix.lower()
+    source = f"photo/photo{ending if ending.isascii() and ending[1:].isalnum() else ''}"
+    members[source] = photo.source or encode_picture(photo.picture, "png")
+    writer = Writer(skipped=(Photo,))
+    tree = writer.tree(document, "")
+    tree["photo"] = {
+        "name": photo.name,
+        "source": source,
+        "camera": writer.tree(photo.camera, "camera"),
+    }
+    members |= writer.pictures
+    for k, item in enumerate(document.objects):
+        if item.lifted is not None:
+            members[f"objects/{k}/gaussians.ply"] = encode_ply(item.lifted.gaussians)
+    with scratch_file(folder) as arrays:
+        write_zip(arrays, {f"{path}.npy": Npy(a) for path, a in writer.arrays.items()})
+        members[ARRAYS] = Pieces(arrays)
+        head = {
+            "format": FORMAT,
+            "version": VERSION,
+            "document": tree,
+            "sha256": {name: digest(member) for name, member in members.items()},
+        }
+        text = json.dumps(head, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+        write_zip(file, {DOCUMENT: text.encode()} | members)
+
+
+def decode_session(data: bytes) -> Document:
+    """The document of a session file's bytes, equal to the saved one array by array.
+
+    Raises SessionError: one sentence.
+    """
+    return read_session(io.BytesIO(data))
+
+
+def read_session(file: IO[bytes]) -> Document:
+    """The same of a file that is open; its arrays are unpacked one by one."""
+    with Zip(file, "session") as archive:
+        members = {name: archive.read(name) for name in archive.names if name != ARRAYS}
+        head = _head(members)
+        hashes = head.get("sha256")
+        if not isinstance(hashes, dict):
+            raise SessionError("the session's document.json is damaged: sha256 is missing")
+        for name, expected in hashes.items():
+            if name not in archive.names:
+                raise SessionError(f"the session is incomplete: {named(name)} is missing")
+            own = members[name] if name in members else archive.pieces(name)
+            if digest(own) != expected:
+                raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
+        trusted = {name: members[name] for name in hashes if name in members}
+        if ARRAYS not in hashes:
+            raise SessionError(f"the session is incomplete: {ARRAYS} is missing")
+        arrays = _arrays(archive)
+    return build_document(head.get("document"), trusted, arrays)
+
+
+def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.ndarray]) -> Document:
+    """The document of document.json's tree; `members` hold the photo's file and the pictures.
+
+    Raises SessionError where the parts do not fit each other.
+    """
+    reader = Reader(members, arrays)
+    if not isinstance(tree, dict):
+        raise SessionError("the session's document.json is damaged: document is missing")
+    photo = _photo(tree.get("photo"), members, reader)
+    try:
+        document = _with_copies(reader.value(Document, tree | {"photo": photo}, "document"))
+        _check(document)
+    except SessionError:
+        raise
+    except (ValueError, TypeError) as error:
+        raise SessionError(f"the session is damaged: {error}") from error
+    return document
+
+
+def _head(members: dict[str, bytes]) -> dict[str, Any]:
+    """document.json, of this version."""
+    if DOCUMENT not in members:
+        raise SessionError("the file is a zip archive but not a session: it has no document.json")
+    try:
+        head = json.loads(members[DOCUMENT], parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise SessionError("the session's document.json is damaged") from error
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
+        raise SessionError("the file is a zip archive but not a session")
+    version = head.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise SessionError(f"the session has no valid version ({shown(version)})")
+    if version > VERSION:
+        raise SessionError(f"the session was made by a newer version ({shown(version)})")
+    return head
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _photo(tree: object, members: dict[str, bytes], reader: Reader) -> Photo:
+    """The photo, its picture decoded from the original file's bytes."""
+    if not isinstance(tree, dict) or tree.get("source") not in members:
+        raise SessionError("the session is damaged: its photo is missing")
+    source = members[tree["source"]]
+    try:
+        picture = read_picture(source)
+    except ImageError as error:
+        raise SessionError(f"the session's photo cannot be read: {error}") from error
+    camera = reader.value(Camera, tree.get("camera"), "photo.camera")
+    name = reader.value(str, tree.get("name"), "photo.name")
+    return Photo(picture, camera, source, name)
+
+
+def _arrays(archive: Zip) -> dict[str, np.ndarray]:
+    """The arrays of arrays.npz by path; never a pickle, never a value beyond numbers."""
+    arrays = {}
+    with archive.inner(ARRAYS) as inner:
+        for name in inner.names:
+            data = bytearray()
+            for piece in inner.pieces(name):
+                data += piece
+            try:
+                arrays[name.removesuffix(".npy")] = read_npy(data)
+            except ArrayError as error:
+                raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
+    return arrays
+
+
+def _with_copies(document: Document) -> Document:
+    """Copies of an object share its mask, by which they are known as copies."""
+    if len(document.objects) > SESSION_OBJECTS:
+        raise ValueError(f"{len(document.objects):,} objects are more than {SESSION_OBJECTS}")
+    known: list[np.ndarray] = []
+    objects = []
+    for item in document.objects:
+        if item.mask is not None:
+            mask = next((m for m in known if np.array_equal(m, item.mask)), item.mask)
+            known.append(mask)
+            item = item if mask is item.mask else replace(item, mask=mask)
+        objects.append(item)
+    return replace(document, objects=tuple(objects))
+
+
+def _check(document: Document) -> None:
+    """ValueError where the document's arrays do not fit each other."""
+    width, height = document.photo.size
+    camera = document.photo.camera
+    _same("the camera", (camera.width, camera.height), (width, height))
+    for item in document.objects:
+        if item.mask is not None:
+            _same("mask", item.mask.shape, (height, width))
+        _check_coverage(item)
+        if item.matte is not None:
+            _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
+            _near("matte", item.matte.box, (width, height))
+        _check_lifted(item)
+    if document.horizon is not None and abs(document.horizon) > MAX_HORIZON * height:
+        raise ValueError(f"a horizon at {document.horizon:g} px is far outside the photo")
+    if (plate := document.plate) is not None:
+        _same("plate", plate.pixels.shape, (*plate.hole.shape, 3))
+        _inside("plate", plate.box, (width, height))
+        if plate.pixels.dtype != document.photo.pixels.dtype:
+            raise ValueError("the plate has another bit depth than the photo")
+        if plate.painted is not None:
+            _same("the plate's repairs", plate.painted.shape, plate.hole.shape)
+    if (refined := document.refined) is not None:
+        _same("refinement", refined.pixels.shape, (*refined.alpha.shape, 3))
+        _inside("refinement", refined.box, (width, height))
+        if refined.pixels.dtype != document.photo.pixels.dtype:
+            raise ValueError("the refinement has another bit depth than the photo")
+        if not 0 <= refined.strength <= 1:
+            raise ValueError(f"a refinement's strength is {refined.strength:g}")
+    _check_joining(document)
+
+
+def _check_joining(document: Document) -> None:
+    """Shadows, light and edges."""
+    if not LEAST_FEATHER <= document.feather <= MOST_FEATHER:
+        raise ValueError(f"the blend is {document.feather:g} times as wide as usual")
+    for item in document.objects:
+        item.shadow.check()
+        shares = {
+            "harmony": item.harmony, "relighting": item.relight,
+            "grain": item.grain, "defocus": item.defocus,
+        }  # fmt: skip
+        for name, value in shares.items():
+            if not 0 <= value <= 1:
+                raise ValueError(f"an object's {name} is {value:g}, not between 0 and 1")
+
+
+def _check_coverage(item: EditObject) -> None:
+    """A soft mask and a prompt's answer belong to the mask."""
+    if item.coverage is not None:
+        if item.mask is None or item.coverage.dtype != np.uint8:
+            raise ValueError("an object's coverage belongs to no mask")
+        if not np.array_equal(item.coverage >= SELECTED, item.mask):
+            raise ValueError("an object's coverage is not that of its mask")
+    if item.found is not None:
+        found = None if item.mask is None else item.mask.shape
+        _same("an answer's mask", (item.found.shape, item.found.dtype), (found, np.dtype(bool)))
+
+
+def _check_lifted(item: EditObject) -> None:
+    lifted = item.lifted
+    if lifted is None:
+        if item.handles or item.pose is not None:
+            raise ValueError("an object that is not lifted has handles")
+        return
+    count, nodes = len(lifted.gaussians), len(lifted.control_points)
+    _same("u0", lifted.texture.u0.shape, (count, 2))
+    _same("visibility", lifted.texture.visibility.shape, (count,))
+    _same("solidity", lifted.texture.solidity.shape, (count,))
+    _same("control_points", lifted.control_points.shape, (nodes, 3))
+    _same("world_from_object", lifted.world_from_object.shape, (4, 4))
+    for handle in item.handles:
+        _same("handle", (handle.point.shape, handle.target.shape), ((3,), (3,)))
+        if not 0 <= handle.control_point < nodes:
+            raise ValueError(f"a handle names control point {handle.control_point} of {nodes}")
+        if handle.turn is not None:
+            _same("a handle's turn", handle.turn.shape, (3,))
+        if not handle.softness >= 0:
+            raise ValueError(f"a handle's softness is {handle.softness:g}")
+    item.rig.check(nodes)
+    if item.pose is not None:
+        _same("pose", item.pose.points.shape, (nodes, 3))
+        _same("rotations", item.pose.rotations.shape, (nodes, 3, 3))
+
+
+def _same(what: str, found: tuple, expected: tuple) -> None:
+    if found != expected:
+        raise ValueError(f"{what} is {found}, expected {expected}")
+
+
+def _inside(what: str, box: tuple[int, int, int, int], size: tuple[int, int]) -> None:
+    if box[0] < 0 or box[1] < 0 or box[2] > size[0] or box[3] > size[1]:
+        raise ValueError(f"the {what}'s box {box} is not inside the photo")
+
+
+def _near(what: str, box: tuple[int, int, int, int], size: tuple[int, int]) -> None:
+    """An object that the frame cuts goes on beyond it, by as much again at most."""
+    width, height = size
+    if box[0] < -width or box[1] < -height or box[2] > 2 * width or box[3] > 2 * height:
+        raise ValueError(f"the {what}'s box {box} is not near the photo")

@@ -1,0 +1,155 @@
+"""Dataclasses of the document to JSON values and back, by their type hints; arrays set apart.
+
+An array becomes {"png": member} where it is a mask or 8- or 16-bit pixels, else {"array": path}.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from ..base.arrays import all_finite, frozen
+from ..pictures.image import ImageError, Picture, encode_mask, encode_picture, read_picture
+
+
+class SessionError(ValueError):
+    """The file is not a session that can be opened; one sentence."""
+
+
+@dataclass
+class Writer:
+    """Turns values into JSON values, and collects the arrays on the way."""
+
+    skipped: tuple[type, ...] = ()  # dataclasses that the caller writes
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)  # by path
+    pictures: dict[str, bytes] = field(default_factory=dict)  # PNG files by member name
+
+    def tree(self, value: Any, path: str) -> Any:
+        """The JSON value of `value`, whose arrays are named after `path`."""
+        if isinstance(value, np.ndarray):
+            return self._array(value, path)
+        if isinstance(value, self.skipped):
+            return None
+        if is_dataclass(value):
+            inner = f"{path}/" if path else ""
+            return {
+                f.name: self.tree(getattr(value, f.name), inner + f.name) for f in fields(value)
+            }
+        if isinstance(value, tuple | list):
+            return [self.tree(part, f"{path}/{k}") for k, part in enumerate(value)]
+        if value is None or isinstance(value, str):
+            return value
+        if isinstance(value, bool | np.bool_):
+            return bool(value)
+        if isinstance(value, int | np.integer):
+            return int(value)
+        if not math.isfinite(value):
+            raise SessionError(f"{path} is not a finite number and cannot be saved")
+        return float(value)
+
+    def _array(self, array: np.ndarray, path: str) -> dict[str, str]:
+        if array.dtype.kind == "f" and not all_finite(array):
+            raise SessionError(f"{path} holds values that are not finite and cannot be saved")
+        is_mask = array.dtype == np.bool_ and array.ndim == 2
+        is_pixels = array.dtype in (np.uint8, np.uint16) and array.shape[2:] == (3,)
+        if array.size and (is_mask or is_pixels):
+            member = f"{path}.png"
+            self.pictures[member] = (
+                encode_mask(array) if is_mask else encode_picture(Picture(array), "png")
+            )
+            return {"png": member}
+        self.arrays[path] = array
+        return {"array": path}
+
+
+@dataclass
+class Reader:
+    """Builds values of a given type from JSON values. Raises SessionError."""
+
+    members: dict[str, bytes]  # the PNG files by member name
+    arrays: dict[str, np.ndarray]  # by path
+
+    def value(self, hint: Any, tree: Any, where: str) -> Any:
+        """A value of the type `hint`; `where` names it in an error."""
+        if isinstance(hint, type) and isinstance(tree, hint) and is_dataclass(hint):
+            return tree  # made by the caller already
+        origin = get_origin(hint)
+        if origin in (Union, types.UnionType):
+            return self._union(get_args(hint), tree, where)
+        if hint is np.ndarray or origin is np.ndarray:
+            return self._array((hint,), tree, where)
+        if origin is tuple:
+            return self._tuple(get_args(hint), tree, where)
+        if is_dataclass(hint):
+            return self._dataclass(hint, tree, where)
+        if hint is float and type(tree) is int and abs(tree) < 1 << 63:
+            return float(tree)
+        if type(tree) is not hint:
+            raise _damaged(where)
+        return tree
+
+    def _union(self, hints: tuple, tree: Any, where: str) -> Any:
+        """`X | None`, or several kinds of array."""
+        if tree is None and types.NoneType in hints:
+            return None
+        if all(get_origin(h) is np.ndarray for h in hints if h is not types.NoneType):
+            return self._array(hints, tree, where)
+        return self.value(next(h for h in hints if h is not types.NoneType), tree, where)
+
+    def _tuple(self, hints: tuple, tree: Any, where: str) -> tuple:
+        if not isinstance(tree, list):
+            raise _damaged(where)
+        if hints[-1] is Ellipsis:
+            hints = (hints[0],) * len(tree)
+        if len(hints) != len(tree):
+            raise _damaged(where)
+        pairs = enumerate(zip(hints, tree, strict=True))
+        return tuple(self.value(hint, part, f"{where}.{k}") for k, (hint, part) in pairs)
+
+    def _dataclass(self, kind: Any, tree: Any, where: str) -> Any:
+        if not isinstance(tree, dict):
+            raise _damaged(where)
+        hints = get_type_hints(kind)
+        given = {}
+        for f in fields(kind):
+            if f.name in tree:
+                given[f.name] = self.value(hints[f.name], tree[f.name], f"{where}.{f.name}")
+            elif f.default is MISSING and f.default_factory is MISSING:
+                raise _damaged(f"{where}.{f.name}")
+        return kind(**given)
+
+    def _array(self, hints: tuple, tree: Any, where: str) -> np.ndarray:
+        """An array of one of the declared kinds: a kernel would be compiled anew for others."""
+        match tree:
+            case {"array": str(path)} if path in self.arrays:
+                array = self.arrays[path]
+            case {"png": str(member)} if member in self.members:
+                array = self._picture(member)
+            case _:
+                raise _damaged(where)
+        if not any(_is_of(array, hint) for hint in hints):
+            raise SessionError(f"the session is damaged: {where} has numbers of another kind")
+        return frozen(array)
+
+    def _picture(self, member: str) -> np.ndarray:
+        try:
+            picture = read_picture(self.members[member])
+        except ImageError as error:
+            raise SessionError(f"the session is damaged: {member}: {error}") from error
+        return picture.pixels[..., 0] > 127 if picture.is_grey else picture.pixels
+
+
+def _is_of(array: np.ndarray, hint: Any) -> bool:
+    """Whether `hint` is an array of that dtype, or of any."""
+    kinds = [get_args(part) for part in get_args(hint)[1:]]  # np.ndarray[shape, np.dtype[scalar]]
+    return hint is np.ndarray or any(
+        k and (k[0] is Any or np.dtype(k[0]) == array.dtype) for k in kinds
+    )
+
+
+def _damaged(where: str) -> SessionError:
+    return SessionError(f"the session's document.json is damaged at {where}")

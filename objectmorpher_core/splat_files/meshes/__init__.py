@@ -1,0 +1,1 @@
+"""Mesh files, sampled into Gaussians on their surface."""

@@ -1,0 +1,101 @@
+"""The triangles of a mesh, all in one frame, and what they look like; where they are sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import F32, F64, I32, Mask
+from .texture import Texture
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What the triangles of one material show, before their tint."""
+
+    texture: Texture | None
+    cutoff: float | None  # alpha from which a spot is there at all; None: alpha is opacity
+    is_opaque: bool  # alpha means nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles, counter-clockwise from outside."""
+
+    corners: F64  # (T, 3, 3)
+    uv: F64  # (T, 3, 2) v up from the picture's bottom row
+    tint: F32  # (T, 3, 4) linear straight RGBA, times the texture
+    which: np.ndarray  # (T,) index into looks
+    looks: tuple[Look, ...]
+
+    def areas(self) -> F64:
+        """(T,)"""
+        return 0.5 * np.linalg.norm(self._cross(), axis=1)
+
+    def normals(self) -> F64:
+        """(T, 3) unit, by the corners' order; of a triangle without area anything."""
+        cross = self._cross()
+        return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
+
+    def select(self, kept: Mask) -> Surface:
+        """The triangles at `kept` (T,)."""
+        return Surface(
+            self.corners[kept], self.uv[kept], self.tint[kept], self.which[kept], self.looks
+        )  # fmt: skip
+
+    def _cross(self) -> F64:
+        a, b, c = (self.corners[:, k] for k in range(3))
+        return np.cross(b - a, c - a)
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """Places spread evenly over a surface."""
+
+    points: F64  # (M, 3)
+    triangle: I32  # (M,)
+    weights: F64  # (M, 3) barycentric
+
+    @staticmethod
+    def spread(surface: Surface, count: int, rng: np.random.Generator) -> Spots:
+        """`count` places, as many a unit of area everywhere."""
+        cumulative = np.cumsum(surface.areas())
+        # one in each count-th part of the area: evener than independent draws
+        marks = (np.arange(count) + rng.random(count)) / count * cumulative[-1]
+        triangle = np.minimum(np.searchsorted(cumulative, marks), len(cumulative) - 1)
+        root, along = np.sqrt(rng.random(count)), rng.random(count)
+        weights = np.stack([1 - root, root * (1 - along), root * along], axis=1)
+        points = np.einsum("mk,mka->ma", weights, surface.corners[triangle])
+        return Spots(points, triangle.astype(np.int32), weights)
+
+    def colors(self, surface: Surface, width: float) -> F32:
+        """Premultiplied linear RGBA (M, 4) of spots `width` wide, in the surface's units."""
+        tint = np.einsum("mk,mka->ma", self.weights, surface.tint[self.triangle])
+        uv = np.einsum("mk,mka->ma", self.weights, surface.uv[self.triangle])
+        stretch = _stretch(surface)[self.triangle]
+        which = surface.which[self.triangle]
+        colors = np.ones((len(uv), 4), np.float32)
+        for k, look in enumerate(surface.looks):
+            rows = which == k
+            if look.texture is not None:
+                size = np.sqrt(look.texture.width * look.texture.height)
+                colors[rows] = look.texture.sample(uv[rows], stretch[rows] * size * width)
+            if look.is_opaque:
+                colors[rows, :3] /= np.maximum(colors[rows, 3:], 1e-6)
+                tint[rows, 3] = colors[rows, 3] = 1
+            straight = tint[rows]
+            colors[rows] *= np.column_stack([straight[:, :3] * straight[:, 3:], straight[:, 3]])
+            if look.cutoff is not None:
+                alpha = colors[rows, 3]
+                kept = alpha >= look.cutoff
+                colors[rows] *= np.where(kept, 1 / np.maximum(alpha, 1e-6), 0)[:, None]
+        return colors
+
+
+def _stretch(surface: Surface) -> F64:
+    """(T,) share of the picture's side a unit of length on the surface."""
+    a, b, c = (surface.uv[:, k] for k in range(3))
+    ab, ac = b - a, c - a
+    in_picture = 0.5 * np.abs(ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
+    return np.sqrt(in_picture / np.maximum(surface.areas(), 1e-300))
