@@ -13,7 +13,7 @@ from .base import backends
 from .base.threads import core_count
 from .compose import refine
 from .lift.relief import depth_look
-from .lift.trellis import weights
+from .lift.trellis import configs
 from .lift.workers import file as worker_file
 from .models import device
 
@@ -161,7 +161,7 @@ def _lifting() -> Stage:
     if _has_gpu() and "trellis" in dict(absent):
         better += "; " if better else ""
         better += "to make up what the photo does not show: " + " and ".join(
-            f"`objectmorpher models get {id}`" for id in (weights.TRELLIS, weights.ENCODER)
+            f"`objectmorpher models get {id}`" for id in (configs.TRELLIS, configs.ENCODER)
         )
     workers = _workers()
     absent += tuple((n, told) for n, told, is_there in workers if not is_there)

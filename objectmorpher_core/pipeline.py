@@ -21,8 +21,7 @@ from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
 from .compose.plate.plate import build_plate
 from .deform.puppet import Puppet, puppet_of
-from .document import edits, front_edits
-from .document.hint import Hint
+from .document import edits
 from .document.model import (
     AS_SEEN,
     Document,
@@ -33,14 +32,13 @@ from .document.model import (
     Plate,
     Prompt,
 )
+from .document.settings import Hint
 from .lift.registration.importing import Scene, Source, place_import, register_file
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
-from .scripting import scripted
-from .scripting.left_behind import has_left, with_plate
-from .scripting.refining import Refining, with_refinement
+from .scripting import runner
 from .scripting.report import Stopwatch, build_report
+from .scripting.runner import Refining, has_left, prompt_of, with_plate, with_refinement
 from .scripting.script import ALONE, EditScript, FurtherObject, Others, ScriptError
-from .scripting.scripted import prompt_of
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
 from .segment.matting.matte import band_width, build_matte
@@ -220,7 +218,7 @@ def lift_first(
     document: Document, script: EditScript, mask: bytes | None = None, progress: Progress = silent
 ) -> Document:
     """An opened photo with the script's own object chosen and lifted, ready to be edited."""
-    scripted.refuse_missing(script)
+    runner.refuse_missing(script)
     run = _Run(document, Stopwatch())
     run.choose(script, mask, part(progress, 0.0, 0.5))
     run.lift(0, script, part(progress, 0.5, 1.0))
@@ -241,20 +239,20 @@ def continue_script(
     `mask`: bytes of the script's mask picture. `needs_plate`: the plate is made even where nothing
     moved. `others`: the photo's further objects. Raises the stages' one-sentence ValueErrors.
     """
-    scripted.refuse_missing(script, others)
-    refiner = scripted.refiner_of(script, others)
+    runner.refuse_missing(script, others)
+    refiner = runner.refiner_of(script, others)
     stopwatch = stopwatch or Stopwatch()
     run = _Run(document, stopwatch)
-    wishes = scripted.with_inherited((FurtherObject(script), *others.objects))
+    wishes = runner.with_inherited((FurtherObject(script), *others.objects))
     for k, wanted in enumerate(wishes):
         step = part(progress, 0.6 * k / len(wishes), 0.6 * (k + 1) / len(wishes))
         own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
-        with scripted.told_of(k + 1, others):
+        with runner.told_of(k + 1, others):
             if k > 0:
                 mask = Path(own.mask).read_bytes() if own.mask else None
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
-    document = scripted.ordered(run.document, others)
+    document = runner.ordered(run.document, others)
     if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
@@ -289,18 +287,18 @@ class _Run:
             self._keep(k)
             return
         if wanted.duplicate is not None:
-            self.document = scripted.copied(self.document, k, wanted)
+            self.document = runner.copied(self.document, k, wanted)
         else:
             if not is_lifted:
                 self.lift(k, script, part(progress, 0.5, 0.8))
-            self.document = scripted.with_settings(self.document, k, script)
+            self.document = runner.with_settings(self.document, k, script)
         puppet = self.puppets[k] = puppet_of(self.document.objects[k], self.document.photo.camera)
         step = part(progress, 0.8, 1.0)
-        self.document, self.energies[k] = scripted.posed(
+        self.document, self.energies[k] = runner.posed(
             self.document, k, puppet, script, step, self._stopwatch
         )
         if wanted.duplicate is None:
-            self.document = scripted.placed(self.document, k, script)
+            self.document = runner.placed(self.document, k, script)
         if script.shadow == "auto" and has_left(self.document.objects[k]):
             self.casting.add(k)
 
@@ -347,7 +345,7 @@ class _Run:
         mask = self.document.objects[k].selection
         assert mask is not None, "it was chosen"
         matte = cut_front(self.document.photo.pixels, mask)
-        self.document = front_edits.keep_in_front(self.document, k, matte)
+        self.document = edits.keep_in_front(self.document, k, matte)
 
     def _reading(self, backend: str, progress: Progress) -> Reading:
         if backend not in self._readings:
@@ -361,7 +359,7 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
     photo, mask = document.photo, document.objects[k].selection
     assert mask is not None, "it was chosen"
     if script.splats is None:
-        settings = scripted.lift_settings(document, script)
+        settings = runner.lift_settings(document, script)
         made = lift_mask(
             photo.pixels, photo.camera, mask, script.lift, settings, progress, script.seed
         )

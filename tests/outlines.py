@@ -8,7 +8,7 @@ from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.shadow.shadow import Standing, ground_normal
 from objectmorpher_core.compose.silhouette import Silhouette, fine_grid
-from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.raster.texture import TextureLevels

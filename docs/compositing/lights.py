@@ -12,12 +12,11 @@ from worlds import CAMERA, LIGHTS, Lamp
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_matrix
-from objectmorpher_core.compose.light.light_estimate import estimate_light
-from objectmorpher_core.compose.light.lighting import object_texture
+from objectmorpher_core.compose.light.lighting import estimate_light, object_texture
 from objectmorpher_core.compose.light.relight import relight
 from objectmorpher_core.deform.puppet import Puppet
-from objectmorpher_core.document.joining import USUAL_RELIGHT
 from objectmorpher_core.document.model import DeformSettings, LiftSettings, Placement
+from objectmorpher_core.document.settings import USUAL_RELIGHT
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster import tiles
 

@@ -22,8 +22,8 @@ from objectmorpher_core.base.arrays import F64, Pixels
 from objectmorpher_core.base.pixels import pixels_from_unit
 from objectmorpher_core.compose.light.harmonize import at_strength, light_gain, light_map
 from objectmorpher_core.compose.silhouette import Silhouette
-from objectmorpher_core.document.joining import USUAL_HARMONY
 from objectmorpher_core.document.model import Document, Photo
+from objectmorpher_core.document.settings import USUAL_HARMONY
 from objectmorpher_core.pictures.image import Picture, encode_picture
 
 SIZE = 150  # px, of the object's square

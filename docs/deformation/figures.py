@@ -24,8 +24,8 @@ from PIL import Image, ImageDraw
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import Deformer
+from objectmorpher_core.deform.resampling import split_stretched
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.deform.splitting import split_stretched
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import PhotoTexture
 

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.skinning import Skinned
-from objectmorpher_core.raster import columns, projection, tiles
+from objectmorpher_core.raster import projection, rules, tiles
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.texture import build_levels
 
@@ -144,13 +144,13 @@ def _draw_outlines(draw: ImageDraw.ImageDraw, projected: F64) -> None:
     """Each Gaussian that faces the camera, as an ellipse of half a standard deviation."""
     angle = np.linspace(0, 2 * np.pi, 25)
     circle = OUTLINE * np.stack([np.cos(angle), np.sin(angle)])
-    for row in projected[projected[:, columns.BODY] > 0.5]:
+    for row in projected[projected[:, rules.BODY] > 0.5]:
         # the covariance from its parts, see `projection`
-        yy = 1 / row[columns.RYY]
-        xy = -row[columns.TILT] * yy
-        xx = 1 / row[columns.QXX] + xy * xy / yy
+        yy = 1 / row[rules.RYY]
+        xy = -row[rules.TILT] * yy
+        xx = 1 / row[rules.QXX] + xy * xy / yy
         root = np.linalg.cholesky(np.array([[xx, xy], [xy, yy]], np.float64))
-        at = row[[columns.CX, columns.CY]] + (root @ circle).T
+        at = row[[rules.CX, rules.CY]] + (root @ circle).T
         draw.line(at.ravel().tolist(), INK, SUPERSAMPLE)
 
 

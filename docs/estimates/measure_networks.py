@@ -34,7 +34,7 @@ from objectmorpher_core.base.progress import silent
 from objectmorpher_core.compose.plate.pixelhacker import sampler as pixelhacker
 from objectmorpher_core.compose.refine import klein
 from objectmorpher_core.lift.trellis.configs import Sampling
-from objectmorpher_core.lift.trellis.sampler import sample
+from objectmorpher_core.lift.trellis.generator import sample
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_research.training.composition import edit_models
 

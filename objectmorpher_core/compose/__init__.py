@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 from ..base import backends
 from ..base.arrays import Mask, Pixels
 from ..base.progress import Progress
-from ..document.hint import Hint
+from ..document.settings import Hint
 
 
 class InpaintError(ValueError):

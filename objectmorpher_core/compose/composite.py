@@ -19,11 +19,12 @@ from ..base.pixels import crop, pixels_from_unit, unit_pixels
 from ..base.progress import Progress, silent
 from ..deform.puppet import Puppet, puppet_of
 from ..document.model import Document, EditObject, Matte, Placement, Plate
+from ..document.settings import Refined
 from ..raster import tiles
 from ..raster.binning import TILE
 from ..raster.posed import PosedSplats
 from ..raster.reference_layers import Picture3D
-from .blend import FEATHER_START as FEATHER_START  # the view looks here for these two
+from .blend import FEATHER_START as FEATHER_START
 from .blend import (
     NEAR,
     STILL_ALPHA,
@@ -42,7 +43,6 @@ from .light.lighting import NOTHING, Lighting, Lit
 from .light.lighting import object_texture as object_texture
 from .order import holes, leaves_a_hole, stack
 from .plate.plate import hole_margin, plate_crop, plate_of_holes
-from .refined import with_refined
 from .shadow.shadow import Shade
 
 STRIP = 1_500_000  # px of the crop that are drawn at a time; about 100 bytes each
@@ -386,3 +386,25 @@ def drawn_alone(
         drawn[drawn[..., 3] <= 0] = 0
         cutout[top - y0 : bottom - y0] = pixels_from_unit(drawn, dtype)
     return cutout, drawing.box
+
+
+# The refinement over the composite: seen inside the footprint only, as strongly as is wanted.
+
+
+def with_refined(photo: Pixels, pixels: Pixels, refined: Refined) -> tuple[Pixels, float]:
+    """`pixels` (H, W, 3), an edited `photo`, refined; and the refiner's share of what changed.
+
+    Where the refinement's alpha is 0, the integers stay as they are.
+    """
+    x0, y0, x1, y1 = refined.box
+    weights = refined.weights
+    old = pixels[y0:y1, x0:x1]
+    base = unit_pixels(old)
+    mixed = base + weights[..., None] * (unit_pixels(refined.pixels) - base)
+    result = pixels.copy()
+    shown = (weights > 0)[..., None]
+    result[y0:y1, x0:x1] = np.where(shown, pixels_from_unit(mixed, old.dtype), old)
+    whole = int(differ(result, photo).sum())
+    is_changed = differ(result[y0:y1, x0:x1], photo[y0:y1, x0:x1])
+    total = float(weights[is_changed].sum(dtype=np.float64))
+    return result, total / whole if whole else 0.0

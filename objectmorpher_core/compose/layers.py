@@ -15,7 +15,7 @@ import numpy as np
 from ..base.pixels import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
 from ..document.model import Document, EditObject, Matte, Plate
-from ..document.refinement import Refined
+from ..document.settings import Refined
 from .blend import Box
 from .composite import Composite, Moved, composite, drawn_alone, whole_box
 from .order import holes

@@ -10,10 +10,9 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 
 from ..base.arrays import F64, I32, Sparse
-from .anderson import Anderson
+from .anderson import Anderson, solve_small
 from .bodies import Bodies, Pivot
 from .constraints import Constraints, HeldResponse, Patch, Targets, followed
-from .elimination import solve_small
 from .links import Links, in_single
 from .response import build_response, product
 

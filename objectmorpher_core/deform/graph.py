@@ -12,8 +12,16 @@ from scipy.spatial import KDTree
 from ..base.arrays import F64, I32, Mask
 from ..document.model import DeformSettings
 from ..document.rig import Seam
-from .struts import find_struts, weigh_struts
-from .surface_links import CHUNK, TINY, Cells, Edges, Surface, without_gaps
+from .surface_links import (
+    CHUNK,
+    TINY,
+    Cells,
+    Edges,
+    Surface,
+    find_struts,
+    weigh_struts,
+    without_gaps,
+)
 
 AUXILIARY_RADIUS = 2.0  # x mean nearest-neighbour distance, paper 3.2.1
 LINK_RADIUS = 0.3  # x diameter, paper 3.2.1

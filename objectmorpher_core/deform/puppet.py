@@ -19,10 +19,9 @@ from ..raster.picking import pick
 from ..raster.posed import PosedSplats, RestSplats
 from ..raster.reference_layers import Picture3D
 from ..raster.texture import TextureLevels
-from ..raster.thinning import thinned
 from ..raster.tiles import Drawable
 from .deformer import Deformer
-from .splitting import Split, split_stretched
+from .resampling import Split, split_stretched, thinned
 
 DRAFT = 8_000  # solid Gaussians of a picture that must be quick
 PICK_STEPS = 8  # Newton steps of the inverse motion; three are usual

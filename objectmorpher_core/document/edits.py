@@ -8,16 +8,6 @@ import numpy as np
 
 from ..base.arrays import Mask, Selection
 from ..base.camera import Camera
-from .hint import Hint
-from .joining import (
-    LEAST_FEATHER,
-    MOST_FEATHER,
-    USUAL_DEFOCUS,
-    USUAL_GRAIN,
-    USUAL_HARMONY,
-    USUAL_RELIGHT,
-    Shadow,
-)
 from .model import (
     DeformSettings,
     Document,
@@ -30,6 +20,19 @@ from .model import (
     Plate,
     Pose,
     Prompt,
+    is_shown_alike,
+)
+from .rig import Rig, Seam
+from .settings import (
+    LEAST_FEATHER,
+    MOST_FEATHER,
+    USUAL_DEFOCUS,
+    USUAL_GRAIN,
+    USUAL_HARMONY,
+    USUAL_RELIGHT,
+    Hint,
+    Refined,
+    Shadow,
 )
 
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
@@ -394,3 +397,121 @@ def set_feather(document: Document, feather: float) -> Document:
     if not LEAST_FEATHER <= feather <= MOST_FEATHER:
         raise EditError(f"a blend of {feather:g} x is not {LEAST_FEATHER:g} to {MOST_FEATHER:g}")
     return replace(document, feather=float(feather), refined=None)
+
+
+# Changes of what stays in front of the edited objects, as it stands in the photo.
+
+
+def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Document:
+    """Object `k` is not edited: it covers what is, by its `matte`, as it stands in the photo.
+
+    The matte may come later. Raises EditError where nothing is selected, or it was moved.
+    """
+    item = document.objects[k]
+    if item.mask is None:
+        raise EditError("nothing is selected that could stay in front")
+    if item.is_moved:
+        raise EditError("what was moved cannot stay where it is")
+    kept = replace(item, matte=matte or item.matte, stays_in_front=True)
+    return document.with_object(k, kept)
+
+
+def let_go(document: Document, k: int) -> Document:
+    """Object `k` does not stay in front any more."""
+    item = replace(document.objects[k], stays_in_front=False)
+    return document.with_object(k, item if item.lifted else replace(item, matte=None))
+
+
+# What is changed about the refinement of an edit, as pure functions Document -> Document.
+
+
+def set_refined(document: Document, refined: Refined | None) -> Document:
+    """The edit as a refiner made it look; None: as it was put together."""
+    changed = replace(document, refined=refined)
+    if refined is not None:
+        return changed.with_backend("refine", refined.backend)
+    others = tuple((stage, name) for stage, name in document.backends if stage != "refine")
+    return replace(changed, backends=others)
+
+
+def set_strength(document: Document, strength: float) -> Document:
+    """How much of the refinement is shown, in [0, 1]."""
+    if not 0 <= strength <= 1:
+        raise EditError(f"a strength of {strength:g} is not between 0 and 1")
+    if document.refined is None:
+        raise EditError("the edit is not refined")
+    return replace(document, refined=replace(document.refined, strength=float(strength)))
+
+
+def show_the_same(one: Document, other: Document) -> bool:
+    """Whether a refinement of one edit is one of the other, too."""
+    if one.photo is not other.photo or one.plate is not other.plate:
+        return False
+    if (one.horizon, one.feather) != (other.horizon, other.feather):
+        return False
+    if len(one.objects) != len(other.objects):
+        return False
+    return all(map(is_shown_alike, one.objects, other.objects))
+
+
+# Changes of how an object's regions move, as pure functions Document -> Document.
+
+
+def set_rig(document: Document, k: int, rig: Rig) -> Document:
+    """How the regions of object `k` move; its pose was solved with the old rig and is gone."""
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before saying how its parts move")
+    try:
+        rig.check(len(item.lifted.control_points))
+    except ValueError as error:
+        raise EditError(str(error)) from error
+    return document.with_object(k, replace(item, rig=rig, pose=None))
+
+
+def cut(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:
+    """Control points `first` and `second` of object `k` do not move each other directly."""
+    rig = document.objects[k].rig
+    return set_rig(document, k, replace(rig, seams=(*rig.seams, Seam(first, second))))
+
+
+def glue(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:
+    """Control points `first` and `second` of object `k` hang together as neighbours do."""
+    rig = document.objects[k].rig
+    return set_rig(document, k, replace(rig, seams=(*rig.seams, Seam(first, second, True))))
+
+
+def make_body(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points of object `k` move as one rigid body. They leave the bodies they were in."""
+    rig = document.objects[k].rig
+    others = (np.setdiff1d(body, nodes) for body in rig.bodies)
+    bodies = (*(body for body in others if len(body) > 1), np.unique(nodes))
+    return set_rig(document, k, replace(rig, bodies=bodies))
+
+
+def freeze(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points `nodes` of object `k` stay where they are now, whatever is dragged."""
+    item = document.objects[k]
+    if item.lifted is None:
+        raise EditError("lift the object before saying how its parts move")
+    rig, rest = item.rig, item.lifted.control_points.astype(np.float64)
+    places = rig.held_at(rest)
+    places[nodes] = rest[nodes] if item.pose is None else item.pose.points[nodes]
+    old = np.empty(0, np.int32) if rig.held is None else rig.held
+    return set_rig(document, k, _with_held(rig, np.union1d(old, nodes), places - rest))
+
+
+def thaw(document: Document, k: int, nodes: np.ndarray) -> Document:
+    """Control points `nodes` of object `k` are frozen no more."""
+    item = document.objects[k]
+    if item.lifted is None or item.rig.held is None:
+        return document
+    left = np.setdiff1d(item.rig.held, nodes)
+    rest = item.lifted.control_points.astype(np.float64)
+    return set_rig(document, k, _with_held(item.rig, left, item.rig.held_at(rest) - rest))
+
+
+def _with_held(rig: Rig, held: np.ndarray, shifts: np.ndarray) -> Rig:
+    """The rig with these frozen control points; `shifts` (M, 3) of all from rest."""
+    own = shifts[held]
+    return replace(rig, held=held if len(held) else None, shifts=own if own.any() else None)

@@ -17,11 +17,9 @@ from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
 from .gaussians import Gaussians
-from .hint import Hint
-from .joining import Shadow
 from .pose import Handle, Pose
-from .refinement import Refined
 from .rig import Rig
+from .settings import Hint, Refined, Shadow
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,17 +14,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from ..base import installation
-from ..base.files import sync_folder
+from ..base.files import make_folder, sync_folder, write_all
 from ..base.progress import Progress, silent
 from ..base.quoting import shown
-from . import hub_download, lock
+from . import hub_download
 from .fetch import POLL, SLACK, check_online, folder, sha256_of
-from .lock import FileFacts, Locked
 from .registry import HubModel, ModelError, families, hub_model, hub_models
 from .tensors_only import convert
 from .weight_folder import (
@@ -79,7 +78,7 @@ def place(id: str) -> Path | None:
 
 def files(id: str) -> tuple[Path, ...]:
     """Where the files of model `id` are; none where it is not there whole."""
-    known, at = lock.locked(id), place(id)
+    known, at = locked(id), place(id)
     return tuple(at / name for name in known.files) if known and at else ()
 
 
@@ -140,7 +139,7 @@ def use_folder(id: str, at: Path) -> HubState:
             names = check_folder(family, at)
         id = _nearest(family, sum((at / n).stat().st_size for n in names)) if id == family else id
         facts = {name: FileFacts((at / name).stat().st_size, "") for name in names}
-        lock.write(id, Locked(facts, folder=str(at)))
+        write(id, Locked(facts, folder=str(at)))
     except OSError as error:
         raise ModelError(f"{at.name} cannot be used: {error.strerror or error}") from error
     return look_hub(id)
@@ -174,7 +173,7 @@ def convert_folder(id: str, at: Path, progress: Progress = silent) -> HubState:
         facts = {name: _facts(partial / name) for name in wanted}
         if place.exists():
             shutil.rmtree(place)
-        lock.write(id, Locked(facts))
+        write(id, Locked(facts))
         os.replace(partial, place)
     except OSError as error:
         raise ModelError(f"{at.name} cannot be converted: {error.strerror or error}") from error
@@ -190,10 +189,10 @@ def remove_hub(id: str) -> None:
     Which commit it was stays in the lock file. Raises ModelError.
     """
     model = hub_model(id)
-    known = lock.locked(id)
+    known = locked(id)
     try:
         if known is not None and known.folder:
-            lock.write(id, None)
+            write(id, None)
         for left in (folder() / model.id, folder() / (PARTIAL + model.id)):
             if left.exists():
                 shutil.rmtree(left)
@@ -208,7 +207,7 @@ def _nearest(family: str, size: int) -> str:
 
 
 def _state(model: HubModel, is_hashed: bool) -> HubState:
-    known = lock.locked(model.id)
+    known = locked(model.id)
     at = Path(known.folder) if known and known.folder else folder() / model.id
     if known is None or not (known.folder or at.is_dir()):
         return HubState(model, at, "missing")
@@ -230,7 +229,7 @@ def _damage(at: Path, known: Locked, is_hashed: bool) -> str:
             if size != fact.size:
                 return f"{name} has {size} bytes, not {fact.size}"
             if is_hashed and fact.sha256 and sha256_of(at / name) != fact.sha256:
-                return f"{name} has another hash than the one in {lock.NAME}"
+                return f"{name} has another hash than the one in {NAME}"
         except OSError as error:
             return f"{name} cannot be read: {error.strerror or error}"
         except ValueError:
@@ -244,7 +243,7 @@ def _download(model: HubModel, progress: Progress) -> None:
     where.mkdir(parents=True, exist_ok=True)
     partial, at = where / (PARTIAL + model.id), where / model.id
     partial.mkdir(exist_ok=True)
-    pinned = lock.locked(model.id)
+    pinned = locked(model.id)
     if pinned is not None and pinned.folder:
         pinned = None
     revision = model.revision or (pinned.revision if pinned else "")
@@ -260,7 +259,7 @@ def _download(model: HubModel, progress: Progress) -> None:
     if at.exists():  # a damaged one
         shutil.rmtree(at)
     # The pin first: files that are in place are looked at by it.
-    lock.write(model.id, Locked(facts, revision))
+    write(model.id, Locked(facts, revision))
     os.replace(partial, at)
     sync_folder(where)
 
@@ -356,3 +355,67 @@ def _sentence(model: HubModel, kind: str, detail: str) -> str:
         "odd": f"the Hub's answer is odd: {detail}",
     }
     return f"{model.id} cannot be downloaded: {reasons.get(kind, detail or 'nothing was said')}"
+
+
+# Which files of a model are the right ones here: `models.lock` beside the models.
+
+NAME = "models.lock"
+TOO_MUCH = (RecursionError, OverflowError)  # depth, and numbers beyond numbers
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """What a file has to be."""
+
+    size: int  # bytes
+    sha256: str  # hexadecimal; empty where nobody has computed it: in the user's own folder
+
+
+@dataclass(frozen=True)
+class Locked:
+    """The files that are a model here."""
+
+    files: Mapping[str, FileFacts]  # by path, in the model's folder
+    revision: str = ""  # commit of its repository
+    folder: str = ""  # the user's own; empty: ours
+
+
+def locked(id: str) -> Locked | None:
+    """What the lock file says of a model, if anything. Raises ModelError where it is damaged."""
+    return _read().get(id)
+
+
+def write(id: str, entry: Locked | None) -> None:
+    """Changes the entry of one model; None takes it out. Raises ModelError or OSError."""
+    known = _read()
+    known.pop(id, None)
+    if entry is not None:
+        known[id] = entry
+    told = {name: asdict(known[name]) for name in sorted(known)}
+    where = folder()
+    make_folder(where)
+    text = json.dumps({"version": 1, "models": told}, indent=1) + "\n"
+    write_all({where / NAME: text.encode()})
+
+
+def _read() -> dict[str, Locked]:
+    at = folder() / NAME
+    try:
+        data = at.read_bytes()
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise ModelError(f"{at} cannot be read: {error.strerror or error}") from error
+    try:
+        return {str(id): _entry(told) for id, told in json.loads(data)["models"].items()}
+    except (ValueError, KeyError, TypeError, AttributeError, *TOO_MUCH) as error:
+        raise ModelError(f"{at} is damaged: remove it, and get its models again") from error
+
+
+def _entry(told: dict) -> Locked:
+    facts = {
+        str(name): FileFacts(int(fact["size"]), str(fact["sha256"]))
+        for name, fact in told["files"].items()
+        if not Path(name).is_absolute() and ".." not in Path(name).parts
+    }
+    return Locked(facts, str(told["revision"]), str(told["folder"]))

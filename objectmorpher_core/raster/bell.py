@@ -8,8 +8,8 @@ import numpy as np
 
 from ..base.kernel_files import numba
 from ..base.threads import FAST
-from . import columns as p
-from .singles import ONE, ZERO
+from . import rules as p
+from .rules import ONE, ZERO
 from .tile_memory import STRIP
 
 STRIP_END = np.float32(STRIP - 1)

@@ -14,8 +14,7 @@ import numpy as np
 from ..base.arrays import F32, frozen
 from ..base.kernel_files import numba
 from ..base.threads import FAST, core_count, in_threads
-from .columns import CUT, CX, CY, EX, EY, QXX, TILT, WEIGHT
-from .singles import HALF, ONE, ZERO
+from .rules import CUT, CX, CY, EX, EY, HALF, ONE, QXX, TILT, WEIGHT, ZERO
 
 TILE = 16  # px, of a surface's tiles
 SMALL = np.float32(1 / 4)  # of a tile, extents of a Gaussian that touches about four

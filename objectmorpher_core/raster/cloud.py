@@ -14,9 +14,9 @@ import numpy as np
 
 from ..base.kernel_files import numba
 from ..base.threads import FAST
-from . import columns as p
+from . import rules as p
 from .bell import SIXTEENTH, rows_of
-from .singles import HALF, INFINITE, ONE, ZERO
+from .rules import HALF, INFINITE, ONE, ZERO
 from .tile_memory import STRIP, clear_tile, number_pixels, write_rgba
 
 WIDE, TALL = STRIP, 64  # px, of a tile

@@ -10,8 +10,7 @@ from ..base.kernel_files import numba
 from ..base.threads import FAST
 from . import tile_memory as m
 from .look_up import look_up
-from .rules import coverage, ramp
-from .singles import HALF, INFINITE, ONE, ZERO
+from .rules import HALF, INFINITE, ONE, ZERO, coverage, ramp
 
 TINY = np.float32(1e-30)
 LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows no photo

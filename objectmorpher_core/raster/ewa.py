@@ -15,7 +15,7 @@ from ..base.threads import FAST
 from ..deform import skinning
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT
-from . import columns as p
+from . import rules as p
 from .posed import (
     COLOUR,
     COSINE,

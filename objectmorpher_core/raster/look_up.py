@@ -10,8 +10,8 @@ from ..base.kernel_files import numba
 from ..base.threads import EXACT
 from . import tile_memory as m
 from .intrinsics import sixteen_texels
+from .rules import HALF, ONE, TWO, ZERO
 from .sampling import C15, C25, add_halved, sample
-from .singles import HALF, ONE, TWO, ZERO
 
 HIGHEST = np.float32(1e6)  # px: what looks farther away looks at nothing
 

@@ -17,9 +17,8 @@ from ..base.threads import FAST, in_threads
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
 from . import ewa
-from .columns import FRONT, PLAIN_SPAN, SPAN, SX, Z
 from .posed import REST_ROWS, PosedSplats, view_limits
-from .rules import RULES
+from .rules import FRONT, PLAIN_SPAN, RULES, SPAN, SX, Z
 
 
 def project(

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.kernel_files import numba
 from ..base.threads import EXACT
 from .intrinsics import sixteen_texels
-from .singles import HALF, ONE, TWO, ZERO
+from .rules import HALF, ONE, TWO, ZERO
 
 C15, C25 = np.float32(1.5), np.float32(2.5)
 ONE_ON, TWO_ON, THREE_ON = np.uint64(1), np.uint64(2), np.uint64(3)

@@ -16,7 +16,7 @@ from ..base.kernel_files import numba
 from ..base.threads import EXACT, in_threads
 from .intrinsics import between, bytes_over, four_texels
 from .reference import Picture3D
-from .singles import HALF, ONE, TWO, ZERO
+from .rules import HALF, ONE, TWO, ZERO
 from .texture import TextureLevels
 
 Box = tuple[int, int, int, int]

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..base.kernel_files import numba
 from ..base.threads import FAST
-from . import columns as p
+from . import rules as p
 from . import tile_memory as m
 from .bell import bell
 from .binning import TILE
 from .intrinsics import fetch
 from .look_up import look_up
-from .singles import HALF, ONE, ZERO
+from .rules import HALF, ONE, ZERO
 
 STEP = 2  # px between nodes
 SIDE = TILE // STEP + 1  # nodes

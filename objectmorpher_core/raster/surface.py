@@ -13,15 +13,23 @@ import numpy as np
 
 from ..base.kernel_files import numba
 from ..base.threads import FAST
-from . import columns as p
+from . import rules as p
 from . import tile_memory as m
 from .bell import strip_rows
 from .binning import TILE
 from .compositing import composite_layer
-from .fronts import FAR, first_front, next_front
-from .layer_sums import add, add_all, add_body, add_more, multiply, take
-from .rules import LAYERS, limits_of
-from .singles import HALF, INFINITE, ONE, ZERO
+from .layer_sums import (
+    FAR,
+    add,
+    add_all,
+    add_body,
+    add_more,
+    first_front,
+    multiply,
+    next_front,
+    take,
+)
+from .rules import HALF, INFINITE, LAYERS, ONE, ZERO, limits_of
 from .smooth import draw_smooth, is_plain, new_nodes
 
 MIDDLE = np.float32(TILE / 2)

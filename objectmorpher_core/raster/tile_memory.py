@@ -12,8 +12,7 @@ import numpy as np
 from ..base.kernel_files import numba
 from ..base.threads import EXACT
 from .binning import TILE
-from .rules import LAYERS
-from .singles import HALF, ZERO
+from .rules import HALF, LAYERS, ZERO
 
 PIXELS = TILE * TILE
 STRIP = 8  # px, columns that lie side by side

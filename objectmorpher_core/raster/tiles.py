@@ -17,12 +17,11 @@ from ..base.camera import Camera
 from ..base.threads import in_threads
 from .binning import TILE, bin_tiles
 from .cloud import TALL, WIDE, draw_one_by_one
-from .columns import CX, CY, EX, EY, WEIGHT
 from .depth_order import depth_order
 from .posed import PosedSplats
 from .projection import project
 from .reference import Picture3D
-from .rules import RULES
+from .rules import CX, CY, EX, EY, RULES, WEIGHT
 from .surface import draw_layers
 from .texture import TextureLevels
 

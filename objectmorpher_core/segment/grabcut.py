@@ -9,9 +9,8 @@ from ..base.arrays import F32, RGB, Mask
 from ..base.progress import Progress, silent
 from ..document.model import Prompt
 from .choice import guess
-from .level import at_level
 from .matting.edges import cut
-from .selection import SelectionError, box_mask, check_prompt
+from .selection import SelectionError, at_level, box_mask, check_prompt
 from .subject import SubjectNet
 from .walk import Walk
 

@@ -24,11 +24,10 @@ from ..base.camera import Camera
 from ..base.files import OutputError, reason_of, write_all
 from ..base.limits import SESSION_OBJECTS
 from ..base.quoting import named, shown
-from ..document.joining import LEAST_FEATHER, MOST_FEATHER
 from ..document.model import SELECTED, Document, EditObject, Photo
+from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
-from .npy import ArrayError, read_npy
-from .tree import Reader, SessionError, Writer
+from .tree import ArrayError, Reader, SessionError, Writer, read_npy
 from .zip import Member, Npy, Pieces, Zip, digest, scratch_file, write_zip
 
 __all__ = ["SessionError", "decode_session", "encode_session", "read_session", "save_session"]

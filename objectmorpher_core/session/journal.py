@@ -28,8 +28,7 @@ from ..base.limits import SESSION_UNPACKED as MAX_BYTES
 from ..document.model import Document, Photo
 from ..pictures.image import MAX_PIXELS, Picture, encode_picture
 from .file import build_document
-from .npy import ArrayError, read_npy
-from .tree import SessionError, Writer
+from .tree import ArrayError, SessionError, Writer, read_npy
 
 FORMAT = "objectmorpher recovery"
 VERSION = 1

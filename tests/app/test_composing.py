@@ -13,14 +13,14 @@ from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.compose_tool import ComposeTool
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import (
+from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
+from objectmorpher_core.document.settings import (
     USUAL_DEFOCUS,
     USUAL_GRAIN,
     USUAL_HARMONY,
     USUAL_RELIGHT,
     Shadow,
 )
-from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from strokes import press, stroke
 from tests.reflected import mirrored, photo_with

@@ -12,8 +12,8 @@ from objectmorpher.editor.view import Composed, ToolName
 from objectmorpher.tools.compose_tool import ComposeTool
 from objectmorpher.tools.pointer import Button
 from objectmorpher_core.compose.plate.plate import plate_picture
-from objectmorpher_core.document.hint import Hint
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import move, press, stroke
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from color_vision import MATRICES, SIGHTS, difference, lab
-from objectmorpher.canvas.paint import DEPTH_STOPS, STRAIN_STOPS
+from objectmorpher.canvas.painter import DEPTH_STOPS, STRAIN_STOPS
 from objectmorpher.gui.overlay.canvas import ACCENT, WARM, WHITE
 from objectmorpher.gui.overlay.place import COLOURS
 from objectmorpher.gui.overlay.rig import HATCHES, YELLOW

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher.canvas import paint
+from objectmorpher.canvas import painter
 from objectmorpher.canvas.derived import Derived
 from objectmorpher.canvas.painter import PAINTED, shown_now
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Shown, ToolName, View
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
-from objectmorpher_core.document.refinement import Refined
-from objectmorpher_core.scripting.refining import coarse_edit
+from objectmorpher_core.document.settings import Refined
+from objectmorpher_core.scripting.runner import coarse_edit
 
 COUNTED = 0.06  # of all changed pixels: the view counts on a small picture, its blend is coarser
 F32 = 1e-6
-RED, YELLOW, BLUE = paint.STRAIN_STOPS[::-1]
+RED, YELLOW, BLUE = painter.STRAIN_STOPS[::-1]
 
 
 @pytest.fixture
@@ -38,27 +38,27 @@ def bent(editor: Editor, ball: Document) -> Document:
 
 
 def test_what_is_farther_is_darker() -> None:
-    spread = paint.DepthRange(2.0, 5.0, 3.0)
-    colors = paint.depth_colors(np.linspace(2, 5, 200), spread).astype(float)
+    spread = painter.DepthRange(2.0, 5.0, 3.0)
+    colors = painter.depth_colors(np.linspace(2, 5, 200), spread).astype(float)
     lightness = colors @ (0.2126, 0.7152, 0.0722)
     assert (np.diff(lightness) < 0).all()
-    outside = paint.depth_colors(np.array([1.0, 9.0, np.nan]), spread)
-    expected = paint.DEPTH_STOPS[:1] + paint.DEPTH_STOPS[-1:] * 2
+    outside = painter.depth_colors(np.array([1.0, 9.0, np.nan]), spread)
+    expected = painter.DEPTH_STOPS[:1] + painter.DEPTH_STOPS[-1:] * 2
     np.testing.assert_allclose(outside, expected, atol=F32)
 
 
 def test_the_range_of_depths_holds_all_and_a_little_more() -> None:
-    spread = paint.depth_range(np.array([2.0, 3.0, 2.5]), 2.0)
+    spread = painter.depth_range(np.array([2.0, 3.0, 2.5]), 2.0)
     assert (spread.near, spread.far) == pytest.approx((1.9, 3.1), abs=1e-5)
     assert spread.half == pytest.approx(0.3, abs=1e-5)
-    flat = paint.depth_range(np.array([2.0, 2.0]), 2.0)
+    flat = painter.depth_range(np.array([2.0, 2.0]), 2.0)
     assert flat.far > flat.near
 
 
 def test_normals_of_a_sphere_point_outward() -> None:
     normals = _sphere(400)
     still = np.broadcast_to(np.eye(3), (400, 3, 3))
-    colors = paint.normal_colors(normals, still)
+    colors = painter.normal_colors(normals, still)
     right, up, near = (normals * (1, -1, -1)).T
     np.testing.assert_allclose(colors, 0.5 + 0.5 * np.stack([right, up, near], 1), atol=F32)
 
@@ -67,22 +67,24 @@ def test_normals_turn_with_the_object_and_stand_on_what_is_squeezed() -> None:
     normals = _sphere(200)
     turn = matrix_from_vector(np.array([0.3, -0.8, 0.2]))
     np.testing.assert_allclose(
-        paint.moved_normals(normals, np.broadcast_to(turn, (200, 3, 3))), normals @ turn.T, atol=F32
+        painter.moved_normals(normals, np.broadcast_to(turn, (200, 3, 3))),
+        normals @ turn.T,
+        atol=F32,
     )
     squeeze = np.diag([1.0, 0.25, 1.0])  # a sphere becomes an ellipsoid: gradient of its equation
-    squeezed = paint.moved_normals(normals, np.broadcast_to(squeeze, (200, 3, 3)))
+    squeezed = painter.moved_normals(normals, np.broadcast_to(squeeze, (200, 3, 3)))
     expected = normals / (1.0, 0.25, 1.0)
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     np.testing.assert_allclose(squeezed, expected, atol=F32)
-    mirrored = paint.moved_normals(normals, np.broadcast_to(np.diag([-1.0, 1, 1]), (200, 3, 3)))
+    mirrored = painter.moved_normals(normals, np.broadcast_to(np.diag([-1.0, 1, 1]), (200, 3, 3)))
     np.testing.assert_allclose(mirrored, normals * (-1, 1, 1), atol=F32)
 
 
 def test_strain_goes_from_blue_by_yellow_to_red() -> None:
     nodes, weights = np.array([[0], [1], [2], [3]], np.int32), np.ones((4, 1))
-    full = paint.FULL_STRAIN
+    full = painter.FULL_STRAIN
     most, least = np.array([1.0, 1 + full / 2, 1 + full, 1.0]), np.array([1.0, 1.0, 1.0, 0.1])
-    colors = paint.strain_colors(paint.stretch(most, least), nodes, weights)
+    colors = painter.strain_colors(painter.stretch(most, least), nodes, weights)
     np.testing.assert_allclose(colors, [BLUE, YELLOW, RED, RED], atol=F32)
 
 
@@ -134,7 +136,7 @@ def test_a_refinements_share_is_about_that_of_the_export(
     document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0), turn=(30.0, 0.0, 0.0)))
     edit = coarse_edit(document)
     made = Refined(edit.left, edit.top, 255 - edit.coarse, edit.shown, "klein", strength=strength)
-    document = refine_edits.set_refined(document, made)
+    document = edits.set_refined(document, made)
     shares, exact = editor.derived.painter.shares(document), composite(document).shares
     for name in ("from_photo", "from_lifter", "from_inpainter", "from_refiner"):
         assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name

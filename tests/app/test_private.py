@@ -11,8 +11,7 @@ import pytest
 
 from objectmorpher.cli import parser as cli
 from objectmorpher.system.logs import CRASHES, NAME
-from objectmorpher.system.private import without_names
-from objectmorpher.system.report import report
+from objectmorpher.system.report import report, without_names
 from objectmorpher_core.pictures.image import read_picture
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import edits, rig_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import (
     Click,
@@ -46,11 +46,11 @@ def test_a_handle_turns_and_softens(document):
 
 
 def test_regions_are_cut_glued_and_made_bodies(document):
-    changed = rig_edits.cut(document, 0, *REGIONS)
-    changed = rig_edits.glue(changed, 0, np.array([9]), np.array([11]))
+    changed = edits.cut(document, 0, *REGIONS)
+    changed = edits.glue(changed, 0, np.array([9]), np.array([11]))
     assert [s.is_glued for s in changed.objects[0].rig.seams] == [False, True]
-    changed = rig_edits.make_body(changed, 0, np.array([0, 1, 2, 3]))
-    changed = rig_edits.make_body(changed, 0, np.array([3, 4, 3]))
+    changed = edits.make_body(changed, 0, np.array([0, 1, 2, 3]))
+    changed = edits.make_body(changed, 0, np.array([3, 4, 3]))
     assert [b.tolist() for b in changed.objects[0].rig.bodies] == [[0, 1, 2], [3, 4]]
     assert document.objects[0].rig.seams == ()
 
@@ -68,26 +68,26 @@ def test_regions_are_cut_glued_and_made_bodies(document):
 ])  # fmt: skip
 def test_impossible_rigs_are_refused(document, rig, sentence):
     with pytest.raises(EditError, match=sentence):
-        rig_edits.set_rig(document, 0, rig)
+        edits.set_rig(document, 0, rig)
 
 
 def test_freezing_remembers_where_points_are_and_thawing_forgets_it(document):
     rest = document.objects[0].lifted.control_points.astype(np.float64)
-    at_rest = rig_edits.freeze(document, 0, np.array([4, 2]))
+    at_rest = edits.freeze(document, 0, np.array([4, 2]))
     assert at_rest.objects[0].rig.held.tolist() == [2, 4]
     assert at_rest.objects[0].rig.shifts is None
     moves = np.random.default_rng(3).normal(size=rest.shape)
     pose = Pose(rest + moves, np.broadcast_to(np.eye(3), (len(rest), 3, 3)))
-    posed = rig_edits.freeze(edits.set_pose(at_rest, 0, pose), 0, np.array([3, 7]))
+    posed = edits.freeze(edits.set_pose(at_rest, 0, pose), 0, np.array([3, 7]))
     rig = posed.objects[0].rig
     assert rig.held.tolist() == [2, 3, 4, 7]
     np.testing.assert_allclose(rig.shifts[[0, 2]], 0.0, atol=1e-12)
     np.testing.assert_allclose(rig.shifts[[1, 3]], moves[[3, 7]], atol=1e-12)
     assert [rig.is_held(node) for node in (2, 5, 7)] == [True, False, True]
-    left = rig_edits.thaw(posed, 0, np.array([3, 5])).objects[0].rig
+    left = edits.thaw(posed, 0, np.array([3, 5])).objects[0].rig
     assert left.held.tolist() == [2, 4, 7]
     np.testing.assert_allclose(left.shifts[2], moves[7], atol=1e-12)
-    assert rig_edits.thaw(posed, 0, rig.held).objects[0].rig.shifts is None
+    assert edits.thaw(posed, 0, rig.held).objects[0].rig.shifts is None
     reset = edits.reset_pose(posed, 0).objects[0]
     assert reset.rig.held.tolist() == [2, 3, 4, 7]
     assert (reset.rig.shifts, reset.pose, reset.handles) == (None, None, ())
@@ -100,7 +100,7 @@ def test_freezing_remembers_where_points_are_and_thawing_forgets_it(document):
 def test_a_stiffness_must_be_above_nothing(document):
     count = len(document.objects[0].lifted.control_points)
     with pytest.raises(EditError, match="not above 0"):
-        rig_edits.set_rig(document, 0, Rig(stiffness=np.zeros(count)))
+        edits.set_rig(document, 0, Rig(stiffness=np.zeros(count)))
 
 
 def test_other_control_points_keep_handles_and_regions_where_they_were(document):
@@ -108,7 +108,7 @@ def test_other_control_points_keep_handles_and_regions_where_they_were(document)
     left = np.flatnonzero(points[:, 0] < -0.1)
     right = np.flatnonzero(points[:, 0] > 0.1)
     changed = edits.add_handle(document, 0, _point(document, 5))
-    changed = rig_edits.make_body(rig_edits.cut(changed, 0, left, right), 0, left)
+    changed = edits.make_body(edits.cut(changed, 0, left, right), 0, left)
     changed = edits.resample(changed, 0, 60)
     item = changed.objects[0]
     assert len(item.lifted.control_points) == 60

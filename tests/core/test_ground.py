@@ -7,9 +7,14 @@ import pytest
 
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix, turn_of
-from objectmorpher_core.document.ground import GroundError, ground_under
 from objectmorpher_core.document.model import Placement
-from objectmorpher_core.document.placement import Hold, centre_of, with_centre
+from objectmorpher_core.document.placement import (
+    GroundError,
+    Hold,
+    centre_of,
+    ground_under,
+    with_centre,
+)
 from tests import shapes
 
 EXACT = 1e-9

@@ -7,7 +7,7 @@ import io
 import numpy as np
 import pytest
 
-from objectmorpher_core.session.npy import ArrayError, read_npy
+from objectmorpher_core.session.tree import ArrayError, read_npy
 
 
 def saved(array: np.ndarray, version: tuple[int, int] | None = None) -> bytes:

@@ -21,10 +21,10 @@ from objectmorpher.worker.export_functions import write_export
 from objectmorpher_core.base.files import write_all, write_new
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import Document, Placement
-from objectmorpher_core.models import lock
+from objectmorpher_core.models import hub
 from objectmorpher_core.models.added import add, added
 from objectmorpher_core.models.fetch import install
-from objectmorpher_core.models.lock import FileFacts, Locked
+from objectmorpher_core.models.hub import FileFacts, Locked
 from objectmorpher_core.models.registry import ModelError, Weight
 from objectmorpher_core.pictures.image import encode_picture, read_picture
 from objectmorpher_core.pipeline import export
@@ -252,12 +252,12 @@ def _lock() -> Scenario:
     new = Locked({"b.safetensors": FileFacts(5, "11")}, "def")
 
     def state() -> str:
-        found = lock.locked("m")
+        found = hub.locked("m")
         assert found in (old, new)
         return OLD if found == old else NEW
 
-    return Scenario("models.lock", _in_cache(lambda: lock.write("m", old)),
-                    _in_cache(lambda: lock.write("m", new)), _in_cache(state),
+    return Scenario("models.lock", _in_cache(lambda: hub.write("m", old)),
+                    _in_cache(lambda: hub.write("m", new)), _in_cache(state),
                     frozenset({"models/models.lock"}), (OSError, ModelError))  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Click, LiftSettings, Plate, Prompt
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.workers.file import FOLDER, read_worker
-from objectmorpher_core.models import lock
+from objectmorpher_core.models import hub
 from objectmorpher_core.models.added import added
 from objectmorpher_core.models.registry import ModelError
 from objectmorpher_core.models.weight_folder import (
@@ -106,9 +106,9 @@ def read_lock(data: bytes, folder: Path) -> None:
     from objectmorpher_core.models.hub import look_hub
 
     (folder / "models").mkdir()
-    (folder / "models" / lock.NAME).write_bytes(data)
+    (folder / "models" / hub.NAME).write_bytes(data)
     with variable("OBJECTMORPHER_CACHE", folder), refusing(ModelError):
-        found = lock.locked("sam-vit-base")
+        found = hub.locked("sam-vit-base")
         assert found is None or all(".." not in name for name in found.files)
         look_hub("sam-vit-base")
 

@@ -26,12 +26,11 @@ from objectmorpher_core.document.model import (
 
 from ..editor.view import View
 from .blend import build_blend
-from .fronts import Fronts
+from .fronts import Fronts, RefinedView
 from .layers import Layers
 from .lights import Lights
 from .memo import Memo
 from .painter import Painter
-from .refined_view import RefinedView
 from .shape import Shape, Shapes, build_shape
 from .surface_facts import SurfaceFacts
 

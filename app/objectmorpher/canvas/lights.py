@@ -23,7 +23,7 @@ from .memo import Memo, same
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lighting, Lit
-    from objectmorpher_core.document.joining import Shadow
+    from objectmorpher_core.document.settings import Shadow
 
     from .derived import Derived
 

@@ -57,7 +57,7 @@ class SurfaceFacts:
         return self._seen(lambda: self._find_seen(document, k), self._derived.posed(document, k))
 
     def _find_seen(self, document: Document, k: int) -> Mask:
-        from objectmorpher_core.raster.seen import seen_points
+        from objectmorpher_core.raster.picking import seen_points
 
         thing = document.objects[k]
         assert thing.lifted is not None

@@ -18,6 +18,7 @@ from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.scripting.animation import Clip
 from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, encode_output
+from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import (
     BatchItem,
     EditScript,
@@ -27,7 +28,6 @@ from objectmorpher_core.scripting.script import (
     parse_scripts,
     script_from,
 )
-from objectmorpher_core.scripting.scripted import refuse_missing
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 

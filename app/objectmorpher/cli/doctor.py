@@ -10,7 +10,7 @@ from dataclasses import asdict
 
 from .. import __version__
 from ..system.logs import log_path
-from ..system.private import without_names
+from ..system.report import without_names
 
 ANOTHER = "Another copy, with it, is made by the commands below; or a server of yours has it."
 

@@ -8,23 +8,24 @@ more closely while the pointer goes on resting: what that costs the click need n
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.base.arrays import Mask, Selection
 from objectmorpher_core.document.model import Click, Photo, Prompt
 from objectmorpher_core.segment import Found
 
 from ..worker import job_functions
 from ..worker.job_error import JobError
+from ..worker.job_functions import Choice
 from ..worker.jobs import RELUCTANCE
-from .closer_look import choice_of
 from .tasks import SELECT, Question
 
 if TYPE_CHECKING:
     from .editor import Editor
+
 
 CANDIDATE = "candidate"  # kind of job
 CLOSER = "closer candidate"  # kind of job, of one that is shown
@@ -186,3 +187,81 @@ class Candidates:
         if wanted is not None:
             self._editor.tasks.question = None
         return wanted
+
+
+# A better answer to a click that was answered at a glance, a moment later.
+
+LOOK = "closer look"  # kind of job
+
+
+@dataclass(frozen=True, eq=False)
+class _Glance:
+    """What was answered at a glance, and the step that it made."""
+
+    question: Question
+    base: Selection | None  # (H, W) what was selected before
+    asked: Prompt  # what was answered; the question's click may be a hand's tremor beside it
+    mask: Mask | None  # (H, W) the step's
+    cursor: int  # of the history
+    found: Found | None = None  # the better answer, while the hand is busy
+
+
+class CloserLook:
+    """The one that is owed, if any."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._owed: _Glance | None = None
+
+    def begin(self, question: Question, base: Selection | None, asked: Prompt) -> None:
+        """The step that was just made may be told better."""
+        history = self._editor.history
+        assert history is not None
+        self._owed = _Glance(question, base, asked, self._editor.mask, history.cursor)
+        self._ask(self._owed)
+
+    def poll(self) -> bool:
+        """Once a frame: asks again, or shows the answer. Whether anything changed."""
+        editor, owed = self._editor, self._owed
+        if owed is None:
+            return False
+        if not self._is_wanted(owed):
+            self._owed = None
+        elif owed.found is not None and not editor.hand.is_busy and editor.preview is None:
+            self._owed = None
+            editor.selection.improve(owed.question, owed.base, owed.found)
+            return True
+        elif owed.found is None and editor.jobs.is_idle:  # it had to give way
+            self._ask(owed)
+        return False
+
+    def _is_wanted(self, owed: _Glance) -> bool:
+        """Whether the step is still the last word about what is selected."""
+        editor, history = self._editor, self._editor.history
+        if history is None or history.cursor != owed.cursor or editor.tasks.question is not None:
+            return False
+        return editor.current == owed.question.k and editor.mask is owed.mask
+
+    def _ask(self, owed: _Glance) -> None:
+        editor = self._editor
+        assert editor.document is not None
+
+        def accept(found: Found) -> None:
+            if self._owed is owed:
+                self._owed = replace(owed, found=found)
+
+        def fail(error: object) -> None:
+            """The first answer stays: nobody asked for a second one."""
+            if self._owed is owed:
+                self._owed = None
+
+        editor.jobs.start(
+            "Looking closer", job_functions.closer_look, editor.document.photo.pixels, owed.asked,
+            choice_of(editor), done=accept, failed=fail, kind=LOOK, is_quiet=True, is_spare=True,
+        )  # fmt: skip
+
+
+def choice_of(editor: Editor) -> Choice:
+    """Which segmenter is asked."""
+    seed = editor.document.seed if editor.document is not None else 0
+    return Choice(editor.settings.backends.segment, seed)

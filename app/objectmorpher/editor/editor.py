@@ -28,15 +28,13 @@ from ..worker.job_functions import WARM
 from ..worker.jobs import RELUCTANCE, Jobs
 from ..worker.threads import Chores
 from .autosave import Autosave
-from .candidate import Candidates
-from .closer_look import CloserLook
+from .candidate import Candidates, CloserLook
 from .feedback import Action, Hover, Message
 from .filing import OPEN, Filing
 from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
 from .intents.exporting import Exporting
-from .intents.handle_numbers import HandleNumbers
 from .intents.hinting import Hinting
 from .intents.looking import Looking
 from .intents.masking import Masking
@@ -44,7 +42,7 @@ from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects
 from .intents.placing import Placing
-from .intents.posing import Posing
+from .intents.posing import HandleNumbers, Posing
 from .intents.refining import Refining
 from .intents.rigging import Rigging
 from .intents.selection import Selection

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document import edits, front_edits
-from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import (
     Document,
     EditObject,
@@ -25,6 +24,7 @@ from objectmorpher_core.document.model import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment import Found
 
 from ..canvas.layers import Rendered, Request
@@ -260,7 +260,7 @@ class Tasks:
             matte = self._front[1]
             if matte is None:  # asked, or failed
                 return False
-            self._amend(lambda now: front_edits.keep_in_front(now, k, matte))
+            self._amend(lambda now: edits.keep_in_front(now, k, matte))
             return True
 
         def accept(matte: Matte) -> None:

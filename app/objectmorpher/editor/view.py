@@ -14,7 +14,35 @@ import numpy as np
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.base.camera import Camera
 
-from .pose_view import PoseView
+# What the Pose tool does now, and which of its marks are shown: neither saved nor undone.
+
+
+class PoseMode(Enum):
+    """What dragging over the object does, in the order of the panel."""
+
+    DRAG = "Drag"
+    FREEZE = "Freeze"
+    STIFFEN = "Stiffen"
+    BODY = "Rigid group"
+    CUT = "Cut"
+    GLUE = "Glue"
+
+
+BRUSHES = (PoseMode.FREEZE, PoseMode.STIFFEN, PoseMode.BODY)  # they paint with the round brush
+
+
+@dataclass(eq=False)
+class PoseView:
+    """Mutable: the tool and its panel write it."""
+
+    mode: PoseMode = PoseMode.DRAG
+    stiffness: float = 4.0  # x the usual one, of what is painted with Stiffen
+    has_ring: bool = True  # around the selected handle
+    is_mirrored: bool = False  # a drag moves the mirrored point too
+    has_anchors: bool = True
+    has_regions: bool = True
+    has_influence: bool = False
+
 
 MARGIN = 24.0  # points between the fitted photo and the canvas's edge
 MIN_ZOOM, MAX_ZOOM = 0.02, 64.0  # canvas px per image px

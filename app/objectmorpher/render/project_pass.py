@@ -21,8 +21,7 @@ from objectmorpher_core.raster import posed
 from objectmorpher_core.raster.posed import PosedSplats, RestSplats
 from objectmorpher_core.raster.rules import RULES
 
-from .gpu_memory import Stream, Uploads
-from .instances import Columns, Instances
+from .gpu_memory import Columns, Instances, Stream, Uploads
 from .shaders import buffer_layout, build_feedback, set_uniforms
 
 PLAIN: Columns = (("p_centre", "4f"), ("p_kernel", "4f"), ("p_axes", "4f"), ("p_color", "4f"))

@@ -12,14 +12,12 @@ from objectmorpher_core.base.arrays import U8
 
 from ..canvas.layers import Layer
 from ..editor.view import View
-from .blend_texture import BlendTexture
 from .defocus_pass import DefocusPass
-from .kept_canvas import KeptCanvas, Place
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
-from .still_view import StillView
-from .textures import PictureTexture
+from .still_view import KeptCanvas, Place, StillView
+from .textures import BlendTexture, PictureTexture
 
 if TYPE_CHECKING:
     from .splat_pass import SplatPass, SplatPicture

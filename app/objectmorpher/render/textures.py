@@ -11,6 +11,9 @@ import numpy as np
 
 from objectmorpher_core.base.brush import Box
 
+from ..canvas.blend import CELL
+from .scene import Scene
+
 SHARP_FROM = 4.0  # magnification from which single pixels are shown
 
 
@@ -125,3 +128,28 @@ def _as_u8(pixels: np.ndarray) -> np.ndarray:
     if pixels.dtype == np.float32:
         return (pixels * 255 + 0.5).astype(np.uint8)
     return pixels
+
+
+# Where the edit is shown and where the photo, for the passes that ask.
+
+BLEND = 7  # texture unit, bound for all passes
+ALL = np.ones((1, 1), np.float32)  # the edit everywhere
+
+
+class BlendTexture:
+    """The scene's blend on the GPU."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._texture = PictureTexture(context, has_mipmaps=False)
+
+    def use(self, scene: Scene) -> None:
+        self._texture.upload(ALL if scene.blend is None else scene.blend)
+        self._texture.use(BLEND, 1.0)
+
+
+def blend_cells(scene: Scene) -> tuple[float, float]:
+    """Canvas px that the blend covers."""
+    if scene.blend is None:
+        return 1.0, 1.0
+    height, width = scene.blend.shape
+    return float(width * CELL), float(height * CELL)

@@ -14,8 +14,7 @@ from objectmorpher_core.base.limits import ANSWER_LINE as MOST_LINE
 from objectmorpher_core.base.progress import Progress
 
 from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost
-from .answers import is_sound
-from .fitting import fits
+from .fitting import fits, is_sound
 from .message import Message, MessageError, decode, encode
 from .table import table, types
 

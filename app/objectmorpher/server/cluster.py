@@ -11,12 +11,16 @@ run programs, so that a cluster that is started here gets a token of Ray's, too.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
+import platform
 import secrets
 import sys
 import threading
 from collections import OrderedDict
+from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -24,9 +28,8 @@ from objectmorpher_core.base.progress import Cancelled, Progress
 
 from ..worker.stages import STAGES
 from .offers import Offers, look_at_offers
-from .replica import DONE, STARTED, Replica
-from .running import Call, Outcome
-from .table import Served
+from .running import Call, Outcome, perform
+from .table import Served, table
 
 log = logging.getLogger(__name__)
 
@@ -239,3 +242,50 @@ def _start_ray(plan: Plan) -> None:
     else:
         ray.init(address=plan.address, **common)
     serve.start(http_options={"location": "NoServer"})
+
+
+# One process of a stage on a cluster: runs a call at a time, and tells how far it is.
+
+BEAT = 0.1  # s between two looks at a running job
+STARTED, PROGRESS, DONE = "started", "progress", "done"  # what it tells
+
+
+class Replica:
+    """What Ray Serve starts, as often as the plan says."""
+
+    def __init__(self) -> None:
+        # One thread: job functions remember their last photo, and are not made for two at a time.
+        self._thread = ThreadPoolExecutor(1)
+
+    async def run(
+        self, name: str, body: bytes, blobs: dict[str, Any]
+    ) -> AsyncIterator[tuple[str, Any]]:
+        """Tells the place, then steps, then the outcome; `blobs` are references to Ray's store.
+
+        When the stream is closed the job is asked to stop.
+        """
+        stop = threading.Event()
+        steps: list[tuple[float, str]] = []
+
+        def work() -> Outcome | None:
+            import ray
+
+            arrays: Any = {key: ray.get(reference) for key, reference in blobs.items()}
+            call = Call(name, body, arrays)
+            try:
+                return perform(call, table()[name], lambda *s: steps.append(s), stop.is_set)
+            except Cancelled:
+                return None
+
+        yield STARTED, (platform.node(), os.getpid())
+        job = asyncio.get_running_loop().run_in_executor(self._thread, work)
+        try:
+            while not job.done():
+                await asyncio.wait({job}, timeout=BEAT)
+                if steps:
+                    step = steps[-1]
+                    steps.clear()
+                    yield PROGRESS, step
+            yield DONE, job.result()
+        finally:
+            stop.set()

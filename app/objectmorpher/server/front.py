@@ -15,6 +15,8 @@ import json
 import logging
 import queue
 import threading
+from collections import OrderedDict
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
@@ -28,7 +30,6 @@ from objectmorpher_core.base.progress import Cancelled
 
 from .. import __version__
 from .address import PROTOCOL
-from .blobs import Blobs
 from .http import Handler, HttpServer, Refusal
 from .message import MessageError, MissingError, decode, digest
 from .offers import told_offers
@@ -208,3 +209,40 @@ class _Conversation:
 
     def _tell(self, fraction: float, note: str) -> None:
         self._said.put((fraction, note))
+
+
+# Large arrays that were sent to a server, by their SHA-256; the least recently used go first.
+
+
+class Blobs:
+    """A bounded memory, for many threads."""
+
+    def __init__(self, most: int) -> None:
+        """`most`: bytes in all."""
+        self._most = most
+        self._kept: OrderedDict[str, bytes] = OrderedDict()
+        self._size = 0
+        self._lock = threading.Lock()
+
+    def add(self, name: str, body: bytes) -> None:
+        """Keeps `body`; what was not used for longest is dropped where it does not fit."""
+        with self._lock:
+            if name not in self._kept:
+                self._size += len(body)
+            self._kept[name] = body
+            self._kept.move_to_end(name)
+            while self._size > self._most and len(self._kept) > 1:
+                self._size -= len(self._kept.popitem(last=False)[1])
+
+    def found(self, names: Iterable[str]) -> dict[str, bytes]:
+        """Those of `names` that are here."""
+        with self._lock:
+            here = [name for name in names if name in self._kept]
+            for name in here:
+                self._kept.move_to_end(name)
+            return {name: self._kept[name] for name in here}
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return self._size

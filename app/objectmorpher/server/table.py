@@ -16,11 +16,9 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.limits import ASKED_GAUSSIANS as MOST_GAUSSIANS
 from objectmorpher_core.document import model as documents
 from objectmorpher_core.document.gaussians import Gaussians
-from objectmorpher_core.document.hint import Hint
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import LiftedObject, LiftSettings, Matte, Plate, Prompt
-from objectmorpher_core.document.refinement import Refined
-from objectmorpher_core.scripting.refining import Refining
+from objectmorpher_core.document.settings import Hint, Refined, Shadow
+from objectmorpher_core.scripting.runner import Refining
 
 from ..editor.settings import AUTO
 from ..worker import job_functions

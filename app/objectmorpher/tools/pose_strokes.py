@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher.tools.picture_line import along_line
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_about, turn_matrix, vector_from_matrix
 
 from ..system.texts import t
@@ -17,6 +17,7 @@ from .pointer import SNAP, TURN_SPEED, Pointer, Stroke, draw_box, has_moved, one
 if TYPE_CHECKING:
     from ..canvas.derived import Spot
     from ..editor.editor import Editor
+
 
 DEPTH_STEP = 0.03  # object diameters per notch of the wheel
 STEADY = 5.0  # points around a handle within which the pointer has no direction
@@ -149,3 +150,36 @@ def box(editor: Editor, start: Pointer, other: int | None = None) -> Stroke:
         editor.objects.take(other)
     elif not start.shift:
         editor.posing.select(None)
+
+
+# A point that is moved along a line in space, led by a place of the picture.
+
+LEAST_SLANT = 0.3  # of a line's length that its picture shows; less, and the point would run off
+UP = np.array([0.0, -1.0])  # px
+
+
+def along_line(
+    camera: Camera, point: np.ndarray, direction: np.ndarray, delta: np.ndarray
+) -> float:
+    """How far along a line a point goes when its picture is led by `delta` (2,) px.
+
+    The line goes through `point` (3,) world, along the unit `direction` (3,). The point's picture
+    goes where the led place is nearest to the line's picture. Of a line that points nearly at the
+    camera the picture is too short for that: there, up is outwards, towards the camera.
+    """
+    focal, depth = camera.focal, float(point[2])
+    start = camera.project(point)
+    ray = (start - (camera.cx, camera.cy)) / focal
+    rate = (direction[:2] - direction[2] * ray) * focal / depth  # px per unit of the line
+    length = float(np.linalg.norm(rate))
+    usual = focal / depth
+    if length < LEAST_SLANT * usual:
+        towards = -np.sign(direction[2]) or 1.0
+        return float(delta @ UP) * towards / usual
+    along = rate / length
+    gone = float(delta @ along)
+    at = float((start - (camera.cx, camera.cy)) @ along) + gone
+    steepness = focal * float(direction[:2] @ along) - at * float(direction[2])
+    if steepness * length <= 0:  # past the line's vanishing point
+        return gone / length
+    return gone * depth / steepness

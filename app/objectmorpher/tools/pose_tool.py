@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..editor.feedback import Hover
-from ..editor.pose_view import PoseMode
+from ..editor.view import PoseMode
 from ..system.texts import t
 from . import pose_strokes, rig_brush
 from .pointer import Button, Pointer, Shape, Stroke, ignore

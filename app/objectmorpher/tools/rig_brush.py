@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..editor.pose_view import BRUSHES, PoseMode
+from ..editor.view import BRUSHES, PoseMode
 from ..system.texts import t
 from .pointer import Button, Pointer, Stroke
 

@@ -16,7 +16,6 @@ import numpy as np
 from objectmorpher_core.base.arrays import RGB, U8, Mask, Pixels, Selection
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import Progress, part
-from objectmorpher_core.document.hint import Hint
 from objectmorpher_core.document.model import (
     Document,
     LiftedObject,
@@ -25,6 +24,7 @@ from objectmorpher_core.document.model import (
     Plate,
     Prompt,
 )
+from objectmorpher_core.document.settings import Hint
 
 from ..canvas.layers import Rendered, Request, render
 from ..canvas.shape import rehearse_lift
@@ -35,13 +35,12 @@ if TYPE_CHECKING:
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.doctor import Stage
     from objectmorpher_core.document.gaussians import Gaussians
-    from objectmorpher_core.document.joining import Shadow
-    from objectmorpher_core.document.refinement import Refined
+    from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.registration.importing import Import, Scene
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
-    from objectmorpher_core.scripting.refining import Refining
+    from objectmorpher_core.scripting.runner import Refining
     from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
@@ -316,7 +315,7 @@ _refiners: dict[str, Refiner] = {}  # the last one, for its pipeline takes long 
 
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
     """What of the edit a network is to see."""
-    from objectmorpher_core.scripting.refining import coarse_edit
+    from objectmorpher_core.scripting.runner import coarse_edit
 
     return coarse_edit(document, progress)
 

@@ -27,9 +27,8 @@ from ...base.threads import EXACT, in_threads
 from ...raster import tiles
 from ...raster.posed import PosedSplats
 from ...raster.reference_layers import Picture3D
-from ...raster.rules import RULES
+from ...raster.rules import HALF, RULES, ZERO
 from ...raster.sampling import sample
-from ...raster.singles import HALF, ZERO
 from ...raster.texture import TextureLevels, build_levels
 from ..silhouette import Grid, cell_places, fine_grid, sketched
 from .defocus import attenuation

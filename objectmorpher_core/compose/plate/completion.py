@@ -19,7 +19,7 @@ import numpy as np
 from ...base.arrays import F32, I32, Mask, frozen
 from ...base.progress import Progress
 from . import patch_search
-from .source_guide import Guide, guidance
+from .sources import Guide, guidance
 
 PATCH_RADIUS = 3  # px
 HALF_KNOWN = 0.5  # share of a coarse pixel that must be known, or it is of the hole

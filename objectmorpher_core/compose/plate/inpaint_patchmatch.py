@@ -14,12 +14,11 @@ import numpy as np
 
 from ...base.arrays import F32, Mask, Pixels
 from ...base.progress import Progress, part
-from ...document.hint import Hint
+from ...document.settings import Hint
 from .. import InpaintError
 from .completion import Completion, complete, shrunk, smooth
 from .patch_detail import with_detail
-from .source_guide import Guide
-from .source_prior import unlikely
+from .sources import Guide, unlikely
 from .structure_lines import find_lines
 
 SEARCH_PIXELS = 100_000  # of the small picture

@@ -16,8 +16,8 @@ import numpy as np
 from ...base.arrays import F32, Mask, Pixels
 from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part, silent
-from ...document.hint import Hint
 from ...document.model import Document, Matte, Plate
+from ...document.settings import Hint
 from .. import Inpainter, LooksFar, TakesHints
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo

@@ -13,7 +13,7 @@ import numpy as np
 from ...base.arrays import F32, RGB, U8, Pixels
 from ...base.pixels import pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part
-from ...document.refinement import Refined
+from ...document.settings import Refined
 from ...pictures.image import to_u8
 from ..blend import Box
 from ..composite import Composite

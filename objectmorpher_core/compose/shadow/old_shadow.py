@@ -15,9 +15,8 @@ import numpy as np
 from ...base.arrays import F32, Mask, Pixels
 from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, silent
-from ...document.hint import Hint
-from ...document.joining import Shadow
 from ...document.model import Plate
+from ...document.settings import Hint, Shadow
 from .. import Inpainter
 from ..plate.plate import Box, build_plate, cut, hole_margin, overlap
 from ..silhouette import cells_bounds, sampled

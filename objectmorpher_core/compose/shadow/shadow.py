@@ -22,7 +22,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64
 from ...base.camera import Camera
-from ...document.joining import Shadow
+from ...document.settings import Shadow
 from ..blend import Box
 from ..silhouette import Grid, box_around, sampled
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask, Pixels
 from ...base.pixels import unit_pixels
-from ...document.joining import MOST_SHADOW, Shadow
 from ...document.model import Matte
+from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32
-from ...document.joining import Shadow
+from ...document.settings import Shadow
 from .shadow import HARDEST, last_blur, smooth
 
 SOLID = 0.5  # alpha from which on a pixel belongs to the object

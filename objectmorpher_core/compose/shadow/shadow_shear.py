@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64
 from ...base.pixels import crop
-from ...document.joining import Shadow
+from ...document.settings import Shadow
 from .shadow import BAND, BAND_BLUR, BAND_DROP, BLURS, FADE, FAINTEST, HARDEST, last_blur, smooth
 
 LIFT = 0.4  # x height: a lower edge that is farther above the lowest does not stand on the ground

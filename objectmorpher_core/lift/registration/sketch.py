@@ -20,7 +20,7 @@ from ...base.poisson_disk import thin_to_spacing
 from ...base.rotations import matrices_from_quats
 from ...base.threads import FAST
 from ...document.gaussians import Gaussians
-from ...raster.singles import ONE, ZERO
+from ...raster.rules import ONE, ZERO
 
 TANGENT_SIGMA = 0.66  # x spacing: neighbours overlap without gaps
 NORMAL_SHARE = 0.15  # x that: how thick a surfel is

@@ -11,9 +11,8 @@ from ...base.arrays import F64
 from ...base.camera import Camera
 from ...document.model import LiftSettings
 from .bilinear import bilinear
-from .cuts import Cuts
+from .cuts import Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
-from .overlaps import Overlaps, overlaps_of
 from .prism import Prism
 from .silhouette import Silhouette
 from .standing import FLAT, Standing, stand

@@ -14,8 +14,7 @@ import numpy as np
 
 from ...base.arrays import F64
 from ...base.camera import Camera
-from .plan import Plan
-from .prism import MOST_TURN, Prism, find_prism
+from .prism import MOST_TURN, Plan, Prism, find_prism
 from .silhouette import TOUCHING, Silhouette, lower_hull
 
 STEEPEST = 0.9  # slope of the outline in the photo, beyond which it leaves the ground

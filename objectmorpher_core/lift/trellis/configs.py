@@ -8,6 +8,7 @@ from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ... import models
 from .. import LiftError
 
 LARGEST = 1 << 14  # no number of a config is larger: a lying file cannot ask for all the memory
@@ -254,3 +255,34 @@ def part_path(folder: Path, where: str, shared: Path | None = None) -> Path:
         if at.with_name(at.name + ".json").exists():
             return at
     raise LiftError(f"{folder / where}.json is missing: the model's folder is not complete")
+
+
+# Where the weights lie, and what to get when they do not.
+
+TRELLIS, CUPID = "trellis-image-large", "cupid"
+ENCODER = "dinov2-with-registers-large"
+PACKAGES = ("torch", "transformers", "safetensors")
+
+
+def weights_folder(id: str) -> Path:
+    """The folder of model `id`: the manager's or the user's own.
+
+    Also one that was put, or linked, by hand where the manager would put it.
+    """
+    return models.place(id) or models.folder() / id
+
+
+def missing(*ids: str) -> str | None:
+    """What has to be installed before the models `ids` can run, as one sentence."""
+    if reason := models.not_installed(PACKAGES):
+        return reason
+    for id in ids:
+        state = models.look_hub(id)
+        if state.state == "damaged":
+            return f"{id} is damaged ({state.reason}): objectmorpher models get {id}"
+        where = weights_folder(id)
+        if not (where / ("config.json" if id == ENCODER else "pipeline.json")).exists():
+            own = f"or objectmorpher models add {state.model.family} FOLDER"
+            size = f"{state.model.size / 1e9:.1f} GB, {state.model.licence}"
+            return f"{id} is not there: objectmorpher models get {id} ({size}), {own}"
+    return None

@@ -14,8 +14,8 @@ from ...base.arrays import F64
 from ...models.device import Plan
 from .camera import view
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied
+from .latent import looked_up
 from .picture import Picture
-from .views import looked_up
 from .voxels import Voxels
 
 PLACES = "sparse_structure_uv_decoder"

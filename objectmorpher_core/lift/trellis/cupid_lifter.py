@@ -11,7 +11,7 @@ from ...document.gaussians import Gaussians
 from ...splat_files.splats.axes import QUARTER_TURN, turned
 from .. import Subject
 from ..registration.placement import Hints
-from . import weights
+from . import configs
 from .camera import View, pose_in
 from .lifter import UP, TrellisLifter, within_memory
 from .picture import Picture
@@ -25,7 +25,7 @@ class CupidLifter(TrellisLifter):
     """Image to 3D that stands where the photo shows it."""
 
     name = "cupid"
-    ids = (weights.CUPID, weights.ENCODER, weights.TRELLIS)
+    ids = (configs.CUPID, configs.ENCODER, configs.TRELLIS)
 
     def _new_generator(self, folders: Folders, tiers: tuple[Plan, ...]) -> Generator:
         from .cupid import CupidGenerator

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -18,7 +21,6 @@ from .camera import View
 from .configs import Pipeline, Sampling, part_path, pipeline
 from .parts import load_part
 from .picture import Encoder, Picture
-from .sampler import sample
 from .voxels import Voxels
 
 log = logging.getLogger(__name__)
@@ -223,3 +225,31 @@ def occupied(logits: Tensor) -> Voxels:
         least = logits.flatten().topk(CELLS).values[-1]
         return Voxels.of(logits >= torch.clamp(least, min=1e-30))
     return Voxels.of(logits > 0)
+
+
+# Following a flow from noise to what it makes, by Euler steps, with guidance.
+
+Velocity = Callable[[Tensor, Tensor, bool], Tensor]
+"""velocity(x, time (B,) in thousandths, whether the picture is shown) -> like x"""
+
+
+def times(how: Sampling) -> np.ndarray:
+    """(steps + 1,) from 1, noise, to 0."""
+    t = np.linspace(1, 0, how.steps + 1)
+    return how.rescale_t * t / (1 + (how.rescale_t - 1) * t)
+
+
+def sample(
+    velocity: Velocity, noise: Tensor, how: Sampling, progress: Progress, note: str
+) -> Tensor:
+    """What the flow makes of `noise`. `progress` is told before each step, and may cancel."""
+    x = noise
+    moments = times(how)
+    for i, (now, then) in enumerate(pairwise(moments)):
+        progress(i / how.steps, f"{note}, step {i + 1} of {how.steps}")
+        time = torch.full((len(x),), float(1000 * now), dtype=torch.float32, device=x.device)
+        v = velocity(x, time, True)
+        if how.interval[0] <= now <= how.interval[1] and how.guidance != 0:
+            v = (1 + how.guidance) * v - how.guidance * velocity(x, time, False)
+        x = x - float(now - then) * v
+    return x

@@ -16,7 +16,7 @@ from .. import LiftError, Subject
 from ..registration.imported import lift_imported
 from ..registration.placement import Hints, Proposal, Registrar, register
 from ..registration.view import Target
-from . import weights
+from . import configs
 from .configs import Sampling
 
 if TYPE_CHECKING:
@@ -38,12 +38,12 @@ class TrellisLifter:
     """Image to 3D (paper 3.1). `LiftSettings.count` does not apply: all Gaussians are kept."""
 
     name = "trellis"
-    ids: tuple[str, ...] = (weights.TRELLIS, weights.ENCODER)
+    ids: tuple[str, ...] = (configs.TRELLIS, configs.ENCODER)
     _kept: dict[str, Any] = {}  # noqa: RUF012  generators, loaded once in a process
 
     def missing(self) -> str | None:
         """See `Lifter`."""
-        return weights.missing(*self.ids)
+        return configs.missing(*self.ids)
 
     def lift(
         self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
@@ -73,7 +73,7 @@ class TrellisLifter:
     def _generator(self) -> Generator:
         from .generator import Folders
 
-        folders = Folders(*(weights.weights_folder(id) for id in self.ids))
+        folders = Folders(*(configs.weights_folder(id) for id in self.ids))
         if (known := self._kept.get(self.name)) is None or known.folders != folders:
             self._kept[self.name] = self._new_generator(folders, tiers())
         return self._kept[self.name]

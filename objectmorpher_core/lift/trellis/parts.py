@@ -23,9 +23,8 @@ from .configs import (
     config,
     read_json,
 )
-from .latent import LatentFlow
+from .latent import LatentFlow, ViewLatentFlow
 from .structure import StructureDecoder, StructureFlow
-from .views import ViewLatentFlow
 from .windowed import GaussianDecoder, LatentEncoder
 
 PICKLES = (".pt", ".pth", ".bin", ".ckpt", ".pkl")

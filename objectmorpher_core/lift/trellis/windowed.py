@@ -10,8 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...document.gaussians import Gaussians
-from .attention import attend_in_windows
-from .blocks import Block, Part, place_code, unit_layer_norm
+from .blocks import Block, Part, attend_in_windows, place_code, unit_layer_norm
 from .configs import Activations, GaussianDecoderConfig, LatentEncoderConfig, WindowedConfig
 from .voxels import Voxels
 

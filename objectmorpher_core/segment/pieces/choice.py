@@ -19,7 +19,6 @@ from ...base.arrays import F32, F64, Mask
 from ...document.model import Click, Prompt
 from ..selection import SelectionError, box_mask
 from .pieces import Pieces
-from .places import centred, depth, extent, only
 from .relabel import islands, touching
 
 CENTRED_WHOLE = 0.3  # exponent: how much a click is in the middle of the whole that it means
@@ -398,3 +397,36 @@ def _subject_around(ground: Ground, piece: int) -> F64 | None:
     fringe = cv2.dilate(own, np.ones((9, 9), np.uint8)) > 0
     other = (labels > 0) & (own == 0)
     return pieces.mean(np.where(fringe & ~other, salience, np.where(other, 0, salience * 0.5)))
+
+
+# Where pieces lie: how far they reach, and how deep in them a place is.
+
+OFF_CENTRE = 0.05  # least that counts for being in the middle
+
+
+def centred(pieces: Pieces, mask: Mask, click: Click) -> float:
+    """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
+    deep = depth(pieces.paint_sparsely(mask))
+    column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
+    near = deep[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    here = near.max() if near.size else 0.0
+    return max(float(here / max(deep.max(), 1e-6)), OFF_CENTRE)
+
+
+def depth(mask: Mask) -> F32:
+    """(h, w) px to the edge of a mask; the frame is one."""
+    framed = cv2.copyMakeBorder(mask.view(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
+
+
+def only(pieces: Pieces, piece: int) -> Mask:
+    alone = np.zeros(pieces.count, bool)
+    alone[piece] = True
+    return alone
+
+
+def extent(pieces: Pieces, mask: Mask) -> tuple[int, int, int, int]:
+    """left, top, right, bottom px of the reduced photo that pieces (n,) reach."""
+    painted = pieces.paint(mask)
+    rows, columns = np.flatnonzero(painted.any(1)), np.flatnonzero(painted.any(0))
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1

@@ -16,10 +16,9 @@ import numpy as np
 
 from ...base.arrays import RGB, Mask
 from ...document.model import Prompt
-from .choice import Choice, Ground, Region, correct
+from .choice import Choice, Ground, Region, correct, depth
 from .features import crop_tokens
 from .pieces import PIECES, WORK_AREA, Pieces
-from .places import depth
 from .relabel import relabel, touching
 
 DEEP = 2.0  # x side of a piece: a click that is less deep in what it means needs finer pieces

@@ -16,9 +16,9 @@ from ...base.progress import Progress, part, silent
 from ...document.model import Click, Prompt
 from ...models import HubModel, ModelError
 from ...models.hub import EXTRA
-from ..level import at_level
 from ..selection import (
     SelectionError,
+    at_level,
     box_mask,
     check_mask,
     check_prompt,

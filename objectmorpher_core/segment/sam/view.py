@@ -16,9 +16,8 @@ from ...base.arrays import F32, RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge, sharpen_band
 from ..pieces.view import steps_of
-from .choice import at_level
 from .frame import Box, Frame
-from .network import Asked, SamNetwork
+from .network import Asked, Masks, SamNetwork
 
 REMEMBERED = 16  # answers of a photo
 WORK_SIDE = 1536  # px of a photo in which the edge is found; a larger one follows by its own edges
@@ -121,3 +120,28 @@ def inside_box(prompt: Prompt, box: Box) -> Prompt:
         c for c in prompt.clicks if left <= c.x < right and top <= c.y < bottom
     )
     return replace(prompt, clicks=clicks)
+
+
+# Which of SAM's three masks a click means: they are a part, an object and a group, unordered.
+
+CLEARLY = 0.85  # x area: a mask smaller than so much of another is a part of it
+NESTED = 0.7  # share of a part that must lie in its whole
+DOUBTFUL = 0.6  # x best score: worse masks are no alternatives
+
+
+def at_level(masks: Masks, level: str) -> int:
+    """Index of the mask that a click means at a level: "part", "object" or "group"."""
+    inside = masks.logits > 0
+    areas = inside.sum((1, 2))
+    whole = int(np.argmax(np.where(areas > 0, masks.scores, -np.inf)))
+    if level == "object" or not areas[whole]:
+        return whole
+    is_fair = masks.scores >= DOUBTFUL * masks.scores[whole]
+    if level == "part":
+        nested = (inside & inside[whole]).sum((1, 2)) >= NESTED * areas
+        fits = is_fair & nested & (areas > 0) & (areas < CLEARLY * areas[whole])
+        return int(np.argmax(np.where(fits, areas, -1))) if fits.any() else whole
+    nested = (inside & inside[whole]).sum((1, 2)) >= NESTED * areas[whole]
+    fits = is_fair & nested & (CLEARLY * areas > areas[whole]) & ~inside.all((1, 2))
+    smallest = np.where(fits, -areas, -np.inf)
+    return int(np.argmax(smallest)) if fits.any() else whole

@@ -25,8 +25,7 @@ from ..splats.ply_table import read_header
 from .folder import MeshFolder
 from .gltf_check import MAX_SIDE, MAX_TRIANGLES, check_gltf
 from .sampling import sample_surface
-from .surface import Look, Surface
-from .texture import WORKING, Texture, linear_from_srgb
+from .surface import WORKING, Look, Surface, Texture, linear_from_srgb
 
 log = logging.getLogger(__name__)
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.binning import bin_tiles
-from objectmorpher_core.raster.columns import Z
 from objectmorpher_core.raster.depth_order import depth_order
 from objectmorpher_core.raster.projection import project
+from objectmorpher_core.raster.rules import Z
 
 from . import gl, gsplat_torch
 from .scenes import VIEW, Row, Scene, cloud_scene, lift_scene

@@ -10,8 +10,8 @@ import pytest
 
 from conftest import wait_until
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.intents import hub_models
-from objectmorpher.gui.dialogs.hub_rows import GAINS, NAMES, SIZES, STAGES
+from objectmorpher.editor.intents import models as hub_models
+from objectmorpher.gui.dialogs.models_dialog import GAINS, NAMES, SIZES, STAGES
 from objectmorpher_core import models
 from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 

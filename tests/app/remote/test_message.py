@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from same_values import same_values
 
-from objectmorpher.server.answers import is_sound
+from objectmorpher.server.fitting import is_sound
 from objectmorpher.server.message import LARGE, MessageError, MissingError, decode, encode
 from objectmorpher.server.table import table, types
 from objectmorpher.worker.job_functions import Choice, Cut
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.document.hint import Hint
 from objectmorpher_core.document.model import Click, LiftSettings, Matte, Plate, Prompt
+from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment import Found
 
 RANDOM = np.random.default_rng(3)

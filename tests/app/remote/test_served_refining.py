@@ -12,15 +12,15 @@ from desk import Desk
 from same_values import same_values
 
 from objectmorpher.server.address import ServerLost
-from objectmorpher.server.answers import is_sound
 from objectmorpher.server.client import call
+from objectmorpher.server.fitting import is_sound
 from objectmorpher.server.offers import Offer
 from objectmorpher.worker import job_functions
 from objectmorpher_core.base.arrays import F32, RGB, frozen
 from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.refine.refinement import CoarseEdit
-from objectmorpher_core.scripting.refining import Refining
+from objectmorpher_core.scripting.runner import Refining
 
 
 class Dimming:

@@ -13,7 +13,7 @@ from objectmorpher.gui.window.scenes import OF_THE_PHOTO
 from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import plate_cover
-from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Prompt
 from objectmorpher_core.pipeline import cut_front, make_plate
 from tests import shapes
@@ -39,7 +39,7 @@ def document() -> Document:
     pixels[mask] = pixels[mask][:, [1, 0, 2]] // 2 + 100
     document = shapes.lifted_scene(pixels, inside, 800).document()
     document = edits.set_mask(edits.add_object(document), 1, mask, Prompt())
-    document = front_edits.keep_in_front(document, 1, cut_front(pixels, mask))
+    document = edits.keep_in_front(document, 1, cut_front(pixels, mask))
     document = edits.set_plate(document, make_plate(pixels, plate_cover(document), "telea"))
     return edits.set_placement(document, 0, Placement(move=(50.0, 0.0), depth=-0.3))
 
@@ -78,7 +78,7 @@ def test_the_window_shows_it_as_it_is_exported(context, monkeypatch, document, k
         exported = composite(document).pixels.astype(np.float32) / 255
         assert np.abs(window - exported).mean() <= PIXEL
         assert np.abs(window - exported)[:, 114:126].max() <= PIXEL, "the post itself"
-    without = composite(front_edits.let_go(document, 1)).pixels.astype(np.float32) / 255
+    without = composite(edits.let_go(document, 1)).pixels.astype(np.float32) / 255
     assert np.abs(without - exported).max() > 0.2
     context.finish()
 

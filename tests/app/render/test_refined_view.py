@@ -13,9 +13,9 @@ from objectmorpher.gui.window.scenes import REFINED
 from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import plate_cover
-from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
-from objectmorpher_core.document.refinement import Refined
+from objectmorpher_core.document.settings import Refined
 from objectmorpher_core.pipeline import make_plate
 from tests import shapes
 from tests.app.render.pictures import make_renderer
@@ -39,9 +39,7 @@ def refined_edit(strength: float) -> Document:
     x0, y0, x1, y1 = result.box
     pixels = 255 - result.pixels[y0:y1, x0:x1]
     alpha = np.round(result.weights * 255).astype(np.uint8)
-    return refine_edits.set_refined(
-        document, Refined(x0, y0, pixels, alpha, "klein", strength=strength)
-    )
+    return edits.set_refined(document, Refined(x0, y0, pixels, alpha, "klein", strength=strength))
 
 
 @pytest.fixture
@@ -146,6 +144,6 @@ def test_another_strength_in_the_same_view_is_another_picture(view):
     derived, document = Derived(), refined_edit(1.0)
     (first,) = derived.refined.layers(document, view)
     assert derived.refined.layers(document, view) == (first,), "remembered"
-    weaker = refine_edits.set_strength(document, 0.5)
+    weaker = edits.set_strength(document, 0.5)
     (second,) = derived.refined.layers(weaker, view)
     assert abs(int(second.rgba.max()) - int(first.rgba.max()) / 2) <= 1

@@ -13,8 +13,8 @@ from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import Placement
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.pipeline import make_plate
 from tests import focussed, shapes
 from tests.app.render.pictures import make_renderer, specified

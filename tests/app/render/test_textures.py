@@ -8,7 +8,7 @@ import numpy as np
 
 from objectmorpher.render.textures import PictureTexture
 from objectmorpher_core.base.brush import Brush
-from objectmorpher_core.segment.mask_painting import MaskPainting
+from objectmorpher_core.segment.mask_edit import MaskPainting
 
 pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 

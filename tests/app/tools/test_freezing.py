@@ -9,8 +9,7 @@ import pytest
 
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.pose_view import PoseMode, PoseView
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import PoseMode, PoseView, ToolName
 from objectmorpher.tools.pointer import Button, Pointer
 from objectmorpher.tools.pose_tool import PoseTool
 from objectmorpher_core.base.arrays import F64

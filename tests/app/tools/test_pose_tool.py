@@ -10,8 +10,7 @@ import pytest
 from conftest import CENTRE, RADII
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.pose_view import PoseView
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import PoseView, ToolName
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import RING, PoseTool
 from objectmorpher_core.base.rotations import matrix_from_vector

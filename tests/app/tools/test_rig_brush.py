@@ -11,8 +11,7 @@ import pytest
 from conftest import CENTRE
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.rigging import gaps_to_way
-from objectmorpher.editor.pose_view import PoseMode, PoseView
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import PoseMode, PoseView, ToolName
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import PoseTool
 from objectmorpher_core.base.brush import Brush

@@ -15,9 +15,9 @@ from objectmorpher_core.compose import load
 from objectmorpher_core.compose.plate.completion import smooth
 from objectmorpher_core.compose.plate.patch_search import patch_cost, vote
 from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
-from objectmorpher_core.compose.plate.source_prior import SUBJECT_COST, strange, unlikely
+from objectmorpher_core.compose.plate.sources import SUBJECT_COST, strange, unlikely
 from objectmorpher_core.compose.plate.structure_lines import draw_lines, find_lines
-from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment.subject import SubjectNet
 from tests import focussed
 

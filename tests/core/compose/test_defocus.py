@@ -9,8 +9,7 @@ import skimage.data
 
 from objectmorpher_core.compose import composite as composing
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.light.defocus import blurred
-from objectmorpher_core.compose.light.sharpness import measure_blur
+from objectmorpher_core.compose.light.defocus import blurred, measure_blur
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
 from tests import focussed, shapes

@@ -16,8 +16,8 @@ from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
 from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 from objectmorpher_core.deform.puppet import Puppet, puppet_of
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import Document, EditObject, Photo, Placement, Prompt
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.pipeline import lift_mask, make_plate
 from objectmorpher_core.raster.texture import TextureLevels

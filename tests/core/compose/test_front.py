@@ -15,7 +15,7 @@ from objectmorpher_core.compose.layers import layers
 from objectmorpher_core.compose.order import reordered, stack
 from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
 from objectmorpher_core.deform.puppet import puppet_of
-from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Document, Placement, Prompt
 from objectmorpher_core.pipeline import cut_front
@@ -51,7 +51,7 @@ def _document(dtype: type = np.uint8) -> Document:
     document = edits.set_mask(edits.add_object(document), 1, _post(x) > 0.5, Prompt())
     mask = document.objects[1].mask
     assert mask is not None
-    document = front_edits.keep_in_front(document, 1, cut_front(pixels, mask))
+    document = edits.keep_in_front(document, 1, cut_front(pixels, mask))
     return edits.set_plate(document, build_plate(pixels, plate_cover(document), load("telea")))
 
 
@@ -105,7 +105,7 @@ def test_where_nothing_moves_behind_it_nothing_changes():
 def test_a_hidden_or_released_one_covers_nothing():
     moved = edits.set_placement(_document(), 0, BEHIND)
     at = (60, int(POST))
-    for changed in (edits.set_visible(moved, 1, False), front_edits.let_go(moved, 1)):
+    for changed in (edits.set_visible(moved, 1, False), edits.let_go(moved, 1)):
         assert _order(changed) == [0]
         shown = composite(changed).pixels[at].astype(int)
         assert np.abs(shown - INK).max() < 40
@@ -161,9 +161,9 @@ def test_a_session_keeps_it():
 def test_what_moved_or_is_not_selected_cannot_stay_in_front():
     moved = edits.set_placement(_document(), 0, BEHIND)
     with pytest.raises(EditError, match="moved"):
-        front_edits.keep_in_front(moved, 0)
+        edits.keep_in_front(moved, 0)
     with pytest.raises(EditError, match="nothing is selected"):
-        front_edits.keep_in_front(edits.add_object(moved), 2)
+        edits.keep_in_front(edits.add_object(moved), 2)
 
 
 def test_another_mask_is_cut_out_anew_and_a_lift_ends_it():

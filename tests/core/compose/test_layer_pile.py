@@ -11,8 +11,8 @@ import pytest
 from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.layers import BACKGROUND, EMPTY, PHOTO, UNTOUCHED, Layer, layers
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import Document, Photo, Placement
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.pictures.image import Picture
 from tests import shapes
 

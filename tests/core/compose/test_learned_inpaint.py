@@ -47,7 +47,7 @@ def pixelhacker(tmp_path, monkeypatch) -> Path:
 def test_chunks_are_the_recurrence(length, closed):
     """Also where gates are all but shut, whose cumulative logarithm no float32 can invert."""
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker.linear_attention import chunked, recurrence
+    from objectmorpher_core.compose.plate.pixelhacker.network import chunked, recurrence
 
     random = torch.Generator().manual_seed(length)
     q, k, logits = torch.randn(3, 2, 3, length, 5, generator=random)
@@ -59,7 +59,7 @@ def test_chunks_are_the_recurrence(length, closed):
 
 def test_pairs_in_portions_are_the_same(monkeypatch):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.pixelhacker import linear_attention as attention
+    from objectmorpher_core.compose.plate.pixelhacker import network as attention
 
     q, k, g = torch.randn(3, 1, 2, 70, 4, generator=torch.Generator().manual_seed(0))
     once = attention.chunked(q, k, q, -g.abs())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.light.light_estimate import ABOVE, estimate_light
+from objectmorpher_core.compose.light.lighting import ABOVE, estimate_light
 from objectmorpher_core.compose.light.relight import LEAST, MOST, Relit, relight, turned_normals
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits

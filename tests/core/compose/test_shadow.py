@@ -13,8 +13,8 @@ from objectmorpher_core.compose.light.lighting import stand
 from objectmorpher_core.compose.shadow.shadow import Standing, cast, ground_normal
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
 from tests.outlines import silhouette, standing, upright

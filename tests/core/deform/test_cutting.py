@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objectmorpher_core.deform.cutting import sides_of_cut
+from objectmorpher.editor.intents.rigging import sides_of_cut
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_core.document.rig import Rig, Seam

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.deform.elimination import FEW, solve_small
+from objectmorpher_core.deform.anderson import FEW, solve_small
 
 F64 = 1e-9
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.deform.splitting import MOST_PIECES, split_stretched
+from objectmorpher_core.deform.resampling import MOST_PIECES, split_stretched
 from objectmorpher_core.document.gaussians import Gaussians
 from tests import shapes
 

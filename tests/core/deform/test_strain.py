@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.deform.deformer import measure_strain
 from objectmorpher_core.deform.graph import build_graph
-from objectmorpher_core.deform.strain import measure_strain
 from objectmorpher_core.document.model import Pose
 from tests import shapes
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.document import edits, rig_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Click, Document, LiftedObject, LiftSettings, Prompt
 from objectmorpher_core.document.rig import Rig
@@ -133,8 +133,8 @@ def _region(document: Document) -> np.ndarray:
 
 @thicknesses
 def test_the_rig_of_the_same_gaussians_stays_as_it_is(thickness):
-    before = rig_edits.make_body(_document(), 0, _region(_document()))
-    before = rig_edits.freeze(before, 0, _region(before))
+    before = edits.make_body(_document(), 0, _region(_document()))
+    before = edits.freeze(before, 0, _region(before))
     after = edits.set_thickness(before, 0, thickness)
     assert np.array_equal(after.objects[0].rig.bodies[0], before.objects[0].rig.bodies[0])
     assert after.objects[0].rig.held is not None
@@ -142,7 +142,7 @@ def test_the_rig_of_the_same_gaussians_stays_as_it_is(thickness):
 
 
 def test_the_rig_of_a_shape_that_is_lifted_anew_covers_the_same_part_of_the_photo():
-    before = rig_edits.freeze(_document(), 0, _region(_document()))
+    before = edits.freeze(_document(), 0, _region(_document()))
     after = _lifted_anew(before, LiftSettings(2500, 0.6))
     held = after.objects[0].rig.held
     assert held is not None
@@ -157,7 +157,7 @@ def test_what_was_frozen_away_from_its_rest_is_as_far_from_it_in_the_world(thick
     before = _document()
     region = _region(before)
     shifts = np.full((len(region), 3), 0.05)
-    before = rig_edits.set_rig(before, 0, Rig(held=region, shifts=shifts))
+    before = edits.set_rig(before, 0, Rig(held=region, shifts=shifts))
     after = edits.set_thickness(before, 0, thickness)
     rig = after.objects[0].rig
     assert rig.shifts is not None
@@ -166,7 +166,7 @@ def test_what_was_frozen_away_from_its_rest_is_as_far_from_it_in_the_world(thick
 
 @thicknesses
 def test_there_and_back_is_the_same_edit(thickness):
-    before = rig_edits.freeze(_with_handles(_document(), True), 0, _region(_document()))
+    before = edits.freeze(_with_handles(_document(), True), 0, _region(_document()))
     there = edits.set_thickness(before, 0, thickness)
     back = edits.set_thickness(there, 0, 1.0)
     for old, new in zip(before.objects[0].handles, back.objects[0].handles, strict=True):

@@ -9,8 +9,7 @@ import pytest
 from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.document.model import LiftSettings, Matte
 from objectmorpher_core.lift.relief.canvas import Canvas
-from objectmorpher_core.lift.relief.colours import Colouring, colouring, fill_in
-from objectmorpher_core.lift.relief.growing import grown
+from objectmorpher_core.lift.relief.colours import Colouring, colouring, fill_in, grown
 from objectmorpher_core.lift.relief.mirror import MirrorAxis
 from objectmorpher_core.lift.relief.silhouette import Silhouette
 from objectmorpher_core.pipeline import lift_mask

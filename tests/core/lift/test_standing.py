@@ -8,7 +8,7 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.lift.relief.plan import Plan
+from objectmorpher_core.lift.relief.prism import Plan
 from objectmorpher_core.lift.relief.silhouette import Silhouette
 from objectmorpher_core.lift.relief.standing import FLAT, LEAST_DEPTH, TRUST, Standing, stand
 from tests.core.lift.standing_things import View, figure

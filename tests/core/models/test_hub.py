@@ -15,7 +15,7 @@ import pytest
 
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled
-from objectmorpher_core.models import hub, lock, registry
+from objectmorpher_core.models import hub, registry
 from objectmorpher_core.models.hub_download import PART
 from objectmorpher_core.models.weight_folder import check_folder, check_safetensors
 from tests.core.models.local_hub import COMMIT, TOKEN, Hub, offering, own_cache
@@ -68,7 +68,7 @@ def test_a_model_is_got_whole_pinned_and_not_got_again(server: Hub, cache: Path)
     assert at == models.place(FREE.id)
     assert sorted(os.listdir(at)) == ["config.json", "model.safetensors"]
     assert (at / "model.safetensors").read_bytes() == WEIGHTS
-    assert left_in(cache) == sorted([FREE.id, lock.NAME])
+    assert left_in(cache) == sorted([FREE.id, hub.NAME])
     assert seen[-1] == 1.0 and min(seen) >= 0
     state = models.verify_hub(FREE.id)
     assert state.state == "ok" and state.revision == COMMIT and not state.is_own
@@ -214,7 +214,7 @@ def test_damage_on_the_disk_is_seen(server: Hub, cache: Path) -> None:
     assert models.look_hub(FREE.id).state == "damaged" and models.place(FREE.id) is None
     models.get(FREE.id)
     assert models.verify_hub(FREE.id).state == "ok"
-    (cache / lock.NAME).write_text("{", "utf-8")
+    (cache / hub.NAME).write_text("{", "utf-8")
     with pytest.raises(models.ModelError, match="is damaged"):
         models.look_hub(FREE.id)
 
@@ -249,7 +249,7 @@ def test_a_folder_is_used_where_it_is_and_forgotten(own: Path, cache: Path) -> N
     state = models.use_folder(FREE.id, own)
     assert state.state == "ok" and state.is_own and models.place(FREE.id) == own
     assert models.get(FREE.id) == own and models.verify_hub(FREE.id).state == "ok"
-    assert left_in(cache) == [lock.NAME]
+    assert left_in(cache) == [hub.NAME]
     assert [m.id for m in models.installed("sam2")] == [FREE.id]
     models.remove_hub(FREE.id)
     assert models.place(FREE.id) is None and (own / "config.json").exists()
@@ -316,6 +316,6 @@ def test_paths_in_the_lock_file_stay_inside_the_folder(cache: Path) -> None:
     cache.mkdir(parents=True)
     (cache / FREE.id).mkdir()
     entry = {"files": {"../../x": {"size": 1, "sha256": ""}}, "revision": "", "folder": ""}
-    (cache / lock.NAME).write_text(json.dumps({"version": 1, "models": {FREE.id: entry}}))
-    found = lock.locked(FREE.id)
+    (cache / hub.NAME).write_text(json.dumps({"version": 1, "models": {FREE.id: entry}}))
+    found = hub.locked(FREE.id)
     assert found is not None and not found.files

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.puppet import Puppet
+from objectmorpher_core.deform.resampling import thinned
 from objectmorpher_core.document.model import DeformSettings, Placement
 from objectmorpher_core.raster import tiles
 from objectmorpher_core.raster.sharpening import sharpen
-from objectmorpher_core.raster.thinning import thinned
 from tests import shapes
 
 LEVEL = 1 / 255

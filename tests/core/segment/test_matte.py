@@ -18,9 +18,10 @@ from objectmorpher_core.segment.matting.matte import (
     extended_part,
     signed_distance,
     soft_cutout,
+    unveiled,
+    veil,
 )
 from objectmorpher_core.segment.matting.unmix import exact, unmixed
-from objectmorpher_core.segment.matting.veil import unveiled, veil
 from tests import shapes
 
 LEVEL = 1 / 255

@@ -18,10 +18,10 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.models import ModelError, device
 from objectmorpher_core.segment import SelectionError
-from objectmorpher_core.segment.sam.choice import at_level
 from objectmorpher_core.segment.sam.frame import Frame
 from objectmorpher_core.segment.sam.network import Asked, Masks, open_network
 from objectmorpher_core.segment.sam.segmenter import Sam
+from objectmorpher_core.segment.sam.view import at_level
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from objectmorpher_core.base.rotations import matrices_from_quats
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import COUNT, read, read_object
-from objectmorpher_core.splat_files.meshes.texture import linear_from_srgb, srgb_from_linear
+from objectmorpher_core.splat_files.meshes.surface import linear_from_srgb, srgb_from_linear
 from tests.core.splat_files import mesh_files
 
 COLORS = np.array(

@@ -12,9 +12,8 @@ import numpy as np
 from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.brush import Stroke
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.hint import Hint
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import Document, EditObject, Plate
+from objectmorpher_core.document.settings import Hint, Shadow
 
 from ...canvas.layers import Layer
 from ...canvas.memo import same

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.settings import Hint
 
 from ...system.texts import t
 

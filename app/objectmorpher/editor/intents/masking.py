@@ -18,7 +18,7 @@ from objectmorpher_core.base.arrays import U8, Selection
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Photo, Prompt
 from objectmorpher_core.segment import mask_edit
-from objectmorpher_core.segment.mask_painting import MaskPainting
+from objectmorpher_core.segment.mask_edit import MaskPainting
 
 from ...system.texts import t
 from ...tools.pointer import Pointer

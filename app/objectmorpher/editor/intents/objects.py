@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.document import edits, front_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
 
 from ...canvas.layers import is_front
@@ -149,11 +149,11 @@ class Objects:
         if document is None or item is None or editor.hand.is_busy:
             return
         if item.stays_in_front:
-            editor.apply(t("Do not keep in front"), front_edits.let_go(document, k))
+            editor.apply(t("Do not keep in front"), edits.let_go(document, k))
             return
         editor.jobs.cancel(LIFT)  # what it would bring is to be edited
         try:
-            editor.apply(t("Keep in front"), front_edits.keep_in_front(document, k))
+            editor.apply(t("Keep in front"), edits.keep_in_front(document, k))
         except edits.EditError as error:
             editor.complain(str(error))
             return

@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.ground import Ground, GroundError, ground_under
 from objectmorpher_core.document.model import Placement
-from objectmorpher_core.document.placement import Hold, centre_of, with_centre
+from objectmorpher_core.document.placement import (
+    Ground,
+    GroundError,
+    Hold,
+    centre_of,
+    ground_under,
+    with_centre,
+)
 
 from ...canvas.derived import ObjectFrame
 from ...system.texts import t

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from objectmorpher_core.document import refine_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
-from objectmorpher_core.document.refinement import Refined
+from objectmorpher_core.document.settings import Refined
 
 from ...system.texts import t
 from ...worker import job_functions
@@ -48,7 +48,7 @@ class Refining:
 
     def _ask(self, seed: int) -> None:
         """What is to be seen of the edit is cut out here; the network may be on a server."""
-        from objectmorpher_core.scripting.refining import Refining as How
+        from objectmorpher_core.scripting.runner import Refining as How
 
         editor, asked = self._editor, self._editor.committed
         if asked is None:
@@ -79,10 +79,10 @@ class Refining:
         if self._answer is None or editor.hand.is_busy or editor.preview is not None:
             return False
         (asked, refined), self._answer = self._answer, None
-        if document is None or not refine_edits.show_the_same(asked, document):
+        if document is None or not edits.show_the_same(asked, document):
             editor.say(t("The edit has changed meanwhile: refine it again"))
         else:
-            editor.apply(t("Refine"), refine_edits.set_refined(document, refined))
+            editor.apply(t("Refine"), edits.set_refined(document, refined))
         return True
 
     def preview_strength(self, strength: float) -> None:
@@ -90,11 +90,11 @@ class Refining:
         editor = self._editor
         if editor.committed is None or editor.committed.refined is None or editor.hand.is_busy:
             return
-        editor.preview = refine_edits.set_strength(editor.committed, strength)
+        editor.preview = edits.set_strength(editor.committed, strength)
 
     def remove(self) -> None:
         """The edit as it was put together."""
         document = self._editor.committed
         if document is not None and document.refined is not None:
-            changed = refine_edits.set_refined(document, None)
+            changed = edits.set_refined(document, None)
             self._editor.apply(t("Remove refinement"), changed)

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from objectmorpher_core.base.arrays import F64, I32, Mask
-from objectmorpher_core.document import edits, rig_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Pose
 from objectmorpher_core.document.rig import Rig
 
 from ...system.texts import t
-from ..pose_view import PoseMode
+from ..view import PoseMode
 
 if TYPE_CHECKING:
     from objectmorpher_core.deform.rigidity import Rigidity
 
     from ..editor import Editor
+
 
 USUAL = 1.0  # stiffness of what was not painted
 NEAREST = 1.5  # x spacing: a small brush between control points takes the nearest within this
@@ -91,7 +92,7 @@ class Rigging:
         if len(nodes) == 0:
             return
         if kind is PoseMode.FREEZE:
-            edit = rig_edits.thaw if is_erasing else rig_edits.freeze
+            edit = edits.thaw if is_erasing else edits.freeze
             self._hold(t("Erase") if is_erasing else t("Freeze"), edit, nodes)
         elif is_erasing:
             self._set(t("Erase"), _erased(self.rig, kind, nodes, self._count))
@@ -113,11 +114,10 @@ class Rigging:
         if len(whole) < 2:
             self._editor.say(t("A rigid group needs a larger stroke"))
             return
-        self._apply(t("Rigid group"), rig_edits.make_body, whole)
+        self._apply(t("Rigid group"), edits.make_body, whole)
 
     def cut(self, way: F64) -> None:
         """Parts what is left of a line (S, 2), image px, from what is right of it."""
-        from objectmorpher_core.deform.cutting import sides_of_cut
 
         editor = self._editor
         assert editor.document is not None and editor.object is not None
@@ -129,7 +129,7 @@ class Rigging:
         if len(first) == 0 or len(second) == 0:
             editor.say(t("Draw the cut across the object"))
             return
-        self._apply(t("Cut"), rig_edits.cut, first, second)
+        self._apply(t("Cut"), edits.cut, first, second)
 
     def glue(self, way: F64) -> None:
         """Joins what is under the brush at the beginning of a line to what is at its end."""
@@ -146,7 +146,7 @@ class Rigging:
         if along < TOGETHER * straight.min():
             editor.say(t("These parts hang together already"))
             return
-        self._apply(t("Glue"), rig_edits.glue, first, second)
+        self._apply(t("Glue"), edits.glue, first, second)
 
     def unseam(self, kind: PoseMode, nodes: I32) -> None:
         """Takes back the cuts, or the glue, that these control points are part of."""
@@ -163,7 +163,7 @@ class Rigging:
         """Takes back what was said about a region."""
         rig = self.rig
         if region.kind is PoseMode.FREEZE:
-            self._hold(t("Remove region"), rig_edits.thaw, region.nodes)
+            self._hold(t("Remove region"), edits.thaw, region.nodes)
             return
         if region.seam >= 0:
             seams = tuple(s for i, s in enumerate(rig.seams) if i != region.seam)
@@ -193,7 +193,7 @@ class Rigging:
         return len(thing.lifted.control_points)
 
     def _set(self, label: str, rig: Rig) -> None:
-        self._apply(label, rig_edits.set_rig, rig)
+        self._apply(label, edits.set_rig, rig)
 
     def _apply(
         self, label: str, edit: Callable[..., Document], *arguments: Any, start: Pose | None = None
@@ -241,3 +241,32 @@ def _erased(rig: Rig, kind: PoseMode, nodes: I32, count: int) -> Rig:
     gone = _is_in(nodes, count)
     bodies = (body[~gone[body]] for body in rig.bodies)
     return replace(rig, bodies=tuple(body for body in bodies if len(body) > 1))
+
+
+# The two sides of a cut that is drawn across an object's picture.
+
+
+def sides_of_cut(pairs: np.ndarray, picture: F64, stroke: F64) -> tuple[I32, I32]:
+    """The control points left and right of a cut; both empty where it crosses no link.
+
+    `pairs` (L, 2) are the links, `picture` (M, 2) px where the control points are seen, `stroke`
+    (S, 2) px the line that was drawn. The cut goes right through the object: every link whose
+    picture crosses the line is cut, on its near side and on its far side.
+    """
+    votes = np.zeros(len(picture))
+    a, b = picture[pairs[:, 0]], picture[pairs[:, 1]]
+    for start, end in pairwise(stroke):
+        along = end - start
+        if not along.any():
+            continue
+        side_a, side_b = _cross(along, a - start), _cross(along, b - start)
+        link = b - a
+        apart = _cross(link, start - a) * _cross(link, end - a) < 0
+        crossed = apart & (side_a * side_b < 0)
+        np.add.at(votes, pairs[crossed, 0], np.sign(side_a[crossed]))
+        np.add.at(votes, pairs[crossed, 1], np.sign(side_b[crossed]))
+    return np.flatnonzero(votes < 0).astype(np.int32), np.flatnonzero(votes > 0).astype(np.int32)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> F64:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

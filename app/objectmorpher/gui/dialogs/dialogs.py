@@ -12,8 +12,7 @@ from imgui_bundle import portable_file_dialogs as pfd
 
 from ...editor.editor import Editor
 from ...editor.filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dialog, Filing
-from ...editor.intents.hub_models import GIVEN
-from ...editor.intents.models import MODEL_ENDING
+from ...editor.intents.models import GIVEN, MODEL_ENDING
 from ...editor.opening import OBJECT_ENDINGS
 from ...system.texts import t
 from ..widgets.modal import modal

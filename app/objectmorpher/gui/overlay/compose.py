@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
-from objectmorpher_core.document.hint import Hint
+from objectmorpher_core.document.settings import Hint
 
 from ...editor.view import Composed
 from ...system.texts import t

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 from imgui_bundle import ImVec2, imgui
 
-from ...canvas.paint import DEPTH_STOPS, FULL_STRAIN, STRAIN_STOPS, Stops
-from ...canvas.painter import shown_now
+from ...canvas.painter import DEPTH_STOPS, FULL_STRAIN, STRAIN_STOPS, Stops, shown_now
 from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...render.scene import Hatch

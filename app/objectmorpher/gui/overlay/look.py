@@ -44,3 +44,23 @@ def draw_pixel_grid(canvas: Canvas) -> None:
         for point in canvas.at(np.array([(0, y) for y in range(low[1], high[1] + 1)], float)):
             y = round(point.y) + shift
             canvas.draw.add_line(ImVec2(start.x, y), ImVec2(end.x, y), color, 1.0)
+
+
+# Before and after.
+
+
+def draw_comparison(canvas: Canvas) -> None:
+    """The line between before and after, or that all of it is before."""
+    view, rect = canvas.editor.view, canvas.rect
+    top = rect.y + theme.pt(12)
+    if view.is_before or view.split is None:
+        canvas.label(t("Before"), rect.x + theme.pt(12), top)
+        return
+    x = rect.x + view.split * rect.width
+    high, low = ImVec2(x, rect.y), ImVec2(x, rect.y + rect.height)
+    canvas.line(high, low, WHITE, width=2, alpha=1.0)
+    grip = ImVec2(x, rect.y + rect.height / 2)
+    canvas.draw.add_circle_filled(grip, theme.pt(9), theme.u32(DARK, 0.7))
+    canvas.draw.add_circle_filled(grip, theme.pt(7), theme.u32(WHITE))
+    canvas.label(t("Before"), x - theme.pt(12), top, side=1.0)
+    canvas.label(t("After"), x + theme.pt(12), top)

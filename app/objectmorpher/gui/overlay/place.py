@@ -12,7 +12,7 @@ from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, DARK, WHITE, Canvas
-from .other import draw_other
+from .select import draw_other
 
 MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
 PIECES = 96  # of a ring

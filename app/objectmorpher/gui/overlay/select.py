@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2
 
+from ...tools.mask_tool import erases
 from ..widgets.fade import fades
 from ..widgets.theme import theme
-from .canvas import ACCENT, DARK, WARM, Canvas
+from .canvas import ACCENT, DARK, WARM, WHITE, Canvas
 
 DOTS = 6.0  # points between the dots of a dotted line
 DOT = 1.4  # points, their radius
@@ -76,3 +77,31 @@ def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
     canvas.draw.add_line(ImVec2(at.x - arm, at.y), ImVec2(at.x + arm, at.y), dark, width)
     if is_foreground:
         canvas.draw.add_line(ImVec2(at.x, at.y - arm), ImVec2(at.x, at.y + arm), dark, width)
+
+
+# The selection's edge while it is painted, and the brush.
+
+
+def draw_mask(canvas: Canvas) -> None:
+    """For the Mask tool. During a stroke the veil alone shows the edge: it is there at once."""
+    editor = canvas.editor
+    if editor.masking.painting is None:
+        draw_edge(canvas)
+    if editor.pointer is not None:
+        canvas.brush(erases(editor, editor.pointer))
+
+
+# The object under the pointer that a click would make the current one.
+
+
+def draw_other(canvas: Canvas) -> None:
+    """A dashed box around it, and its name."""
+    editor, other = canvas.editor, canvas.editor.hover.other
+    document = editor.document
+    if other is None or document is None or editor.hand.is_busy or other >= len(document.objects):
+        return
+    if document.objects[other].lifted is None:
+        return
+    corners = canvas.at(editor.derived.frame(document, other).corners)
+    canvas.dashes(corners, WHITE)
+    canvas.label(document.objects[other].name, corners[3].x, corners[3].y)

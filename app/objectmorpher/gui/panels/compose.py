@@ -8,7 +8,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core import compose
-from objectmorpher_core.document.joining import (
+from objectmorpher_core.document.settings import (
     LEAST_FEATHER,
     MOST_FEATHER,
     MOST_SHADOW,
@@ -22,11 +22,9 @@ from ...commands import run
 from ...commands.compose import not_moved
 from ...editor.editor import Editor
 from ...editor.view import Composed
-from ...system.texts import t
+from ...system.texts import sentence, t
 from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
-from ..widgets.command_button import command_button
-from ..widgets.dial import SIDE, dial
 from ..widgets.method_choice import draw_method
 from ..widgets.pictures import pictures
 from ..widgets.segmented import Choice, segmented
@@ -34,9 +32,12 @@ from ..widgets.theme import RADIUS, theme
 from ..widgets.widgets import (
     GAP,
     LABEL_WIDTH,
+    SIDE,
     Change,
     Number,
     checkbox,
+    command_button,
+    dial,
     drawn_button,
     half_width,
     heading,
@@ -47,7 +48,6 @@ from ..widgets.widgets import (
 )
 from ..window.landmarks import mark
 from .brush import draw_brush_fields, draw_radius
-from .network import draw_network
 
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 DEGREES = 72.0  # points, width of the direction's field
@@ -234,3 +234,31 @@ def _take(editor: Editor, change: Change, preview: Callable[[], None], label: st
         preview()
     if change.is_done:
         editor.commit(label)
+
+
+# The Compose tool's network, which makes the edit look as if it had been photographed.
+
+
+def draw_network(editor: Editor) -> None:
+    """Which network, its buttons, and how much of what it made is shown."""
+    heading(t("Network"))
+    draw_method(editor, "refine")
+    if (reason := editor.methods.why_not("refine")) is not None:
+        note(f"{sentence(reason)}.")
+        command_button(editor, "models", width=-1)
+    if editor.refining.refined is None:
+        command_button(editor, "refine", width=-1)
+        note(t("Fits light, colour and edges of the edit; nothing outside it changes."))
+        return
+    half = half_width()
+    command_button(editor, "refine", width=half)
+    imgui.same_line()
+    command_button(editor, "refine_again", width=half)
+    number = Number(t("Amount"), "%.0f %%", 0.5, 5.0, 100.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.refining.refined.strength)
+    if change.is_changed:
+        editor.refining.preview_strength(change.value / 100)
+    if change.is_done:
+        editor.commit(t("Amount of refinement"))
+    command_button(editor, "unrefine", width=-1)
+    note(t("It goes as soon as what it shows is changed."))

@@ -9,9 +9,17 @@ from objectmorpher_core.segment.mask_edit import LARGEST_REACH
 from ...commands import COMMANDS, why_not
 from ...editor.editor import Editor
 from ...system.texts import t
-from ..widgets.command_button import command_button
 from ..widgets.theme import Icon
-from ..widgets.widgets import Number, gap, half_width, heading, note, number_field, tooltip
+from ..widgets.widgets import (
+    Number,
+    command_button,
+    gap,
+    half_width,
+    heading,
+    note,
+    number_field,
+    tooltip,
+)
 
 ICONS = {
     "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,

@@ -7,9 +7,8 @@ from imgui_bundle import ImVec2, imgui
 from ...editor.editor import Editor
 from ...editor.history import History
 from ...system.texts import t
-from ..widgets.rows import fill_row, text_top
 from ..widgets.theme import theme
-from ..widgets.widgets import drawn_button, heading, rule
+from ..widgets.widgets import drawn_button, fill_row, heading, rule, text_top
 
 ROW = 28.0  # points
 CORNER = 4.0  # radius

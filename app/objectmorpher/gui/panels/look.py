@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from objectmorpher_core.document.model import LEAST_THICKNESS, MOST_THICKNESS
+
 from ...canvas.painter import shown_now
 from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...system.texts import t
-from ..widgets.command_button import command_button
-from ..widgets.rows import end_row, fill_row, text_top
+from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import Icon, theme
-from ..widgets.widgets import checkbox, drawn_button, gap, heading, note, small_text, tooltip
-from .shape import draw_shape
+from ..widgets.widgets import (
+    Number,
+    checkbox,
+    command_button,
+    drawn_button,
+    end_row,
+    fill_row,
+    gap,
+    heading,
+    note,
+    number_field,
+    small_text,
+    text_top,
+    tooltip,
+)
 
 ROW = 28.0  # points
 ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "800 %"))
@@ -82,3 +96,117 @@ def _draw_zooms(editor: Editor) -> None:
         if why_not(editor, name) is None:
             keys = keys_of(editor, name)
             tooltip(t(COMMANDS[name].label) + (f" ({keys})" if keys else ""))
+
+
+# The object's shape in the Look tool, where it is seen from all sides.
+
+
+def draw_shape(editor: Editor) -> None:
+    """Thickness, the other side, symmetry; and an object out of a file instead."""
+    if not editor.is_lifted:
+        return
+    heading(t("Shape"))
+    if (reason := editor.shaping.why_fixed) is None:
+        _draw_thickness(editor)
+        _draw_trust(editor)
+        _draw_back(editor)
+        _draw_symmetry(editor)
+        _draw_standing(editor)
+        _draw_depth(editor)
+    else:
+        note(f"{reason}.")
+        _draw_poses(editor)
+    label = t(COMMANDS["import_shape"].label)
+    command_button(editor, "import_shape", f"{Icon.CUBE}  {label}")
+    gap(12)
+
+
+def _draw_thickness(editor: Editor) -> None:
+    shape = editor.shaping.settings
+    low, high = 100 * LEAST_THICKNESS, 100 * MOST_THICKNESS
+    number = Number(t("Thickness"), "%.0f %%", 1.0, 10.0, 100.0, low, high)
+    change = number_field(number, 100 * shape.thickness)
+    if change.is_changed:
+        editor.shaping.preview_thickness(change.value / 100)
+    if change.is_done:
+        editor.commit(t("Thickness"))
+
+
+def _draw_trust(editor: Editor) -> None:
+    """How far the shape network is believed, where it can look."""
+    if not editor.models.has_shape:
+        return
+    number = Number(t("Trust"), "%.0f %%", 1.0, 10.0, 100.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.shaping.trust)
+    tooltip(t("In the learned shape; at 0 % the outline alone tells it"))
+    if change.is_changed:
+        editor.shaping.preview_trust(change.value / 100)
+    if change.is_done:
+        editor.shaping.end_trust()
+
+
+def _draw_back(editor: Editor) -> None:
+    choices = (
+        Choice(
+            "auto", t("Auto"), t("As the object looks: mirrored where it is seen from the side")
+        ),
+        Choice("mirrored", t("Mirrored"), t("The other side looks like this one")),
+        Choice("continued", t("Continued"), t("The rim goes on to the other side")),
+    )
+    note(t("Other side"))
+    back = segmented("back", choices, editor.shaping.settings.back)
+    if back != editor.shaping.settings.back:
+        editor.shaping.say(t("Other side"), back=back)
+
+
+def _draw_symmetry(editor: Editor) -> None:
+    choices: tuple[Choice[bool | None], ...] = (
+        Choice(None, t("Auto"), t("Left and right are taken to be alike where they look so")),
+        Choice(True, t("Symmetric"), t("Left and right are alike: what is hidden is mirrored")),
+        Choice(False, t("Not"), t("Left and right have nothing to do with each other")),
+    )
+    note(t("Symmetry"))
+    chosen = segmented("symmetry", choices, editor.shaping.settings.is_symmetric)
+    if chosen != editor.shaping.settings.is_symmetric:
+        editor.shaping.say(t("Symmetry"), is_symmetric=chosen)
+
+
+def _draw_standing(editor: Editor) -> None:
+    is_standing = editor.shaping.settings.is_standing
+    chosen = checkbox(t("Stands on the ground"), is_standing)
+    tooltip(t("Its feet tell which end is nearer; not so for what flies or hangs"))
+    if chosen != is_standing:
+        editor.shaping.say(t("Standing"), is_standing=chosen)
+
+
+def _draw_depth(editor: Editor) -> None:
+    """Where a depth model is there, or would be used."""
+    uses_depth = editor.shaping.settings.uses_depth
+    if not editor.models.has_depth and uses_depth:
+        return
+    chosen = checkbox(t("Use the depth model"), uses_depth)
+    tooltip(t("Its front is as deep as the model sees it; what you painted is added to that"))
+    if chosen != uses_depth:
+        editor.shaping.say(t("Depth model"), uses_depth=chosen)
+
+
+def _draw_poses(editor: Editor) -> None:
+    """The poses in which the file's object looks like the photo."""
+    fitting = editor.shaping.fitting
+    if fitting is not None and len(fitting.found.registration.proposals) > 1:
+        proposals = fitting.found.registration.proposals
+        choices = tuple(
+            Choice(
+                proposal, f"{100 * proposal.iou:.0f} %",
+                t("Its outline agrees by {share} %, its colours differ by {error} %",
+                  share=f"{100 * proposal.iou:.1f}", error=f"{100 * proposal.colour_error:.1f}"),
+            )
+            for proposal in proposals
+        )  # fmt: skip
+        chosen = segmented("poses", choices, fitting.chosen)
+        if chosen is not fitting.chosen:
+            editor.shaping.choose(chosen)
+        if fitting.found.registration.is_ambiguous:
+            note(fitting.found.registration.reason)
+    command_button(editor, "fit_again")
+    note(t("Place it by hand, then fit it from there."))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from ...editor.editor import Editor
 from ...editor.view import Painted
 from ...system.texts import t
-from ..widgets.command_button import command_button
 from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import Icon
-from ..widgets.widgets import gap, heading, note
+from ..widgets.widgets import command_button, gap, heading, note
 from .brush import draw_brush_fields
 from .edge import draw_command, draw_edge, draw_lift_warning
 

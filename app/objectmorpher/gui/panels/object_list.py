@@ -10,9 +10,18 @@ from imgui_bundle import ImVec2, imgui
 from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...system.texts import t
-from ..widgets.rows import end_row, fill_row, text_top
 from ..widgets.theme import SMALL_SIZE, Icon, theme
-from ..widgets.widgets import Kind, button, drawn_button, heading, icon_button, note
+from ..widgets.widgets import (
+    Kind,
+    button,
+    drawn_button,
+    end_row,
+    fill_row,
+    heading,
+    icon_button,
+    note,
+    text_top,
+)
 from ..window.landmarks import mark
 
 ROW = 32.0  # points

@@ -11,12 +11,12 @@ from objectmorpher_core.document.model import Placement
 from ...commands import COMMANDS, run, why_not
 from ...editor.editor import Editor
 from ...system.texts import t
-from ..widgets.command_button import command_button
 from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
     FILL,
     Number,
     checkbox,
+    command_button,
     gap,
     heading,
     icon_button,

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
 from objectmorpher_core.document.model import EditObject
 
 from ...canvas.painter import shown_now
 from ...editor.editor import Editor
-from ...editor.pose_view import PoseMode
-from ...editor.view import Shown
+from ...editor.intents.posing import Numbers
+from ...editor.intents.rigging import Region
+from ...editor.view import BRUSHES, PoseMode, Shown
 from ...system.texts import t
-from ..widgets.command_button import command_button
 from ..widgets.segmented import Choice, segmented
-from ..widgets.theme import Icon
-from ..widgets.widgets import checkbox, gap, half_width, heading, note, tooltip
-from .pose_handle import draw_handles, draw_numbers
-from .pose_rig import draw_modes, draw_regions
+from ..widgets.theme import Icon, theme
+from ..widgets.widgets import (
+    BETWEEN,
+    Number,
+    checkbox,
+    command_button,
+    drawn_button,
+    end_row,
+    fill_row,
+    gap,
+    half_width,
+    heading,
+    icon_button,
+    note,
+    number_field,
+    text_top,
+    tooltip,
+)
+from .brush import draw_radius
 
 NAMES = {Rigidity.RIGID: "Rigid", Rigidity.NORMAL: "Normal", Rigidity.SOFT: "Soft"}
 
@@ -77,3 +94,198 @@ def _draw_overlays(editor: Editor) -> None:
     is_strain = shown_now(editor.document, view) is Shown.STRAIN
     if checkbox(t("Strain"), is_strain) != is_strain:
         view.shown = Shown.COMPOSITE if is_strain else Shown.STRAIN
+
+
+# The list of handles, and the numbers of the current one.
+
+ROW = 28.0  # points
+VISIBLE_ROWS = 6
+PER_PX = 0.5  # px per point that a field is dragged
+
+
+def draw_handles(editor: Editor) -> None:
+    """All of them; a click selects one, with Shift or Ctrl one more."""
+    heading(t("Handles"))
+    thing = editor.object
+    if thing is None or not thing.handles:
+        note(t("Drag a point on the object: it follows, and the far side holds still."))
+        return
+    count = len(thing.handles)
+    if count <= VISIBLE_ROWS:
+        for h in range(count):
+            _draw_row(editor, h)
+        return
+    step = theme.pt(ROW + BETWEEN)
+    imgui.begin_child("##handles", ImVec2(0, VISIBLE_ROWS * step + step / 2))
+    for h in range(count):
+        if editor.object is not None and h < len(editor.object.handles):  # one may be removed
+            _draw_row(editor, h)
+    imgui.end_child()
+
+
+def _draw_row(editor: Editor, h: int) -> None:
+    thing = editor.object
+    if thing is None or h >= len(thing.handles):
+        return
+    is_pin = thing.handles[h].is_pin
+    start = imgui.get_cursor_screen_pos()
+    size = ImVec2(imgui.get_content_region_avail().x, theme.pt(ROW))
+    imgui.set_next_item_allow_overlap()
+    if drawn_button(f"##handle{h}", size):
+        io = imgui.get_io()
+        if io.key_shift or io.key_ctrl:
+            editor.posing.toggle(h)
+        else:
+            editor.posing.select(h)
+    draw = imgui.get_window_draw_list()
+    end = ImVec2(start.x + size.x, start.y + size.y)
+    fill_row(start, end, h in editor.posing.selected, imgui.is_item_hovered())
+    middle = ImVec2(start.x + theme.pt(16), (start.y + end.y) / 2)
+    if h == editor.posing.handle:
+        draw.add_circle(middle, theme.pt(9), theme.u32("accent"), 0, theme.pt(2))
+    if is_pin:
+        draw.add_ngon_filled(middle, theme.pt(6), theme.u32("text"), 4)
+    else:
+        draw.add_circle_filled(middle, theme.pt(5), theme.u32("accent"))
+    top = text_top(start, size.y)
+    name = t("Pin {number}", number=h + 1) if is_pin else t("Handle {number}", number=h + 1)
+    draw.add_text(ImVec2(start.x + theme.pt(34), top), theme.u32("text"), name)
+    imgui.set_cursor_screen_pos(ImVec2(end.x - theme.pt(28), start.y))
+    if icon_button(Icon.CLOSE, f"remove{h}", t("Remove it (Del)")):
+        editor.posing.remove(h)
+    end_row(start, ROW)
+
+
+def draw_numbers(editor: Editor) -> None:
+    """Of the handle that was selected last."""
+    numbers = editor.handle_numbers.read()
+    if numbers is None:
+        return
+    gap(12)
+    h = editor.posing.handle
+    assert h is not None
+    is_pin = numbers.is_pin
+    heading(t("Pin {number}", number=h + 1) if is_pin else t("Handle {number}", number=h + 1))
+    _draw_place(editor, numbers)
+    _draw_turn(editor, numbers)
+    soft = Number(t("Softness"), "%.2f", 0.005, 0.1, 0.0, 0.0, 10.0)
+    change = number_field(soft, numbers.softness)
+    if change.is_changed:
+        editor.handle_numbers.soften(change.value)
+    if change.is_done:
+        editor.posing.finish(t("Softness of handle"))
+    now_pin = checkbox(t("Pin: it holds still"), is_pin)
+    if now_pin != is_pin:
+        editor.handle_numbers.set_pin(now_pin)
+    half = half_width()
+    command_button(editor, "reset_handle", t("Reset"), half)
+    tooltip(t("Selected handles go back to where their points were"))
+    imgui.same_line()
+    command_button(editor, "remove_handle", t("Remove"), half)
+
+
+def _draw_place(editor: Editor, numbers: Numbers) -> None:
+    fields = (
+        (Number("X", "%.1f px", PER_PX, 1.0, numbers.rest[0]), "x"),
+        (Number("Y", "%.1f px", PER_PX, 1.0, numbers.rest[1]), "y"),
+        (Number(t("Depth"), "%.2f ×", 0.005, 0.05), "depth"),
+    )
+    for number, name in fields:
+        change = number_field(number, getattr(numbers, name))
+        if name == "depth":
+            tooltip(t("In diameters of the object, away from you"))
+        if change.is_changed:
+            wanted = replace(numbers, **{name: change.value})
+            editor.handle_numbers.move(wanted.x, wanted.y, wanted.depth)
+        if change.is_done:
+            editor.posing.finish(t("{name} of handle", name=number.name))
+
+
+def _draw_turn(editor: Editor, numbers: Numbers) -> None:
+    change = number_field(Number(t("Turn"), "%.1f°", 0.25, 5.0), numbers.turn)
+    if change.is_changed:
+        editor.handle_numbers.turn(change.value)
+    if change.is_done:
+        editor.posing.finish(t("Turn of handle"))
+    is_free = checkbox(t("Turns with the object"), numbers.is_free)
+    tooltip(t("Off: it is held as it is turned"))
+    if is_free != numbers.is_free:
+        editor.handle_numbers.set_free(is_free)
+
+
+# What dragging does, and the regions that move in a way of their own.
+
+ICONS = {
+    PoseMode.DRAG: Icon.POSE, PoseMode.FREEZE: Icon.FREEZE, PoseMode.STIFFEN: Icon.STIFFEN,
+    PoseMode.BODY: Icon.BODY, PoseMode.CUT: Icon.CUT, PoseMode.GLUE: Icon.GLUE,
+}  # fmt: skip
+NOTES = {
+    PoseMode.FREEZE: "Paint what must stay exactly where it is now.",
+    PoseMode.STIFFEN: "Paint what must bend less than the rest, or more.",
+    PoseMode.BODY: "Paint what must move as one rigid piece: a head, a shoe, a lid. "
+    "A stroke that begins on a group makes it larger.",
+    PoseMode.CUT: "Draw a line where two parts touch but do not belong together. "
+    "It cuts right through the object.",
+    PoseMode.GLUE: "Drag from one part to another: what is under the brush at both ends "
+    "hangs together from then on.",
+}
+
+
+def draw_modes(editor: Editor) -> None:
+    """The row of what dragging does, and its settings."""
+    view = editor.view.pose
+    modes = tuple(Choice(mode, ICONS[mode], t(mode.value)) for mode in PoseMode)
+    view.mode = segmented("mode", modes, view.mode)
+    if view.mode is PoseMode.DRAG:
+        return
+    gap(8)
+    heading(t(view.mode.value))
+    note(t(NOTES[view.mode]))
+    gap(4)
+    if view.mode in BRUSHES or view.mode is PoseMode.GLUE:
+        draw_radius(editor)
+    if view.mode is PoseMode.STIFFEN:
+        stiff = Number(t("Stiffness"), "%.2f ×", 0.02, 0.5, 4.0, 0.05, 50.0)
+        view.stiffness = number_field(stiff, view.stiffness).value
+
+
+def draw_regions(editor: Editor) -> None:
+    """What was painted, with a button to take each back."""
+    regions = editor.rigging.regions()
+    if not regions:
+        return
+    gap(12)
+    heading(t("Regions"))
+    numbers: dict[PoseMode, int] = {}
+    for row, region in enumerate(regions):
+        numbers[region.kind] = numbers.get(region.kind, 0) + 1
+        _draw_region(editor, region, row, _name(region, numbers[region.kind]))
+
+
+def _name(region: Region, number: int) -> str:
+    if region.kind is PoseMode.FREEZE:
+        return t("Frozen")
+    if region.kind is PoseMode.STIFFEN:
+        factor = f"{region.value:.3g}"
+        return t("Stiffness {factor}×", factor=factor)
+    names = {
+        PoseMode.BODY: "Rigid group {number}", PoseMode.CUT: "Cut {number}",
+        PoseMode.GLUE: "Glue {number}",
+    }  # fmt: skip
+    return t(names[region.kind], number=number)
+
+
+def _draw_region(editor: Editor, region: Region, row: int, name: str) -> None:
+    start = imgui.get_cursor_screen_pos()
+    width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
+    draw = imgui.get_window_draw_list()
+    top = text_top(start, height)
+    draw.add_text(ImVec2(start.x + theme.pt(8), top), theme.u32("secondary"), ICONS[region.kind])
+    draw.add_text(ImVec2(start.x + theme.pt(34), top), theme.u32("text"), name)
+    points = t("{count} points", count=len(region.nodes))
+    right = start.x + width - theme.pt(36) - imgui.calc_text_size(points).x
+    draw.add_text(ImVec2(right, top), theme.u32("secondary"), points)
+    imgui.set_cursor_screen_pos(ImVec2(start.x + width - theme.pt(28), start.y))
+    if icon_button(Icon.CLOSE, f"region{row}", t("Remove it")):
+        editor.rigging.remove(region)
+    end_row(start, ROW)

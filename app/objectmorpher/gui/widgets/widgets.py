@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,7 +11,10 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
+from ...commands import COMMANDS, run, why_not
+from ...editor.editor import Editor
 from ...system.texts import t
+from ...tools.pointer import SNAP
 from ..window.landmarks import mark
 from .theme import FIELD, PRIMARY, RADIUS, SMALL_SIZE, Icon, theme
 
@@ -275,3 +279,77 @@ def checkbox(label: str, is_on: bool) -> bool:
     imgui.pop_style_color(3)
     imgui.pop_style_var(2)
     return is_on
+
+
+# A command as a button.
+
+
+def command_button(editor: Editor, name: str, label: str = "", width: float = -1.0) -> None:
+    """It says `label`, else the command's name; `width` in points, -1 fills.
+
+    Where the command cannot run it is greyed out, and the reason is its tooltip.
+    """
+    shown = label or t(COMMANDS[name].label)
+    if button(shown, why_not=why_not(editor, name), width=width):
+        run(editor, name)
+
+
+# Rows of a list: what lies behind one, where its text stands, and where the next begins.
+
+BETWEEN = 2.0  # points from a row to the next
+
+
+def fill_row(
+    start: ImVec2, end: ImVec2, is_current: bool, is_hovered: bool, radius: float = RADIUS
+) -> None:
+    """Behind a row that is the current one, or under the pointer; corners in screen units."""
+    if is_current or is_hovered:
+        role = "raised" if is_current else "hovered"
+        draw = imgui.get_window_draw_list()
+        draw.add_rect_filled(start, end, theme.u32(role), theme.pt(radius))
+
+
+def text_top(start: ImVec2, height: float) -> float:
+    """Where a line of the current font is in the middle of a row; screen units."""
+    return start.y + (height - imgui.get_font_size()) / 2
+
+
+def end_row(start: ImVec2, height: float, between: float = BETWEEN) -> None:
+    """The next row is below one that began at `start` and is `height` points high."""
+    below = start.y + theme.pt(height + between) - imgui.get_style().item_spacing.y
+    imgui.set_cursor_screen_pos(ImVec2(start.x, below))
+    imgui.dummy(ImVec2(0, 0))
+
+
+# A small round field for a direction.
+
+SIDE = 60.0  # points
+KNOB = 5.0
+
+
+def dial(name: str, degrees: float, hint: str) -> Change:
+    """The direction in degrees, 0 to the right and 90 down, in (-180, 180]."""
+    start, side = imgui.get_cursor_screen_pos(), theme.pt(SIDE)
+    imgui.invisible_button(f"##{name}", ImVec2(side, side))
+    is_active = imgui.is_item_active()
+    is_hovered = imgui.is_item_hovered() or is_active
+    centre = ImVec2(start.x + side / 2, start.y + side / 2)
+    changed = Change(degrees, is_done=imgui.is_item_deactivated())
+    if is_active:
+        mouse = imgui.get_mouse_pos()
+        aimed = math.degrees(math.atan2(mouse.y - centre.y, mouse.x - centre.x))
+        if imgui.get_io().key_shift:
+            aimed = round(aimed / SNAP) * SNAP
+        changed = Change(aimed, is_changed=aimed != degrees)
+        degrees = aimed
+    draw, radius = imgui.get_window_draw_list(), side / 2 - theme.pt(2)
+    draw.add_circle_filled(centre, radius, theme.u32("hovered" if is_hovered else "raised"), 48)
+    draw.add_circle(centre, radius, theme.u32("pressed"), 48, theme.pt(1))
+    angle, reach = math.radians(degrees), radius - theme.pt(KNOB + 3)
+    end = ImVec2(centre.x + reach * math.cos(angle), centre.y + reach * math.sin(angle))
+    draw.add_line(centre, end, theme.u32("secondary"), theme.pt(2))
+    draw.add_circle_filled(centre, theme.pt(3), theme.u32("secondary"), 16)
+    draw.add_circle_filled(end, theme.pt(KNOB), theme.u32("accent"), 24)
+    if not is_active:
+        tooltip(hint)
+    return changed

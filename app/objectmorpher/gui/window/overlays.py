@@ -10,14 +10,12 @@ from imgui_bundle import ImVec2
 from ...editor.editor import Editor
 from ...editor.view import ToolName
 from ..overlay.canvas import Canvas
-from ..overlay.compare import draw_comparison
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
-from ..overlay.look import draw_look, draw_pixel_grid
-from ..overlay.mask import draw_mask
+from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
-from ..overlay.select import draw_selection
+from ..overlay.select import draw_mask, draw_selection
 from .landmarks import mark_on_canvas
 from .layout import Rect
 

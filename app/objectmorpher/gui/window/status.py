@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ...editor.editor import Editor
 from ...editor.feedback import Message
 from ...editor.intents.models import DOWNLOAD
-from ...system.private import without_names
+from ...system.report import without_names
 from ...system.texts import t
 from ...worker.jobs import Job
 from ...worker.threads import Chore

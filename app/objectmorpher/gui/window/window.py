@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from imgui_bundle import imgui  # before glfw: both must use one libglfw
-
-# isort: split
 import glfw
+from imgui_bundle import ImVec2, imgui
+
+from objectmorpher_core.document.model import Document
 
 from ...canvas.derived import import_core
 from ...cli.options import WindowOptions
@@ -25,7 +25,7 @@ from ...editor.shortcuts import Shortcuts
 from ...render.renderer import Renderer
 from ...system.freed_memory import set_aside
 from ...system.motion import motion
-from ...system.texts import ENGLISH, use_language
+from ...system.texts import ENGLISH, t, use_language
 from ...tools.pointer import Shape
 from ..dialogs.dialogs import Dialogs
 from ..dialogs.popups import Popups
@@ -43,9 +43,7 @@ from .menu import draw_menu
 from .overlays import draw_overlays
 from .scenes import build_scene
 from .status import draw_status
-from .title import Title
 from .toolbar import draw_toolbar
-from .window_size import WindowSize
 
 log = logging.getLogger(__name__)
 
@@ -366,3 +364,91 @@ _IMGUI_CURSORS = {
     int(imgui.MouseCursor_.resize_ns): glfw.RESIZE_NS_CURSOR,
     int(imgui.MouseCursor_.resize_all): glfw.RESIZE_ALL_CURSOR,
 }
+
+
+# The window's title: the file, and what the edit has changed of it.
+
+
+class Title:
+    """As it was written last."""
+
+    def __init__(self) -> None:
+        self._text = ""
+        self._changed: tuple[Document | None, int] = (None, 0)  # px that a document changes
+
+    def changed(self, editor: Editor, is_quiet: bool) -> str | None:
+        """Once a frame: the new one, or None; `is_quiet`: nothing has happened for a moment."""
+        if is_quiet and editor.preview is None and editor.committed is not self._changed[0]:
+            document = editor.committed
+            count = 0 if document is None else editor.derived.painter.count_changed(document)
+            self._changed = (document, count)
+        before, self._text = self._text, self._text_for(editor)
+        return self._text if self._text != before else None
+
+    def _text_for(self, editor: Editor) -> str:
+        document = editor.committed
+        if document is None:
+            return "ObjectMorpher"
+        name = editor.path.name if editor.path else document.photo.name
+        state = "" if editor.is_saved else f" — {self._edited(document)}"
+        return f"{name}{state} · ObjectMorpher"
+
+    def _edited(self, document: Document) -> str:
+        counted, count = self._changed
+        if counted is not document or count == 0:
+            return t("edited")
+        return t("edited, about {count} px", count=f"{count:,}")
+
+
+# How large the window is, and what the time is, for ImGui.
+
+BUTTONS = (glfw.MOUSE_BUTTON_LEFT, glfw.MOUSE_BUTTON_RIGHT, glfw.MOUSE_BUTTON_MIDDLE)
+LEAST_STEP = 1e-4  # s between two frames; ImGui asks for more than none
+
+
+class WindowSize:
+    """As GLFW told of it last.
+
+    ImGui's own backend asks for it in every frame, and X answers when it has shown the last one:
+    what could be computed meanwhile is not.
+    """
+
+    def __init__(self, handle: Any) -> None:
+        """`handle`: GLFW's window."""
+        self.size: tuple[int, int] = glfw.get_window_size(handle)  # window units
+        self.pixels: tuple[int, int] = glfw.get_framebuffer_size(handle)
+        self._handle = handle
+        self._time = time.perf_counter()
+        self._is_pointer_inside = True
+        take_pointer: Any = self._take_pointer
+        glfw.set_cursor_enter_callback(handle, take_pointer)  # before ImGui's, which calls it too
+        take_size: Any = self._take_size
+        take_pixels: Any = self._take_pixels
+        glfw.set_window_size_callback(handle, take_size)
+        glfw.set_framebuffer_size_callback(handle, take_pixels)
+
+    @property
+    def ratio(self) -> float:
+        """Framebuffer px per window unit."""
+        return self.pixels[0] / max(self.size[0], 1)
+
+    def begin_frame(self) -> None:
+        """Tells ImGui, in place of its backend's own beginning of a frame."""
+        io, now = imgui.get_io(), time.perf_counter()
+        io.display_size = ImVec2(*self.size)
+        io.display_framebuffer_scale = ImVec2(self.ratio, self.pixels[1] / max(self.size[1], 1))
+        io.delta_time = max(now - self._time, LEAST_STEP)
+        self._time = now
+        if not self._is_pointer_inside and any(
+            glfw.get_mouse_button(self._handle, button) for button in BUTTONS
+        ):  # to ImGui it is nowhere, but a stroke goes on there
+            io.add_mouse_pos_event(*glfw.get_cursor_pos(self._handle))
+
+    def _take_pointer(self, _window: object, is_inside: int) -> None:
+        self._is_pointer_inside = bool(is_inside)
+
+    def _take_size(self, _window: object, width: int, height: int) -> None:
+        self.size = (width, height)
+
+    def _take_pixels(self, _window: object, width: int, height: int) -> None:
+        self.pixels = (width, height)

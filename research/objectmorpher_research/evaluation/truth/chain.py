@@ -17,7 +17,6 @@ from objectmorpher_core.compose.composite import (
 )
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.joining import Shadow
 from objectmorpher_core.document.model import (
     LEAST_THICKNESS,
     DeformSettings,
@@ -30,9 +29,10 @@ from objectmorpher_core.document.model import (
     Pose,
     Prompt,
 )
+from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, open_photo
-from objectmorpher_core.scripting.left_behind import with_plate
+from objectmorpher_core.scripting.runner import with_plate
 from objectmorpher_core.scripting.script import EditScript
 
 from .cases import Case, Guidance
@@ -136,7 +136,7 @@ class Chain:
 
     def _plate(self, document: Document) -> tuple[Plate, Shadow]:
         """What is behind the object, and the shadow that it takes along."""
-        from objectmorpher_core.scripting.left_behind import has_left
+        from objectmorpher_core.scripting.runner import has_left
 
         item = document.objects[0]
         leaves = has_left(item)

@@ -10,10 +10,10 @@ from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import REFINEMENT, layers
 from objectmorpher_core.compose.refine import RefineError, refinement
-from objectmorpher_core.document import edits, refine_edits
-from objectmorpher_core.document.joining import Shadow
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
-from objectmorpher_core.scripting.refining import coarse_edit
+from objectmorpher_core.document.settings import Shadow
+from objectmorpher_core.scripting.runner import coarse_edit
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
@@ -45,7 +45,7 @@ def edited():
 
 def refined(document, strength=1.0, seed=0):
     made = refinement.refine(coarse_edit(document), Dimming(), silent, seed, strength)
-    return refine_edits.set_refined(document, made)
+    return edits.set_refined(document, made)
 
 
 def test_it_changes_the_footprint_and_no_pixel_outside():
@@ -106,13 +106,13 @@ def test_it_goes_with_what_it_showed_and_only_then():
     }
     assert [name for name, after in changes.items() if after.refined is not None] == []
     assert ("refine", "dimming") in document.backends
-    assert dict(refine_edits.set_refined(document, None).backends).get("refine") is None
+    assert dict(edits.set_refined(document, None).backends).get("refine") is None
     with pytest.raises(edits.EditError, match="not between 0 and 1"):
-        refine_edits.set_strength(document, 1.5)
+        edits.set_strength(document, 1.5)
 
 
 def test_a_session_keeps_it_to_the_byte():
-    document = refine_edits.set_strength(refined(edited()), 0.7)
+    document = edits.set_strength(refined(edited()), 0.7)
     again = decode_session(encode_session(document))
     kept, was = again.refined, document.refined
     assert kept.box == was.box and kept.strength == 0.7 and kept.backend == "dimming"
@@ -133,8 +133,8 @@ def test_it_is_the_topmost_layer_and_the_pile_is_the_export():
 
 
 def test_every_backend_is_known_to_scripts():
+    from objectmorpher_core.scripting.runner import refuse_missing
     from objectmorpher_core.scripting.script import EditScript, ScriptError
-    from objectmorpher_core.scripting.scripted import refuse_missing
 
     for name in refine.BACKENDS:
         if refine.missing(name) is not None:

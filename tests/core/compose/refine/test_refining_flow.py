@@ -23,11 +23,11 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.refine import RefineError, klein
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
-from objectmorpher_core.document import edits, refine_edits
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.models import device
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.scripting.refining import Refining, coarse_edit
+from objectmorpher_core.scripting.runner import Refining, coarse_edit
 from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
@@ -64,7 +64,7 @@ def test_the_job_refines_the_edit_and_the_export_shows_it():
     assert (made.backend, made.seed, made.strength) == ("klein", 2, 0.5)
     shares = [share for share, _ in told]
     assert shares == sorted(shares) and any("step 2 of 2" in note for _, note in told)
-    before, after = composite(bare), composite(refine_edits.set_refined(bare, made))
+    before, after = composite(bare), composite(edits.set_refined(bare, made))
     assert not np.array_equal(after.pixels, before.pixels)
     outside = ~before.footprint
     assert np.array_equal(after.pixels[outside], before.pixels[outside])

@@ -19,9 +19,9 @@ from objectmorpher_core.lift.trellis.camera import view
 from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
 from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter, pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
+from objectmorpher_core.lift.trellis.latent import looked_up
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
 from objectmorpher_core.lift.trellis.picture import Picture
-from objectmorpher_core.lift.trellis.views import looked_up
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte

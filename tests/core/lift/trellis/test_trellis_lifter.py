@@ -1,4 +1,4 @@
-"""From a photo and a mask to a registered object, with a tiny TRELLIS of random weights."""
+"""From a photo and a mask to a registered object, with a tiny TRELLIS of random configs."""
 
 # ruff: noqa: E402 (nothing that needs torch can be imported before the skip)
 from __future__ import annotations
@@ -18,8 +18,8 @@ from safetensors.torch import load_file, save_file
 from objectmorpher_core import lift
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
+from objectmorpher_core.lift.trellis import configs
 from objectmorpher_core.lift.trellis import generator as generators
-from objectmorpher_core.lift.trellis import weights
 from objectmorpher_core.lift.trellis.generator import Generator, unseen
 from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
 from objectmorpher_core.lift.trellis.parts import build
@@ -195,13 +195,13 @@ def test_missing_weights_are_one_sentence_that_says_how_to_get_them(tmp_path, mo
         lift.load("trellis")
     for told in ("models get trellis-image-large", "models add trellis FOLDER", "MIT", "GB"):
         assert told in str(error.value)
-    tiny_trellis.write_model(weights.weights_folder(weights.TRELLIS))
+    tiny_trellis.write_model(configs.weights_folder(configs.TRELLIS))
     with pytest.raises(LiftError, match="dinov2-with-registers-large"):
         lift.load("trellis")
-    tiny_trellis.write_encoder(weights.weights_folder(weights.ENCODER))
+    tiny_trellis.write_encoder(configs.weights_folder(configs.ENCODER))
     assert lift.load("trellis").name == "trellis"
 
 
 def test_missing_packages_are_one_sentence(monkeypatch):
-    monkeypatch.setattr(weights, "PACKAGES", ("torch", "no_such_package"))
+    monkeypatch.setattr(configs, "PACKAGES", ("torch", "no_such_package"))
     assert "no_such_package is not installed: pip install" in (TrellisLifter().missing() or "")

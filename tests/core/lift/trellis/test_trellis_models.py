@@ -14,7 +14,7 @@ pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 
 from objectmorpher_core import lift, models
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.trellis import lifter, weights
+from objectmorpher_core.lift.trellis import configs, lifter
 from objectmorpher_core.models import device
 from tests.core.lift.trellis import tiny_trellis
 from tests.core.models.local_hub import serving
@@ -33,21 +33,21 @@ def cache(tmp_path, monkeypatch):
 
 
 def test_folders_of_the_users_are_found_by_the_lifter(tiny):
-    assert models.use_folder("trellis", tiny[0]).model.id == weights.TRELLIS
-    models.use_folder(weights.ENCODER, tiny[1])
+    assert models.use_folder("trellis", tiny[0]).model.id == configs.TRELLIS
+    models.use_folder(configs.ENCODER, tiny[1])
     assert lift.load("trellis").name == "trellis"
-    assert weights.weights_folder(weights.TRELLIS) == tiny[0]
+    assert configs.weights_folder(configs.TRELLIS) == tiny[0]
 
 
 def test_a_folder_that_was_linked_by_hand_is_found_as_before(tiny):
     models.folder().mkdir(parents=True)
-    for id, at in zip((weights.TRELLIS, weights.ENCODER), tiny, strict=True):
+    for id, at in zip((configs.TRELLIS, configs.ENCODER), tiny, strict=True):
         (models.folder() / id).symlink_to(at)
     assert lift.load("trellis").name == "trellis"
 
 
 def test_they_are_got_from_the_hub_without_the_parts_for_meshes(tiny, monkeypatch):
-    model = models.hub_model(weights.TRELLIS)
+    model = models.hub_model(configs.TRELLIS)
     files = {
         "pipeline.json": (tiny[0] / "pipeline.json").read_bytes(),
         "ckpts/slat_dec_mesh_x.safetensors": b"not wanted",
@@ -97,7 +97,7 @@ def test_a_folder_of_no_use_is_one_sentence_and_nothing_has_changed(tiny, tmp_pa
     damaged(copy, how)
     with pytest.raises(models.ModelError, match=sentence):
         models.use_folder("trellis", copy)
-    assert models.look_hub(weights.TRELLIS).state == "missing"
+    assert models.look_hub(configs.TRELLIS).state == "missing"
 
 
 def test_a_file_that_is_cut_off_later_is_said_before_it_is_opened(tiny, tmp_path):

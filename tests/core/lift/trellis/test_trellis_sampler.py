@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch", reason="TRELLIS needs torch")
 
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift.trellis.configs import Sampling
-from objectmorpher_core.lift.trellis.sampler import sample, times
+from objectmorpher_core.lift.trellis.generator import sample, times
 
 F32 = 1e-5
 NOISE = torch.linspace(-1, 1, 12).reshape(2, 6)

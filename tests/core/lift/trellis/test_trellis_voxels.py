@@ -9,8 +9,8 @@ torch = pytest.importorskip("torch", reason="TRELLIS needs torch")
 
 from torch.nn import functional
 
-from objectmorpher_core.lift.trellis import attention
-from objectmorpher_core.lift.trellis.attention import attend, attend_in_windows
+from objectmorpher_core.lift.trellis import blocks
+from objectmorpher_core.lift.trellis.blocks import attend, attend_in_windows
 from objectmorpher_core.lift.trellis.latent import Kernel
 from objectmorpher_core.lift.trellis.voxels import Voxels, pooled
 
@@ -85,7 +85,7 @@ def test_attention_in_portions_is_attention(monkeypatch):
     q, k, v = torch.randn(3, 2, 37, 4, 8)
     is_key = torch.rand(2, 37) < 0.5
     whole = attend(q, k, v), attend(q, k, v, is_key)
-    monkeypatch.setattr(attention, "SCORES", 2 * 4 * 37 * 5)  # five queries at a time
+    monkeypatch.setattr(blocks, "SCORES", 2 * 4 * 37 * 5)  # five queries at a time
     for found, expected in zip((attend(q, k, v), attend(q, k, v, is_key)), whole, strict=True):
         assert torch.allclose(found, expected, atol=F32)
 

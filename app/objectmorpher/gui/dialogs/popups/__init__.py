@@ -12,8 +12,7 @@ from ....editor.shortcuts import Shortcuts
 from ....editor.view import Popup
 from ...widgets.fade import fades
 from .about import draw_about
-from .compute import ComputeFields
-from .preferences import draw_preferences
+from .preferences import ComputeFields, draw_preferences
 from .shortcuts import ShortcutsPopup
 
 LEAST = 0.01  # opacity: ImGui takes no input for what cannot be seen at all

@@ -1,35 +1,45 @@
-"""What a script says about an object that is lifted: handles, pose, place, light, copies, order."""
+"""The runner: carries out a script on a document, step by step."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import compose, lift, segment
-from ..base.progress import Progress
+from ..base.progress import Progress, part, silent
 from ..compose import refine
-from ..compose.composite import object_texture
+from ..compose.composite import composite, object_texture
 from ..compose.order import reordered
+from ..compose.plate.plate import build_plate, plate_cover
+from ..compose.refine import refinement
+from ..compose.refine.refinement import CoarseEdit
+from ..compose.shadow.old_reflection import OldReflection
+from ..compose.shadow.old_shadow import OldShadow, traceless_plate
+from ..compose.shadow.old_traces import find_old_traces
 from ..deform.puppet import Puppet, puppet_of
 from ..document import edits
-from ..document.joining import Shadow
 from ..document.model import (
     GAUSSIANS,
     Click,
     DeformSettings,
     Document,
+    EditObject,
     LiftSettings,
+    Matte,
     Placement,
     Prompt,
 )
+from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
 from .report import Stopwatch
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
+
+# What a script says about an object that is lifted: handles, pose, place, light, copies, order.
 
 
 def refuse_missing(script: EditScript, others: Others = ALONE) -> None:
@@ -237,3 +247,98 @@ def ordered(document: Document, others: Others) -> Document:
         for k, item in enumerate(document.objects)
     )
     return replace(document, objects=objects)
+
+
+# What a script's objects leave behind: the plate of all, their old shadows and reflections.
+
+USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
+
+
+def with_plate(
+    document: Document,
+    script: EditScript,
+    casting: frozenset[int],
+    progress: Progress,
+) -> Document:
+    """The document with what is behind all its objects, filled in as the script's hints say.
+
+    Those of the numbers in `casting` take their own shadow along.
+
+    An object that has left its place takes its shadow off the ground, where that is sure. It, and
+    every copy of it that is elsewhere, throws one like it. Its reflection goes, and none is drawn.
+    """
+    document = edits.set_hints(document, _hints(script, document.photo.size))
+    covered, pixels = plate_cover(document), document.photo.pixels
+    gone: list[OldShadow | OldReflection] = []
+    for matte in _distinct(document, casting):
+        alike = [k for k in casting if document.objects[k].matte is matte]
+        old = find_old_traces(pixels, matte, covered)
+        for k in alike:
+            if old.shadow is not None and document.objects[k].is_visible:
+                document = edits.set_shadow(document, k, old.shadow.shadow)
+        if not any(o.matte is matte and not has_left(o) for o in document.objects):
+            gone += old.found
+    inpainter = compose.load(script.inpaint)
+    if gone:
+        plate = traceless_plate(
+            pixels, covered, gone, inpainter, progress, script.seed, document.hints
+        )
+    else:
+        plate = build_plate(pixels, covered, inpainter, progress, script.seed, document.hints)
+    return edits.set_plate(document, plate)
+
+
+def has_left(item: EditObject) -> bool:
+    """Whether it is not where its shadow in the photo is: turned and bent it still stands there."""
+    place = item.placement
+    return not item.is_visible or place.move != (0, 0) or place.depth != 0 or place.scale != 1
+
+
+def _hints(script: EditScript, size: tuple[int, int]) -> tuple[Hint, ...]:
+    """From where the script has the background filled in, of a photo of `size` (w, h) px."""
+    usual = USUAL_HINT * float(np.hypot(*size))
+    return tuple(
+        Hint(fill.source, fill.to, usual if fill.radius is None else fill.radius)
+        for fill in script.fill_from
+    )
+
+
+def _distinct(document: Document, casting: frozenset[int]) -> list[Matte]:
+    """Their mattes, each once: copies share theirs."""
+    found: dict[int, Matte] = {}
+    for k in sorted(casting):
+        if (matte := document.objects[k].matte) is not None:
+            found.setdefault(id(matte), matte)
+    return list(found.values())
+
+
+# An edit refined by a network: the composite made, what is to be seen of it cut out, handed over.
+
+
+@dataclass(frozen=True)
+class Refining:
+    """How an edit is to be refined."""
+
+    backend: str
+    seed: int = 0
+    strength: float = 1.0  # in [0, 1]
+
+
+def coarse_edit(
+    document: Document, progress: Progress = silent, puppets: dict[int, Puppet] | None = None
+) -> CoarseEdit:
+    """What of the edit a refiner sees. Raises RefineError where nothing was edited."""
+    bare = replace(document, refined=None)
+    result = composite(bare, puppets, progress, keeps_weights=True)
+    return refinement.cut_edit(document.photo.pixels, result)
+
+
+def with_refinement(
+    document: Document, how: Refining, progress: Progress, puppets: dict[int, Puppet]
+) -> Document:
+    """`document` refined. Raises RefineError or ModelError."""
+    refiner = refine.load(how.backend)
+    edit = coarse_edit(document, part(progress, 0.0, 0.05), puppets)
+    rest = part(progress, 0.05, 1.0)
+    made = refinement.refine(edit, refiner, rest, how.seed, how.strength)
+    return edits.set_refined(document, made)

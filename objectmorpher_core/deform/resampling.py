@@ -1,23 +1,18 @@
-"""Splits Gaussians that a pose stretches too far into several, at rest.
-
-A Gaussian drawn out to a long ellipse is moved as one piece and smears its colour along it.
-Where F stretches its plane by more than a limit, k smaller ones are laid along the direction at
-rest that is stretched most; each then follows the motion of its own place. With l the standard
-deviation along that direction and the others given, k pieces of equal weight, sd s and h s apart
-have together the mean and the covariance of the original if
-
-    s^2 + (h s)^2 (k^2 - 1) / 12 = l^2.
-"""
+"""Gaussians at rest, split where a pose stretches them too far, or thinned for a quick picture."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F64, I32
+from ..base.arrays import F64, I32, frozen
+from ..base.poisson_disk import thin_to_spacing
 from ..base.rotations import matrices_from_quats
 from ..document.gaussians import Gaussians
+from ..document.model import LiftedObject, PhotoTexture
+
+# Splits Gaussians that a pose stretches too far into several, at rest.
 
 MOST_STRETCH = 2.0  # a Gaussian of half the resolution: the eye sees the smear from here on
 MOST_PIECES = 8
@@ -98,3 +93,38 @@ def _pieces(
     w, x, y, z = quats.T
     turned = np.stack([a * w - b * z, a * x + b * y, a * y - b * x, a * z + b * w], axis=1)
     return means, turned, np.stack([np.sqrt(large), np.sqrt(small), scales[:, 2]], axis=1)
+
+
+# Fewer, wider Gaussians that stand for all of an object where its picture must be quick.
+
+LEAST_GAIN = 1.2  # x spacing: with less, thinning is not worth it
+
+
+def thinned(lifted: LiftedObject, count: int) -> tuple[LiftedObject, I32] | None:
+    """About `count` of the solid Gaussians, so much wider, and which ones; None for a small object.
+
+    The soft edge stays as it is: its Gaussians are few and each is seen by itself.
+    """
+    is_solid = lifted.texture.solidity > 0.5
+    solid = np.flatnonzero(is_solid)
+    gain = float(np.sqrt(len(solid) / count))
+    if gain < LEAST_GAIN:
+        return None
+    points = lifted.gaussians.means[solid].astype(np.float64)
+    normals = lifted.gaussians.normals[solid]
+    # Those that the photo shows are offered first: they have most to tell.
+    order = np.argsort(-lifted.texture.visibility[solid], kind="stable")
+    kept = solid[thin_to_spacing(points, gain * lifted.spacing, order, normals)]
+    chosen = frozen(np.concatenate([kept, np.flatnonzero(~is_solid)]), np.int32)
+    gaussians, texture = lifted.gaussians.select(chosen), lifted.texture
+    gain = float(np.sqrt(len(solid) / len(kept)))  # what the thinning really gave
+    scales = gaussians.scales.copy()
+    scales[: len(kept), :2] *= gain  # along the surface
+    own = PhotoTexture(
+        texture.u0[chosen], texture.visibility[chosen], texture.solidity[chosen]
+    )  # fmt: skip
+    wide = replace(
+        lifted, gaussians=replace(gaussians, scales=scales), texture=own,
+        spacing=gain * lifted.spacing,
+    )  # fmt: skip
+    return wide, chosen

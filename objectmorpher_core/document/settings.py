@@ -1,0 +1,103 @@
+"""What the artist sets about a photo's edit: where the background is filled in from, how moved
+objects join the photo, and what a learned refiner has made of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import F32, U8, Pixels, frozen
+
+# From where the background is to be filled in, as the user says it.
+
+
+@dataclass(frozen=True)
+class Hint:
+    """The background around `to` is to be filled in with what is around `source`."""
+
+    source: tuple[float, float]  # x, y px of the photo
+    to: tuple[float, float]
+    radius: float  # px, of both places
+
+    def __post_init__(self) -> None:
+        if not self.radius > 0:
+            raise ValueError(f"a hint's radius is {self.radius:g} px")
+
+    def moved(self, dx: float, dy: float, scale: tuple[float, float] = (1.0, 1.0)) -> Hint:
+        """The same in px of a picture whose corner is at (-dx, -dy), `scale` across and down."""
+        (a, b), (c, d) = self.source, self.to
+        source = (a + dx) * scale[0], (b + dy) * scale[1]
+        return Hint(source, ((c + dx) * scale[0], (d + dy) * scale[1]), self.radius * min(scale))
+
+
+# How a moved object is joined to the photo, in numbers that the artist chooses.
+
+MOST_SHADOW = 4.0  # x the object's height, length of its shadow
+# Of an object that is harmonised.
+USUAL_HARMONY, USUAL_RELIGHT, USUAL_GRAIN, USUAL_DEFOCUS = 0.8, 0.75, 1.0, 1.0
+LEAST_FEATHER, MOST_FEATHER = 0.25, 3.0  # x the usual width of the blend
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """The soft shadow that a moved object casts on the ground below it, see compose/shadow/shadow.py."""
+
+    strength: float = 0.0  # in [0, 1], of the light that it takes; 0: there is none
+    direction: float = 20.0  # degrees, where it falls: 0 to the right, 90 towards the viewer
+    length: float = 0.6  # x the object's height in the picture
+    softness: float = 0.4  # in [0, 1]: how blurred its far end is
+    contact: float = 0.7  # in [0, 1]: how dark the ground is right below the object
+    colour: tuple[float, float, float] = (0.02, 0.02, 0.04)  # sRGB in [0, 1], near black
+    ground: float | None = None  # degrees above it from which one looks; None: by the horizon
+
+    def check(self) -> None:
+        """Raises ValueError where a number makes no sense."""
+        if self.ground is not None and not 0 <= self.ground <= 90:
+            raise ValueError(f"a ground seen from {self.ground:g} degrees is not 0 to 90 above it")
+        shares = {"strength": self.strength, "softness": self.softness, "contact": self.contact}
+        for name, value in shares.items():
+            if not 0 <= value <= 1:
+                raise ValueError(f"a shadow's {name} of {value:g} is not between 0 and 1")
+        if not 0 <= self.length <= MOST_SHADOW:
+            raise ValueError(f"a shadow's length of {self.length:g} is not 0 to {MOST_SHADOW:g}")
+        if not math.isfinite(self.direction):
+            raise ValueError("a shadow's direction is not a number of degrees")
+        if not all(0 <= channel <= 1 for channel in self.colour):
+            raise ValueError("a shadow's colour is not between 0 and 1")
+
+
+# What a learned refiner has made of an edit, as the document keeps it.
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """The edit as a learned refiner made it look, shown over the composite inside its footprint."""
+
+    left: int  # px, crop's corner in the photo
+    top: int
+    pixels: Pixels  # (h, w, 3) the photo's bit depth
+    alpha: U8  # (h, w) how much of the edit is seen: 0 outside the footprint
+    backend: str
+    seed: int = 0
+    strength: float = 1.0  # in [0, 1], how much of it is shown
+
+    def __post_init__(self) -> None:
+        # What is frozen stays the same array: of another strength it is known by its identity.
+        if self.pixels.flags.writeable:
+            object.__setattr__(self, "pixels", frozen(self.pixels))
+        if self.alpha.flags.writeable:
+            object.__setattr__(self, "alpha", frozen(self.alpha, np.uint8))
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1 px of the crop in the photo."""
+        height, width = self.alpha.shape
+        return self.left, self.top, self.left + width, self.top + height
+
+    @property
+    def weights(self) -> F32:
+        """(h, w) in [0, 1]: how much of it is shown."""
+        return self.alpha.astype(np.float32) * np.float32(self.strength / 255)
