@@ -21,7 +21,7 @@ from pathlib import Path
 
 PACKAGING = Path(__file__).resolve().parent
 ROOT = PACKAGING.parent
-sys.path[:0] = [str(ROOT), str(PACKAGING)]
+sys.path[:0] = [str(ROOT / "app"), str(ROOT), str(PACKAGING)]
 
 import bundled  # noqa: E402
 import licences  # noqa: E402

@@ -17,6 +17,7 @@ import pytest
 import objectmorpher_core as om
 from objectmorpher.cli import parser as cli
 from objectmorpher_core.scripting.script import script_from
+from tests.tree import over
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -34,7 +35,7 @@ def name_of(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
-every_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
+every_page = over("page", PAGES)
 
 
 @cache

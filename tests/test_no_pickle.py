@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
+from tests.tree import over
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("app", "objectmorpher_core", "packaging", "research")
@@ -45,7 +45,7 @@ def uses(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+@over("path", SOURCES)
 def test_no_module_that_runs_what_it_reads_is_imported(path: Path) -> None:
     if name_of(path) in OWN_PIPE:
         return
@@ -57,7 +57,7 @@ def test_no_module_that_runs_what_it_reads_is_imported(path: Path) -> None:
     assert not found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+@over("path", SOURCES)
 def test_numpy_and_torch_read_numbers_only(path: Path) -> None:
     for name, call in calls(path):
         if name in ("np.load", "numpy.load"):
@@ -69,7 +69,7 @@ def test_numpy_and_torch_read_numbers_only(path: Path) -> None:
 
 def test_what_comes_from_the_wire_is_not_the_pipes() -> None:
     """The server's messages are decoded by `message.py`, which knows no pickle."""
-    for path in (ROOT / "app" / "remote").glob("*.py"):
+    for path in (ROOT / "app" / "objectmorpher" / "server").glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         modules = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
         assert not any(m is not None and m.endswith("wire") for m in modules), path.name

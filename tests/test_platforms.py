@@ -13,6 +13,7 @@ import pytest
 
 from objectmorpher_core import models
 from objectmorpher_core.base.files import OutputError, write_all
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -46,7 +47,8 @@ sys.modules["msvcrt"] = msvcrt
 sys.platform = "win32"
 for path in sys.argv[4:]:
     importlib.import_module(path)
-from app import cli, file_lock
+from objectmorpher.cli import parser as cli
+from objectmorpher.system import file_lock
 from pathlib import Path
 photo, session, out = sys.argv[1:4]
 edit = ["edit", photo, "--click", "280,150", "--turn", "15,0,0", "--session", session, "-o", out]
@@ -64,9 +66,11 @@ def test_the_job_is_done_without_what_windows_lacks(tmp_path) -> None:
     photo = ROOT / "assets" / "samples" / "coffee.jpg"
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_POSIX, photo, tmp_path / "s.omorph", tmp_path / "o.png",
-         "objectmorpher.worker.jobs", "objectmorpher.editor.editor", "objectmorpher.editor.recovery", "objectmorpher.editor.autosave", "objectmorpher_core.scripting.report",
+         "objectmorpher.worker.jobs", "objectmorpher.editor.editor",
+         "objectmorpher.editor.recovery",
+         "objectmorpher.editor.autosave", "objectmorpher_core.scripting.report",
          "objectmorpher_core.doctor", "objectmorpher_core.lift.workers.process"],
-        cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": PYTHONPATH},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
 
@@ -151,7 +155,7 @@ def test_a_terminal_without_the_characters_gets_a_sentence(tmp_path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "objectmorpher", "info", "東京の写真.omorph"],
         cwd=tmp_path, capture_output=True,
-        env=os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": PYTHONPATH},
     )  # fmt: skip
     told = done.stderr.decode("cp1252")
     assert done.returncode == 1

@@ -43,10 +43,10 @@ depth a thing turns is not in the photo.
 
 Seven of the solids are meshes of the package pybullet (zlib licence), which are fetched and not
 kept here; the figure, the mug and the box are made by `solids.py`. The thresholds in
-`lift/relief/prism.py` and `lift/relief/standing.py` were chosen while looking at these ten, so they say what the
-method can do rather than what it will do. The network was trained on none of them. The motorcycle
-and the photos below were not used for the silhouette's rules; pictures of theirs are among the
-backgrounds and materials that the network has seen.
+`lift/relief/prism.py` and `lift/relief/standing.py` were chosen while looking at these ten, so they
+say what the method can do rather than what it will do. The network was trained on none of them. The
+motorcycle and the photos below were not used for the silhouette's rules; pictures of theirs are
+among the backgrounds and materials that the network has seen.
 """
 DEPTH = """## Their surfaces
 

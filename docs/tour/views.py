@@ -21,7 +21,10 @@ def make(docs: Path) -> None:
     shutil.copyfile(window, docs / "window.jpg")
     with tempfile.TemporaryDirectory() as folder, x_display(1440, 900) as display:
         assert display is not None, "no free X display was found"
-        environment = os.environ | {"DISPLAY": display, "PYTHONPATH": str(ROOT)}
+        environment = os.environ | {
+            "DISPLAY": display,
+            "PYTHONPATH": f"{ROOT / 'app'}{os.pathsep}{ROOT}",
+        }
         environment["OBJECTMORPHER_SETTINGS"] = f"{folder}/settings.toml"
         session = f"{folder}/edit.omorph"
         edit = ("-m", "objectmorpher", "edit", "--script", EDIT, "-o", f"{folder}/out.png")

@@ -50,7 +50,7 @@ def prepare(inside: Path) -> None:
 def inside() -> Path:
     """The folder of an installer's copy; that of a checkout or wheel elsewhere."""
     named = os.environ.get("OBJECTMORPHER_INSIDE")
-    return Path(named) if named else Path(__file__).parents[1]
+    return Path(named) if named else Path(__file__).parents[2]
 
 
 def build_name(folder: Path) -> str:
@@ -59,16 +59,18 @@ def build_name(folder: Path) -> str:
     A kernel is compiled together with those that it calls: any change of any file may be one of it.
     """
     digest = hashlib.sha256()
-    for path in _sources(folder):
-        name = path.relative_to(folder).as_posix().encode()
+    for name, path in _sources(folder):
         content = path.read_bytes()
         digest.update(b"%d %d " % (len(name), len(content)) + name + content)
     return digest.hexdigest()
 
 
-def _sources(folder: Path) -> Iterator[Path]:
-    for package in ("app", "objectmorpher_core"):
-        yield from sorted((folder / package).rglob("*.py"))
+def _sources(folder: Path) -> Iterator[tuple[bytes, Path]]:
+    """The name and the path of each source; a checkout has one of the packages in `app`."""
+    for package in ("objectmorpher", "objectmorpher_core"):
+        above = folder if (folder / package).is_dir() else folder / "app"
+        for path in sorted((above / package).rglob("*.py")):
+            yield path.relative_to(above).as_posix().encode(), path
 
 
 def written_build(folder: Path) -> str:

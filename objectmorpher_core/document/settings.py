@@ -43,7 +43,7 @@ LEAST_FEATHER, MOST_FEATHER = 0.25, 3.0  # x the usual width of the blend
 
 @dataclass(frozen=True)
 class Shadow:
-    """The soft shadow that a moved object casts on the ground below it, see compose/shadow/shadow.py."""
+    """The soft shadow that a moved object casts on the ground below it (compose/shadow)."""
 
     strength: float = 0.0  # in [0, 1], of the light that it takes; 0: there is none
     direction: float = 20.0  # degrees, where it falls: 0 to the right, 90 towards the viewer

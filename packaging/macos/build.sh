@@ -9,7 +9,7 @@ python3.11 -m venv .make/packaging
 python=.make/packaging/bin/python
 "$python" -m pip install --require-hashes -r packaging/locks/packaging.txt
 "$python" packaging/build.py folder
-version=$("$python" -c 'import app; print(app.__version__)')
+version=$("$python" -c 'import objectmorpher; print(objectmorpher.__version__)')
 bundle=dist/ObjectMorpher.app
 program=$bundle/Contents/MacOS/objectmorpher
 

@@ -10,7 +10,7 @@ py -3.11 -m venv .make\packaging
 $python = ".make\packaging\Scripts\python.exe"
 & $python -m pip install --require-hashes -r packaging\locks\packaging.txt
 & $python packaging\build.py folder
-$version = (& $python -c "import app; print(app.__version__)").Trim()
+$version = (& $python -c "import objectmorpher; print(objectmorpher.__version__)").Trim()
 
 # It starts, computes, and starts processes of its own, before anybody gets it.
 $program = "dist\objectmorpher\objectmorpher.exe"

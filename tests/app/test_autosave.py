@@ -25,6 +25,7 @@ from objectmorpher.editor.settings import Settings
 from objectmorpher_core.document.model import Document, EditObject, Matte, Photo, Placement
 from objectmorpher_core.pictures.image import Picture
 from objectmorpher_core.session.journal import DOCUMENT, read_journal
+from tests.tree import PYTHONPATH
 
 INTERVAL = 0.5  # s, for tests that need not wait for the editor's own
 MOST_LOST = 10.0  # s of work that a crash may cost
@@ -161,7 +162,7 @@ def test_a_disk_that_takes_nothing_is_told_once_and_the_work_goes_on(
 def kill_and_read(tmp_path: Path, seconds: float) -> tuple[Document | None, int, int]:
     """The document that a killed editor has left; its last step, and that of 10 s before."""
     log, data = tmp_path / "log", tmp_path / "data"
-    environment = {**os.environ, "OBJECTMORPHER_DATA": str(data), "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "OBJECTMORPHER_DATA": str(data), "PYTHONPATH": PYTHONPATH}
     command = [sys.executable, str(Path(__file__).parent / "edit_until_killed.py"), str(log)]
     with subprocess.Popen(command, env=environment, cwd=ROOT) as process:
         while not log.exists() or not log.read_text():

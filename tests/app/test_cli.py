@@ -21,6 +21,7 @@ from objectmorpher_core.compose import BACKENDS
 from objectmorpher_core.pictures.image import read_picture
 from objectmorpher_core.scripting.script import EditScript
 from tests import shapes
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[2]
 MASK = shapes.mask("ellipse")
@@ -561,8 +562,9 @@ def test_the_parser_is_built_without_heavy_imports():
 
 def test_the_program_runs_as_a_module(folder):
     told = subprocess.run(
-        [sys.executable, "-m", "objectmorpher", *EDIT, *TURN], cwd=folder, capture_output=True, text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
+        [sys.executable, "-m", "objectmorpher", *EDIT, *TURN], cwd=folder, capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": PYTHONPATH}, check=False,
     )  # fmt: skip
     assert (told.returncode, told.stderr) == (0, "")
     assert Path("out.png").exists()
@@ -571,7 +573,7 @@ def test_the_program_runs_as_a_module(folder):
 def test_a_failing_program_exits_with_a_code_and_a_sentence(folder):
     told = subprocess.run(
         [sys.executable, "-m", "objectmorpher", "edit", "none.png", *EDIT[2:]], cwd=folder,
-        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": PYTHONPATH}, check=False,
     )  # fmt: skip
     assert told.returncode == cli.FAILED
     assert told.stderr == "objectmorpher: none.png does not exist\n"

@@ -25,7 +25,8 @@ else:
     opening.join()
     from objectmorpher_core.segment import dino_tokens
     print("opened", dino_tokens._opened.cache_info().currsize)
-    print(any(name in sys.modules for name in ("objectmorpher_core.pipeline", "objectmorpher.cli.commands")))
+    later = ("objectmorpher_core.pipeline", "objectmorpher.cli.commands")
+    print(any(name in sys.modules for name in later))
 """
 
 

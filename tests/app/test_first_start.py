@@ -11,6 +11,7 @@ import pytest
 
 from objectmorpher.system.first_start import mark_compiled, needs_compiling, start_compiling
 from objectmorpher_core.base import installation
+from tests.tree import PYTHONPATH
 
 # A copy as an installer's: a small kernel of its own, under the settings that such a copy has.
 KERNEL = """
@@ -23,7 +24,7 @@ def twice(x):
 START = """
 import sys
 from pathlib import Path
-from objectmorpher_core import installation
+from objectmorpher_core.base import installation
 folder = Path(sys.argv[1])
 installation.prepare(folder)
 sys.path.insert(0, str(folder))
@@ -47,7 +48,7 @@ def run(folder: Path, kernels: Path) -> tuple[int, int]:
     """What its kernel computes, and how many kernels came from the disk."""
     done = subprocess.run(
         [sys.executable, "-c", START, folder], capture_output=True, text=True, check=True,
-        env=os.environ | {installation.KERNELS: str(kernels), "PYTHONPATH": str(ROOT)},
+        env=os.environ | {installation.KERNELS: str(kernels), "PYTHONPATH": PYTHONPATH},
     )  # fmt: skip
     value, hits = done.stdout.split()
     return int(value), int(hits)
@@ -88,7 +89,7 @@ def test_a_checkout_compiles_nothing_by_itself() -> None:
 
 @pytest.mark.parametrize("change", ["content", "name"])
 def test_the_name_of_a_build_is_of_all_its_sources(tmp_path, change: str) -> None:
-    for package in ("app", "objectmorpher_core"):
+    for package in ("objectmorpher", "objectmorpher_core"):
         (tmp_path / package).mkdir()
         (tmp_path / package / "one.py").write_text("a = 1\n", encoding="utf-8")
     before = installation.build_name(tmp_path)

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tree import PYTHONPATH
+
 ROOT = Path(__file__).parents[2]
 CODE = """
 import logging, sys
@@ -69,7 +71,7 @@ def test_a_fault_of_native_code_is_noted(tmp_path: Path, where: str) -> None:
     program.write_text(FAULT, encoding="utf-8")
     command = [sys.executable, str(program), str(tmp_path), where]
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONFAULTHANDLER"}
-    environment["PYTHONPATH"] = str(ROOT)
+    environment["PYTHONPATH"] = PYTHONPATH
     ended = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True)
     assert (ended.returncode != 0) == (where == "here")
     noted = (tmp_path / "objectmorpher-crashes.log").read_text()

@@ -13,6 +13,7 @@ from conftest import PATIENCE
 from hands import ROOT
 from objectmorpher.editor.settings import AUTO, read_settings
 from objectmorpher.system.motion import FULL, REDUCED, Motion
+from tests.tree import PYTHONPATH
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads GNOME's setting")
@@ -50,7 +51,7 @@ def moving(environment: dict[str, str], motion: str) -> dict[str, int]:
     """How many pictures of the real window differ after each action."""
     program = str(Path(__file__).parent / "shoot_motion.py")
     result = subprocess.run(
-        [sys.executable, program, motion], env={**environment, "PYTHONPATH": str(ROOT)},
+        [sys.executable, program, motion], env={**environment, "PYTHONPATH": PYTHONPATH},
         capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr

@@ -55,7 +55,7 @@ def environment(home: Path) -> dict[str, str]:
     """As a desktop has it: without what machines of CI set, which keeps some libraries silent."""
     own = {
         "PATH": os.environ["PATH"], "HOME": str(home), "OPENBLAS_NUM_THREADS": "1",
-        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "app")]),
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "app"), str(ROOT), str(ROOT / "tests" / "app")]),
     }  # fmt: skip
     if "NUMBA_CACHE_DIR" in os.environ:
         own["NUMBA_CACHE_DIR"] = os.environ["NUMBA_CACHE_DIR"]

@@ -13,6 +13,7 @@ from objectmorpher.cli import parser as cli
 from objectmorpher.system.logs import CRASHES, NAME
 from objectmorpher.system.report import report, without_names
 from objectmorpher_core.pictures.image import read_picture
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[2]
 SECRETS = ("anna", "Anna", "Kowalska", "wedding", "holiday", "clinic")
@@ -79,7 +80,7 @@ def test_real_tracebacks_keep_their_lines_and_lose_their_names(
 CRASH = """
 import os, sys
 from pathlib import Path
-from app import cli
+from objectmorpher.cli import parser as cli
 from objectmorpher.system.logs import start_log
 start_log(Path(sys.argv[1]))
 os.abort()
@@ -96,7 +97,7 @@ def test_a_crash_is_in_the_report_with_the_folder_as_home(
     monkeypatch.setenv("HOME", str(home))
     monkeypatch.setenv("USERPROFILE", str(home))
     monkeypatch.delenv("PYTHONFAULTHANDLER", raising=False)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
     subprocess.run([sys.executable, str(program), str(home / "log")], capture_output=True)
     assert str(home) in (home / "log" / CRASHES).read_text()
     told = report(home / "log")

@@ -22,6 +22,7 @@ from conftest import PATIENCE
 from hands import ROOT, Hands, opened
 from objectmorpher_core.session.file import save_session
 from shoot_views import NAMES, made_document
+from tests.tree import PYTHONPATH
 
 pytestmark = pytest.mark.window
 
@@ -40,7 +41,7 @@ def shoot(environment: dict[str, str], out: Path, renderer: str) -> None:
     command = [sys.executable, str(Path(__file__).parent / "shoot_views.py"), str(out)]
     result = subprocess.run(
         [*command, "--renderer", renderer],
-        env={**environment, "PYTHONPATH": str(ROOT)},
+        env={**environment, "PYTHONPATH": PYTHONPATH},
         capture_output=True, text=True, timeout=3 * PATIENCE, cwd=ROOT,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from tests.tree import PYTHONPATH
+
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.slow
 def test_after_the_warm_up_neither_an_import_nor_a_lift_compiles_anything(tmp_path: Path) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    environment |= {"PYTHONPATH": str(ROOT)}
+    environment |= {"PYTHONPATH": PYTHONPATH}
 
     def run(*command: str) -> set[str]:
         """The kernels on the disk afterwards: a file for each mixture of types."""

@@ -315,7 +315,7 @@ def _fill_from(text: str) -> dict[str, Any]:
 def _command(
     name: str, help: str, add_options: Callable[[argparse.ArgumentParser], None]
 ) -> Subcommand:
-    run = lazily("cli_commands", f"run_{name.replace('-', '_')}")
+    run = lazily("commands", f"run_{name.replace('-', '_')}")
     return Subcommand(name, help, add_options, run)
 
 
@@ -339,7 +339,7 @@ SUBCOMMANDS = (
     _on_photo("edit", "edit a photo without a window", _add_edit),
     Subcommand(
         "batch", "run many edit scripts, whatever becomes of each", _add_batch,
-        lazily("cli_batch", "run_batch"),
+        lazily("batch", "run_batch"),
     ),
     _on_photo("select", "write the mask of the chosen object", _add_select),
     _command("replay", "render a saved session again", _add_replay),
@@ -347,16 +347,16 @@ SUBCOMMANDS = (
     _command("convert", "turn splat and mesh files into each other", _add_convert),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
-        lazily("cli_models", "run_models"),
+        lazily("models", "run_models"),
     ),
     Subcommand(
         "doctor", "what runs here, and what would help", _add_doctor,
-        lazily("cli_doctor", "run_doctor"),
+        lazily("doctor", "run_doctor"),
     ),
     _command("warm-up", "compile the kernels now, not when needed", _add_warm_up),
     Subcommand(
-        "serve", "compute for the windows of other computers", lazily("cli_serve", "add_serve"),
-        lazily("cli_serve", "run_serve"),
+        "serve", "compute for the windows of other computers", lazily("serve", "add_serve"),
+        lazily("serve", "run_serve"),
     ),
 )  # fmt: skip
 COMMANDS = (*(subcommand.name for subcommand in SUBCOMMANDS), *RESEARCH)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+HERE = __name__.rpartition(".")[0]
 GROUP = "objectmorpher.commands"  # of entry points, each a Subcommand
 RESEARCH = ("bench", "train", "evaluate")  # commands of research/, which is installed apart
 
@@ -34,7 +35,7 @@ def add_subcommands(
             word.set_defaults(run=subcommand.run)
 
 
-def lazily(module: str, function: str, package: str = __package__) -> Callable[[Any], None]:
+def lazily(module: str, function: str, package: str = HERE) -> Callable[[Any], None]:
     """A function of a module in `package`, imported when it is called: `--help` stays instant."""
 
     def call(argument: Any) -> None:

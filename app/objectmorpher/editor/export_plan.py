@@ -22,7 +22,7 @@ class What(Enum):
 
 
 class Motion(Enum):
-    """What a video shows; the names are those of `objectmorpher_core.scripting.animation.MOTIONS`."""
+    """What a video shows, named as in `objectmorpher_core.scripting.animation.MOTIONS`."""
 
     MORPH = "Photo to edit"
     SWAY = "Sway"

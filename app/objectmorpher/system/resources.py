@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parents[1]
+CHECKOUT = PACKAGE.parents[1]
 
 
 def resource(name: str) -> Path:
     """The file or folder called `name`, such as "shaders/splat.vert".
 
-    A wheel carries it inside this package, a checkout beside it. Raises FileNotFoundError.
+    A wheel holds it inside the package, a checkout at its root. Raises FileNotFoundError.
     """
-    for folder in (PACKAGE, PACKAGE.parent):
+    for folder in (PACKAGE, CHECKOUT):
         path = folder / name
         if path.exists():
             return path

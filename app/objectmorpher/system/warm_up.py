@@ -1,4 +1,7 @@
-"""Compiles what the editor uses, so that nobody waits for it: `python -m objectmorpher.system.warm_up`."""
+"""Compile what the editor uses, so that nobody waits for it later.
+
+Run it as `python -m objectmorpher.system.warm_up`.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 log = logging.getLogger(__name__)
 
-OURS = ("app", "objectmorpher_core")  # packages
+OURS = ("objectmorpher", "objectmorpher_core")  # packages
 # What the system says of a wrong request: no other try makes it right.
 LASTING = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL)
 

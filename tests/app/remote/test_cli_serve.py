@@ -54,7 +54,8 @@ def test_it_makes_a_token_serves_this_computer_only_and_ends_when_asked(tmp_path
     path = tmp_path / "token"
     environment = {k: v for k, v in os.environ.items() if k != "OBJECTMORPHER_TOKEN"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "objectmorpher", "serve", "--alone", "--port", "0", "--stages", "inpaint",
+        [sys.executable, "-m", "objectmorpher", "serve", "--alone", "--port", "0",
+         "--stages", "inpaint",
          "--token-file", str(path)],
         cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import pytest
 from tests.core.models.small_networks import brightness
 from tests.faults import network
 from tests.faults.tracer import missing
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[3]
 FIRST_THAT_TELLS = (1, 29)  # of onnxruntime's versions
@@ -39,7 +40,7 @@ def run(code: str, home: Path, **more: str) -> tuple[list[str], list[network.Att
     net = home.parent / "net.onnx"
     net.write_bytes(brightness())
     home.mkdir()
-    environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(ROOT)}
+    environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": PYTHONPATH}
     environment |= {"XDG_CACHE_HOME": str(home / "cache"), **more}
     command = [sys.executable, "-c", code, str(net)]
     status, said, tried = network.run(command, home, environment)
