@@ -69,7 +69,7 @@ def test_the_research_package_is_apart(installed, tmp_path):
     """The wheel holds none of it, does not list its commands, and says how to get them."""
     files = run(installed / "python", "-m", "pip", "show", "--files", "objectmorpher", cwd=tmp_path)
     files = files.partition("Files:")[2]
-    assert "app/objectmorpher/cli/parser.py" in files and "research" not in files
+    assert "objectmorpher/cli/parser.py" in files and "research" not in files
     assert "evaluate" not in run(installed / "objectmorpher", "--help", cwd=tmp_path)
     done = subprocess.run(
         [installed / "objectmorpher", "bench", "deform"], cwd=tmp_path, env=clean(),
