@@ -28,6 +28,7 @@ from .editing.computing import Computing
 from .editing.exporting import Exporting
 from .editing.handle_numbers import HandleNumbers
 from .editing.hinting import Hinting
+from .editing.landing import Landing
 from .editing.looking import Looking
 from .editing.masking import Masking
 from .editing.methods import Methods
@@ -47,6 +48,7 @@ from .job_error import JobError
 from .job_functions import WARM
 from .jobs import RELUCTANCE, Jobs
 from .recovery import Recovery
+from .refits import Refits
 from .settings import Settings
 from .shape import Shapes
 from .tasks import SELECT, Tasks
@@ -66,7 +68,7 @@ class Editor:
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
         self.autosave, self.recovery = Autosave(self), Recovery(self)
-        self.tasks = Tasks(self)
+        self.tasks, self.refits = Tasks(self), Refits(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.masking, self.shaping = Masking(self), Shaping(self)
@@ -76,6 +78,7 @@ class Editor:
         self.composing, self.looking = Composing(self), Looking(self)
         self.methods, self.computing = Methods(self), Computing(self)
         self.hinting, self.refining = Hinting(self), Refining(self)
+        self.landing = Landing(self)
         self.candidates = Candidates(self)
         self.closer_look = CloserLook(self)
         self.derived = self._nothing_derived()
@@ -197,6 +200,7 @@ class Editor:
         self.exporting.close()
         self.objects.carried = None
         self.tasks.forget()
+        self.refits.forget()
         self.composing.forget()
         self.hinting.forget()
         self.refining.forget()
@@ -292,6 +296,7 @@ class Editor:
         is_changed = self.chores.poll() or is_changed
         self.tasks.rehearse()
         is_changed = self.tasks.ensure_fronts() or is_changed
+        is_changed = self.refits.ensure() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
         is_changed = self.refining.deliver() or is_changed

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.pipeline import Reading
     from objectmorpher_core.refined import Refined
     from objectmorpher_core.refining import Refining
+    from objectmorpher_core.refitting import Background, Lifted, Refitted
     from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
@@ -149,6 +150,15 @@ def lift(
     progress(0.95, "getting ready to pose")
     rehearse_lift(matte, lifted, cut.camera)  # seconds, once
     return matte, lifted
+
+
+def refit(
+    was: Lifted, scene: Scene, behind: Background | None, seed: int, progress: Progress
+) -> Refitted:
+    """A lifted object whose selection was refined, in its new shape."""
+    from objectmorpher_core.refitting import refit
+
+    return refit(was, scene, behind, progress, seed)
 
 
 def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:

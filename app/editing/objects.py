@@ -42,6 +42,14 @@ class Objects:
         self._editor.hand.abort(self._editor)
         self.take(k)
 
+    def take_up(self, k: int) -> None:
+        """As `choose`, for object `k` that was clicked where it is now."""
+        editor = self._editor
+        self.take(k)
+        if editor.object is not None:
+            editor.say(t("{name} is chosen · Click it again to change its outline",
+                         name=editor.object.name))  # fmt: skip
+
     def take(self, k: int) -> Callable[[], None]:
         """As `choose`, for a stroke in progress; what is returned takes it back."""
         editor = self._editor

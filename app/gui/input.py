@@ -12,6 +12,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from ..commands import next_step, run, take_next_step
+from ..editing.landing import OF_THE_PHOTO
 from ..editor import Editor
 from ..feedback import Hover
 from ..shortcuts import Shortcuts
@@ -164,7 +165,7 @@ class Input:
     def _press(self, editor: Editor, button: Button) -> None:
         """A button goes down at the crosshair."""
         pointer, tool = self.crosshair.pointer(button), TOOLS[editor.view.tool]
-        if editor.view.is_before:
+        if not _is_answered(editor):
             return
         self.shape = tool.hover(editor, pointer)
         editor.message = None
@@ -195,7 +196,7 @@ class Input:
                     stroke = navigate.pan(editor, pressed)
                 elif navigate.is_on_split(editor, pressed):
                     stroke = navigate.drag_split(editor, pressed)
-                elif button is Button.MIDDLE or editor.view.is_before:
+                elif button is Button.MIDDLE or not _is_answered(editor):
                     continue
                 else:
                     editor.message = None
@@ -238,6 +239,11 @@ class Input:
             editor.posing.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))
+
+
+def _is_answered(editor: Editor) -> bool:
+    """Whether a press does anything: on the photo as it was only what selects in it."""
+    return not editor.view.is_before or editor.view.tool in OF_THE_PHOTO
 
 
 @contextmanager

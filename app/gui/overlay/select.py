@@ -25,9 +25,13 @@ def draw_selection(canvas: Canvas) -> None:
     prompt = editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
-        canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
+        if not editor.landing.is_current_moved:
+            canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
     for click in prompt.clicks:
-        _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
+        place = np.array([[click.x, click.y]])
+        if editor.landing.is_current_moved and document is not None and click.is_foreground:
+            place = editor.derived.carried(document, editor.current, place)
+        _draw_click(canvas, canvas.at(place)[0], click.is_foreground)
     if editor.rubber is not None:
         draw_rubber(canvas)
     if editor.selection.path is not None:
@@ -35,11 +39,14 @@ def draw_selection(canvas: Canvas) -> None:
 
 
 def draw_edge(canvas: Canvas) -> None:
-    """The outline of what is selected."""
-    editor = canvas.editor
-    if editor.mask is not None:
-        for outline in editor.derived.contours(editor.mask):
-            canvas.polyline(canvas.at(outline), ACCENT)
+    """The outline of what is selected, where that is seen now."""
+    editor, document = canvas.editor, canvas.editor.document
+    if editor.mask is None or document is None:
+        return
+    for outline in editor.derived.contours(editor.mask):
+        if editor.landing.is_current_moved:
+            outline = editor.derived.carried(document, editor.current, outline)
+        canvas.polyline(canvas.at(outline), ACCENT)
 
 
 def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:

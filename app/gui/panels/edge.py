@@ -71,8 +71,8 @@ def _hint(name: str) -> str:
     return hints.get(name, "")
 
 
-def draw_lift_warning(editor: Editor) -> None:
+def draw_refinement_note(editor: Editor) -> None:
     """What a changed selection means for what is lifted."""
-    if editor.is_lifted:
-        note(t("The photo is shown as it was. If you change the selection, the object will be "
-               "lifted anew; Undo brings shape and pose back."))  # fmt: skip
+    if editor.object is not None and editor.is_lifted:
+        note(t("{name} is in 3D already. Change its outline whenever you like: its shape follows, "
+               "and its pose and place stay.", name=editor.object.name))  # fmt: skip

@@ -10,7 +10,7 @@ from ..segmented import Choice, segmented
 from ..theme import Icon
 from ..widgets import gap, heading, note
 from .brush import draw_brush_fields
-from .edge import draw_command, draw_edge, draw_lift_warning
+from .edge import draw_command, draw_edge, draw_refinement_note
 
 
 def draw_mask(editor: Editor) -> None:
@@ -24,7 +24,7 @@ def draw_mask(editor: Editor) -> None:
         return
     if editor.view.brush.hardness >= 1:
         note(t("A fully hard brush leaves the edge to the photo."))
-    draw_lift_warning(editor)
+    draw_refinement_note(editor)
     gap(12)
     draw_edge(editor)
     gap(12)

@@ -12,7 +12,7 @@ from ..models_dialog import draw_offer
 from ..segmented import Choice, segmented
 from ..theme import Icon
 from ..widgets import checkbox, gap, heading, note, tooltip
-from .edge import draw_command, draw_edge, draw_lift_warning
+from .edge import draw_command, draw_edge, draw_refinement_note
 
 
 def draw_select(editor: Editor) -> None:
@@ -70,7 +70,7 @@ def _draw_facts(editor: Editor) -> None:
             note(t("Right-click what does not belong to the object, then lift it."))
             draw_command(editor, "import_shape")
         _draw_front(editor, editor.object)
-    draw_lift_warning(editor)
+    draw_refinement_note(editor)
     draw_offer(editor)
 
 
