@@ -178,6 +178,7 @@ class Editor:
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
+        self.recovery.offer()
 
     def close(self) -> None:
         """Closes the document, and lets go of what was computed for it: gigabytes, maybe."""
@@ -247,7 +248,7 @@ class Editor:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        text = t("Now after: {label}", label=self.history.label(index))
+        text = t("Back at: {label}", label=self.history.label(index))
         self._travel(partial(self.history.jump, index), text)
 
     def _travel(self, go: Callable[[], None], text: str) -> None:

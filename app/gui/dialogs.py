@@ -18,7 +18,7 @@ from ..opening import OBJECT_ENDINGS
 from ..texts import t
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
-from .modal import modal
+from .modal import is_confirmed, is_dismissed, modal
 from .models_dialog import draw_models
 from .theme import FIELD, PRIMARY, theme
 from .widgets import Kind, button
@@ -103,7 +103,7 @@ class Dialogs:
     def _draw_answers(self, filing: Filing) -> None:
         answer = None
         top = imgui.get_cursor_pos_y()
-        if button(t("Save session"), Kind.PRIMARY, width=132):
+        if button(t("Save session"), Kind.PRIMARY, width=132) or is_confirmed():
             answer = filing.answer_save
         lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()
@@ -112,7 +112,7 @@ class Dialogs:
             answer = filing.answer_discard
         imgui.same_line()
         imgui.set_cursor_pos_y(lower)
-        if button(t("Cancel"), width=104) or imgui.is_key_pressed(imgui.Key.escape):
+        if button(t("Cancel"), width=104) or is_dismissed():
             answer = filing.answer_cancel
         if answer is not None:
             imgui.close_current_popup()

@@ -45,6 +45,7 @@ class Input:
         self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
+        self._has_popup = False  # in the last frame
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
 
     def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
@@ -107,9 +108,12 @@ class Input:
         pressed, self._pressed = self._pressed, []
         if pressed and self._shortcuts.take(pressed[-1]):
             return
-        if imgui.get_io().want_text_input or imgui.is_popup_open("", ANY_POPUP):
+        had_popup, self._has_popup = self._has_popup, imgui.is_popup_open("", ANY_POPUP)
+        if imgui.get_io().want_text_input or self._has_popup:
             editor.view.is_before = False
             return
+        if had_popup:  # ImGui has folded up a list for it already
+            pressed = [keys for keys in pressed if keys != "Escape"]
         editor.view.is_before = editor.document is not None and imgui.is_key_down(imgui.Key.x)
         for keys in pressed:
             if not self.focus.take(editor, keys):

@@ -11,7 +11,7 @@ from ..editor import Editor
 from ..filing import Dialog
 from ..texts import t
 from .hub_rows import draw_hub_rows
-from .modal import PADDING, modal
+from .modal import PADDING, is_dismissed, modal
 from .theme import Icon, theme
 from .widgets import Kind, bold_text, button, gap, half_width, note, rule, tooltip
 from .worker_rows import draw_worker_rows
@@ -35,7 +35,7 @@ def draw_models(editor: Editor) -> None:
         _draw_rows(editor)
         imgui.dummy(theme.size(0, 4))
         imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20 + BUTTON))
-        if button(t("Close"), width=BUTTON) or imgui.is_key_pressed(imgui.Key.escape):
+        if button(t("Close"), width=BUTTON) or is_dismissed():
             editor.models.is_open = False
             imgui.close_current_popup()
 

@@ -34,7 +34,7 @@ from .fade import fades
 from .frame_log import FrameLog
 from .input import HELP, Input
 from .inspector import draw_inspector
-from .layout import Rect, lay_out
+from .layout import Layout, Rect, has_panel, lay_out
 from .menu import draw_menu
 from .overlays import draw_overlays
 from .pictures import pictures
@@ -173,7 +173,7 @@ class Window:
         if self._options.file is not None:
             self.editor.filing.open(self._options.file)
         if self._options.frames is None:
-            self.editor.recovery.look()
+            self.editor.recovery.look(is_shown=self._options.file is None)
             self.editor.models.look()
             self.editor.chores.start(
                 "Getting ready", lambda progress: self._warm_up(), kind="warm up",
@@ -219,10 +219,10 @@ class Window:
         self._input.focus.begin(self.editor, self._shortcuts.recording is not None)
         self._size.begin_frame()
         imgui.new_frame()
-        layout = lay_out(*self._size.size, self.editor.document is not None)
+        layout = self._lay_out()
         self._resize_canvas(layout.canvas, ratio)
         self._input.update(self.editor, layout.canvas, ratio)
-        layout = lay_out(*self._size.size, self.editor.document is not None)
+        layout = self._lay_out()
         draw_menu(self.editor, layout.menu)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
@@ -243,6 +243,11 @@ class Window:
         landmarks.write()
         self._save_settings()
         return True
+
+    def _lay_out(self) -> Layout:
+        view, size = self.editor.view, self._size.size
+        view.has_panel = has_panel(size[0], view.wants_panel)
+        return lay_out(*size, self.editor.document is not None, view.has_panel)
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
@@ -301,6 +306,7 @@ class Window:
         if (name, scale) != self._look:
             self._look = (name, scale)
             looks.apply(name if name in looks.PALETTES else "dark", scale)
+            self._size.forbid_less(*(round(theme.pt(side)) for side in looks.LEAST_SIZE))
 
     def _monitor_scale(self) -> float:
         """Window units per point. Where the framebuffer is finer than the window, 1."""

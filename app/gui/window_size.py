@@ -40,6 +40,11 @@ class WindowSize:
         """Framebuffer px per window unit."""
         return self.pixels[0] / max(self.size[0], 1)
 
+    def forbid_less(self, width: int, height: int) -> None:
+        """Neither side gets shorter than that, window units."""
+        any_size = glfw.DONT_CARE
+        glfw.set_window_size_limits(self._handle, width, height, any_size, any_size)
+
     def begin_frame(self) -> None:
         """Tells ImGui, in place of its backend's own beginning of a frame."""
         io, now = imgui.get_io(), time.perf_counter()
