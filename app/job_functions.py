@@ -309,7 +309,7 @@ def take_shadow(
     from objectmorpher_core.compose.old_shadow import traceless_plate
     from objectmorpher_core.compose.old_traces import find_old_traces
 
-    progress(0.0, "Looking for its shadow and reflection")
+    progress(0.0, "")
     old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
     if not old.found:
         return None

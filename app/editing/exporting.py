@@ -19,7 +19,7 @@ from ..export_plan import (
     is_folder,
 )
 from ..tasks import WRITE
-from ..texts import t
+from ..texts import folder_of, t
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -312,7 +312,8 @@ class Exporting:
         name = plan.path.name
         editor.jobs.start(
             t("Exporting {name}", name=name), write_export, document, plan,
-            done=lambda _: editor.say(t("Exported {name}", name=name)),
+            done=lambda _: editor.say(t("Exported {name} to {folder}", name=name,
+                                        folder=folder_of(plan.path))),
             failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
             kind=f"{WRITE} {plan.path}",
         )  # fmt: skip

@@ -7,6 +7,7 @@ Everywhere else, and everywhere while the photo is shown (X is held), it lands o
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,13 @@ if TYPE_CHECKING:
     from ..editor import Editor
 
 OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that work on the photo as it was
+
+
+class Of(Enum):
+    """What of the edited picture is no object's."""
+
+    PHOTO = "photo"
+    BACKGROUND = "background"  # filled in where an object was
 
 
 class Landing:
@@ -57,6 +65,30 @@ class Landing:
             if editor.derived.surface_at(document, k, editor.view, canvas_xy) is not None:
                 return k if item.is_moved else None
         return None
+
+    def owner_at(self, canvas_xy: np.ndarray) -> int | Of | None:
+        """What canvas px (2,) of the edit belong to: an object, by its index, or `Of`.
+
+        None beside the photo, and where something else than the edit is shown.
+        """
+        editor = self._editor
+        document = editor.document
+        is_shown = self.is_edit_shown and editor.is_on_photo(canvas_xy)
+        if document is None or not is_shown:
+            return None
+        for k in reversed(editor.objects.order()):
+            item = document.objects[k]
+            is_seen = item.lifted is not None and item.is_visible
+            if is_seen and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return k
+        plate = editor.derived.plate(document)
+        if plate is None:
+            return Of.PHOTO
+        column, row = np.floor(editor.view.image_from_canvas(canvas_xy)).astype(int)
+        x0, y0, x1, y1 = plate.box
+        is_inside = x0 <= column < x1 and y0 <= row < y1
+        is_filled = is_inside and plate.hole[row - y0, column - x0]
+        return Of.BACKGROUND if is_filled else Of.PHOTO
 
     def in_photo(self, canvas_xy: np.ndarray) -> F64:
         """Image px (2,) that is meant by canvas px (2,)."""

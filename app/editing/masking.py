@@ -24,7 +24,7 @@ from .. import job_functions
 from ..feedback import Action
 from ..job_error import JobError
 from ..tasks import SELECT, WRITE
-from ..texts import t
+from ..texts import folder_of, t
 from ..tools.pointer import Pointer
 from ..view import ToolName
 
@@ -211,7 +211,8 @@ class Masking:
             editor.jobs.start(
                 t("Exporting {name}", name=path.name), job_functions.write_coverage,
                 selection, path, failed=editor.complain_of, kind=f"{WRITE} {path}",
-                done=lambda _: editor.say(t("Exported {name}", name=path.name)),
+                done=lambda _: editor.say(t("Exported {name} to {folder}", name=path.name,
+                                            folder=folder_of(path))),
             )  # fmt: skip
 
     # Steps

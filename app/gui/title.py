@@ -36,4 +36,8 @@ class Title:
         counted, count = self._changed
         if counted is not document or count == 0:
             return t("edited")
-        return t("edited, about {count} px", count=f"{count:,}")
+        width, height = document.photo.size
+        share = 100 * count / (width * height)
+        if share < 1:
+            return t("edited, less than 1 % of the photo")
+        return t("edited, {share} % of the photo", share=round(share))

@@ -40,7 +40,7 @@ def _draw_worker(editor: Editor, state: WorkerState) -> None:
     if worker is None:
         note(f"{sentence(state.why_not or '')}.")
         return
-    note(t("Licence {licence}", licence=worker.licence or t("not told")))
+    note(t("Licence {licence}", licence=worker.licence or t("unknown")))
     if worker.page:
         note(t("From {source}", source=worker.page.removeprefix("https://")))
     if not worker.is_free:

@@ -37,7 +37,7 @@ class MaskTool:
 
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:
-            return t("Esc takes the stroke back")
+            return t("Esc cancels the stroke")
         painted = editor.view.selecting.painted
         if painted is Painted.DEPTH:
             return t("Drag brings nearer · Right-drag or Alt pushes back · [ ] size")

@@ -23,7 +23,7 @@ def draw_mask(editor: Editor) -> None:
         _draw_shape_facts(editor)
         return
     if editor.view.brush.hardness >= 1:
-        note(t("A fully hard brush leaves the edge to the photo."))
+        note(t("With a fully hard brush the edge follows the photo."))
     draw_refinement_note(editor)
     gap(12)
     draw_edge(editor)
@@ -69,5 +69,5 @@ def _draw_shape_facts(editor: Editor) -> None:
         note(t("Paint on, where something stands before the object: it is completed there, in 3D "
                "and in colour."))  # fmt: skip
     if not editor.is_lifted:
-        note(t("It counts when the object is lifted."))
+        note(t("It takes effect when you lift the object."))
     command_button(editor, "clear_painted")

@@ -33,4 +33,4 @@ def draw_network(editor: Editor) -> None:
     if change.is_done:
         editor.commit(t("Amount of refinement"))
     command_button(editor, "unrefine", width=-1)
-    note(t("It goes as soon as what it shows is changed."))
+    note(t("It is removed as soon as you change the edit."))

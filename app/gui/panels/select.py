@@ -58,7 +58,7 @@ def _draw_facts(editor: Editor) -> None:
     if adds or removes:
         facts.append(t("{adds} added, {removes} removed by click.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:
-        facts.append(t("What you changed by hand stays when you click again."))
+        facts.append(t("What you painted stays when you click again."))
     if facts:
         note(" ".join(facts))
     if mask is None and editor.view.selecting.mode is SelectMode.CLICK:
