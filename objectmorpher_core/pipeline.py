@@ -41,10 +41,9 @@ from .scripting.runner import Refining, has_left, prompt_of, with_plate, with_re
 from .scripting.script import ALONE, EditScript, FurtherObject, Others, ScriptError
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
-from .segment.matting.matte import band_width, build_matte
+from .segment.matting.matte import cut_out
 from .splat_files import COUNT
 
-MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
 NO_CHOICE: dict[str, Any] = dict(click=(), not_click=(), box=None, subject=False, mask=None)
 
 
@@ -102,15 +101,9 @@ def lift_mask(
     """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians."""
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
-    matte = _cut_out(pixels, mask)
+    matte = cut_out(pixels, mask)
     subject = lift.Subject(pixels, camera, is_selected(mask), matte)
     return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
-
-
-def _cut_out(pixels: Pixels, mask: Selection) -> Matte:
-    height, width = mask.shape
-    margin = int(np.ceil(MATTE_MARGIN * band_width(width, height))) + 8
-    return build_matte(pixels, mask, margin)
 
 
 def cut_front(pixels: Pixels, mask: Selection) -> Matte:
@@ -118,7 +111,7 @@ def cut_front(pixels: Pixels, mask: Selection) -> Matte:
 
     Where it is opaque, or short of it by less than shows, it is the photo to the last bit.
     """
-    matte = _cut_out(pixels, mask)
+    matte = cut_out(pixels, mask)
     height, width = mask.shape
     is_whole = matte.alpha >= OPAQUE
     own = unit_pixels(crop(pixels, (0, 0, width, height), matte.box))

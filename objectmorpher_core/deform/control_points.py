@@ -40,6 +40,19 @@ def sample_control_points(means: np.ndarray, opacities: np.ndarray, count: int =
     return candidates[chosen].astype(np.float32)
 
 
+def with_more_points(kept: np.ndarray, means: np.ndarray, gap: float) -> F32:
+    """Control points `kept` (K, 3), and more of `means` (N, 3) where none is within `gap`."""
+    points = [*np.asarray(kept, np.float64)]
+    candidates = np.asarray(means, np.float64)
+    nearest = np.full(len(candidates), np.inf)
+    for point in points:
+        np.minimum(nearest, ((candidates - point) ** 2).sum(1), out=nearest)
+    while len(points) < MAX_COUNT and len(candidates) and nearest.max() > gap**2:
+        points.append(candidates[nearest.argmax()])
+        np.minimum(nearest, ((candidates - points[-1]) ** 2).sum(1), out=nearest)
+    return np.array(points, np.float32).reshape(-1, 3)
+
+
 def _farthest_points(points: F64, start: int, count: int) -> np.ndarray:
     """Indices (<= count,) of points (N, 3), each the farthest from all before; no point twice.
 

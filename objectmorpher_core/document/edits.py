@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import Mask, Selection
 from ..base.camera import Camera
 from .model import (
+    SELECTED,
     DeformSettings,
     Document,
     EditObject,
@@ -35,6 +36,7 @@ from .settings import (
     Shadow,
 )
 
+SAME_THING = 0.15  # IoU of two masks, below which they are of two things
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
 
 
@@ -58,22 +60,26 @@ def remove_object(document: Document, k: int) -> Document:
 
 
 def set_mask(document: Document, k: int, mask: Selection | None, prompt: Prompt) -> Document:
-    """The mask (H, W) of object `k`, bool or soft u8, and what the user said to get it."""
-    return _with_mask(document, k, document.objects[k].with_mask(mask, prompt))
+    """The mask (H, W) of object `k`, bool or soft u8, and what the user said to get it.
+
+    A lifted object whose mask is only refined keeps all that was done to it; its shape is to be
+    refitted. Another mask is a new selection, see `is_refinement`.
+    """
+    return _with_mask(document, k, mask, prompt)
 
 
 def change_mask(document: Document, k: int, mask: Selection) -> Document:
-    """The mask (H, W) of object `k`, bool or soft u8, changed by hand.
+    """The mask (H, W) of object `k`, bool or soft u8, changed by hand; see `set_mask`.
 
     What the prompt had given is kept beside it, so that `answer_prompt` knows what was changed.
     """
     item = document.objects[k]
     found = item.mask if item.found is None and not item.prompt.is_empty else item.found
-    return _with_mask(document, k, item.with_mask(mask, item.prompt, found))
+    return _with_mask(document, k, mask, item.prompt, found)
 
 
 def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Document:
-    """The mask (H, W) that was `found` for the prompt of object `k`.
+    """The mask (H, W) that was `found` for the prompt of object `k`; see `set_mask`.
 
     What was changed by hand since the last answer stays as it is, except where a new click says
     the contrary: the latest word counts.
@@ -84,20 +90,67 @@ def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Do
     if item.found is None or item.mask is None:
         return set_mask(document, k, found, prompt)
     mask, without = corrected(item, found, prompt)
-    return _with_mask(document, k, item.with_mask(mask, prompt, without))
+    return _with_mask(document, k, mask, prompt, without)
 
 
-def _with_mask(document: Document, k: int, changed: EditObject) -> Document:
-    mask = changed.mask
-    if mask is not None:
+def is_refinement(item: EditObject, selection: Selection | None) -> bool:
+    """Whether a selection (H, W) is of the thing that was lifted, or of another one."""
+    if item.lifted is None or item.mask is None or selection is None:
+        return False
+    if selection.shape != item.mask.shape:
+        return False
+    mask = selection if selection.dtype == np.bool_ else selection >= SELECTED
+    shared = np.count_nonzero(mask & item.mask)
+    return shared > SAME_THING * (mask.sum() + item.mask.sum() - shared)
+
+
+def _with_mask(
+    document: Document, k: int, mask: Selection | None, prompt: Prompt, found: Mask | None = None
+) -> Document:
+    item = document.objects[k]
+    is_refined = is_refinement(item, mask)
+    if mask is None or not is_refined:
+        changed = item.with_mask(mask, prompt, found)
+    else:
+        changed = item.with_refined_mask(mask, prompt, found)
+    if changed.mask is not None:
         width, height = document.photo.size
-        if mask.shape != (height, width):
-            raise EditError(f"the mask is {mask.shape}, the photo is {(height, width)}")
-        if not mask.any():
+        if changed.mask.shape != (height, width):
+            raise EditError(f"the mask is {changed.mask.shape}, the photo is {(height, width)}")
+        if not changed.mask.any():
             raise EditError("nothing is selected")
-        if mask.all():
+        if changed.mask.all():
             raise EditError("the object covers the whole photo, there is no background left")
-    return document.with_object(k, changed)
+    if not is_refined:
+        return document.with_object(k, changed)
+    # The plate and the refinement stay, too, until the shape is refitted; copies stay copies.
+    outline = {name: getattr(changed, name) for name in ("mask", "coverage", "shaped")}
+    objects = (replace(o, **outline) if _is_copy(o, item) else o for o in document.objects)
+    document = replace(document, objects=tuple(objects))
+    return replace(
+        document, objects=tuple(changed if i == k else o for i, o in enumerate(document.objects))
+    )
+
+
+def _is_copy(other: EditObject, item: EditObject) -> bool:
+    return other.mask is item.mask and other.lifted is item.lifted
+
+
+def refit(
+    document: Document, k: int, matte: Matte, lifted: LiftedObject, plate: Plate | None
+) -> Document:
+    """Object `k` and its copies in the shape that was refitted to their refined mask.
+
+    Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
+    """
+    from ..lift.carrying import refitted
+
+    item, camera = document.objects[k], document.photo.camera
+    objects = tuple(
+        refitted(other, matte, lifted, camera) if _is_copy(other, item) else other
+        for other in document.objects
+    )
+    return replace(document, objects=objects, plate=plate, refined=None)
 
 
 def set_lifted(

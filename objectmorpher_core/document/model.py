@@ -1,8 +1,9 @@
 """The document: everything that is saved and undone. Immutable; compare parts with `is`.
 
 What a change invalidates is written once, in the `with_*` methods of `EditObject`:
-photo -> everything; mask -> matte, lifted, plate; lifted -> handles, pose. Placement, handles
-and pose invalidate nothing that is stored.
+photo -> everything; another mask -> matte, lifted, plate; lifted -> handles, pose. A mask that is
+only refined leaves all of that as it is until the shape has been refitted to it. Placement,
+handles and pose invalidate nothing that is stored.
 """
 
 from __future__ import annotations
@@ -283,6 +284,8 @@ class EditObject:
     defocus: float = 0.0  # in [0, 1], how far it is as blurred as the photo at its new depth
     shape: LiftSettings = field(default_factory=LiftSettings)
     stays_in_front: bool = False  # covers what is edited, as it does in the photo
+    # (H, W) what matte and lift are of, where the mask was refined since; None: they are up to date
+    shaped: Selection | None = None
 
     @property
     def is_moved(self) -> bool:
@@ -300,17 +303,25 @@ class EditObject:
         self, selection: Selection | None, prompt: Prompt, found: Mask | None = None
     ) -> EditObject:
         """A new mask, or coverage: matte, lift, handles, pose and placement are gone."""
-        mask, coverage = None, None
-        if selection is not None:
-            if selection.dtype == np.uint8:
-                mask = frozen(selection >= SELECTED)
-                coverage = frozen(selection) if (selection != mask * np.uint8(255)).any() else None
-            else:
-                mask = frozen(selection, np.bool_)
+        mask, coverage = _mask_and_coverage(selection)
         return EditObject(
             self.name, prompt=prompt, mask=mask, coverage=coverage,
             found=None if found is None else frozen(found, np.bool_), deform=self.deform,
             shape=self.shape, stays_in_front=self.stays_in_front,
+        )  # fmt: skip
+
+    def with_refined_mask(
+        self, selection: Selection, prompt: Prompt, found: Mask | None = None
+    ) -> EditObject:
+        """A refined mask, or coverage, of the same thing: all that was done to it stays.
+
+        Its shape is of the older mask until it is refitted, see `shaped`.
+        """
+        mask, coverage = _mask_and_coverage(selection)
+        return replace(
+            self, prompt=prompt, mask=mask, coverage=coverage,
+            found=None if found is None else frozen(found, np.bool_),
+            shaped=self.selection if self.shaped is None else self.shaped,
         )  # fmt: skip
 
     def with_lifted(
@@ -318,7 +329,18 @@ class EditObject:
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
         fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
-        return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False)
+        shaped = self.shaped if matte is self.matte else None
+        return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False, shaped=shaped)
+
+
+def _mask_and_coverage(selection: Selection | None) -> tuple[Mask | None, U8 | None]:
+    """A selection (H, W), bool or u8, as an object keeps it: the second one where it is soft."""
+    if selection is None:
+        return None, None
+    if selection.dtype != np.uint8:
+        return frozen(selection, np.bool_), None
+    mask = frozen(selection >= SELECTED)
+    return mask, frozen(selection) if (selection != mask * np.uint8(255)).any() else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -239,7 +239,7 @@ class MaskPainting:
         # Nothing is drawn soft by an edge of a pixel: there the photo is asked.
         self._is_hard = (1 - brush.hardness) * brush.radius <= 2 * EDGE
         self._is_bool = self._is_hard and (selection is None or selection.dtype == np.bool_)
-        self._is_erasing = is_erasing
+        self.is_erasing = is_erasing
         self._stroke = Stroke(size, brush)
 
     def move_to(self, x: float, y: float) -> None:
@@ -251,7 +251,7 @@ class MaskPainting:
         brush, before = self._stroke.coverage[part], self._before[part]
         if self._is_hard:
             brush = (brush >= 0.5).astype(np.float32)
-        after = before * (1 - brush) if self._is_erasing else before + (FULL - before) * brush
+        after = before * (1 - brush) if self.is_erasing else before + (FULL - before) * brush
         self.shown[part] = (after + 0.5).astype(np.uint8)
         self.touched.append(box)
 

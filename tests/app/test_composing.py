@@ -144,7 +144,7 @@ def test_a_way_of_filling_without_chance_offers_no_variants(bare: Editor) -> Non
     bare.methods.choose("inpaint", "telea")
     reason = COMMANDS["variants"].why_not(bare)
     bare.methods.choose("inpaint", "auto")
-    assert reason == "This way of filling gives the same every time"
+    assert reason == "This filler gives the same picture every time"
     assert COMMANDS["variants"].why_not(bare) is None
 
 
@@ -221,7 +221,7 @@ def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) 
     wait_for_jobs(editor)
     assert editor.document is document
     assert editor.message is not None
-    assert editor.message.text.startswith("No shadow or reflection is sure")
+    assert editor.message.text.startswith("No clear shadow or reflection")
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def test_the_command_shows_the_background_and_comes_back(taking: Editor) -> None
     run(taking, "take_from")
     assert taking.view.compose.drag is Composed.REPAIR
     reason = COMMANDS["forget_sources"].why_not(taking)
-    assert reason == "Nothing says where the background is taken from"
+    assert reason == "No fill source has been set"
 
 
 def test_a_drag_is_one_step_with_its_background(taking: Editor, ball: Document) -> None:
@@ -65,7 +65,7 @@ def test_a_drag_is_one_step_with_its_background(taking: Editor, ball: Document) 
     assert document is not None and document.hints == (hint,)
     np.testing.assert_allclose((*hint.source, *hint.to), (16, 20, *middle(ball)), atol=0.01)
     assert hint.radius == taking.view.brush.radius
-    assert taking.history is not None and taking.history.undo_label == "Take from here"
+    assert taking.history is not None and taking.history.undo_label == "Fill from a spot"
     assert not np.array_equal(plate_picture(document), plate_picture(ball))
     outside = np.ones(document.photo.pixels.shape[:2], bool)
     x0, y0, x1, y1 = document.plate.box

@@ -17,12 +17,14 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.tasks import Combine, Question
 from objectmorpher.editor.view import Selecting, SelectMode, ToolName
+from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.mask_tool import MaskTool
 from objectmorpher.tools.pointer import Button, Tool
 from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher_core import segment
 from objectmorpher_core.base.brush import Brush
-from objectmorpher_core.document.model import Click, Prompt
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Click, Document, EditObject, Placement, Prompt
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import move, press, stroke
@@ -120,15 +122,102 @@ def test_a_soft_brush_leaves_a_soft_edge_and_a_hard_one_does_not(editor: Editor)
     assert editor.object.coverage is None
 
 
-def test_painting_a_lifted_object_asks_for_a_new_lift_and_undo_brings_it_back(
-    editor: Editor,
+def _moved_ball(editor: Editor, ball: Document, *move: float) -> EditObject:
+    editor.start(ball)
+    point = ball.objects[0].lifted.control_points[0]
+    editor.apply("Pin", edits.add_handle(editor.document, 0, point, is_pin=True))
+    editor.placing.move_to(Placement(move=move, turn=(10, 0, 0)))
+    editor.commit("Move object")
+    return editor.object
+
+
+def test_the_mask_of_a_moved_object_is_refined_where_it_is_seen(
+    editor: Editor, ball: Document
 ) -> None:
-    lifted = lift_ball(editor)
-    assert "lifted anew" in MaskTool().hint(editor)
-    paint(editor, FAR)
-    assert not editor.is_lifted
+    item = _moved_ball(editor, ball, 50.0, -6.0)
+    before = editor.committed
+    # The ball's left edge, where it is now: a stroke there takes it away where it was.
+    paint(editor, (CENTRE[0] + 20, CENTRE[1] - 6), alt=True)
+    thing = editor.object
+    assert thing.lifted is item.lifted and thing.placement == item.placement  # until it follows
+    gone = np.argwhere(item.mask & ~thing.mask)[:, ::-1].mean(0)
+    assert abs(gone[0] - (CENTRE[0] - 30)) < 8 and abs(gone[1] - CENTRE[1]) < 8
+    wait_until(editor, lambda: editor.object.shaped is None)
+    thing = editor.object
+    assert thing.lifted is not item.lifted and len(thing.handles) == 1
+    assert thing.placement.turn == item.placement.turn
+    motions = [o.placement.matrix(o.lifted, before.photo.camera) for o in (item, thing)]
+    np.testing.assert_allclose(*motions, atol=1e-9)
+    assert editor.document.plate is not None
     run(editor, "undo")
-    assert editor.document is lifted
+    assert editor.committed is before
+    run(editor, "redo")
+    assert editor.object is thing
+
+
+def test_what_would_throw_work_away_is_only_offered(editor: Editor, ball: Document) -> None:
+    item = _moved_ball(editor, ball, 30.0, 0.0)
+    for act in (lambda: run(editor, "invert"), editor.selection.clear):
+        act()
+        assert editor.object is item
+        assert item.name in editor.message.text
+    editor.message.action.run()
+    assert editor.mask is None
+    run(editor, "undo")
+    assert editor.object is item
+
+
+def test_a_click_lands_on_what_is_seen(editor: Editor, ball: Document) -> None:
+    item = _moved_ball(editor, ball, 60.0, 0.0)
+    seen = editor.view.canvas_from_image(np.array(CENTRE) + (60, 0))
+    landed = editor.landing.in_photo(seen)
+    assert np.hypot(*(landed - CENTRE)) < 8  # it is turned, too
+    np.testing.assert_allclose(
+        editor.derived.carried(editor.document, 0, landed[None])[0],
+        editor.view.image_from_canvas(seen), atol=1.0,
+    )  # fmt: skip
+    editor.view.is_before = True
+    np.testing.assert_allclose(editor.landing.in_photo(seen), np.array(CENTRE) + (60, 0))
+    editor.view.is_before = False
+    editor.objects.start_another()
+    stroke(editor, SelectTool(), seen)
+    assert editor.object is item and editor.selection.pending is None
+
+
+def test_the_edited_picture_stays_whatever_tool_and_object(editor: Editor, ball: Document) -> None:
+    """Random tools, objects and keys: the canvas shows the edit, or a badge says what it shows."""
+    random = np.random.default_rng(3)
+    _moved_ball(editor, ball, 40.0, 5.0)
+    run(editor, "duplicate")
+    editor.placing.move_to(Placement(move=(-40.0, 0.0)))
+    editor.commit("Move object")
+    editor.view.tool, editor.view.is_before = ToolName.PLACE, False
+    wanted = _picture(editor)
+    assert len(wanted[2]) == 2
+    tools = [tool for tool in ToolName if tool is not ToolName.LOOK]
+    shown = set()
+    for _ in range(300):
+        match random.integers(4):
+            case 0:
+                editor.objects.choose(int(random.integers(2)))
+            case 1:
+                editor.objects.start_another()
+            case 2:
+                editor.choose_tool(tools[random.integers(len(tools))])
+            case 3:
+                editor.view.is_before = bool(random.integers(2))
+        shown.add((editor.view.tool, editor.is_lifted))
+        is_photo = editor.looking.badge == "The photo as it was"
+        assert (_picture(editor) == wanted) != is_photo
+    editor.view.is_before = False
+    assert {(ToolName.SELECT, False), (ToolName.MASK, True), (ToolName.POSE, True)} <= shown
+
+
+def _picture(editor: Editor) -> tuple:
+    """What the canvas shows, by identity."""
+    scene = build_scene(editor, "tiles")
+    rgba = tuple(id(layer.rgba) for layer in scene.layers)
+    return id(scene.photo), id(scene.plate), rgba, id(scene.blend), scene.veil, scene.paper
 
 
 @pytest.mark.slow

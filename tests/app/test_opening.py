@@ -8,6 +8,7 @@ import time
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import cv2
@@ -16,8 +17,10 @@ import pytest
 
 from conftest import CENTRE, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.recovery import Left
 from objectmorpher.editor.settings import Backends
 from objectmorpher.system.freed_memory import set_aside
+from objectmorpher.system.texts import sentence
 from objectmorpher.worker.jobs import Jobs
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.pictures.image import read_picture
@@ -195,3 +198,31 @@ def test_what_was_computed_for_a_closed_document_is_let_go(editor: Editor, ball:
         wait_for_jobs(editor)
         gc.collect()
         assert kept() is None
+
+
+def test_a_missing_file_is_not_worth_a_question_and_keeps_its_name(
+    editor: Editor, ball: Document
+) -> None:
+    editor.start(ball)
+    assert editor.history is not None
+    editor.history.mark_unsaved()
+    editor.filing.open(Path("/nowhere/cat 2.png"))
+    assert editor.filing.question is None
+    assert editor.message is not None and editor.message.text.startswith("cat 2.png cannot")
+    assert sentence("the photo ball.png is empty").startswith("The photo")
+    editor.history.mark_saved(ball)
+
+
+def test_what_was_left_is_offered_where_no_start_screen_shows_it(
+    editor: Editor, ball: Document, tmp_path: Path
+) -> None:
+    editor.recovery.left = (Left(tmp_path, "cat.png", datetime.now(), 1),)
+    editor.start(ball)
+    assert editor.message is None  # the start screen has shown it
+    editor.recovery._is_unseen = True
+    editor.start(ball)
+    assert editor.message is not None and editor.message.text.startswith("cat.png has unsaved work")
+    assert editor.message.action is not None
+    editor.start(ball)
+    assert editor.message is None  # said once
+    editor.recovery.left = ()

@@ -63,7 +63,7 @@ def test_an_export_can_be_tried_again(
     moved.exporting.export_to(tmp_path / "out.png")
     wait_for_jobs(moved)
     retry(moved)
-    assert moved.message is not None and moved.message.text == "Exported out.png"
+    assert moved.message is not None and moved.message.text.startswith("Exported out.png to ")
 
 
 def test_a_background_that_failed_can_be_tried_again(
@@ -122,7 +122,7 @@ def test_a_background_that_gave_way_to_another_is_filled_in_when_it_is_wanted_ag
     editor.poll()
     assert editor.jobs.is_busy(PLATE)
     editor.undo()
-    editor.composing.fill_from((), "Take from here", lambda: None)  # as a drag of a source does
+    editor.composing.fill_from((), "Fill from a spot", lambda: None)  # as a drag of a source does
     wait_for_jobs(editor)
     editor.apply("Select", two)
     wait_for_jobs(editor)

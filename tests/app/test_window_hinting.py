@@ -32,7 +32,7 @@ def test_a_drag_over_the_background_says_from_where(
     with opened(window_environment, session) as hands:
         hands.settle()
         hands.press("shift+b")
-        hands.wait(lambda: "Remove all sources" in hands.places(), "choosing the drag")
+        hands.wait(lambda: "Clear fill sources" in hands.places(), "choosing the drag")
         start, end = (hands.on_photo(*place, size) for place in ((14, 16), middle))
         hands.drag(start, end)
         hands.wait(lambda: "edited" in hands.title(), "filling in")

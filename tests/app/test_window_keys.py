@@ -28,7 +28,7 @@ def test_enter_takes_every_step_and_the_title_counts_what_changed(
         hands.press("KP_Enter")  # harmless where the last Return has lifted it already
         hands.wait(lambda: hands.is_accent(POSE_TOOL), "lifting")
         hands.drag((x, y - 100), (x + 60, y - 120))
-        hands.wait(lambda: "edited, about" in hands.title(), "counting")
+        hands.wait(lambda: "of the photo" in hands.title(), "counting")
         hands.press("Return")  # the large button exports; the same key must not confirm at once
         hands.area("Export ball-edited.png")
         hands.settle()

@@ -226,7 +226,7 @@ def test_a_mask_changed_by_hand_remembers_what_the_prompt_gave(document):
     item = changed.objects[0]
     np.testing.assert_array_equal(item.found, mask)
     np.testing.assert_array_equal(item.mask, grow(mask, 6))
-    assert item.lifted is None
+    assert item.lifted is not None and item.shaped is not None  # it is to be refitted
     by_hand = edits.change_mask(edits.set_mask(document, 0, mask, Prompt()), 0, grow(mask, 3))
     assert by_hand.objects[0].found is None, "no prompt, nothing to tell apart"
 

@@ -35,6 +35,8 @@ from .shape import Shape, Shapes, build_shape
 from .surface_facts import SurfaceFacts
 
 if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
     from objectmorpher_core.deform.puppet import SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.tiles import Drawable
@@ -43,6 +45,8 @@ PICK_REACH = 3.0  # points beside an object within which its nearest point is pi
 MOST_SHAPES = 24  # remembered: every object of a document needs its own in each frame
 SPARE_SHAPES = 4  # more than there are objects: of what was undone
 POSES = 3  # remembered of each object: as it is, as a stroke has it, as somebody looks at it
+CARRIERS = 8  # Gaussians that tell how a place of the photo has moved
+RIDGE = 1e-3  # px^2, where they lie on a line
 OUTLINE_PIXELS = 2e6  # of the grid on which a mask's outline is followed
 
 
@@ -86,6 +90,7 @@ class Derived:
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
+        self._carriers = Memo()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -256,6 +261,23 @@ class Derived:
         motion = thing.placement.matrix(thing.lifted, document.photo.camera)
         return thing.lifted.world_points(points) @ motion[:3, :3].T + motion[:3, 3]
 
+    def carried(self, document: Document, k: int, xy: np.ndarray) -> F64:
+        """Image px (N, 2) where object `k` now shows what the photo has at image px `xy` (N, 2).
+
+        What is around each place tells how it moved: of the Gaussians that carry the photo there.
+        """
+        splats = self.posed(document, k)
+        seen, tree = self._carriers(lambda: _carriers(splats), splats)
+        count = min(CARRIERS, len(seen))
+        near = seen[tree.query(xy, k=count)[1].reshape(-1, count)]
+        at = splats.rest.lifted.texture.u0[near].astype(np.float64)
+        now = document.photo.camera.project(splats.means[near])
+        middle, moved = at.mean(1), now.mean(1)
+        spread = at - middle[:, None]
+        square = spread.transpose(0, 2, 1) @ spread + np.eye(2) * RIDGE
+        linear = np.linalg.solve(square, spread.transpose(0, 2, 1) @ (now - moved[:, None]))
+        return moved + ((np.asarray(xy) - middle)[:, None] @ linear)[:, 0]
+
     def project(self, document: Document, k: int, points: np.ndarray) -> F64:
         """Image px (..., 2) of object-frame points (..., 3), after the placement."""
         return document.photo.camera.project(self.world(document, k, points))
@@ -310,6 +332,15 @@ def _strongest(weights: Sparse, count: int) -> I32:
         ends = weights.indices[first + strongest]
         pairs |= {(min(i, int(j)), max(i, int(j))) for j in ends}
     return np.array(sorted(pairs), np.int32).reshape(-1, 2)
+
+
+def _carriers(splats: PosedSplats) -> tuple[np.ndarray, KDTree]:
+    """The Gaussians that carry the photo, and where in it."""
+    from scipy.spatial import KDTree
+
+    texture = splats.rest.lifted.texture
+    seen = np.flatnonzero(texture.visibility > 0.5)
+    return seen, KDTree(texture.u0[seen])
 
 
 def _outlines(mask: Mask) -> tuple[F32, ...]:

@@ -38,7 +38,7 @@ def _is_taking(editor: Editor) -> bool:
 
 def _no_sources(editor: Editor) -> str | None:
     return nothing_lifted(editor) or (
-        None if editor.hinting.shown else t("Nothing says where the background is taken from")
+        None if editor.hinting.shown else t("No fill source has been set")
     )
 
 
@@ -51,7 +51,7 @@ def _cannot_fill(editor: Editor) -> str | None:
     if document is not None and document.plate is not None:
         is_same = not compose.is_random(name) and document.plate.backend == name
         if is_same and document.plate.painted is None:
-            return t("This way of filling gives the same every time")
+            return t("This filler gives the same picture every time")
     return nothing_lifted(editor)
 
 
@@ -64,7 +64,7 @@ def _cannot_vary(editor: Editor) -> str | None:
     if (reason := compose.missing(name)) is not None:
         return sentence(reason)
     if not compose.is_random(name):
-        return t("This way of filling gives the same every time")
+        return t("This filler gives the same picture every time")
     return nothing_lifted(editor)
 
 
@@ -106,10 +106,10 @@ def _not_refined(editor: Editor) -> str | None:
 COMMANDS: dict[str, Command] = {
     "bare": Command("Background alone", "B", _toggle_bare, nothing_lifted, _is_bare),
     "take_from": Command(
-        "Take from here", "Shift+B", _toggle_taking, nothing_lifted, _is_taking
+        "Fill from a spot", "Shift+B", _toggle_taking, nothing_lifted, _is_taking
     ),
     "forget_sources": Command(
-        "Remove all sources", "", lambda e: e.hinting.remove_all(), _no_sources
+        "Clear fill sources", "", lambda e: e.hinting.remove_all(), _no_sources
     ),
     "fill_again": Command(
         "Fill in again", "", lambda e: e.composing.fill_again(), _cannot_fill

@@ -46,7 +46,7 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("PageUp, PageDown", "Farther, nearer · Shift: much · Alt: little"),
     ),
     "Compose": (
-        ("Drag", "Repair the background, or say from where it is taken"),
+        ("Drag", "Repair the background, or choose what it is filled from"),
         ("Alt-drag, right drag", "Bring the photo back"),
     ),
 }

@@ -41,11 +41,16 @@ def _points(editor: Editor) -> None:
     editor.view.has_points = not editor.view.has_points
 
 
+def _panel(editor: Editor) -> None:
+    editor.view.wants_panel = not editor.view.has_panel
+
+
 def _history(editor: Editor) -> None:
     editor.view.has_history = not editor.view.has_history
 
 
 COMMANDS: dict[str, Command] = {
+    "panel": Command("Panel", "F8", _panel, is_on=lambda e: e.view.has_panel),
     "history": Command("History", "Ctrl+H", _history, is_on=lambda e: e.view.has_history),
     "fit": Command("Fit to window", "F", _fit),
     "actual": Command("Actual size", "Ctrl+1", lambda e: navigate.zoom_to(e, 1.0)),

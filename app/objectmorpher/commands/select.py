@@ -18,13 +18,13 @@ def _no_soft_edge(editor: Editor) -> str | None:
 
 def _not_a_file(editor: Editor) -> str | None:
     is_file = editor.shaping.why_fixed is not None
-    return no_lift(editor) or (None if is_file else t("It was lifted where it is seen"))
+    return no_lift(editor) or (None if is_file else t("It was lifted from this photo"))
 
 
 def _nothing_painted(editor: Editor) -> str | None:
     shape, painted = editor.shaping.settings, editor.view.selecting.painted
     field = shape.hidden if painted is Painted.HIDDEN else shape.nearness
-    return no_selection(editor) or (None if field is not None else t("Nothing is painted"))
+    return no_selection(editor) or (None if field is not None else t("Nothing is painted yet"))
 
 
 COMMANDS: dict[str, Command] = {

@@ -36,6 +36,7 @@ from .intents.composing import Composing
 from .intents.computing import Computing
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
+from .intents.landing import Landing
 from .intents.looking import Looking
 from .intents.masking import Masking
 from .intents.methods import Methods
@@ -48,6 +49,7 @@ from .intents.rigging import Rigging
 from .intents.selection import Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
+from .refits import Refits
 from .settings import Settings
 from .tasks import SELECT, Tasks
 from .view import SelectMode, Shown, ToolName, View
@@ -64,7 +66,7 @@ class Editor:
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
         self.autosave, self.recovery = Autosave(self), Recovery(self)
-        self.tasks = Tasks(self)
+        self.tasks, self.refits = Tasks(self), Refits(self)
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.masking, self.shaping = Masking(self), Shaping(self)
@@ -74,6 +76,7 @@ class Editor:
         self.composing, self.looking = Composing(self), Looking(self)
         self.methods, self.computing = Methods(self), Computing(self)
         self.hinting, self.refining = Hinting(self), Refining(self)
+        self.landing = Landing(self)
         self.candidates = Candidates(self)
         self.closer_look = CloserLook(self)
         self.derived = self._nothing_derived()
@@ -173,6 +176,7 @@ class Editor:
         self.view.fit(document.photo.size)
         if not self.is_lifted:
             self.tasks.read_photo()
+        self.recovery.offer()
 
     def close(self) -> None:
         """Closes the document, and lets go of what was computed for it: gigabytes, maybe."""
@@ -195,6 +199,7 @@ class Editor:
         self.exporting.close()
         self.objects.carried = None
         self.tasks.forget()
+        self.refits.forget()
         self.composing.forget()
         self.hinting.forget()
         self.refining.forget()
@@ -241,7 +246,7 @@ class Editor:
         """To the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
-        text = t("Now after: {label}", label=self.history.label(index))
+        text = t("Back at: {label}", label=self.history.label(index))
         self._travel(partial(self.history.jump, index), text)
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
@@ -290,6 +295,7 @@ class Editor:
         is_changed = self.chores.poll() or is_changed
         self.tasks.rehearse()
         is_changed = self.tasks.ensure_fronts() or is_changed
+        is_changed = self.refits.ensure() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed
         is_changed = self.refining.deliver() or is_changed

@@ -55,6 +55,11 @@ class Filing:
 
     def open(self, path: Path) -> None:
         """Opens a photo or a session, after the question about unsaved changes."""
+        if not path.exists():  # then nothing has to be given up
+            self._editor.complain(
+                t("{name} cannot be opened: there is no such file", name=path.name)
+            )
+            return
         self.guard(lambda: self._open(path, lambda: self._remember(path)))
 
     def drop(self, paths: Sequence[Path]) -> None:

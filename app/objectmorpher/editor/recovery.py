@@ -20,6 +20,7 @@ from ..system.file_lock import FileLock
 from ..system.texts import t
 from ..worker.job_error import JobError
 from .autosave import LOCK, Held, recovery_root
+from .feedback import Action
 
 if TYPE_CHECKING:
     from .editor import Editor
@@ -49,9 +50,14 @@ class Recovery:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.left: tuple[Left, ...] = ()  # newest first
+        self._is_unseen = False
 
-    def look(self) -> None:
-        """Reads the list anew; cheap, the documents are not read."""
+    def look(self, is_shown: bool = True) -> None:
+        """Reads the list anew; cheap, the documents are not read.
+
+        `is_shown`: the start screen shows it. Otherwise it is offered when a file has opened.
+        """
+        self._is_unseen = not is_shown
         found = []
         root = recovery_root()
         for folder in sorted(root.iterdir()) if root.is_dir() else ():
@@ -63,6 +69,21 @@ class Recovery:
             found += [left] if left is not None else []
         found.sort(key=lambda left: left.edited or datetime.min, reverse=True)
         self.left = tuple(found)
+
+    def offer(self) -> None:
+        """Says what was left, once, where the start screen never came up."""
+        editor = self._editor
+        if not self._is_unseen or not self.left:
+            return
+        self._is_unseen, newest = False, self.left[0]
+        if len(self.left) == 1 and not newest.problem:
+            text = t("{name} has unsaved work from {time}", name=newest.name,
+                     time=when(newest.edited))  # fmt: skip
+            editor.say(text, Action(t("Recover"), lambda: self.recover(newest)))
+        else:
+            text = t("Unsaved work of {count} earlier sessions is still here",
+                     count=len(self.left))  # fmt: skip
+            editor.say(text, Action(t("Show"), lambda: editor.filing.guard(editor.close)))
 
     def recover(self, left: Left) -> None:
         """Opens it, unsaved as it was; its folder is this editor's from then on."""

@@ -30,7 +30,7 @@ from objectmorpher_core.segment import Found
 from ..canvas.layers import Rendered, Request
 from ..canvas.memo import same
 from ..canvas.shape import Shape, build_ready_shape, rehearse
-from ..system.texts import t
+from ..system.texts import folder_of, t
 from ..worker import job_functions
 from ..worker.job_error import JobError
 from ..worker.job_functions import Choice, Cut
@@ -219,13 +219,12 @@ class Tasks:
         return is_asked or editor.chores.is_busy(f"{READY} {editor.current}")
 
     def _take_lift(self, changed: Document, k: int) -> None:
-        editor, lifted = self._editor, changed.objects[k].lifted
-        assert lifted is not None
+        editor = self._editor
         editor.posing.select(None)
         editor.apply(t("Lift object"), changed)
         editor.view.tool = ToolName.POSE
-        count = f"{len(lifted.gaussians):,}"
-        editor.say(t("Lifted: {count} Gaussians. Now drag a point on it", count=count))
+        name = changed.objects[k].name
+        editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
 
     def rehearse(self) -> None:
         """Sees to it that the current object can be dragged at once; each frame."""
@@ -268,7 +267,8 @@ class Tasks:
 
         self._front = (mask, None)
         editor.jobs.start(
-            t("Cutting it out"), job_functions.cut_front, document.photo.pixels, item.selection,
+            t("Cutting out what stays in front"), job_functions.cut_front,
+            document.photo.pixels, item.selection,
             done=accept, failed=editor.complain_of, kind=FRONT,
         )  # fmt: skip
         return True
@@ -362,7 +362,8 @@ class Tasks:
                 history.mark_saved(document)
                 editor.path = path
                 editor.settings = editor.settings.with_recent(path)
-                editor.say(t("Saved {name}", name=path.name))
+                editor.say(t("Saved {name} in {folder}", name=path.name,
+                             folder=folder_of(path)))  # fmt: skip
                 if then is not None:
                     then()
 

@@ -96,7 +96,7 @@ class Shown(Enum):
     OBJECT = "Object only"
     DEPTH = "Depth"
     NORMALS = "Normals"
-    PROVENANCE = "Provenance"
+    PROVENANCE = "Invented parts"
     STRAIN = "Strain"
 
 
@@ -124,7 +124,7 @@ class Composed(Enum):
     """What a drag of the Compose tool does to the background that is shown alone."""
 
     REPAIR = "Repair"
-    TAKE = "Take from"
+    TAKE = "Fill from"
 
 
 @dataclass(eq=False)
@@ -151,6 +151,8 @@ class View:
     split: float | None = None  # share of the canvas left of the before/after line
     has_points: bool = False  # control points and links are shown
     has_history: bool = False  # the list of steps is shown
+    wants_panel: bool | None = None  # the panel at the right; None: where there is room for it
+    has_panel: bool = True  # whether that is so, as the window has it
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
     is_grounded: bool = False  # moving an object slides it over the ground

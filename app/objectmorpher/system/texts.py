@@ -8,7 +8,9 @@ assets/languages, one file a language, `"English" = "translation"`; what one lac
 from __future__ import annotations
 
 import logging
+import re
 import tomllib
+from pathlib import Path
 
 from .resources import resource
 
@@ -16,6 +18,8 @@ log = logging.getLogger(__name__)
 
 ENGLISH = "en"
 NAME = "English"  # the text whose translation is the language's own name
+FILE_NAME = re.compile(r"[^.]*[^.\s]\.\w{1,8}\b")
+ARTICLES = ("a", "an", "the", "this", "it", "no")  # of sentences that name a file later on
 _texts: dict[str, str] = {}
 
 
@@ -52,6 +56,13 @@ def t(text: str, **values: object) -> str:
     return found.format(**values) if values else found
 
 
+def folder_of(path: Path) -> str:
+    """The name of the folder that a file is in, as a message says where it went."""
+    folder = path.absolute().parent
+    return folder.name or str(folder)
+
+
 def sentence(text: str) -> str:
-    """With a capital: the library's reasons have none."""
-    return text[:1].upper() + text[1:]
+    """With a capital: the library's reasons have none. A file's name stays as it is."""
+    is_name = FILE_NAME.match(text) and text.split(" ", 1)[0] not in ARTICLES
+    return text if is_name else text[:1].upper() + text[1:]

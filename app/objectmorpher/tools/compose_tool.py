@@ -21,7 +21,7 @@ class ComposeTool:
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         is_other = pointer.alt or pointer.button is Button.RIGHT
         if not editor.view.compose.is_bare:
-            editor.say(t("Show the background alone to paint on it"))
+            editor.say(t("Press B to see the background alone, then paint on it"))
             return ignore()
         if editor.view.compose.drag is Composed.TAKE:
             if is_other:
@@ -58,10 +58,10 @@ class ComposeTool:
             return t("B shows the background alone, to repair it by painting")
         if editor.view.compose.drag is Composed.TAKE:
             if editor.hand.is_busy:
-                return t("Let go where it is wanted · Esc takes it back")
+                return t("Let go where you want it · Esc cancels")
             return t(
-                "Drag from what to take to where it is wanted · Alt-click forgets it · [ ] size"
+                "Drag from a good spot to where you want it · Alt-click removes an arrow · [ ] size"
             )
         if editor.hand.is_busy:
-            return t("Let go to fill in what is painted · Esc takes it back")
+            return t("Let go to fill in what you painted · Esc cancels")
         return t("Paint what to fill in again · Alt-paint brings the photo back · [ ] brush size")

@@ -37,14 +37,12 @@ class MaskTool:
 
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:
-            return t("Esc takes the stroke back")
+            return t("Esc cancels the stroke")
         painted = editor.view.selecting.painted
         if painted is Painted.DEPTH:
             return t("Drag brings nearer · Right-drag or Alt pushes back · [ ] size")
         if painted is Painted.HIDDEN:
             return t("Paint where something hides the object · Right-drag or Alt erases · [ ] size")
-        if editor.is_lifted:
-            return t("After a stroke the object will be lifted anew · Undo brings it back")
         if editor.view.selecting.is_erasing:
             return t("Drag erases · Right-drag or Alt paints · Shift-click draws a line · [ ] size")
         return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")

@@ -43,7 +43,11 @@ class SelectTool:
         self._click(editor, start, is_foreground=False)
 
     def _click(self, editor: Editor, pointer: Pointer, is_foreground: bool) -> None:
-        x, y = editor.view.image_from_canvas(pointer.xy)
+        other = editor.landing.moved_at(pointer.xy)
+        if other is not None and other != editor.current:
+            editor.objects.take_up(other)
+            return
+        x, y = editor.landing.in_photo(pointer.xy)
         editor.selection.add_click(float(x), float(y), is_foreground)
 
     def _choose_box(self, editor: Editor, start: Pointer, end: Pointer) -> None:
@@ -71,7 +75,12 @@ class SelectTool:
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         is_on_photo = editor.is_on_photo(pointer.xy)
         x, y = editor.view.image_from_canvas(pointer.xy)
-        editor.hover = Hover(place=(float(x), float(y)) if is_on_photo else None)
+        other = editor.landing.moved_at(pointer.xy)
+        is_place = is_on_photo and other is None
+        editor.hover = Hover(place=(float(x), float(y)) if is_place else None,
+                             other=None if other == editor.current else other)  # fmt: skip
+        if editor.hover.other is not None:
+            return Shape.HAND
         return Shape.CROSS if is_on_photo else Shape.ARROW
 
     def hint(self, editor: Editor) -> str:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.doctor import Stage
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
+    from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
     from objectmorpher_core.lift.registration.importing import Import, Scene
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
@@ -148,6 +149,15 @@ def lift(
     progress(0.95, "getting ready to pose")
     rehearse_lift(matte, lifted, cut.camera)  # seconds, once
     return matte, lifted
+
+
+def refit(
+    was: Lifted, scene: Scene, behind: Background | None, seed: int, progress: Progress
+) -> Refitted:
+    """A lifted object whose selection was refined, in its new shape."""
+    from objectmorpher_core.lift.refitting import refit
+
+    return refit(was, scene, behind, progress, seed)
 
 
 def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:
@@ -298,7 +308,7 @@ def take_shadow(
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
     from objectmorpher_core.compose.shadow.old_traces import find_old_traces
 
-    progress(0.0, "Looking for its shadow and reflection")
+    progress(0.0, "")
     old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
     if not old.found:
         return None

@@ -87,10 +87,7 @@ def build_plate(
     progress(0.9, "joining it to the photo")
     inner = (slice(y0, y1), slice(x0, x1))
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
-    weight = away[inner]  # of the fill; in place, as all that is as large as the photo
-    np.subtract(SEAM * margin, weight, out=weight)
-    weight /= 0.6 * SEAM * margin
-    np.clip(weight, 0, 1, out=weight)
+    weight = fill_weight(np.asarray(away[inner], np.float32), margin)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
     difference = np.zeros(photo.shape, np.float32)
@@ -107,6 +104,13 @@ def build_plate(
         mixed = pixels_from_unit(mixed, pixels.dtype)
         joined[strip] = np.where(is_invented[strip, :, None], mixed, photo[strip])
     return Plate(int(x0), int(y0), joined, is_invented, inpainter.name, seed)
+
+
+def fill_weight(away: F32, margin: float) -> F32:
+    """How much of the fill is shown `away` (h, w) px from what hides the background; in place."""
+    np.subtract(SEAM * margin, away, out=away)  # all that is as large as the photo
+    away /= 0.6 * SEAM * margin
+    return np.clip(away, 0, 1, out=away)
 
 
 def correction(difference: F32, ring: Mask, margin: float) -> F32:

@@ -2,7 +2,8 @@
 
 Both touch the painted pixels only, whatever the inpainter does. A repair is shown in the edit
 wherever it was painted, also far from the objects: the shadow that an object has left behind can
-be painted out. Where masks change, the plate is made anew, and its repairs are gone.
+be painted out. Where another thing is selected, the plate is made anew, and its repairs are gone;
+where a mask is refined, it is refitted, and they stay.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ...base.progress import Progress, part, silent
 from ...document.model import Document, Plate
 from ...pictures.image import to_u8
 from .. import Inpainter
-from .plate import Box, correction, cut, hole_margin, plate_crop
+from .plate import Box, correction, cut, fill_weight, hole_margin, plate_crop
 
 RIM = 0.5  # x hole margin: the inpainter fills so much more, to compare with what is there
 CONTEXT = 0.6  # x the painted box's longer side, kept around it for the inpainter to copy from
@@ -47,13 +48,18 @@ class Patch:
 def patch_of(document: Document, coverage: F32, box: Box) -> Patch:
     """What a repair has to know: `coverage` (H, W) is painted, nothing of it outside `box`."""
     assert document.plate is not None, "make the plate first"
+    around = _with_context(box, document.photo.size)
+    left, top, right, bottom = around
+    painted = coverage[top:bottom, left:right].copy()
+    return Patch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
+
+
+def _with_context(box: Box, size: tuple[int, int]) -> Box:
+    """The box, and what an inpainter copies from around it, in a photo of `size` px."""
     x0, y0, x1, y1 = box
-    width, height = document.photo.size
     context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
     left, top = max(x0 - context, 0), max(y0 - context, 0)
-    around = (left, top, min(x1 + context, width), min(y1 + context, height))
-    painted = coverage[around[1] : around[3], left : around[2]].copy()
-    return Patch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
+    return left, top, min(x1 + context, size[0]), min(y1 + context, size[1])
 
 
 def fill_patch(
@@ -117,6 +123,59 @@ def restored(document: Document, patch: Patch) -> Plate:
     cut(grown.painted, grown.box, inner)[is_own] = False
     return Plate(grown.left, grown.top, grown.pixels, grown.hole, plate.backend, plate.seed,
                  grown.painted)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Uncovering:
+    """What of a photo (H, W, 3) objects hide now, and what they hid when its plate was made."""
+
+    pixels: Pixels
+    plate: Plate
+    before: Mask  # (H, W)
+    after: Mask  # (H, W)
+
+
+def refitted_plate(
+    change: Uncovering, inpainter: Inpainter, progress: Progress = silent, seed: int = 0
+) -> Plate:
+    """The plate for what objects hide now: filled in where they hide more, the photo where less.
+
+    Everywhere else, and where it was repaired by hand, it stays as it is, to the last bit.
+    """
+    height, width = change.before.shape
+    margin = hole_margin(width, height)
+    away = (
+        cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+        for covered in (change.before, change.after)
+    )
+    before, after = (fill_weight(np.asarray(px, np.float32), margin) for px in away)
+    if (after == before).all():
+        return change.plate
+    grown = _grown(change.plate, change.pixels, _bounds(after + before > 0, (0, 0, width, height)))
+    x0, y0, x1, y1 = grown.box
+    old, new = (weight[y0:y1, x0:x1] for weight in (before, after))
+    free = ~grown.painted
+    is_less, is_more = (new < old) & free, (new > old) & free
+    photo = unit_pixels(change.pixels[y0:y1, x0:x1])
+    share = (new / np.maximum(old, 1e-6))[..., None]
+    mixed = pixels_from_unit(
+        photo + share * (unit_pixels(grown.pixels) - photo), change.pixels.dtype
+    )
+    np.copyto(grown.pixels, mixed, where=is_less[..., None])
+    grown.hole[is_less & (new <= 0)] = False
+    if is_more.any():
+        more = np.where(is_more, (new - old) / np.maximum(1 - old, 1e-6), 0).astype(np.float32)
+        plate = replace(change.plate, left=grown.left, top=grown.top, pixels=grown.pixels,
+                        hole=grown.hole, painted=grown.painted)  # fmt: skip
+        around = _with_context(_bounds(is_more, grown.box), (width, height))
+        patch = Patch(around[0], around[1], plate_crop(change.pixels, plate, around),
+                      crop(more, grown.box, around))  # fmt: skip
+        filled = fill_patch(patch, margin, inpainter, progress, seed)
+        np.copyto(grown.pixels, crop(filled.pixels, around, grown.box), where=is_more[..., None])
+        grown.hole[is_more] = True
+    is_painted = change.plate.painted is not None
+    return Plate(grown.left, grown.top, grown.pixels, grown.hole, change.plate.backend,
+                 change.plate.seed, grown.painted if is_painted else None)  # fmt: skip
 
 
 def thumbnail(photo: Pixels, plate: Plate) -> RGB:

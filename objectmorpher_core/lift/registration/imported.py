@@ -9,6 +9,8 @@ object is the photo's cut-out, all of it and nothing else.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -62,6 +64,18 @@ def lift_imported(
     brim = brim_around(plain, picture, matte, np.random.default_rng(seed))
     progress(0.9, "Choosing control points")
     return _assembled(plain, seen, colors, brim, proposal.camera)
+
+
+def rematted(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
+    """An object from elsewhere with another `matte` of the photo on it; its shape stays."""
+    body = np.flatnonzero(lifted.texture.solidity > 0.5)
+    nothing = np.zeros(len(body), np.float32)
+    texture = PhotoTexture(lifted.texture.u0[body], nothing, nothing + 1)
+    plain = replace(lifted, gaussians=lifted.gaussians.select(body), texture=texture)
+    picture = rest_picture(plain, camera, matte)
+    seen = visibilities(plain, picture, matte)
+    brim = brim_around(plain, picture, matte, np.random.default_rng(seed))
+    return _assembled(plain, seen, plain.gaussians.colors, brim, camera)
 
 
 def _in_own_frame(gaussians: Gaussians, world_from_file: F64) -> tuple[Gaussians, F64]:

@@ -5,21 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from ...base.arrays import F64, Pixels, Selection
 from ...base.camera import Camera
 from ...base.progress import Progress, part, silent
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, Matte
 from ...segment.mask_edit import is_selected
-from ...segment.matting.matte import band_width, build_matte
+from ...segment.matting.matte import cut_out
 from ...splat_files import COUNT, read_object
 from .imported import lift_imported
 from .placement import Hints, Proposal, Registrar, Registration, register
 from .view import Target
 
-MATTE_MARGIN = 4.0  # x the matte's band, kept around the object in the crop
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 
 
@@ -90,7 +87,6 @@ def place_import(
     The document's camera must become `proposal.camera`. Raises LiftError.
     """
     progress(0.0, "Cutting out the object")
-    band = band_width(scene.camera.width, scene.camera.height)
-    matte = build_matte(scene.pixels, scene.mask, int(np.ceil(MATTE_MARGIN * band)) + 8)
+    matte = cut_out(scene.pixels, scene.mask)
     rest = part(progress, 0.4, 1.0)
     return matte, lift_imported(gaussians, proposal, matte, progress=rest, seed=seed)

@@ -24,6 +24,7 @@ from .unmix import Unmixed, coarse_colours, unmixed
 BAND = 0.0040  # x the photo's diagonal: how far a mask's edge may be off, about
 MIN_BAND = 2.0  # px
 REACH = 4.0  # x band: how far from the mask's edge alpha may be soft
+MARGIN = 4.0  # x band, kept around the object in the crop
 EXTENSION = 0.12  # x the object's size: how far it goes on where the photo ends
 
 
@@ -95,6 +96,12 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
         turned[:near] = np.minimum.accumulate(turned[near::-1])[:0:-1]
         turned[far:] = np.minimum.accumulate(turned[far - 1 :])[1:]
     return whole
+
+
+def cut_out(pixels: Pixels, mask: Selection) -> Matte:
+    """`build_matte` with as much around the object as its soft edge may need."""
+    height, width = mask.shape
+    return build_matte(pixels, mask, int(np.ceil(MARGIN * band_width(width, height))) + 8)
 
 
 def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:

@@ -323,7 +323,9 @@ class Composing:
 
         def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
             if answer is None:
-                editor.say(t("No shadow or reflection is sure; paint it out of the background (B)"))
+                editor.say(
+                    t("No clear shadow or reflection was found · Press B to paint it out by hand")
+                )
                 return
             shadow, plate = answer
             if shadow is not None and is_known:

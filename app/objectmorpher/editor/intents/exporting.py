@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...system.texts import t
+from ...system.texts import folder_of, t
 from ...worker.export_functions import write_export
 from ..export_plan import FORMATS, LENGTHS, NAMES, Format, Motion, Plan, What, format_of, is_folder
 from ..tasks import WRITE
@@ -302,7 +302,8 @@ class Exporting:
         name = plan.path.name
         editor.jobs.start(
             t("Exporting {name}", name=name), write_export, document, plan,
-            done=lambda _: editor.say(t("Exported {name}", name=name)),
+            done=lambda _: editor.say(t("Exported {name} to {folder}", name=name,
+                                        folder=folder_of(plan.path))),
             failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
             kind=f"{WRITE} {plan.path}",
         )  # fmt: skip

@@ -68,21 +68,21 @@ class Hinting:
         if not self._is_hidden(hint):
             editor.say(t("Drag to a place that is filled in: the photo stays as it is"))
             return
-        self._ask((*self.shown, hint), t("Take from here"))
+        self._ask((*self.shown, hint), t("Fill from a spot"))
 
     def remove_at(self, canvas_xy: np.ndarray) -> bool:
         """Forgets the uppermost hint with an end here; False where there is none."""
         x, y = self._place(canvas_xy)
         for hint in reversed(self.shown):
             if any(np.hypot(x - a, y - b) <= hint.radius for a, b in (hint.source, hint.to)):
-                self._ask(tuple(h for h in self.shown if h is not hint), t("Remove source"))
+                self._ask(tuple(h for h in self.shown if h is not hint), t("Remove fill source"))
                 return True
         return False
 
     def remove_all(self) -> None:
         """Where the background is taken from is nobody's business any more."""
         if self.shown:
-            self._ask((), t("Remove all sources"))
+            self._ask((), t("Clear fill sources"))
 
     def _ask(self, hints: tuple[Hint, ...], label: str) -> None:
         self._asked = hints

@@ -11,7 +11,9 @@ from objectmorpher_core.base.rotations import turn_matrix, turn_of
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import with_centre
 
+from ...system.texts import t
 from ..view import Orbit, ToolName
+from .landing import OF_THE_PHOTO
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -47,6 +49,21 @@ class Looking:
         if made is None or made[0] is not document or made[1:3] != (k, orbit):
             made = self._made = (document, k, orbit, _alone(document, k, orbit))
         return made[3]
+
+    @property
+    def badge(self) -> str:
+        """What is said over the canvas where that is not plain: it is the photo, or the edit.
+
+        Without a word, and with the last one, the canvas shows the edited picture.
+        """
+        editor = self._editor
+        if editor.document is None:
+            return ""
+        if editor.view.is_before:
+            return t("The photo as it was")
+        if editor.view.tool in OF_THE_PHOTO and editor.landing.is_edit_shown:
+            return t("Your edit · Hold X to see the photo")
+        return ""
 
     def turn(self, orbit: Orbit) -> None:
         """Looks from there."""

@@ -1,7 +1,7 @@
 """The selection changed by hand: painted, its edge moved or softened, inverted, from a file.
 
-Whatever changes a mask drops the shape that was lifted from it: the object has to be lifted anew.
-Undo brings both back.
+A lifted object whose mask is refined keeps all that was done to it, and its shape follows
+(`refits`). Where the mask would become that of another thing, that is said first.
 """
 
 from __future__ import annotations
@@ -20,11 +20,13 @@ from objectmorpher_core.document.model import Document, Photo, Prompt
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.segment.mask_edit import MaskPainting
 
-from ...system.texts import t
+from ...system.texts import folder_of, t
 from ...tools.pointer import Pointer
 from ...worker import job_functions
 from ...worker.job_error import JobError
+from ..feedback import Action
 from ..tasks import SELECT, WRITE
+from ..view import ToolName
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -47,6 +49,7 @@ class Masking:
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
         self.painting: MaskPainting | None = None  # the stroke in progress
+        self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
         self._waiting: list[Change] = []  # the first one is being made
 
@@ -75,12 +78,18 @@ class Masking:
         self.painting = MaskPainting(document.photo.size, selection, brush, is_erasing)
         if pointer.shift and self._last is not None and self._last[0] is document.photo:
             self.painting.move_to(*map(float, self._last[1]))
-        self.move_stroke(pointer)
+        self.trail = [pointer.xy]
+        self._paint_at(editor.landing.begin(pointer.xy))
 
     def move_stroke(self, pointer: Pointer) -> None:
+        if self.painting is not None:
+            self.trail.append(pointer.xy)
+            self._paint_at(self._editor.landing.go_on(pointer.xy))
+
+    def _paint_at(self, xy: np.ndarray) -> None:
+        """The brush moves to image px (2,)."""
         document = self._editor.document
         if self.painting is not None and document is not None:
-            xy = self._editor.view.image_from_canvas(pointer.xy)
             self.painting.move_to(float(xy[0]), float(xy[1]))
             self._last = document.photo, xy
 
@@ -152,7 +161,8 @@ class Masking:
         change, k = self._waiting[0], editor.current
 
         def accept(changed: Selection) -> None:
-            if editor.object is not thing or editor.current != k or editor.hand.is_busy:
+            now = editor.object.selection if editor.object else None
+            if now is not thing.selection or editor.current != k or editor.hand.is_busy:
                 self._forget()
                 return
             self._apply(change.label, changed)
@@ -201,7 +211,8 @@ class Masking:
             editor.jobs.start(
                 t("Exporting {name}", name=path.name), job_functions.write_coverage,
                 selection, path, failed=editor.complain_of, kind=f"{WRITE} {path}",
-                done=lambda _: editor.say(t("Exported {name}", name=path.name)),
+                done=lambda _: editor.say(t("Exported {name} to {folder}", name=path.name,
+                                            folder=folder_of(path))),
             )  # fmt: skip
 
     # Steps
@@ -217,8 +228,36 @@ class Masking:
         except ValueError as error:
             editor.complain(str(error))
             return
-        editor.posing.select(None)
-        editor.apply(label, changed)
+        self.take(label, changed, editor.current)
+
+    def take(self, label: str, changed: Document, k: int) -> None:
+        """A document in which object `k` has another mask is the next step.
+
+        Where that would throw away what was done to a lifted object, it is only offered.
+        """
+        editor, before = self._editor, self._editor.committed
+        is_empty = changed.objects[k].mask is None
+
+        def apply() -> None:
+            editor.posing.select(None)
+            if editor.view.tool is not ToolName.MASK or is_empty:
+                editor.view.tool = ToolName.SELECT
+            editor.apply(label, changed)
+
+        def start_over() -> None:
+            if editor.committed is before and not editor.hand.is_busy:
+                apply()
+
+        if before is None or not loses_work(before, changed, k):
+            apply()
+            return
+        name = before.objects[k].name
+        warning = (
+            t("Without a selection {name} loses its shape, its pose and its place", name=name)
+            if is_empty
+            else t("That is not {name}, whose shape, pose and place would go", name=name)
+        )
+        editor.say(warning, Action(t("Start over"), start_over))
 
     def _changed(self, document: Document, selection: Selection, prompt: Prompt | None) -> Document:
         k = self._editor.current
@@ -227,3 +266,11 @@ class Masking:
         if prompt is None:
             return edits.change_mask(document, k, selection)
         return edits.set_mask(document, k, selection, prompt)
+
+
+def loses_work(before: Document, changed: Document, k: int) -> bool:
+    """Whether what was done to object `k`, which is lifted, would be gone."""
+    if k >= len(before.objects) or changed.objects[k].lifted is not None:
+        return False
+    item = before.objects[k]
+    return item.lifted is not None and (item.is_moved or bool(item.handles))

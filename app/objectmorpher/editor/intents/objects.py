@@ -42,6 +42,14 @@ class Objects:
         self._editor.hand.abort(self._editor)
         self.take(k)
 
+    def take_up(self, k: int) -> None:
+        """As `choose`, for object `k` that was clicked where it is now."""
+        editor = self._editor
+        self.take(k)
+        if editor.object is not None:
+            editor.say(t("{name} is chosen · Click it again to change its outline",
+                         name=editor.object.name))  # fmt: skip
+
     def take(self, k: int) -> Callable[[], None]:
         """As `choose`, for a stroke in progress; what is returned takes it back."""
         editor = self._editor
@@ -102,9 +110,11 @@ class Objects:
         copied = edits.duplicate(editor.document, editor.current)
         editor.apply(t("Duplicate object"), copied)
         self.choose(len(copied.objects) - 1)
-        if editor.view.tool is ToolName.SELECT:  # a click would select anew: the copy's lift goes
+        if editor.view.tool is ToolName.SELECT:  # a click would change the outline of both
             editor.view.tool = ToolName.PLACE
-        editor.say(t("{name} lies over what it is a copy of", name=copied.objects[-1].name))
+        editor.say(
+            t("{name} lies exactly over the original · Drag it away", name=copied.objects[-1].name)
+        )
 
     def remove(self) -> None:
         """The current object is not edited any more: the photo shows it as it was."""
@@ -117,7 +127,7 @@ class Objects:
         left = edits.remove_object(editor.document, k)
         editor.apply(t("Remove object"), left)
         self.choose(max(min(k, len(left.objects) - 1), 0))
-        editor.say(t("{name} is not edited any more", name=name))
+        editor.say(t("{name} is removed · Ctrl+Z brings it back", name=name))
 
     def other_at(self, canvas_xy: np.ndarray) -> int | None:
         """Another lifted object that is in front of all at canvas px; None where the current is."""

@@ -15,7 +15,7 @@ from objectmorpher_core.segment import Found, mask_edit
 
 from ...system.texts import t
 from ..tasks import SELECT, Combine, Question
-from ..view import ToolName
+from .masking import loses_work
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -130,9 +130,7 @@ class Selection:
         editor.jobs.cancel(SELECT)
         if editor.document is not None and editor.mask is not None:
             cleared = edits.set_mask(editor.document, editor.current, None, Prompt())
-            editor.posing.select(None)
-            editor.view.tool = ToolName.SELECT
-            editor.apply(t("Clear selection"), cleared)
+            editor.masking.take(t("Clear selection"), cleared, editor.current)
 
     # Answers
 
@@ -162,6 +160,8 @@ class Selection:
             document = _changed(editor.history.document, question, found.mask, base)
         except ValueError:  # such as all of the photo: then the first answer stays
             return
+        if loses_work(editor.history.document, document, question.k):
+            return
         editor.history.amend(document)
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
@@ -175,10 +175,7 @@ class Selection:
         except ValueError as error:
             editor.complain(str(error))
             return
-        editor.posing.select(None)
-        if editor.view.tool is not ToolName.MASK:
-            editor.view.tool = ToolName.SELECT
-        editor.apply(question.label, changed)
+        editor.masking.take(question.label, changed, k)
 
     # Questions
 

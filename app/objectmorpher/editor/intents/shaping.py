@@ -77,7 +77,7 @@ class Shaping:
         """Why nothing can be said about the shape, or None."""
         thing = self._editor.object
         if thing is not None and thing.lifted is not None and thing.lifted.middle is None:
-            return t("A shape out of a file is as it is there")
+            return t("This shape comes from a 3D file and stays as it is there")
         return None
 
     # Words
@@ -109,7 +109,7 @@ class Shaping:
     def end_trust(self) -> None:
         trust, self._trust = self.trust, None
         if trust != self.settings.trust:
-            self.say(t("Trust"), trust=trust)
+            self.say(t("Learned shape"), trust=trust)
 
     def say(self, label: str, **words: object) -> None:
         """A word about the shape: fields of `LiftSettings`."""
@@ -165,7 +165,7 @@ class Shaping:
             self.say(label, nearness=nearness if nearness.any() else None)
         else:
             hidden = self._hidden(document.photo.size)
-            label = t("Not hidden here") if self._is_inverse else t("Hidden here")
+            label = t("Erase hidden part") if self._is_inverse else t("Paint hidden part")
             self.say(label, hidden=hidden if hidden.any() else None)
         self.drop_stroke()
 
@@ -176,9 +176,9 @@ class Shaping:
     def clear_painted(self) -> None:
         """What was painted with the brush that is chosen is gone."""
         if self._editor.view.selecting.painted is Painted.HIDDEN:
-            self.say(t("Nothing is hidden"), hidden=None)
+            self.say(t("Clear hidden parts"), hidden=None)
         else:
-            self.say(t("Depth as it was"), nearness=None)
+            self.say(t("Clear painted depth"), nearness=None)
 
     def _nearness(self, size: tuple[int, int]) -> F32:
         """(h, w) with the stroke in progress."""
@@ -240,7 +240,7 @@ class Shaping:
         """A 3D object out of a file takes the place of what is selected."""
         editor, scene = self._editor, self._scene()
         if scene is None:
-            editor.say(t("Select what the 3D object stands for first"))
+            editor.say(t("Select what the 3D object replaces first"))
             return
         document, mask, k = editor.document, editor.mask, editor.current
         assert document is not None and mask is not None
@@ -265,7 +265,7 @@ class Shaping:
         k, chosen = editor.current, replace(fitting, chosen=proposal)
 
         def accept(answer: tuple[Matte, LiftedObject]) -> None:
-            self._take_import(k, chosen, *answer, t("Another pose"))
+            self._take_import(k, chosen, *answer, t("Try another fit"))
 
         editor.jobs.start(
             t("Placing the object"), job_functions.place_object,
@@ -336,7 +336,7 @@ class Shaping:
         editor.apply(label, changed)
         self._fitting = fitting
         share = f"{100 * fitting.chosen.iou:.0f}"
-        sentence = t("Its outline agrees with the photo by {share} %", share=share)
+        sentence = t("It covers the photo's outline to {share} %", share=share)
         found = fitting.found.registration
         editor.say(f"{sentence}. {found.reason}" if found.is_ambiguous else sentence)
 

@@ -15,7 +15,7 @@ from ...editor.filing import EXPORT_ENDINGS, PHOTO_ENDINGS, SESSION_ENDING, Dial
 from ...editor.intents.models import GIVEN, MODEL_ENDING
 from ...editor.opening import OBJECT_ENDINGS
 from ...system.texts import t
-from ..widgets.modal import modal
+from ..widgets.modal import is_confirmed, is_dismissed, modal
 from ..widgets.theme import FIELD, PRIMARY, theme
 from ..widgets.widgets import Kind, button
 from .export_dialog import draw_export
@@ -102,7 +102,7 @@ class Dialogs:
     def _draw_answers(self, filing: Filing) -> None:
         answer = None
         top = imgui.get_cursor_pos_y()
-        if button(t("Save session"), Kind.PRIMARY, width=132):
+        if button(t("Save session"), Kind.PRIMARY, width=132) or is_confirmed():
             answer = filing.answer_save
         lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()
@@ -111,7 +111,7 @@ class Dialogs:
             answer = filing.answer_discard
         imgui.same_line()
         imgui.set_cursor_pos_y(lower)
-        if button(t("Cancel"), width=104) or imgui.is_key_pressed(imgui.Key.escape):
+        if button(t("Cancel"), width=104) or is_dismissed():
             answer = filing.answer_cancel
         if answer is not None:
             imgui.close_current_popup()

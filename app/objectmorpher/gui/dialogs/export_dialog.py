@@ -11,7 +11,7 @@ from ...editor.export_plan import LENGTHS, LOSSLESS, Format, Motion, What
 from ...editor.filing import Dialog
 from ...editor.intents.exporting import Exporting
 from ...system.texts import t
-from ..widgets.modal import modal
+from ..widgets.modal import is_confirmed, is_dismissed, modal
 from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import FIELD, PRIMARY, theme
 from ..widgets.widgets import (
@@ -38,7 +38,7 @@ ABOUT = {
     What.DEPTH: "How near the objects are: the nearest point white, twice as far half as bright.",
     What.BACKGROUND: "The photo with its objects painted out.",
     What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
-    What.VIDEO: "A film that can be played again and again, at most 1280 px wide.",
+    What.VIDEO: "A looping film, at most 1280 px wide.",
 }
 
 
@@ -51,11 +51,10 @@ def draw_export(editor: Editor) -> None:
         if not is_shown:
             return
         if exporting.draft is not None:
-            is_unfolded = imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id)
             _draw_what(exporting)
             _draw_how(exporting)
             is_entered = _draw_where(editor)
-            _draw_foot(exporting, is_entered, is_unfolded)
+            _draw_foot(exporting, is_entered)
         # Its document may also have been closed, by a file that was dropped on the window.
         if exporting.draft is None or editor.filing.wanted is not None:
             imgui.close_current_popup()
@@ -146,7 +145,7 @@ def _draw_where(editor: Editor) -> bool:
     return is_entered
 
 
-def _draw_foot(exporting: Exporting, is_entered: bool, is_unfolded: bool) -> None:
+def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     """What is wrong, or what will be replaced; Cancel and the button that does it.
 
     `is_unfolded`: a list was when the frame began, and Esc is for it.
@@ -169,16 +168,9 @@ def _draw_foot(exporting: Exporting, is_entered: bool, is_unfolded: bool) -> Non
     with bold_text():
         label = f"{fitted(exporting.label, room)}###go"
     is_pressed = button(label, Kind.PRIMARY, problem)
-    # The key that opened it is still down in its first frame.
-    # Where the ring is around a control, it is pressed.
-    is_free = not imgui.is_window_appearing() and not imgui.get_io().nav_visible
-    is_enter = is_free and any(
-        imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
-    )
-    is_escape = imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.escape)
-    if is_cancelled or (is_escape and not is_unfolded):
+    if is_cancelled or is_dismissed():
         exporting.close()
-    elif is_pressed or is_entered or (is_enter and not imgui.is_any_item_active()):
+    elif is_pressed or is_entered or is_confirmed():
         exporting.confirm()
 
 

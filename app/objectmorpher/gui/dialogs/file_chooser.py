@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ...editor.editor import Editor
 from ...editor.filing import Dialog
 from ...system.texts import t
-from ..widgets.modal import modal
+from ..widgets.modal import is_dismissed, modal
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import FILL, Kind, button, icon_button, note, shortened, shown_path
 
@@ -55,10 +55,10 @@ class FileChooser:
 
     def _draw(self, editor: Editor) -> None:
         is_entered = self._draw_path()
+        self._is_first = False
         chosen = self._draw_list()
         is_confirmed, is_cancelled = self._draw_foot()
-        self._is_first = False
-        if is_cancelled or imgui.is_key_pressed(imgui.Key.escape):
+        if is_cancelled or is_dismissed():
             self._close()
             editor.filing.cancel_dialog()
         elif chosen is not None or is_entered or is_confirmed:
@@ -163,5 +163,5 @@ class FileChooser:
             files = [e for e in entries if e.suffix.lower() in self._endings and e.is_file()]
         except OSError:
             return
-        self._folder = folder.resolve()
+        self._folder, self._is_first = folder.resolve(), True  # the field has the keys again
         self._entries = folders + sorted(files, key=lambda e: e.name.lower())

@@ -11,7 +11,7 @@ from ...editor.filing import Dialog
 from ...editor.intents.methods import WorkerState
 from ...editor.intents.models import DOWNLOAD, has_torch, names_of
 from ...system.texts import sentence, t
-from ..widgets.modal import PADDING, modal
+from ..widgets.modal import PADDING, is_dismissed, modal
 from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import (
@@ -46,7 +46,7 @@ def draw_models(editor: Editor) -> None:
         _draw_rows(editor)
         imgui.dummy(theme.size(0, 4))
         imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20 + BUTTON))
-        if button(t("Close"), width=BUTTON) or imgui.is_key_pressed(imgui.Key.escape):
+        if button(t("Close"), width=BUTTON) or is_dismissed():
             editor.models.is_open = False
             imgui.close_current_popup()
 
@@ -327,7 +327,7 @@ def _draw_worker(editor: Editor, state: WorkerState) -> None:
     if worker is None:
         note(f"{sentence(state.why_not or '')}.")
         return
-    note(t("Licence {licence}", licence=worker.licence or t("not told")))
+    note(t("Licence {licence}", licence=worker.licence or t("unknown")))
     if worker.page:
         note(t("From {source}", source=worker.page.removeprefix("https://")))
     if not worker.is_free:

@@ -7,6 +7,7 @@ from imgui_bundle import ImVec2
 
 from objectmorpher_core.document.settings import Hint
 
+from ...editor.intents.landing import Of
 from ...editor.view import Composed
 from ...system.texts import t
 from ..widgets.theme import theme
@@ -19,6 +20,7 @@ def draw_compose(canvas: Canvas) -> None:
     """What the Compose tool shows over the photo."""
     editor = canvas.editor
     if not editor.view.compose.is_bare:
+        _draw_owner(canvas)
         return
     text = editor.composing.trouble or t("Background alone")
     if editor.composing.is_repairing:
@@ -32,6 +34,27 @@ def draw_compose(canvas: Canvas) -> None:
             _draw_hint(canvas, hint, 0.75)
         if editor.hinting.dragged is not None:
             _draw_hint(canvas, editor.hinting.dragged, 1.0)
+
+
+def _draw_owner(canvas: Canvas) -> None:
+    """What is under the pointer: the photo, the filled-in background, or which object."""
+    editor, document = canvas.editor, canvas.editor.document
+    if editor.pointer is None or document is None or editor.hand.is_busy:
+        return
+    owner = editor.landing.owner_at(editor.pointer.xy)
+    if owner is None:
+        return
+    if isinstance(owner, Of):
+        text = t("Photo") if owner is Of.PHOTO else t("Background, filled in")
+    else:
+        item = document.objects[owner]
+        text = item.name
+        for outline in editor.derived.contours(item.mask) if item.mask is not None else ():
+            if item.is_moved:
+                outline = editor.derived.carried(document, owner, outline)
+            canvas.polyline(canvas.at(outline), ACCENT, 1.5, alpha=0.8)
+    at = canvas.on_canvas(editor.pointer.xy)[0]
+    canvas.label(text, at.x + theme.pt(14), at.y + theme.pt(14))
 
 
 def _draw_hint(canvas: Canvas, hint: Hint, alpha: float) -> None:

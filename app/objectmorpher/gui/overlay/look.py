@@ -50,11 +50,11 @@ def draw_pixel_grid(canvas: Canvas) -> None:
 
 
 def draw_comparison(canvas: Canvas) -> None:
-    """The line between before and after, or that all of it is before."""
+    """The line between before and after, or what else than the edit alone is shown."""
     view, rect = canvas.editor.view, canvas.rect
     top = rect.y + theme.pt(12)
     if view.is_before or view.split is None:
-        canvas.label(t("Before"), rect.x + theme.pt(12), top)
+        canvas.label(canvas.editor.looking.badge, rect.x + theme.pt(12), top)
         return
     x = rect.x + view.split * rect.width
     high, low = ImVec2(x, rect.y), ImVec2(x, rect.y + rect.height)

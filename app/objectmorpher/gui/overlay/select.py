@@ -26,9 +26,13 @@ def draw_selection(canvas: Canvas) -> None:
     prompt = editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
-        canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
+        if not editor.landing.is_current_moved:
+            canvas.dashes(canvas.at(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])))
     for click in prompt.clicks:
-        _draw_click(canvas, canvas.at(np.array([click.x, click.y]))[0], click.is_foreground)
+        place = np.array([[click.x, click.y]])
+        if editor.landing.is_current_moved and document is not None and click.is_foreground:
+            place = editor.derived.carried(document, editor.current, place)
+        _draw_click(canvas, canvas.at(place)[0], click.is_foreground)
     if editor.rubber is not None:
         draw_rubber(canvas)
     if editor.selection.path is not None:
@@ -36,11 +40,14 @@ def draw_selection(canvas: Canvas) -> None:
 
 
 def draw_edge(canvas: Canvas) -> None:
-    """The outline of what is selected."""
-    editor = canvas.editor
-    if editor.mask is not None:
-        for outline in editor.derived.contours(editor.mask):
-            canvas.polyline(canvas.at(outline), ACCENT)
+    """The outline of what is selected, where that is seen now."""
+    editor, document = canvas.editor, canvas.editor.document
+    if editor.mask is None or document is None:
+        return
+    for outline in editor.derived.contours(editor.mask):
+        if editor.landing.is_current_moved:
+            outline = editor.derived.carried(document, editor.current, outline)
+        canvas.polyline(canvas.at(outline), ACCENT)
 
 
 def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:
@@ -83,12 +90,31 @@ def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
 
 
 def draw_mask(canvas: Canvas) -> None:
-    """For the Mask tool. During a stroke the veil alone shows the edge: it is there at once."""
+    """For the Mask tool. During a stroke the veil alone shows the edge: it is there at once.
+
+    Over an edit, which has no veil, a band shows where the brush went.
+    """
     editor = canvas.editor
     if editor.masking.painting is None:
         draw_edge(canvas)
+    elif editor.landing.is_edit_shown:
+        draw_edge(canvas)
+        _draw_trail(canvas)
     if editor.pointer is not None:
         canvas.brush(erases(editor, editor.pointer))
+
+
+def _draw_trail(canvas: Canvas) -> None:
+    """The band that a stroke in progress has covered."""
+    masking, view = canvas.editor.masking, canvas.editor.view
+    assert masking.painting is not None
+    color = theme.u32(WARM if masking.painting.is_erasing else ACCENT, 0.45)
+    width = max(view.brush.radius * (1 + view.brush.hardness) * view.zoom / canvas.ratio, 2.0)
+    places = canvas.on_canvas(np.array(masking.trail))
+    if len(places) == 1:
+        canvas.draw.add_circle_filled(places[0], width / 2, color)
+    else:
+        canvas.draw.add_polyline(places, color, width, 0)
 
 
 # The object under the pointer that a click would make the current one.

@@ -95,7 +95,8 @@ def _draw_brush(editor: Editor) -> None:
     if compose_view.drag is Composed.TAKE:
         draw_radius(editor)
         command_button(editor, "forget_sources", width=-1)
-        note(t("Drag from what should be there to where it is wanted. Alt-click forgets it."))
+        note(t("Drag from a good spot to where the background should look like it. Alt-click "
+               "removes an arrow."))  # fmt: skip
         return
     draw_brush_fields(editor)
     note(t("Paint over what looks wrong: it is filled in again. Alt brings the photo back."))
@@ -157,7 +158,7 @@ def _draw_shadow(editor: Editor) -> None:
     usual, ground = editor.composing.ground(replace(shadow, ground=None)), shadow.ground
     number = Number(t("Ground"), "%.0f°", 0.5, 5.0, usual, 0.0, 90.0)
     change = number_field(number, usual if ground is None else ground)
-    tooltip(t("How steeply one looks down on the ground: 0° along it, 90° from above"))
+    tooltip(t("How steeply you look down on the ground: 0° along it, 90° from above"))
     ground = None if change.value == usual else change.value
     changed = replace(shadow, ground=ground)
     _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
@@ -261,4 +262,4 @@ def draw_network(editor: Editor) -> None:
     if change.is_done:
         editor.commit(t("Amount of refinement"))
     command_button(editor, "unrefine", width=-1)
-    note(t("It goes as soon as what it shows is changed."))
+    note(t("It is removed as soon as you change the edit."))

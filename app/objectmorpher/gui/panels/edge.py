@@ -32,14 +32,14 @@ ICONS = {
 def draw_edge(editor: Editor) -> None:
     """The edge's buttons and the px they work with."""
     heading(t("Edge"))
-    reach = Number(t("By"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=LARGEST_REACH)
+    reach = Number(t("Distance"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=LARGEST_REACH)
     editor.view.selecting.reach = number_field(reach, editor.view.selecting.reach).value
     draw_pair(editor, "grow", "shrink")
     draw_pair(editor, "smooth", "feather")
     draw_pair(editor, "fill_holes", "remove_islands")
     draw_command(editor, "invert")
     if editor.masking.is_soft:
-        note(t("Part of the edge was drawn soft, and is cut out so."))
+        note(t("Part of this edge is soft by your hand, and stays as you painted it."))
         draw_command(editor, "harden")
     gap(12)
     heading(t("Mask file"))
@@ -71,16 +71,14 @@ def _hint(name: str) -> str:
         "feather": t("Make the edge soft by this many pixels to each side"),
         "fill_holes": t("Select what the selection encloses"),
         "remove_islands": t("Take away the small pieces beside the large one"),
-        "import_shape": t(
-            "A splat or mesh file takes the object's place, where it is in the photo"
-        ),
-        "harden": t("Make the edge hard again: lifting finds it in the photo"),
+        "import_shape": t("Put a 3D file (splats or a mesh) where the object is in the photo"),
+        "harden": t("Forget the softness you painted: the edge follows the photo again"),
     }
     return hints.get(name, "")
 
 
-def draw_lift_warning(editor: Editor) -> None:
+def draw_refinement_note(editor: Editor) -> None:
     """What a changed selection means for what is lifted."""
-    if editor.is_lifted:
-        note(t("The photo is shown as it was. If you change the selection, the object will be "
-               "lifted anew; Undo brings shape and pose back."))  # fmt: skip
+    if editor.object is not None and editor.is_lifted:
+        note(t("{name} is in 3D already. Change its outline whenever you like: its shape follows, "
+               "and its pose and place stay.", name=editor.object.name))  # fmt: skip

@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from ...commands import next_step, run, why_not
+from ...commands import COMMANDS, keys_of, next_step, run, why_not
 from ...editor.editor import Editor
 from ...editor.view import ToolName
+from ...system.texts import t
 from ..widgets.panes import INSPECTOR, edge, pane
-from ..widgets.theme import PRIMARY, theme
-from ..widgets.widgets import Kind, button, rule
+from ..widgets.theme import FOLDED, PRIMARY, Icon, theme
+from ..widgets.widgets import Kind, button, icon_button, rule
 from ..window.layout import Rect
 from .compose import draw_compose
 from .history_list import draw_history
@@ -33,6 +34,10 @@ _scroll = _Scroll()
 
 
 def draw_inspector(editor: Editor, rect: Rect) -> None:
+    """The whole panel, or where there is no room for it the button that unfolds it."""
+    if not editor.view.has_panel:
+        _draw_folded(editor, rect)
+        return
     with pane(INSPECTOR, rect):
         foot = theme.pt(PRIMARY + 24)
         bar = imgui.get_style().scrollbar_size if _scroll.is_needed else 0.0
@@ -49,6 +54,14 @@ def draw_inspector(editor: Editor, rect: Rect) -> None:
             top = rect.y + rect.height - foot + 0.5
             edge((rect.x, top), (rect.x + rect.width, top))
         _draw_foot(editor, rect, foot)
+        edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
+
+
+def _draw_folded(editor: Editor, rect: Rect) -> None:
+    with pane(INSPECTOR, rect, padding=(2, 8)):
+        hint = f"{t(COMMANDS['panel'].label)} ({keys_of(editor, 'panel')})"
+        if icon_button(Icon.SPLIT, "panel", hint, None, FOLDED - 4):
+            run(editor, "panel")
         edge((rect.x + 0.5, rect.y), (rect.x + 0.5, rect.y + rect.height))
 
 

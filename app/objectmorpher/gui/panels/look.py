@@ -136,9 +136,9 @@ def _draw_trust(editor: Editor) -> None:
     """How far the shape network is believed, where it can look."""
     if not editor.models.has_shape:
         return
-    number = Number(t("Trust"), "%.0f %%", 1.0, 10.0, 100.0, 0.0, 100.0)
+    number = Number(t("Learned shape"), "%.0f %%", 1.0, 10.0, 100.0, 0.0, 100.0)
     change = number_field(number, 100 * editor.shaping.trust)
-    tooltip(t("In the learned shape; at 0 % the outline alone tells it"))
+    tooltip(t("How much of the shape the network decides; at 0 % only the outline does"))
     if change.is_changed:
         editor.shaping.preview_trust(change.value / 100)
     if change.is_done:
@@ -173,8 +173,8 @@ def _draw_symmetry(editor: Editor) -> None:
 
 def _draw_standing(editor: Editor) -> None:
     is_standing = editor.shaping.settings.is_standing
-    chosen = checkbox(t("Stands on the ground"), is_standing)
-    tooltip(t("Its feet tell which end is nearer; not so for what flies or hangs"))
+    chosen = checkbox(t("Feet on the ground"), is_standing)
+    tooltip(t("Its feet show which end is nearer. Untick this for things that fly or hang"))
     if chosen != is_standing:
         editor.shaping.say(t("Standing"), is_standing=chosen)
 

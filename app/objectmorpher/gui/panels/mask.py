@@ -9,7 +9,7 @@ from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import Icon
 from ..widgets.widgets import command_button, gap, heading, note
 from .brush import draw_brush_fields
-from .edge import draw_command, draw_edge, draw_lift_warning
+from .edge import draw_command, draw_edge, draw_refinement_note
 
 
 def draw_mask(editor: Editor) -> None:
@@ -22,8 +22,8 @@ def draw_mask(editor: Editor) -> None:
         _draw_shape_facts(editor)
         return
     if editor.view.brush.hardness >= 1:
-        note(t("A fully hard brush leaves the edge to the photo."))
-    draw_lift_warning(editor)
+        note(t("With a fully hard brush the edge follows the photo."))
+    draw_refinement_note(editor)
     gap(12)
     draw_edge(editor)
     gap(12)
@@ -68,5 +68,5 @@ def _draw_shape_facts(editor: Editor) -> None:
         note(t("Paint on, where something stands before the object: it is completed there, in 3D "
                "and in colour."))  # fmt: skip
     if not editor.is_lifted:
-        note(t("It counts when the object is lifted."))
+        note(t("It takes effect when you lift the object."))
     command_button(editor, "clear_painted")

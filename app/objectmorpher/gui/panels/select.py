@@ -12,7 +12,7 @@ from ..dialogs.models_dialog import draw_offer
 from ..widgets.segmented import Choice, segmented
 from ..widgets.theme import Icon
 from ..widgets.widgets import checkbox, gap, heading, note, tooltip
-from .edge import draw_command, draw_edge, draw_lift_warning
+from .edge import draw_command, draw_edge, draw_refinement_note
 
 
 def draw_select(editor: Editor) -> None:
@@ -58,7 +58,7 @@ def _draw_facts(editor: Editor) -> None:
     if adds or removes:
         facts.append(t("{adds} added, {removes} removed by click.", adds=adds, removes=removes))
     if editor.object is not None and editor.object.found is not None:
-        facts.append(t("What you changed by hand stays when you click again."))
+        facts.append(t("What you painted stays when you click again."))
     if facts:
         note(" ".join(facts))
     if mask is None and editor.view.selecting.mode is SelectMode.CLICK:
@@ -70,7 +70,7 @@ def _draw_facts(editor: Editor) -> None:
             note(t("Right-click what does not belong to the object, then lift it."))
             draw_command(editor, "import_shape")
         _draw_front(editor, editor.object)
-    draw_lift_warning(editor)
+    draw_refinement_note(editor)
     draw_offer(editor)
 
 

@@ -16,6 +16,28 @@ SCROLLING = (  # no frame but a scroll bar, where large texts need more than the
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_collapse
 )
 
+_is_unfolded = False  # whether a list was unfolded in the box that was drawn last
+
+
+def is_dismissed() -> bool:
+    """Whether Esc closes the box. A list that is unfolded in it takes the key for itself."""
+    return imgui.is_key_pressed(imgui.Key.escape) and not _is_unfolded and not _has_list()
+
+
+def is_confirmed() -> bool:
+    """Whether Enter presses the box's first button: the keyboard has chosen no other one."""
+    if imgui.get_io().nav_visible or imgui.is_any_item_active():
+        return False
+    if imgui.is_window_appearing():  # the key that opened it is still down
+        return False
+    return any(
+        imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
+    )
+
+
+def _has_list() -> bool:
+    return imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id)
+
 
 @contextmanager
 def modal(title: str, width: float, about: str = "", height: float = 0.0) -> Iterator[bool]:
@@ -44,4 +66,6 @@ def modal(title: str, width: float, about: str = "", height: float = 0.0) -> Ite
         imgui.dummy(theme.size(0, 4))
     yield is_shown
     if is_shown:
+        global _is_unfolded
+        _is_unfolded = _has_list()
         imgui.end_popup()

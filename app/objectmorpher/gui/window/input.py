@@ -14,6 +14,7 @@ from imgui_bundle import imgui
 from ...commands import next_step, run, take_next_step
 from ...editor.editor import Editor
 from ...editor.feedback import Hover
+from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.shortcuts import Shortcuts
 from ...editor.view import ToolName
 from ...system.texts import t
@@ -44,6 +45,7 @@ class Input:
         self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
+        self._has_popup = False  # in the last frame
         self._hovered: tuple[object, ...] | None = None  # where `hover` was last asked
 
     def update(self, editor: Editor, rect: Rect, ratio: float) -> None:
@@ -106,9 +108,12 @@ class Input:
         pressed, self._pressed = self._pressed, []
         if pressed and self._shortcuts.take(pressed[-1]):
             return
-        if imgui.get_io().want_text_input or imgui.is_popup_open("", ANY_POPUP):
+        had_popup, self._has_popup = self._has_popup, imgui.is_popup_open("", ANY_POPUP)
+        if imgui.get_io().want_text_input or self._has_popup:
             editor.view.is_before = False
             return
+        if had_popup:  # ImGui has folded up a list for it already
+            pressed = [keys for keys in pressed if keys != "Escape"]
         editor.view.is_before = editor.document is not None and imgui.is_key_down(imgui.Key.x)
         for keys in pressed:
             if not self.focus.take(editor, keys):
@@ -164,7 +169,7 @@ class Input:
     def _press(self, editor: Editor, button: Button) -> None:
         """A button goes down at the crosshair."""
         pointer, tool = self.crosshair.pointer(button), TOOLS[editor.view.tool]
-        if editor.view.is_before:
+        if not _is_answered(editor):
             return
         self.shape = tool.hover(editor, pointer)
         editor.message = None
@@ -195,7 +200,7 @@ class Input:
                     stroke = navigate.pan(editor, pressed)
                 elif navigate.is_on_split(editor, pressed):
                     stroke = navigate.drag_split(editor, pressed)
-                elif button is Button.MIDDLE or editor.view.is_before:
+                elif button is Button.MIDDLE or not _is_answered(editor):
                     continue
                 else:
                     editor.message = None
@@ -238,6 +243,11 @@ class Input:
             editor.posing.relax()
         if not is_down:
             editor.hand.move(replace(pointer, is_down=False))
+
+
+def _is_answered(editor: Editor) -> bool:
+    """Whether a press does anything: on the photo as it was only what selects in it."""
+    return not editor.view.is_before or editor.view.tool in OF_THE_PHOTO
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..widgets.theme import INSPECTOR, MENU, STATUS, STRIP, theme
+from ..widgets.theme import FOLDED, INSPECTOR, MENU, STATUS, STRIP, theme
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,19 @@ class Layout:
     status: Rect
 
 
-def lay_out(width: float, height: float, has_photo: bool) -> Layout:
-    """For a window of that size, window units."""
+NARROW = 1000.0  # points of the window's width, below which the panel is folded up by itself
+
+
+def has_panel(width: float, wanted: bool | None) -> bool:
+    """Whether the panel is unfolded in a window `width` window units wide; see `View`."""
+    return width >= theme.pt(NARROW) if wanted is None else wanted
+
+
+def lay_out(width: float, height: float, has_photo: bool, has_panel: bool = True) -> Layout:
+    """For a window of that size, window units. Folded up, the panel is a strip with a button."""
     menu, status = theme.pt(MENU), theme.pt(STATUS)
     strip = theme.pt(STRIP) if has_photo else 0.0
-    inspector = theme.pt(INSPECTOR) if has_photo else 0.0
+    inspector = theme.pt(INSPECTOR if has_panel else FOLDED) if has_photo else 0.0
     middle = max(height - menu - status, 1.0)
     across = max(width - strip - inspector, 1.0)
     return Layout(

@@ -15,6 +15,7 @@ from ..widgets.widgets import fitted, icon_button, tooltip
 from .landmarks import mark
 from .layout import Rect
 
+LEAST_NAME = 48.0  # points of room, with less the file's name is left out
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": (
@@ -35,7 +36,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
         *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
-    "Window": ("history", "models", "preferences"),
+    "Window": ("panel", "history", "models", "preferences"),
     "Help": ("shortcuts", "about"),
 }  # fmt: skip
 
@@ -111,16 +112,18 @@ def _draw_right(editor: Editor, rect: Rect) -> None:
     buttons = 2 * side + theme.pt(4 + 12)
     name = editor.path.name if editor.path else editor.document.photo.name
     state = "" if editor.is_saved else t("edited")
-    name = fitted(name, rect.width * 0.28)
-    text = imgui.calc_text_size(name).x
     state_width = imgui.calc_text_size(f"{state}   ").x if state else 0.0
     imgui.same_line()
-    imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))
-    imgui.text_unformatted(name)
-    if state:
-        imgui.same_line(0, theme.pt(8))
-        imgui.text_colored(theme.vec("secondary"), state)
-    imgui.same_line()
+    room = rect.width - buttons - state_width - theme.pt(16) - imgui.get_cursor_pos_x()
+    if room > theme.pt(LEAST_NAME):  # else the window's title has it
+        name = fitted(name, min(rect.width * 0.28, room))
+        text = imgui.calc_text_size(name).x
+        imgui.set_cursor_pos_x(rect.width - buttons - text - state_width - theme.pt(16))
+        imgui.text_unformatted(name)
+        if state:
+            imgui.same_line(0, theme.pt(8))
+            imgui.text_colored(theme.vec("secondary"), state)
+        imgui.same_line()
     imgui.set_cursor_pos_x(rect.width - buttons)
     points = side / theme.scale
     for i, (icon, name) in enumerate(((Icon.UNDO, "undo"), (Icon.REDO, "redo"))):

@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import ImVec2
 
 from ...editor.editor import Editor
+from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import ToolName
 from ..overlay.canvas import Canvas
 from ..overlay.compose import draw_compose
@@ -27,7 +28,6 @@ DRAWN: dict[ToolName, Callable[[Canvas], None]] = {
     ToolName.LOOK: draw_look,
     ToolName.COMPOSE: draw_compose,
 }
-ON_ANYTHING = (ToolName.SELECT, ToolName.MASK)  # the other tools are for lifted objects
 
 
 def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
@@ -41,10 +41,10 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     if not view.is_before:
         if view.has_points and editor.is_lifted and editor.looking.orbit is None:
             draw_control_points(canvas)
-        if editor.is_lifted or view.tool in ON_ANYTHING:
+        if editor.is_lifted or view.tool in OF_THE_PHOTO:
             DRAWN[view.tool](canvas)
         Legend(editor, rect).draw()
     is_split = view.split is not None and editor.looking.orbit is None
-    if view.is_before or is_split:
+    if editor.looking.badge or is_split:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()

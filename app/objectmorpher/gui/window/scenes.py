@@ -9,6 +9,7 @@ from objectmorpher_core.document.model import Document
 from ...canvas.layers import Layer, is_front
 from ...canvas.painter import shown_now
 from ...editor.editor import Editor
+from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import Shown, ToolName
 from ...render.scene import Hatch, Scene, SplatObject
 from ..widgets.theme import theme
@@ -19,7 +20,6 @@ MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that 
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
 REFINED = Hatch((0.0, 0.85, 0.75), slant=0.0)
-OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that are about the photo as it was
 BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
@@ -32,11 +32,12 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     shown = shown_now(document, view)
     if view.tool is ToolName.COMPOSE and view.compose.is_bare and not view.is_before:
         return _bare_scene(editor, document)
-    if shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO:
+    is_edited = any(o.is_moved for o in document.objects)
+    is_selecting = shown is Shown.COMPOSITE and view.tool in OF_THE_PHOTO
+    if is_selecting and (view.is_before or not is_edited):
         return _selecting(editor, document)
     if editor.looking.orbit is not None and not view.is_before:
         return _alone(editor, document, renderer)
-    is_edited = any(o.is_moved for o in document.objects)
     if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
         return Scene(photo, surround)
     if shown is Shown.DEPTH and editor.preview is None:
@@ -60,6 +61,8 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
             objects = (*objects, *refined)
         else:
             layers = (*layers, *refined)
+    if is_selecting and (tint := editor.shaping.painted_layer()) is not None:
+        layers = (*layers, tint)
     return Scene(
         photo, surround, plate, shades, layers, objects, mask,
         hatch=hatch, marks=LIFTED, refined=REFINED, blend=editor.derived.blend(document, view),
@@ -80,7 +83,7 @@ def _alone(editor: Editor, document: Document, renderer: str) -> Scene:
 
 
 def _selecting(editor: Editor, document: Document) -> Scene:
-    """The photo as it was, veiled where it is not selected."""
+    """The photo, of which nothing was moved, veiled where it is not selected."""
     selection, painting = editor.masking.shown, editor.masking.painting
     is_veiled = selection is not None and not editor.view.is_before
     is_painted = editor.view.tool is ToolName.MASK

@@ -81,7 +81,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     if job is None or time.monotonic() - job.started < JOB_DELAY:
         return right
     side = rect.height - theme.pt(4)
-    text = job.title if not job.note else f"{job.title}: {job.note}"
+    text = job.title if job.note in ("", job.title) else f"{job.title}: {job.note}"
     share = f"{100 * job.fraction:.0f} %"
     gap = theme.pt(8)
     x = right - theme.pt(16) - side

@@ -38,7 +38,7 @@ from ..widgets.theme import theme
 from . import landmarks
 from .frame_log import FrameLog
 from .input import HELP, Input
-from .layout import Rect, lay_out
+from .layout import Layout, Rect, has_panel, lay_out
 from .menu import draw_menu
 from .overlays import draw_overlays
 from .scenes import build_scene
@@ -171,7 +171,7 @@ class Window:
         if self._options.file is not None:
             self.editor.filing.open(self._options.file)
         if self._options.frames is None:
-            self.editor.recovery.look()
+            self.editor.recovery.look(is_shown=self._options.file is None)
             self.editor.models.look()
             self.editor.chores.start(
                 "Getting ready", lambda progress: self._warm_up(), kind="warm up",
@@ -217,10 +217,10 @@ class Window:
         self._input.focus.begin(self.editor, self._shortcuts.recording is not None)
         self._size.begin_frame()
         imgui.new_frame()
-        layout = lay_out(*self._size.size, self.editor.document is not None)
+        layout = self._lay_out()
         self._resize_canvas(layout.canvas, ratio)
         self._input.update(self.editor, layout.canvas, ratio)
-        layout = lay_out(*self._size.size, self.editor.document is not None)
+        layout = self._lay_out()
         draw_menu(self.editor, layout.menu)
         if self.editor.document is None:
             self._start.draw(self.editor, layout.canvas)
@@ -241,6 +241,11 @@ class Window:
         landmarks.write()
         self._save_settings()
         return True
+
+    def _lay_out(self) -> Layout:
+        view, size = self.editor.view, self._size.size
+        view.has_panel = has_panel(size[0], view.wants_panel)
+        return lay_out(*size, self.editor.document is not None, view.has_panel)
 
     def _draw(self, canvas: Rect, ratio: float, size: tuple[int, int]) -> None:
         """The picture below ImGui's."""
@@ -299,6 +304,7 @@ class Window:
         if (name, scale) != self._look:
             self._look = (name, scale)
             looks.apply(name if name in looks.PALETTES else "dark", scale)
+            self._size.forbid_less(*(round(theme.pt(side)) for side in looks.LEAST_SIZE))
 
     def _monitor_scale(self) -> float:
         """Window units per point. Where the framebuffer is finer than the window, 1."""
@@ -397,7 +403,11 @@ class Title:
         counted, count = self._changed
         if counted is not document or count == 0:
             return t("edited")
-        return t("edited, about {count} px", count=f"{count:,}")
+        width, height = document.photo.size
+        share = 100 * count / (width * height)
+        if share < 1:
+            return t("edited, less than 1 % of the photo")
+        return t("edited, {share} % of the photo", share=round(share))
 
 
 # How large the window is, and what the time is, for ImGui.
@@ -431,6 +441,11 @@ class WindowSize:
     def ratio(self) -> float:
         """Framebuffer px per window unit."""
         return self.pixels[0] / max(self.size[0], 1)
+
+    def forbid_less(self, width: int, height: int) -> None:
+        """Neither side gets shorter than that, window units."""
+        any_size = glfw.DONT_CARE
+        glfw.set_window_size_limits(self._handle, width, height, any_size, any_size)
 
     def begin_frame(self) -> None:
         """Tells ImGui, in place of its backend's own beginning of a frame."""

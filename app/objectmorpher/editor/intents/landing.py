@@ -1,0 +1,123 @@
+"""Where a press on the canvas lands in the photo, while the canvas shows the edit.
+
+What is seen is what is meant. On the current object, wherever it was moved, a press lands where
+that piece of it is in the photo. On another object that was moved it lands on that object.
+Everywhere else, and everywhere while the photo is shown (X is held), it lands on the photo.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import F64
+
+from ..view import Shown, ToolName
+
+if TYPE_CHECKING:
+    from ..editor import Editor
+
+OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that work on the photo as it was
+
+
+class Of(Enum):
+    """What of the edited picture is no object's."""
+
+    PHOTO = "photo"
+    BACKGROUND = "background"  # filled in where an object was
+
+
+class Landing:
+    """From canvas px to what is meant by them."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._offset = np.zeros(2)  # image px, of the stroke in progress, beside its object
+        self._is_carried = False  # whether that stroke began on an object that was moved
+
+    @property
+    def is_edit_shown(self) -> bool:
+        """Whether the canvas shows an edit that differs from the photo."""
+        editor = self._editor
+        document, view = editor.document, editor.view
+        if document is None or view.is_before or view.shown is not Shown.COMPOSITE:
+            return False
+        return any(o.is_moved for o in document.objects)
+
+    @property
+    def is_current_moved(self) -> bool:
+        """Whether the current object is seen elsewhere than in the photo."""
+        thing = self._editor.object
+        return thing is not None and thing.is_moved and thing.is_visible and self.is_edit_shown
+
+    def moved_at(self, canvas_xy: np.ndarray) -> int | None:
+        """Index of the moved object that is seen at canvas px (2,); None where none is."""
+        editor = self._editor
+        document = editor.document
+        if document is None or not self.is_edit_shown:
+            return None
+        for k in reversed(editor.objects.order()):
+            item = document.objects[k]
+            if item.lifted is None or not item.is_visible:
+                continue
+            if editor.derived.surface_at(document, k, editor.view, canvas_xy) is not None:
+                return k if item.is_moved else None
+        return None
+
+    def owner_at(self, canvas_xy: np.ndarray) -> int | Of | None:
+        """What canvas px (2,) of the edit belong to: an object, by its index, or `Of`.
+
+        None beside the photo, and where something else than the edit is shown.
+        """
+        editor = self._editor
+        document = editor.document
+        is_shown = self.is_edit_shown and editor.is_on_photo(canvas_xy)
+        if document is None or not is_shown:
+            return None
+        for k in reversed(editor.objects.order()):
+            item = document.objects[k]
+            is_seen = item.lifted is not None and item.is_visible
+            if is_seen and editor.derived.surface_at(document, k, editor.view, canvas_xy):
+                return k
+        plate = editor.derived.plate(document)
+        if plate is None:
+            return Of.PHOTO
+        column, row = np.floor(editor.view.image_from_canvas(canvas_xy)).astype(int)
+        x0, y0, x1, y1 = plate.box
+        is_inside = x0 <= column < x1 and y0 <= row < y1
+        is_filled = is_inside and plate.hole[row - y0, column - x0]
+        return Of.BACKGROUND if is_filled else Of.PHOTO
+
+    def in_photo(self, canvas_xy: np.ndarray) -> F64:
+        """Image px (2,) that is meant by canvas px (2,)."""
+        found = self._on_current(canvas_xy)
+        return self._editor.view.image_from_canvas(canvas_xy) if found is None else found
+
+    def begin(self, canvas_xy: np.ndarray) -> F64:
+        """The same where a stroke begins, which is on the object or on the photo all along."""
+        found = self._on_current(canvas_xy)
+        plain = self._editor.view.image_from_canvas(canvas_xy)
+        self._is_carried = found is not None
+        self._offset = np.zeros(2) if found is None else found - plain
+        return plain + self._offset
+
+    def go_on(self, canvas_xy: np.ndarray) -> F64:
+        """The same as the stroke goes on; beside the object as far from it as at its edge."""
+        plain = self._editor.view.image_from_canvas(canvas_xy)
+        if self._is_carried and (found := self._on_current(canvas_xy)) is not None:
+            self._offset = found - plain
+        return plain + self._offset
+
+    def _on_current(self, canvas_xy: np.ndarray) -> F64 | None:
+        """Image px (2,) where the photo has what the current object shows at canvas px."""
+        editor = self._editor
+        document, k = editor.document, editor.current
+        if document is None or not self.is_current_moved or self.moved_at(canvas_xy) != k:
+            return None
+        seen = editor.derived.surface_at(document, k, editor.view, canvas_xy)
+        lifted = document.objects[k].lifted
+        if seen is None or lifted is None:
+            return None
+        return document.photo.camera.project(lifted.world_points(seen.rest))

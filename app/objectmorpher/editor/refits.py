@@ -1,0 +1,140 @@
+"""Shapes that follow their masks: a lifted object whose mask was refined is refitted in the worker.
+
+Until then the older shape is shown. The answer is an addition to the step that refined the mask:
+one undo takes back both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, LiftedObject, Plate
+
+from ..system.texts import t
+from ..worker import job_functions
+from ..worker.job_error import JobError
+
+if TYPE_CHECKING:
+    from objectmorpher_core.lift.refitting import Refitted
+
+    from .editor import Editor
+
+REFIT = "refit"  # kind of job
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What an answer is of; it is dropped where any of it is another one by now."""
+
+    k: int
+    mask: Mask
+    lifted: LiftedObject
+    plate: Plate | None
+
+    def is_of(self, document: Document) -> bool:
+        if self.k >= len(document.objects) or document.plate is not self.plate:
+            return False
+        item = document.objects[self.k]
+        return item.mask is self.mask and item.lifted is self.lifted
+
+
+class Refits:
+    """What is asked of the worker, one object at a time, and its answer."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._asked: Wanted | None = None  # or failed for, or cancelled
+        self._answer: Refitted | None = None  # that is not shown yet
+
+    def forget(self) -> None:
+        """Another document is opened."""
+        self._asked = self._answer = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a shape is on its way that is not shown yet."""
+        document, asked = self._editor.committed, self._asked
+        if document is None or asked is None or not asked.is_of(document):
+            return False
+        return self._answer is not None or self._editor.jobs.is_busy(REFIT)
+
+    def ensure(self) -> bool:
+        """Sees to it that shapes follow their masks; each frame. Whether anything changed."""
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return False
+        outdated = (k for k, o in enumerate(document.objects) if o.lifted and o.shaped is not None)
+        k = next(outdated, None)
+        if k is None:
+            return False
+        if self._asked is None or not self._asked.is_of(document):
+            self._ask(document, k)
+            return True
+        if self._answer is None or editor.hand.is_busy or editor.preview is not None:
+            return False
+        self._show(self._asked, self._answer)
+        return True
+
+    def _ask(self, document: Document, k: int) -> None:
+        from objectmorpher_core.lift.refitting import Lifted, background_of
+        from objectmorpher_core.lift.registration.importing import Scene
+
+        editor, item, photo = self._editor, document.objects[k], document.photo
+        assert item.mask is not None and item.lifted is not None
+        assert item.shaped is not None and item.matte is not None and item.selection is not None
+        wanted = Wanted(k, item.mask, item.lifted, document.plate)
+        self._asked, self._answer = wanted, None
+
+        def accept(answer: Refitted) -> None:
+            if self._asked is wanted:
+                self._answer = answer
+
+        def fail(error: JobError) -> None:
+            editor.complain_of(error.retried_by(self.forget))
+
+        editor.jobs.start(
+            t("Fitting {name} to its new outline", name=item.name), job_functions.refit,
+            Lifted(item.shaped, item.matte, item.lifted, item.shape),
+            Scene(photo.pixels, photo.camera, item.selection),
+            background_of(document, k, editor.settings.backends.inpaint), document.seed,
+            done=accept, failed=fail, kind=REFIT,
+        )  # fmt: skip
+
+    def _show(self, wanted: Wanted, answer: Refitted) -> None:
+        """What drawing it takes is made in a thread first."""
+        editor, k = self._editor, wanted.k
+        self._answer = None
+
+        def change(document: Document) -> Document | None:
+            if not wanted.is_of(document):
+                return None
+            return edits.refit(document, k, answer.matte, answer.lifted, answer.plate)
+
+        def show(changed: Document) -> None:
+            if editor.hand.is_busy or editor.preview is not None:
+                self._answer = answer  # once more, when the hand is idle
+                return
+            assert editor.history is not None and editor.committed is not None
+            lost = len(editor.committed.objects[k].handles) - len(changed.objects[k].handles)
+            editor.history.amend(changed)
+            editor.posing.forget_lost()
+            if lost:
+                editor.say(_farewell(lost))
+
+        title = t("Fitting {name} to its new outline", name=_name(editor, k))
+        editor.tasks.make_ready(k, change, title, show)
+
+
+def _name(editor: Editor, k: int) -> str:
+    document = editor.committed
+    return document.objects[k].name if document and k < len(document.objects) else ""
+
+
+def _farewell(lost: int) -> str:
+    if lost == 1:
+        return t("A handle went with the part it was on · Ctrl+Z brings both back")
+    return t("{count} handles went with the part they were on · Ctrl+Z brings them back",
+             count=lost)  # fmt: skip
