@@ -20,7 +20,7 @@ def set_rig(document: Document, k: int, rig: Rig) -> Document:
         rig.check(len(item.lifted.control_points))
     except ValueError as error:
         raise EditError(str(error)) from error
-    return document.with_object(k, replace(item, rig=rig, pose=None))
+    return document.with_object(k, replace(item, rig=rig, pose=None, base=item.base.at_rest))
 
 
 def cut(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:

@@ -77,12 +77,11 @@ class HandleNumbers:
         posing.turn(h, posing.turn_of(h), more * SIGHT)
 
     def soften(self, softness: float) -> None:
-        """Previews the handle giving way: 0 = not at all."""
+        """Previews the handle giving way from now on: 0 = not at all."""
         editor = self._editor
         h = editor.posing.handle
         assert h is not None and editor.document is not None
-        changed = edits.soften_handle(editor.document, editor.current, h, softness)
-        editor.posing.change(changed)
+        editor.posing.hold(edits.soften_handle(editor.document, editor.current, h, softness))
 
     def set_free(self, is_free: bool) -> None:
         """Whether it turns as the object does, or stays as it is turned now; one step."""
@@ -90,7 +89,7 @@ class HandleNumbers:
         h = editor.posing.handle
         assert h is not None and editor.document is not None
         turn = None if is_free else editor.posing.turn_of(h)
-        editor.posing.change(edits.turn_handle(editor.document, editor.current, h, turn))
+        editor.posing.hold(edits.turn_handle(editor.document, editor.current, h, turn))
         editor.posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
 
     def set_pin(self, is_pin: bool) -> None:
@@ -98,5 +97,5 @@ class HandleNumbers:
         editor = self._editor
         h = editor.posing.handle
         assert h is not None and editor.document is not None
-        editor.posing.change(edits.set_pin(editor.document, editor.current, h, is_pin))
+        editor.posing.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
         editor.posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))

@@ -55,7 +55,7 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
         count = len(chosen)
         posing.finish(t("Drag {count} points", count=count) if count > 1 else t("Drag point"))
     elif is_new:
-        posing.finish(t("Add pin") if start.alt else t("Add handle"))
+        editor.commit(t("Add pin") if start.alt else t("Add handle"))
     else:
         editor.commit("")
         if start.shift and handle in before:

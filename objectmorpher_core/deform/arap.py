@@ -15,6 +15,7 @@ from .bodies import Bodies, Pivot
 from .constraints import Constraints, HeldResponse, Patch, Targets, followed
 from .elimination import solve_small
 from .links import Links, in_single
+from .prestress import full_prestress, least_prestress
 from .response import build_response, product
 
 TOLERANCE = 1e-4  # see `minimise`
@@ -84,6 +85,23 @@ class ArapSolver:
         follow = self._held.follow(len(constraints.nodes))[self._unknown]  # (M, H)
         self._follow = follow[:, blended]  # (M, B) of the handles whose arms turn
         self._parting = self._follow[nodes] - self._follow[nodes[:, :1]]  # (B, K, B)
+
+    def rest_in(self, positions: F64, rotations: F64) -> None:
+        """Strains the object so that it stays in this pose, which meets the targets it aims at.
+
+        Until the next `constrain`. With rigid bodies nothing of the pose is strained any more.
+        """
+        pose = positions, rotations
+        if self._bodies:
+            changes = full_prestress(self._links, pose)
+        else:
+            still, soft = np.zeros((self._rows.shape[0], 3)), self._constraints.softness
+            is_hard = np.concatenate([soft == 0, np.ones(len(self._constraints.held), bool)])
+            changes = least_prestress(
+                self._links, pose, self._is_given, csr_array(self._rows[is_hard]),
+                lambda forces: self._held.solve(forces, still),
+            )  # fmt: skip
+        self._links = self._links.prestressed(changes)
 
     def aim(self, targets: Targets) -> None:
         """Gives the constraints other targets: nothing is factored for that."""
@@ -167,7 +185,7 @@ class ArapSolver:
             pivots.append(pivot)
             if not np.isin(group, self._constraints.turned).any():
                 pose = positions, rotations
-                rotations[group] = self._bodies.fit(self._links.weights, pose, group, pivot)
+                rotations[group] = self._bodies.fit(self._links, pose, group, pivot)
         return tuple(pivots)
 
     def _give(self, positions: F64, rotations: F64) -> float:

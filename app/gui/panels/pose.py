@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
 from objectmorpher_core.document import EditObject
+from objectmorpher_core.hold_edits import Stays, stays_of
 
 from ...editor import Editor
 from ...painter import shown_now
@@ -15,10 +16,16 @@ from ...view import Shown
 from ..command_button import command_button
 from ..segmented import Choice, segmented
 from ..theme import Icon
-from ..widgets import checkbox, gap, half_width, heading, note, tooltip
+from ..widgets import checkbox, gap, half_width, heading, note
 from .pose_handle import draw_handles, draw_numbers
 from .pose_rig import draw_modes, draw_regions
 
+STAYS = {Stays.FAR: "Far side", Stays.ELSE: "All else", Stays.NOTHING: "Only pins"}
+WHAT_STAYS = {
+    Stays.FAR: "The part farthest from the first handle stays where it is",
+    Stays.ELSE: "Only what is near a handle moves, everything else stays",
+    Stays.NOTHING: "Nothing stays by itself: only pins and handles hold",
+}
 NAMES = {Rigidity.RIGID: "Rigid", Rigidity.NORMAL: "Normal", Rigidity.SOFT: "Soft"}
 
 
@@ -46,15 +53,17 @@ def draw_pose(editor: Editor) -> None:
 
 def _draw_material(editor: Editor, thing: EditObject) -> None:
     heading(t("Rigidity"))
-    now = rigidity_of(thing.deform)
+    now, held = rigidity_of(thing.deform), stays_of(thing)
     presets: tuple[Choice[Rigidity | None], ...] = tuple(Choice(r, t(NAMES[r])) for r in Rigidity)
     chosen = segmented("rigidity", presets, now)
     if chosen is not None and chosen is not now:
         editor.rigging.set_rigidity(chosen)
-    is_on = checkbox(t("Hold the far side still"), thing.has_auto_anchors)
-    tooltip(t("With one handle, the part farthest from it is anchored by itself"))
-    if is_on != thing.has_auto_anchors:
-        editor.posing.set_auto_anchors(is_on)
+    gap(8)
+    heading(t("What stays"))
+    kinds = tuple(Choice(s, t(STAYS[s]), t(WHAT_STAYS[s])) for s in Stays)
+    stays = segmented("stays", kinds, held)
+    if stays is not held:
+        editor.posing.set_stays(stays)
 
 
 def _draw_symmetry(editor: Editor) -> None:
