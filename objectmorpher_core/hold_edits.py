@@ -62,10 +62,24 @@ def hold(document: Document, k: int, deformer: Deformer, added: tuple[int, ...] 
     return document.with_object(k, replace(item, handles=handles, base=base))
 
 
+def let_go(document: Document, k: int, deformer: Deformer, handles: tuple[int, ...]) -> Document:
+    """Object `k` without the anchors that are near these of its handles, which will be dragged."""
+    item = document.objects[k]
+    near = [item.handles[h].control_point for h in handles]
+    if item.base.anchors is None or not near:
+        return document
+    anchors = np.intersect1d(item.base.anchors, _beyond(deformer, near, RELEASED))
+    if len(anchors) == len(item.base.anchors):
+        return document
+    held, base = deformer.held(item.handles, item.pose, anchors)
+    return document.with_object(k, replace(item, handles=held, base=base))
+
+
 def _anchors(item: EditObject, deformer: Deformer, added: tuple[int, ...]) -> I32:
     """What stays by itself from now on: what did, but for what is near a new handle.
 
-    The first handles that are to be dragged choose the far side anew.
+    A pin does not move, and takes nothing away. The first handles that are to be dragged choose
+    the far side anew.
     """
     free = [h.control_point for h in item.handles if not h.is_pin]
     if item.is_held_around:
@@ -77,7 +91,8 @@ def _anchors(item: EditObject, deformer: Deformer, added: tuple[int, ...]) -> I3
         kept, near = deformer.farthest_from(free[0]), free[1:]
     else:
         before = tuple(h for i, h in enumerate(item.handles) if i not in added)
-        kept, near = deformer.anchors(before, item.base), new
+        kept = deformer.anchors(before, item.base)
+        near = [node for node in new if node in free]
     return np.intersect1d(kept, _beyond(deformer, near, RELEASED)) if near else kept
 
 

@@ -168,6 +168,13 @@ class Posing:
             changed = edits.set_pin(editor.document, editor.current, handle, False)
             self.hold(self.mirroring.followed(changed, (handle,)), (handle,))
 
+    def let_go(self, handles: tuple[int, ...]) -> None:
+        """Previews what is to be dragged without anchors around it, such as a pin may have."""
+        editor, k = self._editor, self._editor.current
+        if editor.document is not None:
+            deformer = editor.derived.deformer(editor.document, k)
+            editor.preview = hold_edits.let_go(editor.document, k, deformer, handles)
+
     def drag(self, handle: int, spot: Spot) -> None:
         """Previews the handle at another place of the picture."""
         self.drag_all({handle: spot})
@@ -227,7 +234,7 @@ class Posing:
         editor.preview = self._solved = self._restless = solved
 
     def hold(self, changed: Document, added: tuple[int, ...] = ()) -> None:
-        """Previews `changed`, in which other handles (some just `added`) hold the same pose."""
+        """Previews `changed`, whose handles, some just `added`, hold the pose that is shown."""
         self._editor.preview = self._editor.derived.held(changed, self._editor.current, added)
 
     def relax(self) -> None:

@@ -16,6 +16,7 @@ from app.tools.pointer import Pointer
 from app.tools.pose_tool import RING, PoseTool
 from app.view import ToolName
 from objectmorpher_core.document import Document
+from objectmorpher_core.hold_edits import Stays
 from objectmorpher_core.rotations import matrix_from_vector
 
 PIXEL = 1.0  # canvas px
@@ -259,3 +260,34 @@ def test_influence_is_one_at_the_handle_and_less_elsewhere(posed: Editor) -> Non
         posed.object.handles
     )
     np.testing.assert_allclose(shares[anchors], 0, atol=1e-9)
+
+
+def _shown(editor: Editor) -> np.ndarray:
+    """Image px (M, 2) of the control points."""
+    assert editor.document is not None
+    return editor.derived.control_points(editor.document, editor.current)
+
+
+def test_nothing_moves_but_what_is_dragged(posed: Editor) -> None:
+    run(posed, "mirror")  # the partner of a new handle holds what is there, too
+    head = at(posed, 80, 45)
+    stroke(posed, head, head + (60, -30))
+    run(posed, "mirror")
+    before = _shown(posed)
+    stroke(posed, at(posed, 95, 95))
+    stroke(posed, at(posed, 75, 80), alt=True)
+    assert posed.object is not None and posed.object.handles[-1].is_pin
+    posed.handle_numbers.soften(0.7)
+    posed.posing.finish("Softness of handle")
+    posed.handle_numbers.set_free(True)
+    posed.posing.remove(0)
+    assert len(posed.object.base.anchors) > 0 if posed.object.base.anchors is not None else False
+    for stays in Stays:
+        posed.posing.set_stays(stays)
+        assert np.abs(_shown(posed) - before).max() == 0
+        for h in range(len(posed.object.handles)):  # a drag begins with what is seen
+            place = posed.view.canvas_from_image(posed.posing.spot(h).xy)
+            press(posed, TOOL, place)
+            move(posed, place + (4, 0), place)
+            assert np.abs(_shown(posed) - before).max() < 0.05
+            posed.escape()
