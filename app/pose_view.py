@@ -27,7 +27,6 @@ class PoseView:
     mode: PoseMode = PoseMode.DRAG
     stiffness: float = 4.0  # x the usual one, of what is painted with Stiffen
     has_ring: bool = True  # around the selected handle
-    is_mirrored: bool = False  # a drag moves the mirrored point too
     has_anchors: bool = True
     has_regions: bool = True
     has_influence: bool = False

@@ -34,6 +34,9 @@ class ToolName(Enum):
     COMPOSE = "Compose"
 
 
+USUAL_LEVEL = "object"  # what a click means, unless the artist says it
+
+
 class SelectMode(Enum):
     """How the Select tool is told what is meant."""
 
@@ -55,7 +58,7 @@ class Selecting:
     """What the Select and the Mask tool are set to."""
 
     mode: SelectMode = SelectMode.CLICK
-    level: str = "object"  # of document.LEVELS: what a new click means
+    level: str = USUAL_LEVEL  # of document.LEVELS: what a new click means
     reach: float = 4.0  # px of the photo, by which an edge is moved, smoothed or softened
     is_erasing: bool = False  # the brush takes away
     painted: Painted = Painted.SELECTION
@@ -125,7 +128,6 @@ class View:
     has_history: bool = False  # the list of steps is shown
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
-    is_grounded: bool = False  # moving an object slides it over the ground
     orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
     color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints

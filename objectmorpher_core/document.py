@@ -287,6 +287,7 @@ class EditObject:
     stays_in_front: bool = False  # covers what is edited, as it does in the photo
     base: Base = field(default_factory=Base)  # what the handles move it from
     is_held_around: bool = False  # whether a drag leaves all that is not near it where it is
+    is_grounded: bool = False  # moving it slides it over the ground
 
     @property
     def footing(self) -> Base:

@@ -283,6 +283,11 @@ def set_placement(document: Document, k: int, placement: Placement) -> Document:
     return document.with_object(k, replace(item, placement=placement))
 
 
+def set_grounded(document: Document, k: int, is_grounded: bool) -> Document:
+    """Whether moving object `k` slides it over the ground."""
+    return document.with_object(k, replace(document.objects[k], is_grounded=is_grounded))
+
+
 def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
     """How object `k` deforms; its pose was solved with the old settings and is gone."""
     item = document.objects[k]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from objectmorpher_core import edits
-from objectmorpher_core.arrays import F64
+from objectmorpher_core.arrays import F64, Mask
 from objectmorpher_core.document import Document, EditObject, Handle
 from objectmorpher_core.rotations import turned_by
 
@@ -23,17 +23,27 @@ PARTNER = 0.06  # x diameter: a handle so near to the mirrored point is the part
 
 
 class Mirroring:
-    """The mirror plane of the current object, while dragging with symmetry is on."""
+    """The mirror plane of the current object, while it is dragged with symmetry."""
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
+        self._masks: list[Mask] = []  # of the objects that are
 
     @property
     def is_on(self) -> bool:
-        return self._editor.view.pose.is_mirrored
+        """Whether the current object is; another one need not be."""
+        own = self._editor.mask
+        return own is not None and any(mask is own for mask in self._masks)
 
     def toggle(self) -> None:
-        self._editor.view.pose.is_mirrored = not self.is_on
+        own, is_on = self._editor.mask, self.is_on
+        self._masks = [mask for mask in self._masks if mask is not own]
+        if own is not None and not is_on:
+            self._masks.append(own)
+
+    def forget(self) -> None:
+        """The document is closed."""
+        self._masks = []
 
     @property
     def plane(self) -> MirrorPlane | None:

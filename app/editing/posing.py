@@ -84,6 +84,7 @@ class Posing:
     def forget(self) -> None:
         """The document is closed."""
         self._solved = self._restless = None
+        self.mirroring.forget()
 
     @property
     def is_restless(self) -> bool:
@@ -160,6 +161,19 @@ class Posing:
         self.hold(changed, tuple(range(added, len(changed.objects[k].handles))))
         self.select(*others, added)
         return added
+
+    def pin(self) -> None:
+        """A pin where the pointer is, or the handle that it is at becomes one, or none; a step."""
+        editor = self._editor
+        if editor.pointer is None or editor.document is None or editor.hand.is_busy:
+            return
+        h = editor.hover.handle
+        if h is not None and editor.object is not None:
+            is_pin = not editor.object.handles[h].is_pin
+            self.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
+            editor.commit(t("Make it a pin") if is_pin else t("Make it a handle"))
+        elif self.start_handle(editor.pointer.xy, is_pin=True) is not None:
+            editor.commit(t("Add pin"))
 
     def unpin(self, handle: int) -> None:
         """Previews a pin as a handle: it is dragged."""

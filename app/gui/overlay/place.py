@@ -6,7 +6,9 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.document import Placement
+from objectmorpher_core.rotations import turn_matrix, vector_from_matrix
 
+from ...ghost import ghost
 from ...texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..landmarks import mark_on_canvas
@@ -30,6 +32,8 @@ def draw_frame(canvas: Canvas) -> None:
         return
     part = editor.hover.part
     draw_other(canvas)
+    for line in ghost(editor):
+        canvas.dashes(canvas.at(line), WHITE)
     if shown.horizon is not None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)
@@ -120,6 +124,9 @@ def _draw_value(canvas: Canvas, part: str | None) -> None:
         return
     if editor.hand.is_busy:
         text = _value(part, placement, editor.placing.horizon)
+        before = editor.committed
+        if part == "ball" and before is not None and editor.current < len(before.objects):
+            text = f"{_angle(before.objects[editor.current].placement, placement):.0f}°"
     else:
         text = {"yaw": t("Yaw"), "pitch": t("Pitch"), "roll": t("Roll")}.get(part, "")
     if text:
@@ -137,8 +144,15 @@ def _value(part: str, placement: Placement, horizon: float) -> str:
         "yaw": f"{t('Yaw')} {yaw:.1f}°",
         "pitch": f"{t('Pitch')} {pitch:.1f}°",
         "roll": f"{t('Roll')} {roll:.1f}°",
+        "ball": "",
         "turn": f"{t('Yaw')} {yaw:.0f}°  {t('Pitch')} {pitch:.0f}°",
         "horizon": f"{horizon:.0f} px",
     }
     is_deeper = part == "move" and placement.depth != 0
     return f"{values[part]}  ·  {away}" if is_deeper else values[part]
+
+
+def _angle(before: Placement, now: Placement) -> float:
+    """Degrees by which an object was turned, about whatever axis."""
+    both = turn_matrix(*now.turn) @ turn_matrix(*before.turn).T
+    return float(np.degrees(np.linalg.norm(vector_from_matrix(both))))

@@ -68,9 +68,10 @@ def _draw_material(editor: Editor, thing: EditObject) -> None:
 
 def _draw_symmetry(editor: Editor) -> None:
     heading(t("Symmetry"))
-    pose, mirroring = editor.view.pose, editor.posing.mirroring
-    pose.is_mirrored = checkbox(t("Drag the mirrored point too"), pose.is_mirrored)
-    if pose.is_mirrored and not mirroring.is_found():
+    mirroring = editor.posing.mirroring
+    if checkbox(t("Drag the mirrored point too"), mirroring.is_on) != mirroring.is_on:
+        mirroring.toggle()
+    if mirroring.is_on and not mirroring.is_found():
         note(t("No mirror plane was found: an upright one through the middle is used."))
     gap(12)
 

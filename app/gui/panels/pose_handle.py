@@ -28,6 +28,7 @@ from ..widgets import (
 ROW = 28.0  # points
 VISIBLE_ROWS = 6
 PER_PX = 0.5  # px per point that a field is dragged
+_revealed: list[int | None] = [None]  # the handle that the list was scrolled to last
 
 
 def draw_handles(editor: Editor) -> None:
@@ -44,7 +45,10 @@ def draw_handles(editor: Editor) -> None:
         return
     step = theme.pt(ROW + BETWEEN)
     imgui.begin_child("##handles", ImVec2(0, VISIBLE_ROWS * step + step / 2))
+    is_new, _revealed[0] = _revealed[0] != editor.posing.handle, editor.posing.handle
     for h in range(count):
+        if is_new and h == editor.posing.handle:
+            imgui.set_scroll_from_pos_y(imgui.get_cursor_pos_y() - imgui.get_scroll_y() + step / 2)
         if editor.object is not None and h < len(editor.object.handles):  # one may be removed
             _draw_row(editor, h)
     imgui.end_child()

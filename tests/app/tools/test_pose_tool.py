@@ -291,3 +291,26 @@ def test_nothing_moves_but_what_is_dragged(posed: Editor) -> None:
             move(posed, place + (4, 0), place)
             assert np.abs(_shown(posed) - before).max() < 0.05
             posed.escape()
+
+
+def test_p_pins_what_is_under_the_pointer_and_a_handle_that_is(posed: Editor) -> None:
+    place = at(posed, 90, 60)
+    TOOL.hover(posed, Pointer(*place))
+    posed.pointer = Pointer(*place)
+    run(posed, "pin")
+    assert posed.object is not None and posed.object.handles[0].is_pin
+    TOOL.hover(posed, Pointer(*place))
+    run(posed, "pin")
+    assert not posed.object.handles[0].is_pin
+    assert labels(posed) == ["Make it a handle", "Add pin"]
+
+
+def test_symmetry_is_of_one_object_of_one_photo(posed: Editor, ball: Document) -> None:
+    run(posed, "mirror")
+    assert posed.posing.mirroring.is_on
+    posed.objects.start_another()
+    assert not posed.posing.mirroring.is_on
+    posed.objects.choose(0)
+    assert posed.posing.mirroring.is_on
+    posed.start(ball)
+    assert not posed.posing.mirroring.is_on
