@@ -34,7 +34,9 @@ def ghost(editor: Editor) -> tuple[F32, ...]:
 
     def build() -> tuple[F32, ...]:
         means = splats.means[is_solid if is_solid.any() else slice(None)]
-        return _silhouette(camera.project(means[means[:, 2] > 0]))
+        places = camera.project(means[means[:, 2] > 0])
+        is_seen = ((places >= 0) & (places <= before.photo.size)).all(1)
+        return _silhouette(places[is_seen])
 
     return _outlines(build, splats)
 

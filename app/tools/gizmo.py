@@ -160,6 +160,7 @@ class Gizmo:
     corners: F64  # (4, 2) left top, right top, right bottom, left bottom
     centre: F64  # (2,)
     radius: float  # px, of the outer ring: a circle
+    hole: float  # px, radius around the centre that a small object has for itself; or 0
     rings: dict[str, Ring]  # by the turn that each changes
     arrow: Arrow
     horizon: float | None  # its row, while the object is to stand on the ground
@@ -177,7 +178,9 @@ def gizmo(editor: Editor) -> Gizmo | None:
     middle = editor.placing.centre()
     centre, zoom = camera.project(middle), camera.focal / middle[2]
     reach = thing.lifted.diameter * thing.lifted.scale * thing.placement.scale * zoom
-    radius = max(AROUND * reach, 0.5 * reach + OUTSIDE * view.scale)
+    outside = OUTSIDE * view.scale
+    radius = max(AROUND * reach, 0.5 * reach + outside)
+    hole = 0.5 * (reach + outside) if radius < LARGEST_RING * float(size.min()) / 2 else 0.0
     smallest, largest = SMALLEST_RING * view.scale, LARGEST_RING * float(size.min())
     radius = float(np.clip(radius, smallest, max(largest, smallest)))
     world = min(radius / zoom, CLOSEST * float(middle[2]) / OUTERMOST)
@@ -189,6 +192,7 @@ def gizmo(editor: Editor) -> Gizmo | None:
         corners,
         centre,
         OUTERMOST * world * zoom,
+        hole,
         rings(middle, thing.placement.turn, world, camera),
         Arrow(centre, side, near, far),
         None if row is None else float(view.canvas_from_image(np.array([0.0, row]))[1]),

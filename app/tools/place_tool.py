@@ -88,6 +88,8 @@ class PlaceTool:
             return "ball"
         reach = REACH * editor.view.scale
         from_centre = float(np.linalg.norm(pointer.xy - shown.centre)) / shown.radius
+        if from_centre * shown.radius < 0.5 * shown.hole:
+            return OTHER if editor.objects.other_at(pointer.xy) is not None else "move"
         if from_centre < MIDDLE and editor.posing.surface_at(pointer.xy) is not None:
             return OTHER if editor.objects.other_at(pointer.xy) is not None else "move"
         part = _handle_at(shown, pointer.xy, reach)

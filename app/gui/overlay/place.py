@@ -40,9 +40,9 @@ def draw_frame(canvas: Canvas) -> None:
     canvas.polyline(corners, WHITE, width=1.0, alpha=0.5)
     names = [name for name in TURNS if part == name or not editor.hand.is_busy]
     for name in names:
-        _draw_back(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
+        _draw_back(canvas, shown, name, ACCENT if part == name else COLOURS[name])
     for name in names:
-        _draw_front(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
+        _draw_front(canvas, shown, name, ACCENT if part == name else COLOURS[name])
     if part == "depth" or not editor.hand.is_busy:  # what is not dragged is out of the way
         _draw_arrow(canvas, shown.arrow, ACCENT if part == "depth" else WHITE)
     for corner in corners:
@@ -66,15 +66,24 @@ def _runs(ring: Ring, is_wanted: bool) -> list[np.ndarray]:
     return [angles[first] + (angles[1] - angles[0]) * np.arange(count + 1)] if count else []
 
 
-def _draw_back(canvas: Canvas, ring: Ring, color: str) -> None:
-    for angles in _runs(ring, False):
-        points = canvas.on_canvas(ring.seen(angles))
-        canvas.polyline(points, color, width=1.0, is_closed=False, alpha=0.5)
+def _draw_back(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+    for angles in _runs(shown.rings[name], False):
+        for points in _around(shown, shown.rings[name].seen(angles)):
+            canvas.polyline(canvas.on_canvas(points), color, 1.0, is_closed=False, alpha=0.5)
 
 
-def _draw_front(canvas: Canvas, ring: Ring, color: str) -> None:
-    for angles in _runs(ring, True):
-        canvas.polyline(canvas.on_canvas(ring.seen(angles)), color, 2.0, is_closed=False)
+def _draw_front(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+    for angles in _runs(shown.rings[name], True):
+        for points in _around(shown, shown.rings[name].seen(angles)):
+            canvas.polyline(canvas.on_canvas(points), color, 2.0, is_closed=False)
+
+
+def _around(shown: Gizmo, points: np.ndarray) -> list[np.ndarray]:
+    """The pieces of a line (N, 2) canvas px that do not run over a small object."""
+    is_outside = np.linalg.norm(points - shown.centre, axis=1) >= shown.hole
+    ends = np.flatnonzero(np.diff(is_outside)) + 1
+    pieces = zip(np.split(points, ends), np.split(is_outside, ends), strict=True)
+    return [piece for piece, outside in pieces if outside[0] and len(piece) > 1]
 
 
 def _draw_arrow(canvas: Canvas, arrow: Arrow, color: str) -> None:
