@@ -173,7 +173,7 @@ def _draw_symmetry(editor: Editor) -> None:
 
 def _draw_standing(editor: Editor) -> None:
     is_standing = editor.shaping.settings.is_standing
-    chosen = checkbox(t("Stands on the ground"), is_standing)
+    chosen = checkbox(t("It stands in the photo"), is_standing)
     tooltip(t("Its feet tell which end is nearer; not so for what flies or hangs"))
     if chosen != is_standing:
         editor.shaping.say(t("Standing"), is_standing=chosen)
