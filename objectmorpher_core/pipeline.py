@@ -380,7 +380,7 @@ def replay(document: Document, progress: Progress = silent) -> Edited:
         if item.handles:
             with stopwatch.stage("deform"):
                 deformer = puppets[k].deformer
-                energies[k] = deformer.solve(item.handles, item.has_auto_anchors).energies
+                energies[k] = deformer.solve(item.handles, item.footing).energies
     return _finished(document, puppets, energies, progress, stopwatch)
 
 

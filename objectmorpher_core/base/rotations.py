@@ -52,13 +52,16 @@ def vector_from_matrix(matrix: np.ndarray, near: np.ndarray | None = None) -> F6
 def turn_about(vector: np.ndarray, axis: np.ndarray) -> float:
     """How far the rotation `vector` (3,) turns about a unit `axis` (3,): radians.
 
-    The twist of swing and twist: one more turn by a about the axis adds a to it.
+    The twist of swing and twist: one more turn by a about the axis adds a to it. Any angle where
+    the rotation is about the axis itself; else it is in (-pi, pi], as whole turns are not told
+    apart.
     """
     angle = float(np.linalg.norm(vector))
     along = float(vector @ axis)
     if abs(angle - abs(along)) < 1e-9 * max(angle, 1.0):  # about the axis itself, any angle
         return along
-    return float(2.0 * np.arctan2(np.sin(angle / 2) * along / angle, np.cos(angle / 2)))
+    twist = 2.0 * np.arctan2(np.sin(angle / 2) * along / angle, np.cos(angle / 2))
+    return float(np.pi - (np.pi - twist) % (2 * np.pi))
 
 
 def turned_by(vector: np.ndarray, more: np.ndarray) -> F64:

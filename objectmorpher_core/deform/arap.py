@@ -14,11 +14,13 @@ from .anderson import Anderson, solve_small
 from .bodies import Bodies, Pivot
 from .constraints import Constraints, HeldResponse, Patch, Targets, followed
 from .links import Links, in_single
+from .prestress import full_prestress, least_prestress
 from .response import build_response, product
 
 TOLERANCE = 1e-4  # see `minimise`
 NOISE = 1e-14  # x the weights' squares: what rounding may add to the energy
 SLACK = 1e-9  # x the energy: what a step may seem to rise by without being taken back
+FITTING = 1e-3  # of a rotation's entries: what a fit may change in a pose that is to stay
 LAST = 0.7  # x an iteration: what the plain step at the end takes
 SKINNED_SLACK = 1e-5  # the same where a handle's arms turn: the local step does not see them
 
@@ -83,6 +85,35 @@ class ArapSolver:
         follow = self._held.follow(len(constraints.nodes))[self._unknown]  # (M, H)
         self._follow = follow[:, blended]  # (M, B) of the handles whose arms turn
         self._parting = self._follow[nodes] - self._follow[nodes[:, :1]]  # (B, K, B)
+
+    def rest_in(self, positions: F64, rotations: F64) -> None:
+        """Strains the object so that it stays in this pose, which meets the targets it aims at.
+
+        Until the next `constrain`. The least strain will not do in a pose that is crushed so far
+        that its rotations are no fit: then less and less of the pose itself is strained. With
+        rigid bodies nothing of it is.
+        """
+        pose = positions, rotations
+        links, full = self._links, full_prestress(self._links, pose)
+        if self._bodies:
+            self._links = links.prestressed(full)
+            return
+        least = self._least_prestress(links, pose)
+        for share in (0.0, 0.5):
+            self._links = links.prestressed(least + share * (full - least))
+            fitted = self._links.fit(positions, rotations, self._is_given)[0]
+            if np.abs(fitted - rotations).max() < FITTING:
+                return
+        self._links = links.prestressed(full)
+
+    def _least_prestress(self, links: Links, pose: tuple[F64, F64]) -> F64:
+        """See `least_prestress`; soft constraints bear nothing."""
+        still, soft = np.zeros((self._rows.shape[0], 3)), self._constraints.softness
+        is_hard = np.concatenate([soft == 0, np.ones(len(self._constraints.held), bool)])
+        return least_prestress(
+            links, pose, self._is_given, csr_array(self._rows[is_hard]),
+            lambda forces: self._held.solve(forces, still),
+        )  # fmt: skip
 
     def aim(self, targets: Targets) -> None:
         """Gives the constraints other targets: nothing is factored for that."""
@@ -166,7 +197,7 @@ class ArapSolver:
             pivots.append(pivot)
             if not np.isin(group, self._constraints.turned).any():
                 pose = positions, rotations
-                rotations[group] = self._bodies.fit(self._links.weights, pose, group, pivot)
+                rotations[group] = self._bodies.fit(self._links, pose, group, pivot)
         return tuple(pivots)
 
     def _give(self, positions: F64, rotations: F64) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..base.arrays import F64, I32, Sparse
+from .links import Links
 from .rotation_fit import fit_rotations
 
 GRASP = 1e4  # x the weight of a body's links: several handles inside it say how it is turned
@@ -79,19 +80,22 @@ class Bodies:
             rotations[group] = rotations[leaders[0] if len(leaders) else group[0]]
         return rotations
 
-    def fit(self, weights: Sparse, pose: tuple[F64, F64], group: I32, pivot: Pivot) -> F64:
+    def fit(self, links: Links, pose: tuple[F64, F64], group: I32, pivot: Pivot) -> F64:
         """The body's rotation (3, 3) that minimises Eq. 2 while all else stays.
 
         Its links' other ends j are at q_j, and turn with R_j. The body's own view of link ij is
         q_j - c = R (p_j - p_c), the other end's is q_j - c - R_j (p_j - p_i) = R (p_i - p_c).
+        Where the links are at rest changed, p_j - p_c is so by d_ij, and p_j - p_i by -d_ji.
         """
-        q, r = pose
-        rows = weights[group]
-        i = np.repeat(group, np.diff(rows.indptr))
-        j, w = rows.indices, rows.data[:, None]
-        seen = q[j] - pivot.now
-        turned = (r[j] @ (self.points[j] - self.points[i])[..., None])[..., 0]
-        goal = (w * seen).T @ (self.points[j] - pivot.rest)
+        (q, r), starts = pose, links.weights.indptr
+        own = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in group])
+        i = np.repeat(group, np.diff(starts)[group])
+        j, w = links.weights.indices[own], links.weights.data[own, None]
+        seen, there, back = q[j] - pivot.now, self.points[j], self.points[j] - self.points[i]
+        if len(links.changes):
+            there, back = there + links.changes[own], back - links.returning[own]
+        turned = (r[j] @ back[..., None])[..., 0]
+        goal = (w * seen).T @ (there - pivot.rest)
         goal += (w * (seen - turned)).T @ (self.points[i] - pivot.rest)
         goal += GRASP * (float(w.sum()) or 1.0) * pivot.goal
         fitted = r[group[0]].reshape(9, 1).copy()

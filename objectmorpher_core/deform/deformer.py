@@ -12,14 +12,15 @@ from ..base.arrays import F64, I32, Sparse, frozen, frozen_rows
 from ..base.kernel_files import numba
 from ..base.rotations import matrix_from_vector
 from ..base.threads import FAST
-from ..document.model import DeformSettings, Handle, LiftedObject, Pose
+from ..document.model import DeformSettings, LiftedObject, Pose
+from ..document.pose import UNHELD, Base, Handle, Pose, turn_at
 from ..document.rig import Rig
 from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
 from .graph import Graph, build_graph
-from .hold import Frozen, Grasp, Hold, other_sides, stiffened
+from .hold import Frozen, Grasp, Hold, Start, other_sides, stiffened
 from .skinning import Motion, Skin, Skinned, skin
 from .surface_links import Surface
 
@@ -34,6 +35,7 @@ TURNED_RADIUS = 0.1  # x diameter along the surface: what turns with a turned ha
 TURNED_APART = 0.3  # x distance to the next handle, likewise
 SAME = 1e-9  # x diameter, and rad: handles that are moved as one body
 LINE = 1e-6  # x the handles' spread along it: what they spread beside a line
+USUAL = Base()  # from rest, with anchors of their own
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
 
 
@@ -91,23 +93,26 @@ class Deformer:
         """Index of the control point nearest to a rest surface point (3,), object frame."""
         return int(((self.points - point) ** 2).sum(1).argmin())
 
-    def anchors(self, handles: tuple[Handle, ...], is_automatic: bool = True) -> I32:
+    def anchors(self, handles: tuple[Handle, ...], base: Base = USUAL) -> I32:
         """Control points that stay where they are although nobody pinned them.
 
         One handle alone is only a translation for ARAP, so the quarter of its part that is
         farthest along the surface is held; with a second handle, a pin or frozen control points
-        the artist has said what holds.
+        the artist has said what holds. Unless the base says it.
         """
-        is_said = len(handles) != 1 or handles[0].is_pin or self.rig.held is not None
-        if is_said or not is_automatic:
+        if base.anchors is not None:
+            return base.anchors
+        if len(handles) != 1 or handles[0].is_pin or self.rig.held is not None:
             return np.empty(0, np.int32)
-        h = handles[0].control_point
+        return self.farthest_from(handles[0].control_point)
+
+    def farthest_from(self, h: int) -> I32:
+        """The quarter of its part that is farthest from a control point along the surface."""
         if self._last_anchors is None or self._last_anchors[0] != h:
-            self._last_anchors = (h, self._farthest_from(h))
+            self._last_anchors = (h, self._find_farthest(h))
         return self._last_anchors[1]
 
-    def _farthest_from(self, h: int) -> I32:
-        """The quarter of its part that is farthest from a control point along the surface."""
+    def _find_farthest(self, h: int) -> I32:
         distances = self.graph.distances_from(h)
         own = np.flatnonzero(np.isfinite(distances))
         count = max(1, round(ANCHORED_SHARE * len(own)))
@@ -117,7 +122,7 @@ class Deformer:
     def solve(
         self,
         handles: tuple[Handle, ...],
-        has_auto_anchors: bool = True,
+        base: Base = USUAL,
         start: Pose | None = None,
         seconds: float = np.inf,
         tolerance: float = TOLERANCE,
@@ -125,22 +130,55 @@ class Deformer:
         """The pose in which every handle is at its target, but for those on frozen control points.
 
         With `start` the solve continues from there (a drag), for about so many `seconds` or until
-        `tolerance` is met, see `minimise`; without, large moves are made in sub-steps from rest,
-        so the result is a function of the handles alone. Raises ValueError for handles that are
-        not finite.
+        `tolerance` is met, see `minimise`; without, large moves are made in sub-steps from the
+        base, so the result is a function of the handles and their base alone. Raises ValueError
+        for handles that are not finite.
         """
         numbers = [v for h in handles for v in (h.point, h.target, h.turn) if v is not None]
         if not np.isfinite(np.concatenate([*numbers, np.zeros(1)])).all():
             raise ValueError("a handle's point, target or turn is not finite")
         handles = self._effective(handles)
-        if not handles and not self._frozen.shifts.any():
-            return Solution(self.rest(), (0.0,))
-        if (rigid := self._rigid(handles)) is not None:
+        if not handles and (self._pose_of(base) is not None or not self._frozen.shifts.any()):
+            return Solution(self._pose_of(base) or self.rest(), (0.0,))
+        if base.is_usual and (rigid := self._rigid(handles)) is not None:
             return Solution(rigid, (0.0,))
-        solution = self._solved(handles, has_auto_anchors, start, seconds, tolerance)
+        solution = self._solved(handles, base, start, seconds, tolerance)
         if self.settings.stretch_limit is None or self._is_allowed(solution.pose):
             return solution
-        return self._limited(handles, has_auto_anchors, seconds)
+        return self._limited(handles, base, seconds)
+
+    def held(
+        self, handles: tuple[Handle, ...], pose: Pose | None, anchors: I32
+    ) -> tuple[tuple[Handle, ...], Base]:
+        """The handles with their points where `pose` has them, and the base that it is then.
+
+        What they move the object from is that pose, whatever it is; the anchors stay as in it.
+        """
+        if pose is not None and handles:
+            places = self.skin_points(np.array([h.point for h in handles]), pose).points
+            handles = tuple(
+                replace(h, target=place) for h, place in zip(handles, places, strict=True)
+            )
+        return handles, Base(pose, handles, anchors)
+
+    def _pose_of(self, base: Base) -> Pose | None:
+        """What handles begin from. The ablations know only the rest."""
+        is_usual = self.settings.mode == "arap" and not self.settings.is_faithful
+        return base.pose if is_usual else None
+
+    def _start(self, handles: tuple[Handle, ...], base: Base) -> Start:
+        """Where the handles, in their order, begin."""
+        pose = self._pose_of(base)
+        known = {h.control_point: h for h in base.handles}
+        begun = []
+        for h in handles:
+            start = known.get(h.control_point)
+            if pose is None or start is None:
+                begun.append(_on_the_way(h, 0.0))
+                continue
+            turn = turn_at(pose, h.control_point) if start.turn is None else start.turn
+            begun.append(replace(start, turn=None if h.turn is None else turn))
+        return Start(pose, tuple(begun), self.anchors(handles, base), self._frozen)
 
     def _effective(self, handles: tuple[Handle, ...]) -> tuple[Handle, ...]:
         """Those that move anything: what is frozen stays, and they with it.
@@ -172,21 +210,22 @@ class Deformer:
         turned = np.broadcast_to(r, (len(self.points), 3, 3))
         return Pose((self.points - centre) @ r.T + to, turned)
 
-    def _limited(
-        self, handles: tuple[Handle, ...], has_auto_anchors: bool, seconds: float
-    ) -> Solution:
+    def _limited(self, handles: tuple[Handle, ...], base: Base, seconds: float) -> Solution:
         """The farthest that all handles together can go before the stretch limit, by halving."""
-        best, low, high = Solution(self.rest(), (0.0,), 0.0), 0.0, 1.0
-        starts = [h.point for h in handles]
-        if self._frozen.shifts.any():  # they stay: the handles' ways begin where those hold them
-            best = replace(self._solved((), False, None, seconds / LIMIT_STEPS), share=0.0)
-            starts = [self.skin_points(point, best.pose).points[0] for point in starts]
+        starts, low, high = self._start(handles, base).handles, 0.0, 1.0
+        best = Solution(self._pose_of(base) or self.rest(), (0.0,), 0.0)
+        if self._pose_of(base) is None and self._frozen.shifts.any():
+            # They stay: the handles' ways begin where those hold them.
+            best = replace(self._solved((), UNHELD, None, seconds / LIMIT_STEPS), share=0.0)
+            starts = tuple(
+                replace(h, target=self.skin_points(h.point, best.pose).points[0]) for h in starts
+            )
         for _ in range(LIMIT_STEPS):
             share = 0.5 * (low + high)
             partly = tuple(
                 _on_the_way(h, share, start) for h, start in zip(handles, starts, strict=True)
             )
-            solution = self._solved(partly, has_auto_anchors, best.pose, seconds / LIMIT_STEPS)
+            solution = self._solved(partly, base, best.pose, seconds / LIMIT_STEPS)
             if self._is_allowed(solution.pose):
                 best, low = replace(solution, share=share), share
             else:
@@ -200,44 +239,43 @@ class Deformer:
     def _solved(
         self,
         handles: tuple[Handle, ...],
-        has_auto_anchors: bool,
+        base: Base,
         start: Pose | None,
         seconds: float,
         tolerance: float = TOLERANCE,
     ) -> Solution:
-        anchors = self.anchors(handles, has_auto_anchors)
-        self._constrain(handles, anchors)
-        rotations = (start or self.rest()).rotations
+        begun = self._constrain(handles, base)
+        rotations = (start or begun.pose or self.rest()).rotations
         if self.settings.mode == "laplacian":
             minimum = self._laplacian()
         elif self.settings.is_faithful:
             minimum = iterate(self._solver, rotations, FAITHFUL_ITERATIONS)
         else:
             if start is None:
-                rotations = self._approach(handles, rotations)
+                rotations = self._approach(handles, begun, rotations)
             is_hurried = start is not None and np.isfinite(seconds)
             history = self._history if is_hurried else None
             minimum = minimise(
                 self._solver, rotations, ITERATIONS, tolerance, seconds, history
             )  # fmt: skip
-        positions, rotations = self._follow(minimum.positions, minimum.rotations)
+        positions, rotations = self._follow(
+            minimum.positions, minimum.rotations, begun.pose or self.rest()
+        )
         return Solution(Pose(positions, rotations), minimum.energies)
 
-    def iterated(
-        self, handles: tuple[Handle, ...], iterations: int, has_auto_anchors: bool = True
-    ) -> Pose:
+    def iterated(self, handles: tuple[Handle, ...], iterations: int, base: Base = USUAL) -> Pose:
         """The pose after so many plain iterations from rest, settled or not: for comparisons."""
         handles = self._effective(handles)
         if not handles:
             return self.rest()
-        self._constrain(handles, self.anchors(handles, has_auto_anchors))
+        self._constrain(handles, base)
         minimum = iterate(self._solver, self.rest().rotations, iterations)
-        return Pose(*self._follow(minimum.positions, minimum.rotations))
+        return Pose(*self._follow(minimum.positions, minimum.rotations, self.rest()))
 
-    def prepare(self, handles: tuple[Handle, ...], has_auto_anchors: bool = True) -> None:
+    def prepare(self, handles: tuple[Handle, ...], base: Base = USUAL) -> None:
         """Does now what the first solve with these handles would do: their factorisation."""
         if handles := self._effective(handles):
-            self._constrain(handles, self.anchors(handles, has_auto_anchors))
+            self._constrain(handles, base)
 
     def skin_points(
         self, points: np.ndarray, pose: Pose, normals: np.ndarray | None = None
@@ -281,9 +319,7 @@ class Deformer:
         """How much `pose` bends and stretches the object at each control point."""
         return measure_strain(self.points, self._solver.weights, pose)
 
-    def influence(
-        self, handles: tuple[Handle, ...], h: int, has_auto_anchors: bool, pose: Pose | None
-    ) -> F64:
+    def influence(self, handles: tuple[Handle, ...], h: int, base: Base, pose: Pose | None) -> F64:
         """(M,) how much each control point goes along with handle `h`: 1 = as far as it does.
 
         For a small move from `pose`. With the rotations as they are, all follow linearly, and by
@@ -292,7 +328,7 @@ class Deformer:
         if self.rig.is_held(handles[h].control_point):
             return np.zeros(len(self.points))
         handles, h = self._effective(handles), len(self._effective(handles[:h]))
-        self._constrain(handles, self.anchors(handles, has_auto_anchors))
+        self._constrain(handles, base)
         rotations = (pose or self.rest()).rotations
         step = np.array([self.diameter, 0.0, 0.0])
         there = replace(handles[h], target=handles[h].target + step)
@@ -302,10 +338,15 @@ class Deformer:
         self._solver.aim(self._hold.targets(handles))
         return np.linalg.norm(after - before, axis=1) / self.diameter
 
-    def _constrain(self, handles: tuple[Handle, ...], anchors: I32) -> None:
-        """Aims the solver at the handles; it is prepared anew only when their set changed."""
+    def _constrain(self, handles: tuple[Handle, ...], base: Base) -> Start:
+        """Aims the solver at the handles; it is prepared anew only when their set changed.
+
+        Returns where they begin.
+        """
+        start = self._start(handles, base)
         key = (
-            anchors.tobytes(),
+            start.pose,
+            start.anchors.tobytes(),
             *((h.point.tobytes(), h.control_point, h.softness, h.turn is None) for h in handles),
         )
         if key != self._constrained:
@@ -314,10 +355,14 @@ class Deformer:
                 ends = other_sides(points, self._solid, self.graph.mean_spacing, self.diameter)
                 hands = stiffened(self.points, self._solver.weights, points, ends, self.diameter)
             grasp = self._grasp(handles, points)
-            self._hold = Hold.of(handles, grasp, self.points, anchors, self._frozen)
+            self._hold = Hold.of(handles, grasp, self.points, start)
             self._solver.constrain(self._hold.constraints, hands)
+            if start.pose is not None:
+                self._solver.aim(self._hold.targets(start.handles))
+                self._solver.rest_in(start.pose.points, start.pose.rotations)
             self._constrained, self._history = key, Anderson(self.points.size)
         self._solver.aim(self._hold.targets(handles))
+        return start
 
     def _grasp(self, handles: tuple[Handle, ...], points: F64) -> Grasp:
         """The surface point itself, and what turns with it; in the paper its control point."""
@@ -336,19 +381,22 @@ class Deformer:
             around.append(np.flatnonzero(distances <= reach).astype(np.int32))
         return Grasp(bind(points, self.points, self.graph), tuple(around))
 
-    def _approach(self, handles: tuple[Handle, ...], rotations: F64) -> F64:
-        """Walks targets and frozen points from rest to where they are; returns the rotations there.
+    def _approach(self, handles: tuple[Handle, ...], begun: Start, rotations: F64) -> F64:
+        """Walks targets and frozen points from where they begin; returns the rotations there.
 
         From a cold start a large turn ends in a false minimum; in steps of a tenth of the
         diameter each solve begins near its own.
         """
-        moves = np.array([*(h.target - h.point for h in handles), *self._frozen.shifts])
-        turns = np.array([np.zeros(3), *(h.turn for h in handles if h.turn is not None)])
+        pairs = list(zip(handles, begun.handles, strict=True))
+        shifts = self._frozen.shifts if begun.pose is None else np.zeros((1, 3))
+        moves = np.array([*(h.target - s.target for h, s in pairs), *shifts]).reshape(-1, 3)
+        turns = [h.turned - s.turned for h, s in pairs]
+        turns = np.array([np.zeros(3), *turns])
         farthest = np.linalg.norm(moves, axis=1).max() / (LARGE_MOVE * self.diameter)
         largest = np.linalg.norm(turns, axis=1).max() / LARGE_TURN
         steps = int(np.clip(np.ceil(max(farthest, largest)), 1, MOST_STEPS))
         for step in range(1, steps):
-            partly = tuple(_on_the_way(h, step / steps) for h in handles)
+            partly = tuple(_on_the_way(h, step / steps, s) for h, s in pairs)
             self._solver.aim(self._hold.targets(partly, step / steps))
             rotations = minimise(self._solver, rotations, STEP_ITERATIONS).rotations
         self._solver.aim(self._hold.targets(handles))
@@ -360,8 +408,8 @@ class Deformer:
         positions = self._solver.positions(rotations)
         return Minimum(positions, rotations, (self._solver.energy(positions, rotations),))
 
-    def _follow(self, positions: F64, rotations: F64) -> tuple[F64, F64]:
-        """Parts without a handle move rigidly with the nearest part that has one."""
+    def _follow(self, positions: F64, rotations: F64, begun: Pose) -> tuple[F64, F64]:
+        """Parts without a handle move rigidly from `begun` with the nearest part that has one."""
         is_free, components = self._solver.is_free, self._solver.components
         if is_free.all():
             return positions, rotations
@@ -371,17 +419,20 @@ class Deformer:
             own = np.flatnonzero(components == component)
             gaps = ((self.points[own, None] - self.points[None, leaders]) ** 2).sum(-1)
             leader = leaders[np.unravel_index(gaps.argmin(), gaps.shape)[1]]
-            r = rotations[leader]
-            positions[own] = positions[leader] + (self.points[own] - self.points[leader]) @ r.T
-            rotations[own] = r
+            r = rotations[leader] @ begun.rotations[leader].T
+            positions[own] = positions[leader] + (begun.points[own] - begun.points[leader]) @ r.T
+            rotations[own] = r @ begun.rotations[own]
         return positions, rotations
 
 
-def _on_the_way(handle: Handle, share: float, start: F64 | None = None) -> Handle:
-    """The handle when it has gone a `share` of its way from `start` (3,), or from rest."""
-    start = handle.point if start is None else start
-    target = start + share * (handle.target - start)
-    return replace(handle, target=target, turn=None if handle.turn is None else share * handle.turn)
+def _on_the_way(handle: Handle, share: float, start: Handle | None = None) -> Handle:
+    """The handle when it has gone a `share` of its way from where it begins, or from rest."""
+    begun = handle.point if start is None else start.target
+    target = begun + share * (handle.target - begun)
+    if handle.turn is None:
+        return replace(handle, target=target)
+    turned = np.zeros(3) if start is None else start.turned
+    return replace(handle, target=target, turn=turned + share * (handle.turn - turned))
 
 
 def _weighed(weights: csr_array, stiffness: F64 | None) -> csr_array:

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import F64, I32, Sparse, frozen, frozen_rows
 from ..base.kernel_files import numba
 from ..base.rotations import matrix_from_vector
-from ..document.model import Handle
+from ..document.model import Handle, Pose
 from ..document.rig import Rig
 from .binding import Binding
 from .constraints import Constraints, Targets
@@ -39,25 +39,36 @@ class Frozen:
 
 
 @dataclass(frozen=True, eq=False)
+class Start:
+    """Where a set of handles begins, and what stays there."""
+
+    pose: Pose | None  # None: the object at rest
+    handles: tuple[Handle, ...]  # the same ones, as they are in that pose
+    anchors: I32  # control points
+    frozen: Frozen
+
+
+@dataclass(frozen=True, eq=False)
 class Hold:
-    """The rows of a set of handles. They depend on where the handles are at rest only."""
+    """The rows of a set of handles. They depend on where the handles begin only."""
 
     constraints: Constraints
     owners: I32  # (H,) the handle of each row
-    places: F64  # (H, 3) the row's surface point from its handle's, at rest
+    places: F64  # (H, 3) the row's surface point from its handle's, at the start
     turners: I32  # (T,) the handle of each turned control point
-    held: F64  # (P, 3) held control points, at rest
+    held: F64  # (P, 3) held control points, at the start
     shifts: F64  # (P, 3) how far from there they are held
+    turns: F64  # (handles, 3, 3) of the handles at the start
+    turned: F64  # (T, 3, 3) rotations of the turned control points at the start
 
     @classmethod
-    def of(
-        cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, anchors: I32, frozen: Frozen
-    ) -> Hold:
-        """`points` (M, 3) control points at rest; `anchors` stay there, if no handle is on them.
+    def of(cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, start: Start) -> Hold:
+        """`points` (M, 3) control points at rest; anchors stay, if no handle is on them.
 
         A handle is the surface point that the artist clicked. One that is turned too takes the
         control points around it along as one rigid body, all that are not frozen: a row each.
         """
+        frozen = start.frozen
         owners, nodes, weights, turned = [], [], [], []
         binding = grasp.binding
         width = binding.control_points.shape[1]
@@ -82,29 +93,42 @@ class Hold:
         constraints = Constraints(
             index, np.array(weights).reshape(-1, width), surface[:, None] - points[index],
             np.array([handles[h].softness for h in owners]),
-            np.concatenate([np.setdiff1d(anchors, index), frozen.nodes]).astype(np.int32),
+            np.concatenate([np.setdiff1d(start.anchors, index), frozen.nodes]).astype(np.int32),
             np.array([node for node, _ in turned], np.int32),
         )  # fmt: skip
         turners = np.array([h for _, h in turned], np.int32)
         shifts = np.zeros((len(constraints.held), 3))
         shifts[len(shifts) - len(frozen.nodes) :] = frozen.shifts
-        held = points[constraints.held]
-        return cls(constraints, owner, surface - clicked[owner], turners, held, shifts)
+        held, begun = points[constraints.held], clicked
+        rotations = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
+        if start.pose is not None:
+            surface = constraints.placed(start.pose.points, start.pose.rotations)
+            held, shifts = start.pose.points[constraints.held], np.zeros(shifts.shape)
+            rotations = start.pose.rotations[constraints.turned]
+            begun = np.array([h.target for h in start.handles]).reshape(-1, 3)
+        return cls(
+            constraints, owner, surface - begun[owner], turners, held, shifts,
+            _turns(start.handles), rotations,
+        )  # fmt: skip
 
     def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
-        """Where all must be for handles that have the same points at rest.
+        """Where all must be for handles that begin where these do.
 
-        What is frozen has gone a `share` of its way from rest.
+        What is frozen has gone a `share` of its way.
         """
         goals, held = np.array([h.target for h in handles]), self.held + share * self.shifts
         goals = goals.reshape(-1, 3)
         if len(self.turners) == 0:
             return Targets(goals[self.owners] + self.places, held, np.empty((0, 3, 3)))
-        turns = np.stack(
-            [np.eye(3) if h.turn is None else matrix_from_vector(h.turn) for h in handles]
-        )
+        turns = _turns(handles) @ self.turns.transpose(0, 2, 1)  # since the start
         turned = (turns[self.owners] @ self.places[..., None])[..., 0]
-        return Targets(goals[self.owners] + turned, held, turns[self.turners])
+        return Targets(goals[self.owners] + turned, held, turns[self.turners] @ self.turned)
+
+
+def _turns(handles: tuple[Handle, ...]) -> F64:
+    """(handles, 3, 3) how each is turned; one that turns as it comes is not."""
+    turns = [np.eye(3) if h.turn is None else matrix_from_vector(h.turn) for h in handles]
+    return np.array(turns).reshape(-1, 3, 3)
 
 
 # The hand of a handle: links around it are stiffer.

@@ -8,7 +8,7 @@ a half of it zeros), which is read in order and multiplied in registers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from .rotation_fit import fit_rotations
 GROUP = 16  # control points whose rows are multiplied together; 8 and 32 are slower
 Packed = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 LANES = 4  # columns are filled up to a multiple of this
+NO_CHANGES = frozen(np.empty((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,10 @@ class Links:
     blocks: F32  # (B,) the groups' blocks, row by row
     block_starts: np.ndarray  # (groups + 1,) u32
     slots: np.ndarray  # (E,) u32 where each link of `weights` is in `blocks`
+    # (E, 3) by how much the links differ from the rest's, which is then e_ij + d_ij, and those of
+    # the same links seen from their other ends; (0, 3) where they do not (`prestress.py`).
+    changes: F64 = field(default_factory=lambda: NO_CHANGES)
+    returning: F64 = field(default_factory=lambda: NO_CHANGES)
 
     @classmethod
     def of(cls, points: F64, weights: Sparse) -> Links:
@@ -58,10 +63,28 @@ class Links:
         totals = _totals_of(self.points, weights)
         return replace(self, weights=weights, totals=totals, blocks=frozen(blocks))
 
+    def prestressed(self, changes: F64) -> Links:
+        """The same links, at rest by `changes` (E, 3) from where they are at rest."""
+        w, ends = self.weights.data, self.weights.indices
+        starts = np.repeat(np.arange(len(self.points)), np.diff(self.weights.indptr))
+        edges = self.points[ends] - self.points[starts]
+        totals = self.totals.copy()
+        for a in range(3):
+            totals[1 + a] += np.bincount(starts, w * changes[:, a], len(self.points))
+        longer = ((2 * edges + changes) * changes).sum(1)
+        totals[4] += np.bincount(starts, w * longer, len(self.points))
+        numbers = csr_array((np.arange(1, len(w) + 1), ends, self.weights.indptr))
+        back = np.asarray(numbers.T.tocsr().data) - 1
+        return replace(
+            self, totals=frozen(totals), changes=frozen(changes), returning=frozen(changes[back])
+        )
+
     def right_side(self, rotations: F64) -> F64:
         """(M, 3) right-hand side of Eq. 3: sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)."""
         out = np.empty((len(self.points), 3))
         _right_side(*self._packed, self.totals, self._rest, frozen(rotations), out)
+        if len(self.returning):
+            _return(*frozen_rows(self.weights), self.returning, frozen(rotations), out)
         return out
 
     def fit(self, positions: F64, warm: F64, is_given: np.ndarray) -> tuple[F64, float]:
@@ -71,14 +94,17 @@ class Links:
         """
         rotations = np.empty(warm.shape)
         state = frozen(positions), frozen(warm), frozen(is_given), rotations
-        energy = _fit(*self._packed, self.totals, self._rest, *state)
+        more = np.zeros((9, len(self.points) if len(self.changes) else 0))
+        if len(self.changes):
+            _stretch(*frozen_rows(self.weights), self.changes, frozen(positions), more)
+        energy = _fit(*self._packed, self.totals, self._rest, more, *state)
         return rotations, max(float(energy), 0.0)
 
     def energies(self, positions: F64, rotations: F64) -> F64:
         """(M,) each control point's share of Eq. 2, object units squared."""
         out = np.empty(len(positions))
         pose = frozen(positions), frozen(rotations)
-        _energies(*frozen_rows(self.weights), self.points, *pose, out)
+        _energies(*frozen_rows(self.weights), self.points, self.changes, *pose, out)
         return out
 
     @cached_property
@@ -223,9 +249,10 @@ def _right_side(order, columns, column_starts, blocks, block_starts, totals, p, 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _fit(
-    order, columns, column_starts, blocks, block_starts, totals, p, positions, warm, is_given, out
-):
-    """Rotations into `out`, from `warm`; the energy.
+    order, columns, column_starts, blocks, block_starts, totals, p, more, positions, warm,
+    is_given, out,
+):  # fmt: skip
+    """Rotations into `out`, from `warm`; the energy. `more` (9, M) of the sums, or (9, 0).
 
     sum_j w p'_j e_ij^T = sum_j w p'_j p_j^T - (sum_j w p'_j) p_i^T, and
     sum_ij w |e'|^2 = 2 sum_i p'_i . (sum_j w (p'_i - p'_j)): no link's squares are summed. The
@@ -255,6 +282,10 @@ def _fit(
         for b in range(3):
             for i in range(count):
                 s[3 * a + b, i] -= s[9 + a, i] * p[b, i] + q[a, i] * totals[1 + b, i]
+    if more.shape[1] == count:
+        for k in range(9):
+            for i in range(count):
+                s[k, i] += more[k, i]
     fit_rotations(s[:9], r)
     for i in range(count):
         for a in range(3):
@@ -267,12 +298,42 @@ def _fit(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _energies(starts, ends, weights, p, q, r, out):
+def _return(starts, ends, weights, returning, r, out):
+    """out_i += sum_j w R_j d_ji / 2."""
+    for i in range(len(starts) - 1):
+        for a in range(3):
+            total = 0.0
+            for e in range(starts[i], starts[i + 1]):
+                s, d = r[ends[e], a], returning[e]
+                total += weights[e] * (s[0] * d[0] + s[1] * d[1] + s[2] * d[2])
+            out[i, a] += 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _stretch(starts, ends, weights, changes, q, out):
+    """out (9, M) := sum_j w (q_j - c) d_ij^T, about the positions' centroid c."""
+    count = len(q)
+    mean = np.zeros(3)
+    for j in range(count):
+        for a in range(3):
+            mean[a] += q[j, a] / count
+    for i in range(count):
+        for e in range(starts[i], starts[i + 1]):
+            for a in range(3):
+                pull = weights[e] * (q[ends[e], a] - mean[a])
+                for b in range(3):
+                    out[3 * a + b, i] += pull * changes[e, b]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _energies(starts, ends, weights, p, changes, q, r, out):
     for i in range(len(starts) - 1):
         total = 0.0
         for e in range(starts[i], starts[i + 1]):
             j = ends[e]
             x, y, z = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[j, 2] - p[i, 2]
+            if len(changes):
+                x, y, z = x + changes[e, 0], y + changes[e, 1], z + changes[e, 2]
             square = 0.0
             for a in range(3):
                 gap = q[j, a] - q[i, a] - (r[i, a, 0] * x + r[i, a, 1] * y + r[i, a, 2] * z)

@@ -23,6 +23,7 @@ from .model import (
     Prompt,
     is_shown_alike,
 )
+from .pose import Base
 from .rig import Rig, Seam
 from .settings import (
     LEAST_FEATHER,
@@ -282,7 +283,13 @@ def reset_pose(document: Document, k: int) -> Document:
     """Object `k` in the shape of the photo, without handles; what is frozen is so at rest."""
     item = document.objects[k]
     rig = item.rig if item.rig.shifts is None else replace(item.rig, shifts=None)
-    return document.with_object(k, replace(item, handles=(), rig=rig, pose=None))
+    return document.with_object(k, replace(item, handles=(), rig=rig, pose=None, base=Base()))
+
+
+def forget_base(document: Document, k: int) -> Document:
+    """Object `k` is moved from rest again; what stays by itself is as it was."""
+    item = document.objects[k]
+    return document.with_object(k, replace(item, base=item.base.at_rest))
 
 
 def resample(document: Document, k: int, count: int) -> Document:
@@ -310,9 +317,8 @@ def resample(document: Document, k: int, count: int) -> Document:
     if len({h.control_point for h in handles}) < len(handles):
         raise EditError(f"{count} control points are too few to tell the handles apart")
     rig = item.rig.moved_to(np.asarray(KDTree(old).query(points)[1]))
-    return document.with_object(
-        k, replace(item, lifted=lifted, handles=handles, rig=rig, pose=None)
-    )
+    changed = replace(item, lifted=lifted, handles=handles, rig=rig, pose=None, base=Base())
+    return document.with_object(k, changed)
 
 
 def set_pose(document: Document, k: int, pose: Pose | None) -> Document:
@@ -333,15 +339,17 @@ def set_placement(document: Document, k: int, placement: Placement) -> Document:
     return document.with_object(k, replace(item, placement=placement))
 
 
+def set_grounded(document: Document, k: int, is_grounded: bool) -> Document:
+    """Whether moving object `k` slides it over the ground."""
+    return document.with_object(k, replace(document.objects[k], is_grounded=is_grounded))
+
+
 def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
     """How object `k` deforms; its pose was solved with the old settings and is gone."""
-    return document.with_object(k, replace(document.objects[k], deform=settings, pose=None))
-
-
-def set_auto_anchors(document: Document, k: int, has_auto_anchors: bool) -> Document:
-    """Whether the far end of object `k` is held when one handle is all there is."""
-    item = replace(document.objects[k], has_auto_anchors=has_auto_anchors)
-    return document.with_object(k, item)
+    item = document.objects[k]
+    return document.with_object(
+        k, replace(item, deform=settings, pose=None, base=item.base.at_rest)
+    )
 
 
 def set_visible(document: Document, k: int, is_visible: bool) -> Document:
@@ -519,7 +527,7 @@ def set_rig(document: Document, k: int, rig: Rig) -> Document:
         rig.check(len(item.lifted.control_points))
     except ValueError as error:
         raise EditError(str(error)) from error
-    return document.with_object(k, replace(item, rig=rig, pose=None))
+    return document.with_object(k, replace(item, rig=rig, pose=None, base=item.base.at_rest))
 
 
 def cut(document: Document, k: int, first: np.ndarray, second: np.ndarray) -> Document:

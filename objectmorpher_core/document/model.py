@@ -18,7 +18,7 @@ from ..base.camera import Camera
 from ..base.rotations import turn_matrix
 from ..pictures.image import Picture
 from .gaussians import Gaussians
-from .pose import Handle, Pose
+from .pose import UNHELD, Base, Handle, Pose
 from .rig import Rig
 from .settings import Hint, Refined, Shadow
 
@@ -286,6 +286,16 @@ class EditObject:
     stays_in_front: bool = False  # covers what is edited, as it does in the photo
     # (H, W) what matte and lift are of, where the mask was refined since; None: they are up to date
     shaped: Selection | None = None
+    base: Base = field(default_factory=Base)  # what the handles move it from
+    is_held_around: bool = False  # whether a drag leaves all that is not near it where it is
+    is_grounded: bool = False  # moving it slides it over the ground
+
+    @property
+    def footing(self) -> Base:
+        """What the handles move the object from, and what stays there."""
+        if self.base.anchors is None and not self.has_auto_anchors:
+            return replace(self.base, anchors=UNHELD.anchors)
+        return self.base
 
     @property
     def is_moved(self) -> bool:
@@ -328,7 +338,9 @@ class EditObject:
         self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
-        fresh = replace(self, handles=(), rig=Rig(), pose=None, shape=shape or self.shape)
+        fresh = replace(
+            self, handles=(), rig=Rig(), pose=None, base=Base(), shape=shape or self.shape
+        )
         shaped = self.shaped if matte is self.matte else None
         return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False, shaped=shaped)
 

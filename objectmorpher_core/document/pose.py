@@ -1,4 +1,4 @@
-"""What the user asks of an object's control points, and where they go."""
+"""What the user asks of an object's control points, where they go, and from where."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import F64, frozen
+from ..base.arrays import F64, I32, frozen
 from ..base.rotations import vector_from_matrix
 
 
@@ -27,6 +27,11 @@ class Handle:
         if self.turn is not None:
             object.__setattr__(self, "turn", frozen(self.turn, np.float64))
 
+    @property
+    def turned(self) -> F64:
+        """Its turn (3,); none where it turns as it comes."""
+        return np.zeros(3) if self.turn is None else self.turn
+
     def pinned(self, is_pin: bool, pose: Pose | None) -> Handle:
         """As a pin, which is held as it is turned in `pose`; or to be dragged, as it comes."""
         if is_pin == self.is_pin:
@@ -45,6 +50,36 @@ class Pose:
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, np.float64))
         object.__setattr__(self, "rotations", frozen(self.rotations, np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """What the handles move an object from: its pose when their set last changed, and what stays.
+
+    The pose is the one in which the handles are where they were then; they change it by no more
+    than they have moved since. So a handle that is added, softened or removed changes nothing.
+    """
+
+    pose: Pose | None = None  # None: the object at rest
+    handles: tuple[Handle, ...] = ()  # as they were in that pose
+    anchors: I32 | None = None  # control points that stay as they are in it; None: chosen anew
+
+    def __post_init__(self) -> None:
+        if self.anchors is not None:
+            object.__setattr__(self, "anchors", frozen(self.anchors, np.int32))
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether the object moves from rest, with anchors that choose themselves."""
+        return self.pose is None and self.anchors is None
+
+    @property
+    def at_rest(self) -> Base:
+        """The same anchors, from rest."""
+        return Base(anchors=self.anchors)
+
+
+UNHELD = Base(anchors=np.empty(0, np.int32))  # from rest; nothing stays by itself
 
 
 def turn_at(pose: Pose | None, control_point: int) -> F64:

@@ -126,17 +126,15 @@ class _Film:
         return replace(item, pose=pose, placement=placement)
 
     def _solved(self, k: int, item: EditObject, share: float) -> Pose | None:
-        """The pose that the handles give; None where it is not they that made it."""
+        """The pose that the handles give; None where it is not they alone that made it."""
         shifts = item.rig.shifts
-        if not item.handles and shifts is None:
+        if item.base.pose is not None or (not item.handles and shifts is None):
             return None
         deformer = self.puppets[k].deformer
         if shifts is not None:
             deformer = deformer.with_rig(replace(item.rig, shifts=share * shifts))
         handles = tuple(_handle(handle, share) for handle in item.handles)
-        solved = deformer.solve(
-            handles, item.has_auto_anchors, self._last.get(k), tolerance=TOLERANCE
-        )
+        solved = deformer.solve(handles, item.footing, self._last.get(k), tolerance=TOLERANCE)
         self._last[k] = solved.pose
         return solved.pose
 

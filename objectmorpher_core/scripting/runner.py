@@ -180,7 +180,7 @@ def posed(
             deformer = puppet.deformer
         progress(0.55, "Deforming")
         with stopwatch.stage("deform"):
-            solution = deformer.solve(item.handles, item.has_auto_anchors)
+            solution = deformer.solve(item.handles, item.footing)
         energies = solution.energies
         document = edits.set_pose(document, k, solution.pose)
     return document, energies

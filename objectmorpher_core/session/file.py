@@ -269,7 +269,7 @@ def _check_coverage(item: EditObject) -> None:
 def _check_lifted(item: EditObject) -> None:
     lifted = item.lifted
     if lifted is None:
-        if item.handles or item.pose is not None:
+        if item.handles or item.pose is not None or not item.base.is_usual:
             raise ValueError("an object that is not lifted has handles")
         return
     count, nodes = len(lifted.gaussians), len(lifted.control_points)
@@ -278,7 +278,7 @@ def _check_lifted(item: EditObject) -> None:
     _same("solidity", lifted.texture.solidity.shape, (count,))
     _same("control_points", lifted.control_points.shape, (nodes, 3))
     _same("world_from_object", lifted.world_from_object.shape, (4, 4))
-    for handle in item.handles:
+    for handle in (*item.handles, *item.base.handles):
         _same("handle", (handle.point.shape, handle.target.shape), ((3,), (3,)))
         if not 0 <= handle.control_point < nodes:
             raise ValueError(f"a handle names control point {handle.control_point} of {nodes}")
@@ -287,9 +287,15 @@ def _check_lifted(item: EditObject) -> None:
         if not handle.softness >= 0:
             raise ValueError(f"a handle's softness is {handle.softness:g}")
     item.rig.check(nodes)
-    if item.pose is not None:
-        _same("pose", item.pose.points.shape, (nodes, 3))
-        _same("rotations", item.pose.rotations.shape, (nodes, 3, 3))
+    for pose in (item.pose, item.base.pose):
+        if pose is not None:
+            _same("pose", pose.points.shape, (nodes, 3))
+            _same("rotations", pose.rotations.shape, (nodes, 3, 3))
+    anchors = item.base.anchors
+    if anchors is not None and (
+        anchors.ndim != 1 or not ((anchors >= 0) & (anchors < nodes)).all()
+    ):
+        raise ValueError(f"an anchor is none of the object's {nodes} control points")
 
 
 def _same(what: str, found: tuple, expected: tuple) -> None:

@@ -149,9 +149,12 @@ def test_pins_hold_and_handles_can_be_removed(editor: Editor, ball: Document) ->
     np.testing.assert_allclose(editor.posing.positions()[0], held, atol=1e-6)
     assert editor.history is not None
     assert editor.history.undo_label == "Nudge point"
+    pose = editor.object.pose
     editor.posing.remove(1)
     editor.posing.remove(0)
+    assert editor.object.pose is pose  # nothing moves because something lets go
     assert editor.object.handles == ()
+    editor.posing.reset()
     assert editor.object.pose is None
 
 

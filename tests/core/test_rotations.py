@@ -90,7 +90,10 @@ def test_turning_on_about_an_axis_adds_to_the_turn_about_it():
     for start in np.random.default_rng(2).normal(size=(20, 3)):
         before = turn_about(start, axis)
         after = turned_by(start, 0.3 * axis)
-        assert turn_about(after, axis) == pytest.approx(before + 0.3, abs=1e-9)
+        gap = turn_about(after, axis) - before - 0.3
+        assert abs(gap - 2 * np.pi * round(gap / (2 * np.pi))) < 1e-9
+        to = turned_by(start, (np.radians(-12) - before) * axis)
+        assert np.degrees(turn_about(to, axis)) == pytest.approx(-12)  # and not 348
         matrices = matrix_from_vector(after), matrix_from_vector(0.3 * axis)
         np.testing.assert_allclose(matrices[0], matrices[1] @ matrix_from_vector(start), atol=1e-9)
 

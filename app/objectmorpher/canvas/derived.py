@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse
-from objectmorpher_core.document import edits
+from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import (
     DeformSettings,
     Document,
@@ -37,6 +37,7 @@ from .surface_facts import SurfaceFacts
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
+    from objectmorpher_core.deform.deformer import Deformer
     from objectmorpher_core.deform.puppet import SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
     from objectmorpher_core.raster.tiles import Drawable
@@ -220,17 +221,25 @@ class Derived:
         complete.
         """
         thing = document.objects[k]
-        if not thing.handles and thing.rig.shifts is None:
+        if not thing.handles and thing.rig.shifts is None and thing.base.pose is None:
             return edits.set_pose(document, k, None)
-        deformer = self.shape(document.photo, thing).puppet.deformer
-        solution = deformer.solve(thing.handles, thing.has_auto_anchors, start, **effort)
+        deformer = self.deformer(document, k)
+        solution = deformer.solve(thing.handles, thing.footing, start, **effort)
         return edits.set_pose(document, k, solution.pose)
+
+    def deformer(self, document: Document, k: int) -> Deformer:
+        """What solves for object `k`'s pose."""
+        return self.shape(document.photo, document.objects[k]).puppet.deformer
+
+    def held(self, document: Document, k: int, added: tuple[int, ...] = ()) -> Document:
+        """Object `k` held as it is by the handles that it has now, of which some are `added`."""
+        return hold_edits.hold(document, k, self.deformer(document, k), added)
 
     def anchors(self, document: Document, k: int) -> F64:
         """Where the automatic anchors are seen: (A, 2) image px."""
         thing = document.objects[k]
         deformer = self.shape(document.photo, thing).puppet.deformer
-        index = deformer.anchors(thing.handles, thing.has_auto_anchors)
+        index = deformer.anchors(thing.handles, thing.footing)
         points = thing.pose.points if thing.pose else deformer.points
         return self.project(document, k, points[index])
 

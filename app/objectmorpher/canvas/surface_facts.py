@@ -85,8 +85,8 @@ class SurfaceFacts:
         deformer = self._derived.shape(document.photo, thing).puppet.deformer
         handle = thing.handles[h]
         return self._influences(
-            lambda: deformer.influence(thing.handles, h, thing.has_auto_anchors, thing.pose),
-            deformer, handle, thing.handles, thing.pose,
+            lambda: deformer.influence(thing.handles, h, thing.footing, thing.pose),
+            deformer, handle, thing.handles, thing.pose, thing.footing.anchors,
         )  # fmt: skip
 
     def mirror(self, document: Document, k: int) -> MirrorPlane:

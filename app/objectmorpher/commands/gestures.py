@@ -30,7 +30,7 @@ GESTURES: dict[str, tuple[tuple[str, str], ...]] = {
         ("Alt-drag", "Along the surface's normal"),
         ("Ctrl-drag", "Turn the point"),
         ("Wheel while dragging", "Nearer, farther"),
-        ("Alt-click", "Pin that stays"),
+        ("Alt-click, P", "Pin that stays"),
         ("Right-click", "Remove a point"),
         ("Click on another object", "Choose it"),
         ("Arrows, with Shift, Alt", "Nudge by 1 px, by 10 px, by 0.1 px"),

@@ -50,7 +50,7 @@ COMMANDS: dict[str, Command] = {
         "Reset size", "", lambda e: e.placing.reset_size(), _not_sized
     ),
     "ground": Command(
-        "Stand on the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
-        lambda e: e.view.is_grounded,
+        "Move over the ground", "G", lambda e: e.placing.toggle_ground(), no_lift,
+        lambda e: e.placing.is_grounded,
     ),
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..editor.editor import Editor
+from ..editor.view import ToolName
 from ..system.texts import t
 from .command import Command, no_handle, no_lift
 
@@ -26,6 +27,23 @@ def _toggle_influence(editor: Editor) -> None:
     editor.view.pose.has_influence = not editor.view.pose.has_influence
 
 
+def _remove(editor: Editor) -> None:
+    """What is chosen in this tool: in Place it is the object."""
+    if editor.view.tool is ToolName.PLACE:
+        editor.objects.remove()
+    else:
+        editor.posing.remove()
+
+
+def _nothing_to_remove(editor: Editor) -> str | None:
+    return no_lift(editor) if editor.view.tool is ToolName.PLACE else no_handle(editor)
+
+
+def _no_place_for_a_pin(editor: Editor) -> str | None:
+    is_there = editor.hover.surface is not None or editor.hover.handle is not None
+    return no_lift(editor) or (None if is_there else t("Point at the object to pin it there"))
+
+
 def _send_back(editor: Editor) -> None:
     editor.posing.send_back(editor.posing.selected, t("Reset handle"))
 
@@ -38,9 +56,10 @@ def _send_all_back(editor: Editor) -> None:
 
 COMMANDS: dict[str, Command] = {
     "remove_handle": Command(
-        "Remove handle", "Delete", lambda e: e.posing.remove(), no_handle,
+        "Remove handle", "Delete", _remove, _nothing_to_remove,
         other_keys=("Backspace",),
     ),
+    "pin": Command("Pin under the pointer", "P", lambda e: e.posing.pin(), _no_place_for_a_pin),
     "select_handles": Command(
         "Select all handles", "Ctrl+A", lambda e: e.posing.select_all(), no_handles
     ),
@@ -52,7 +71,7 @@ COMMANDS: dict[str, Command] = {
     ),
     "mirror": Command(
         "Symmetry", "", lambda e: e.posing.mirroring.toggle(), no_lift,
-        lambda e: e.view.pose.is_mirrored,
+        lambda e: e.posing.mirroring.is_on,
     ),
     "influence": Command(
         "Influence of the handle", "", _toggle_influence, no_lift,

@@ -52,7 +52,7 @@ from .recovery import Recovery
 from .refits import Refits
 from .settings import Settings
 from .tasks import SELECT, Tasks
-from .view import SelectMode, Shown, ToolName, View
+from .view import USUAL_LEVEL, SelectMode, Shown, ToolName, View
 
 
 class Editor:
@@ -172,6 +172,7 @@ class Editor:
         self.current = max(len(document.objects) - 1, 0)
         self.view.tool = ToolName.POSE if self.is_lifted else ToolName.SELECT
         self.view.split, self.view.shown = None, Shown.COMPOSITE
+        self.view.selecting.level = USUAL_LEVEL
         self.view.orbit = None
         self.view.fit(document.photo.size)
         if not self.is_lifted:

@@ -38,7 +38,6 @@ class PoseView:
     mode: PoseMode = PoseMode.DRAG
     stiffness: float = 4.0  # x the usual one, of what is painted with Stiffen
     has_ring: bool = True  # around the selected handle
-    is_mirrored: bool = False  # a drag moves the mirrored point too
     has_anchors: bool = True
     has_regions: bool = True
     has_influence: bool = False
@@ -62,6 +61,9 @@ class ToolName(Enum):
     COMPOSE = "Compose"
 
 
+USUAL_LEVEL = "object"  # what a click means, unless the artist says it
+
+
 class SelectMode(Enum):
     """How the Select tool is told what is meant."""
 
@@ -83,7 +85,7 @@ class Selecting:
     """What the Select and the Mask tool are set to."""
 
     mode: SelectMode = SelectMode.CLICK
-    level: str = "object"  # of document.LEVELS: what a new click means
+    level: str = USUAL_LEVEL  # of document.LEVELS: what a new click means
     reach: float = 4.0  # px of the photo, by which an edge is moved, smoothed or softened
     is_erasing: bool = False  # the brush takes away
     painted: Painted = Painted.SELECTION
@@ -155,7 +157,6 @@ class View:
     has_panel: bool = True  # whether that is so, as the window has it
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
-    is_grounded: bool = False  # moving an object slides it over the ground
     orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
     color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints

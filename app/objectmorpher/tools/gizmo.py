@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 INSET = 16.0  # points between a corner and the canvas's edge, at least
 SMALLEST_RING = 52.0  # points
+OUTSIDE = 24.0  # points between a small object and its rings and corners, at least
 LARGEST_RING = 0.34  # x the canvas's smaller side
 AROUND = 0.52  # x the object's diameter, radius of the rings
 OUTERMOST = 1.2  # x that, radius of the ring for roll
@@ -54,6 +55,35 @@ class Ring:
     def seen(self, angles: np.ndarray) -> F64:
         """(N, 2) canvas px."""
         return self.camera.project(self.points(angles))
+
+    @property
+    def _arms(self) -> F64:
+        """(N, 2) canvas px from its centre to points all along it."""
+        angles = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+        return self.seen(angles) - self.camera.project(self.centre)
+
+    @property
+    def openness(self) -> float:
+        """How round it is seen: 1 as a circle, 0 as a line."""
+        spread = np.linalg.svd(self._arms, compute_uv=False)
+        return float(spread[1] / max(spread[0], 1e-12))
+
+    @property
+    def reach(self) -> float:
+        """Px from its centre to its farthest point."""
+        return float(np.linalg.norm(self._arms, axis=1).max())
+
+    def speed(self, angle: float) -> float:
+        """Px per radian at which a point of it is seen to move."""
+        before, after = self.seen(angle + np.array([-0.01, 0.01]))
+        return float(np.linalg.norm(after - before)) / 0.02
+
+    def angle_at(self, xy: np.ndarray) -> float:
+        """The angle about its centre, in its plane, of what is seen at canvas px (2,)."""
+        ray = self.camera.unproject(xy, 1.0)
+        normal = np.cross(self.first, self.second)
+        along = ray * (normal @ self.centre) / (normal @ ray) - self.centre
+        return float(np.arctan2(along @ self.second, along @ self.first))
 
     def is_front(self, angles: np.ndarray) -> Mask:
         """(N,) whether that part of it is nearer than the centre."""
@@ -129,6 +159,8 @@ class Gizmo:
 
     corners: F64  # (4, 2) left top, right top, right bottom, left bottom
     centre: F64  # (2,)
+    radius: float  # px, of the outer ring: a circle
+    hole: float  # px, radius around the centre that a small object has for itself; or 0
     rings: dict[str, Ring]  # by the turn that each changes
     arrow: Arrow
     horizon: float | None  # its row, while the object is to stand on the ground
@@ -140,25 +172,39 @@ def gizmo(editor: Editor) -> Gizmo | None:
     if frame is None or thing is None or thing.lifted is None or editor.document is None:
         return None
     size, inset = np.array([view.width, view.height]), INSET * view.scale
-    corners = view.canvas_from_image(frame.corners).clip(inset, np.maximum(size - inset, inset))
+    corners = _kept_off(view.canvas_from_image(frame.corners), OUTSIDE * view.scale)
+    corners = corners.clip(inset, np.maximum(size - inset, inset))
     camera = view.camera(editor.document.photo.camera)
     middle = editor.placing.centre()
     centre, zoom = camera.project(middle), camera.focal / middle[2]
-    radius = AROUND * thing.lifted.diameter * thing.lifted.scale * thing.placement.scale * zoom
+    reach = thing.lifted.diameter * thing.lifted.scale * thing.placement.scale * zoom
+    outside = OUTSIDE * view.scale
+    radius = max(AROUND * reach, 0.5 * reach + outside)
+    hole = 0.5 * (reach + outside) if radius < LARGEST_RING * float(size.min()) / 2 else 0.0
     smallest, largest = SMALLEST_RING * view.scale, LARGEST_RING * float(size.min())
     radius = float(np.clip(radius, smallest, max(largest, smallest)))
     world = min(radius / zoom, CLOSEST * float(middle[2]) / OUTERMOST)
     far = OUTERMOST * world * zoom + SPACE * view.scale
     near = far + ARROW * view.scale
     side = 1.0 if centre[1] + near < view.height else -1.0
-    row = editor.placing.horizon if view.is_grounded else None
+    row = editor.placing.horizon if thing.is_grounded else None
     return Gizmo(
         corners,
         centre,
+        OUTERMOST * world * zoom,
+        hole,
         rings(middle, thing.placement.turn, world, camera),
         Arrow(centre, side, near, far),
         None if row is None else float(view.canvas_from_image(np.array([0.0, row]))[1]),
     )
+
+
+def _kept_off(corners: F64, least: float) -> F64:
+    """Corners (4, 2) of a box, which is as wide and as high as twice `least` px."""
+    middle = corners.mean(0)
+    arms = corners - middle
+    half = np.abs(arms).max(0)
+    return middle + arms * np.maximum(least / np.maximum(half, 1e-6), 1.0)
 
 
 def rings(

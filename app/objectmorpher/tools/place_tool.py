@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from objectmorpher_core.base.rotations import matrix_from_vector, turn_matrix, turn_of
 from objectmorpher_core.document.model import Placement
 
 from ..system.texts import t
-from .gizmo import TURNS, Gizmo, gizmo
+from .gizmo import TURNS, Gizmo, Ring, gizmo
 from .pointer import SNAP, TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved, ignore, one_axis
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
 
 REACH = 10.0  # points around a corner, or beside a ring, where a press takes it
+MIDDLE = 0.5  # x the outer ring's radius: so near to its centre the object is always moved
+ROUND = 0.35  # openness from which a ring is turned by the pointer's angle about its centre
+SLOW = 0.5  # x a ring's radius per radian: where it is seen to move slower, it runs into depth
 DEPTH_STEP = 0.05  # object diameters per notch of the wheel
 SCALE_SNAP = 0.1  # with Shift
 MIN_SCALE, MAX_SCALE = 0.02, 50.0
@@ -31,7 +35,10 @@ Change = Callable[[Pointer, float], Placement]  # of the pointer now, diameters 
 
 
 class PlaceTool:
-    """Drag an object to move it, a corner to scale, a ring to turn, elsewhere to turn freely."""
+    """Drag an object to move it, a corner to scale, a ring to turn about its axis.
+
+    Within the rings, or with Ctrl, it is turned as a ball is with a finger; elsewhere freely.
+    """
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         part = self.part_at(editor, pointer)
@@ -73,11 +80,18 @@ class PlaceTool:
         editor.commit(t("Move the horizon") if is_moved else "")
 
     def part_at(self, editor: Editor, pointer: Pointer) -> str | None:
-        """What a press would take: what is drawn over the object comes before the object."""
+        """What a press would take: the object's middle, then what is drawn over it, then it."""
         shown = gizmo(editor)
         if shown is None:
             return None
+        if pointer.ctrl:
+            return "ball"
         reach = REACH * editor.view.scale
+        from_centre = float(np.linalg.norm(pointer.xy - shown.centre)) / shown.radius
+        if from_centre * shown.radius < 0.5 * shown.hole:
+            return OTHER if editor.objects.other_at(pointer.xy) is not None else "move"
+        if from_centre < MIDDLE and editor.posing.surface_at(pointer.xy) is not None:
+            return OTHER if editor.objects.other_at(pointer.xy) is not None else "move"
         part = _handle_at(shown, pointer.xy, reach)
         if part is not None:
             return part
@@ -86,7 +100,9 @@ class PlaceTool:
         if editor.posing.surface_at(pointer.xy) is not None:
             return "move"
         is_horizon = shown.horizon is not None and abs(pointer.y - shown.horizon) <= reach
-        return "horizon" if is_horizon else "turn"
+        if is_horizon:
+            return "horizon"
+        return "ball" if from_centre < 1.0 else "turn"
 
     def hover(self, editor: Editor, pointer: Pointer) -> Shape:
         part = self.part_at(editor, pointer)
@@ -169,13 +185,11 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
         shown, start = gizmo(editor), editor.placing.placement
         assert shown is not None and start is not None
         ring = shown.rings[part]
-        begun = last = ring.nearest(first.xy)
+        went = _went(ring, first.xy)
 
         def change(now: Pointer, away: float) -> Placement:
-            nonlocal last
-            last = ring.followed(now.xy, last)
             turn = list(start.turn)
-            turn[axis] += float(np.degrees(last - begun))
+            turn[axis] += float(np.degrees(went(now.xy)))
             if now.shift:
                 turn[axis] = round(turn[axis] / SNAP) * SNAP
             turn[axis] = wrapped(turn[axis])
@@ -185,6 +199,75 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
         return change
 
     return begin
+
+
+def _went(ring: Ring, first: np.ndarray) -> Callable[[np.ndarray], float]:
+    """How far, radians, a pointer that began at canvas px (2,) has gone along a ring.
+
+    By its angle about the centre, however far from there, where the ring is seen as one. A ring
+    that is seen from its edge is followed; at its ends, where a few px would be a quarter turn,
+    it goes by the way along its tangent, as a wheel does.
+    """
+    begun = last = ring.nearest(first)
+    if ring.openness >= ROUND:
+        angle, total = ring.angle_at(first), 0.0
+
+        def about(xy: np.ndarray) -> float:
+            nonlocal angle, total
+            now = ring.angle_at(xy)
+            total += wrapped_radians(now - angle)
+            angle = now
+            return total
+
+        return about
+    if ring.speed(begun) < SLOW * ring.reach:
+        outward = ring.seen(np.array([begun]))[0] - ring.camera.project(ring.centre)
+        side = 1.0 if ring.is_front(np.array([begun + 0.1]))[0] else -1.0
+        inward = -outward / max(float(np.linalg.norm(outward)), 1e-9)
+        return lambda xy: side * float((xy - first) @ inward) / ring.reach
+
+    def along(xy: np.ndarray) -> float:
+        nonlocal last
+        last = ring.followed(xy, last)
+        return last - begun
+
+    return along
+
+
+def _ball(editor: Editor, first: Pointer) -> Change:
+    """The point under the finger stays there, as on a ball that turns about its middle.
+
+    Its sphere is as large as the rings, seen along the ray to its centre; beyond its edge it rolls.
+    """
+    shown, start = gizmo(editor), editor.placing.placement
+    assert shown is not None and start is not None
+    sight = editor.placing.centre()
+    forward = sight / np.linalg.norm(sight)
+    right = np.cross([0.0, 1.0, 0.0], forward)
+    right /= np.linalg.norm(right)
+    axes = np.column_stack([right, np.cross(forward, right), forward])  # world from the ball's
+
+    def place(xy: np.ndarray) -> np.ndarray:
+        at = (xy - shown.centre) / shown.radius
+        out = float(np.linalg.norm(at))
+        if out >= 1.0:
+            return np.array([*(at / out), 0.0])
+        return np.array([*at, -np.sqrt(1.0 - out * out)])
+
+    begun, matrix = place(first.xy), turn_matrix(*start.turn)
+
+    def change(now: Pointer, away: float) -> Placement:
+        there = place(now.xy)
+        across = axes @ np.cross(begun, there)
+        size, along = float(np.linalg.norm(across)), float(begun @ there)
+        angle = np.arctan2(size, along)
+        if now.shift:
+            angle = np.radians(SNAP) * round(np.degrees(angle) / SNAP)
+        turned = matrix_from_vector(angle * across / size if size > 1e-9 else np.zeros(3))
+        turn = start.turn if size <= 1e-9 else turn_of(turned @ matrix)
+        return editor.placing.stood(replace(start, turn=turn, depth=start.depth + away))
+
+    return change
 
 
 def _turn(editor: Editor, first: Pointer) -> Change:
@@ -201,13 +284,18 @@ def _turn(editor: Editor, first: Pointer) -> Change:
     return change
 
 
+def wrapped_radians(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    return float(np.pi - (np.pi - angle) % (2 * np.pi))
+
+
 def wrapped(angle: float) -> float:
     """The same direction in (-180, 180] degrees."""
     return float(180.0 - (180.0 - angle) % 360.0)
 
 
 _CHANGES: dict[str, Callable[[Editor, Pointer], Change]] = {
-    "move": _move, "depth": _depth, "scale": _scale, "turn": _turn,
+    "move": _move, "depth": _depth, "scale": _scale, "turn": _turn, "ball": _ball,
     **{part: _along(part) for part in TURNS},
 }  # fmt: skip
 
@@ -217,7 +305,7 @@ def _labels() -> dict[str, str]:
     turn = t("Turn object")
     return {
         "move": t("Move object"), "depth": t("Move object in depth"), "scale": t("Scale object"),
-        "turn": turn, "yaw": turn, "pitch": turn, "roll": t("Roll object"),
+        "turn": turn, "ball": turn, "yaw": turn, "pitch": turn, "roll": t("Roll object"),
     }  # fmt: skip
 
 
@@ -225,10 +313,11 @@ def _hints() -> dict[str, str]:
     ring = t("Drag along the ring to turn the object · Shift turns in steps of 15°")
     return {
         OTHER: t("Click chooses this object · Drag moves it"),
-        "move": t("Drag moves the object · Wheel moves it in depth · Shift keeps one axis"),
+        "move": t("Drag moves the object · Ctrl-drag turns it · Wheel: depth · Shift: one axis"),
         "depth": t("Drag the arrow to bring the object nearer or farther"),
         "scale": t("Drag a corner to scale the object · Shift scales in steps of 10 %"),
         "yaw": ring, "pitch": ring, "roll": ring,
         "turn": t("Drag turns the object in 3D · Shift keeps one axis"),
+        "ball": t("Drag turns the object like a ball under the finger · Shift: steps of 15°"),
         "horizon": t("Drag the horizon to where it is in the photo"),
     }  # fmt: skip

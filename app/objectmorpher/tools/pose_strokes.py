@@ -48,15 +48,17 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
         depth -= pointer.wheel * DEPTH_STEP
         was_moved = is_moved
         is_moved = is_moved or has_moved(editor, start, pointer) or pointer.wheel != 0
-        if is_moved and not was_moved and is_new and start.alt:
-            posing.unpin(handle)  # Alt and no motion would have been a pin
+        if is_moved and not was_moved:
+            if is_new and start.alt:
+                posing.unpin(handle)  # Alt and no motion would have been a pin
+            posing.let_go(chosen)
         if is_moved:
             _follow(editor, held, start, pointer, depth)
     if is_moved:
         count = len(chosen)
         posing.finish(t("Drag {count} points", count=count) if count > 1 else t("Drag point"))
     elif is_new:
-        posing.finish(t("Add pin") if start.alt else t("Add handle"))
+        editor.commit(t("Add pin") if start.alt else t("Add handle"))
     else:
         editor.commit("")
         if start.shift and handle in before:

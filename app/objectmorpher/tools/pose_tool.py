@@ -111,5 +111,7 @@ class PoseTool:
         if editor.hover.other is not None:
             return t("Click chooses this object · Drag draws a box around handles")
         if editor.hover.surface is not None:
-            return t("Drag this point · Ctrl-drag turns it · Click sets a handle · Alt-click a pin")
+            return t(
+                "Drag this point · Ctrl-drag turns it · Click sets a handle · Alt-click or P a pin"
+            )
         return t("Drag a point of the object · Drag beside it selects handles · Space-drag pans")

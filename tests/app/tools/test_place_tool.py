@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from objectmorpher.canvas.ghost import ghost
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import TURNS, gizmo
-from objectmorpher.tools.place_tool import PlaceTool, wrapped
+from objectmorpher.tools.place_tool import SLOW, PlaceTool, wrapped
 from objectmorpher.tools.pointer import Pointer, Shape
+from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.placement import centre_of
@@ -26,7 +28,7 @@ START = Placement(move=(6.0, -4.0), depth=0.2, turn=(20.0, -30.0, 40.0), scale=1
 def placed(editor: Editor, ball: Document) -> Editor:
     """The lifted ball, moved and turned, and the Place tool."""
     editor.start(edits.set_placement(ball, 0, START))
-    editor.view.tool, editor.view.is_grounded = ToolName.PLACE, False
+    editor.view.tool = ToolName.PLACE
     return editor
 
 
@@ -73,7 +75,9 @@ def test_a_ring_turns_about_its_axis_by_the_angle_along_it(
     begin = next(
         float(a)
         for a, at, front in zip(begins, ring.seen(begins), ring.is_front(begins), strict=True)
-        if front and tool.part_at(placed, Pointer(*at)) == part
+        if front
+        and tool.part_at(placed, Pointer(*at)) == part
+        and ring.speed(float(a)) > SLOW * ring.reach
     )
     way = begin + np.radians(np.linspace(0, degrees, 40))
     placement = stroke(placed, *ring.seen(way))
@@ -235,8 +239,8 @@ def test_each_group_of_numbers_goes_back_by_itself(placed: Editor) -> None:
 @pytest.fixture
 def grounded(placed: Editor, ball: Document) -> Editor:
     """The ball at rest, which stands on the ground; the horizon is above its foot."""
-    placed.start(edits.set_horizon(ball, 40.0))
-    placed.view.tool, placed.view.is_grounded = ToolName.PLACE, True
+    placed.start(edits.set_grounded(edits.set_horizon(ball, 40.0), 0, True))
+    placed.view.tool = ToolName.PLACE
     return placed
 
 
@@ -314,3 +318,74 @@ def test_above_the_horizon_it_says_why_and_does_not_snap(grounded: Editor) -> No
 @pytest.mark.parametrize(("angle", "same"), [(190, -170), (-180, 180), (540, 180), (0, 0)])
 def test_angles_are_wrapped(angle: float, same: float) -> None:
     assert wrapped(angle) == pytest.approx(same)
+
+
+# ---- a hand on it ---------------------------------------------------------------------------
+
+
+def _turned(before: Placement, now: Placement) -> float:
+    """Degrees, about any axis."""
+    both = turn_matrix(*now.turn) @ turn_matrix(*before.turn).T
+    return float(np.degrees(np.linalg.norm(vector_from_matrix(both))))
+
+
+def test_a_few_pixels_at_the_end_of_a_ring_turn_by_a_few_degrees(placed: Editor) -> None:
+    shown = gizmo(placed)
+    assert shown is not None
+    ring = shown.rings["pitch"]  # always seen from its edge
+    angles = np.linspace(0, 2 * np.pi, 720)
+    seen, slow = ring.seen(angles), np.array([ring.speed(float(a)) for a in angles])
+    end = seen[np.where(ring.is_front(angles), slow, np.inf).argmin()]
+    inward = (shown.centre - end) / np.linalg.norm(shown.centre - end)
+    placement = stroke(placed, end, end + 15 * inward)
+    assert _turned(START, placement) == pytest.approx(np.degrees(15 / ring.reach), rel=0.05)
+
+
+def test_with_ctrl_it_turns_like_a_ball_and_comes_back(placed: Editor) -> None:
+    shown = gizmo(placed)
+    assert shown is not None
+    right = np.array([0.3 * shown.radius, 0.0])
+    placement = stroke(placed, shown.centre, shown.centre + right / 2, shown.centre + right)
+    assert _turned(START, placement) == 0  # without Ctrl the middle moves it
+    run(placed, "undo")
+    tool, ways = PlaceTool(), (shown.centre + right, shown.centre + 2 * right, shown.centre)
+    press(placed, tool, shown.centre, ctrl=True)
+    for at in ways:
+        move(placed, at, ctrl=True)
+        assert placed.object is not None
+        angle = np.degrees(np.arcsin(np.linalg.norm(at - shown.centre) / shown.radius))
+        assert _turned(START, placed.object.placement) == pytest.approx(angle, abs=0.01)
+        assert bool(ghost(placed)) == (angle > 0)
+    release(placed, shown.centre, ctrl=True)
+    assert ghost(placed) == ()
+
+
+@pytest.mark.parametrize("size", [4.0, 12.0, 30.0])
+def test_a_small_object_is_moved_by_its_middle_and_its_parts_are_outside(
+    placed: Editor, ball: Document, size: float
+) -> None:
+    """`size` canvas px across, about."""
+    small = Placement(scale=size / (88 * placed.view.zoom))
+    placed.start(edits.set_placement(ball, 0, small))
+    placed.view.tool = ToolName.PLACE
+    shown, frame = gizmo(placed), placed.placing.frame()
+    assert shown is not None and frame is not None
+    box = placed.view.canvas_from_image(frame.corners)
+    half = np.linalg.norm(box - shown.centre, axis=1).max()
+    assert min(ring.reach for ring in shown.rings.values()) >= half + 20
+    assert np.abs(shown.corners - shown.centre).min() >= 20
+    assert PlaceTool().part_at(placed, Pointer(*shown.centre)) == "move"
+    before = shown.centre
+    placement = stroke(placed, before, before + (40, 30))
+    assert placement.turn == (0, 0, 0)
+    np.testing.assert_allclose(np.array(placement.move) * placed.view.zoom, [40, 30], atol=1.0)
+
+
+def test_what_the_object_moves_over_is_undone_and_delete_takes_the_object(placed: Editor) -> None:
+    run(placed, "ground")
+    assert placed.placing.is_grounded
+    run(placed, "undo")
+    assert not placed.placing.is_grounded and placed.placing.placement == START
+    assert why_not(placed, "remove_handle") is None
+    run(placed, "remove_handle")
+    assert placed.document is not None and placed.document.objects == ()

@@ -14,6 +14,7 @@ from objectmorpher.editor.view import PoseView, ToolName
 from objectmorpher.tools.pointer import Pointer
 from objectmorpher.tools.pose_tool import RING, PoseTool
 from objectmorpher_core.base.rotations import matrix_from_vector
+from objectmorpher_core.document.hold_edits import Stays
 from objectmorpher_core.document.model import Document
 from strokes import move, press, release
 
@@ -258,3 +259,57 @@ def test_influence_is_one_at_the_handle_and_less_elsewhere(posed: Editor) -> Non
         posed.object.handles
     )
     np.testing.assert_allclose(shares[anchors], 0, atol=1e-9)
+
+
+def _shown(editor: Editor) -> np.ndarray:
+    """Image px (M, 2) of the control points."""
+    assert editor.document is not None
+    return editor.derived.control_points(editor.document, editor.current)
+
+
+def test_nothing_moves_but_what_is_dragged(posed: Editor) -> None:
+    run(posed, "mirror")  # the partner of a new handle holds what is there, too
+    head = at(posed, 80, 45)
+    stroke(posed, head, head + (60, -30))
+    run(posed, "mirror")
+    before = _shown(posed)
+    stroke(posed, at(posed, 95, 95))
+    stroke(posed, at(posed, 75, 80), alt=True)
+    assert posed.object is not None and posed.object.handles[-1].is_pin
+    posed.handle_numbers.soften(0.7)
+    posed.posing.finish("Softness of handle")
+    posed.handle_numbers.set_free(True)
+    posed.posing.remove(0)
+    assert len(posed.object.base.anchors) > 0 if posed.object.base.anchors is not None else False
+    for stays in Stays:
+        posed.posing.set_stays(stays)
+        assert np.abs(_shown(posed) - before).max() == 0
+        for h in range(len(posed.object.handles)):  # a drag begins with what is seen
+            place = posed.view.canvas_from_image(posed.posing.spot(h).xy)
+            press(posed, TOOL, place)
+            move(posed, place + (4, 0), place)
+            assert np.abs(_shown(posed) - before).max() < 0.05
+            posed.escape()
+
+
+def test_p_pins_what_is_under_the_pointer_and_a_handle_that_is(posed: Editor) -> None:
+    place = at(posed, 90, 60)
+    TOOL.hover(posed, Pointer(*place))
+    posed.pointer = Pointer(*place)
+    run(posed, "pin")
+    assert posed.object is not None and posed.object.handles[0].is_pin
+    TOOL.hover(posed, Pointer(*place))
+    run(posed, "pin")
+    assert not posed.object.handles[0].is_pin
+    assert labels(posed) == ["Make it a handle", "Add pin"]
+
+
+def test_symmetry_is_of_one_object_of_one_photo(posed: Editor, ball: Document) -> None:
+    run(posed, "mirror")
+    assert posed.posing.mirroring.is_on
+    posed.objects.start_another()
+    assert not posed.posing.mirroring.is_on
+    posed.objects.choose(0)
+    assert posed.posing.mirroring.is_on
+    posed.start(ball)
+    assert not posed.posing.mirroring.is_on

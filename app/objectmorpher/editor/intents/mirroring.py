@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from objectmorpher_core.base.arrays import F64
+from objectmorpher_core.base.arrays import F64, Mask
+from objectmorpher_core.base.rotations import turned_by
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Handle
 
@@ -21,17 +23,27 @@ PARTNER = 0.06  # x diameter: a handle so near to the mirrored point is the part
 
 
 class Mirroring:
-    """The mirror plane of the current object, while dragging with symmetry is on."""
+    """The mirror plane of the current object, while it is dragged with symmetry."""
 
     def __init__(self, editor: Editor) -> None:
         self._editor = editor
+        self._masks: list[Mask] = []  # of the objects that are
 
     @property
     def is_on(self) -> bool:
-        return self._editor.view.pose.is_mirrored
+        """Whether the current object is; another one need not be."""
+        own = self._editor.mask
+        return own is not None and any(mask is own for mask in self._masks)
 
     def toggle(self) -> None:
-        self._editor.view.pose.is_mirrored = not self.is_on
+        own, is_on = self._editor.mask, self.is_on
+        self._masks = [mask for mask in self._masks if mask is not own]
+        if own is not None and not is_on:
+            self._masks.append(own)
+
+    def forget(self) -> None:
+        """The document is closed."""
+        self._masks = []
 
     @property
     def plane(self) -> MirrorPlane | None:
@@ -69,7 +81,10 @@ class Mirroring:
         return editor.derived.project(document, k, np.array([p.mean(0) for p in pieces]))
 
     def followed(self, document: Document, moved: tuple[int, ...]) -> Document:
-        """`document` with the partners of its handles `moved` where these take them."""
+        """`document` with the partners of its handles `moved` where these take them.
+
+        Each goes from where it was when the handles were last chosen, the mirrored way.
+        """
         plane = self.plane
         if plane is None:
             return document
@@ -83,13 +98,34 @@ class Mirroring:
             document, partner = self._with_partner(document, handle, plane)
             if partner is None or partner in moved:
                 continue
-            point = document.objects[k].handles[partner].point
-            target = point + plane.mirrored_vector(handle.target - handle.point)
-            document = edits.move_handle(document, k, partner, target)
-            turn = None if handle.turn is None else plane.mirrored_turn(handle.turn)
-            document = edits.set_pin(document, k, partner, handle.is_pin)
-            document = edits.turn_handle(document, k, partner, turn)
+            document = self._with_partner_moved(document, (h, partner), plane)
         return document
+
+    def _with_partner_moved(
+        self, document: Document, pair: tuple[int, int], plane: MirrorPlane
+    ) -> Document:
+        k, (h, partner) = self._editor.current, pair
+        thing = document.objects[k]
+        handle, other = thing.handles[h], thing.handles[partner]
+        document = edits.set_pin(document, k, partner, handle.is_pin)
+        start, begun = (self._began(thing, one) for one in (handle, other))
+        way = handle.target - start.target
+        document = edits.move_handle(
+            document, k, partner, begun.target + plane.mirrored_vector(way)
+        )
+        turn = None
+        if handle.turn is not None:
+            turned = turned_by(-start.turned, handle.turn)
+            turn = turned_by(begun.turned, plane.mirrored_turn(turned))
+        return edits.turn_handle(document, k, partner, turn)
+
+    def _began(self, thing: EditObject, handle: Handle) -> Handle:
+        """The handle as it was when the handles were last chosen; a new one begins as it is now."""
+        if thing.base.pose is None:
+            turn = None if handle.turn is None else np.zeros(3)
+            return replace(handle, target=handle.point, turn=turn)
+        known = (h for h in thing.base.handles if h.control_point == handle.control_point)
+        return next(known, handle)
 
     def _with_partner(
         self, document: Document, handle: Handle, plane: MirrorPlane
@@ -105,7 +141,11 @@ class Mirroring:
             return document, None
         found = _handle_near(thing, point, node, handle)
         if found is None:
-            document = edits.add_handle(document, k, point, is_pin=handle.is_pin)
+            place = point
+            if thing.pose is not None:
+                deformer = self._editor.derived.deformer(document, k)
+                place = deformer.skin_points(point, thing.pose).points[0]
+            document = edits.add_handle(document, k, point, place, handle.is_pin)
             found = len(document.objects[k].handles) - 1
         return document, found
 

@@ -14,7 +14,7 @@ from objectmorpher_core.document.model import Document
 from ...canvas.layers import is_front
 from ...system.texts import t
 from ..tasks import LIFT, SELECT
-from ..view import ToolName
+from ..view import USUAL_LEVEL, ToolName
 
 if TYPE_CHECKING:
     from ..editor import Editor
@@ -35,7 +35,7 @@ class Objects:
             editor.hand.abort(editor)
             editor.current = len(editor.document.objects)
             editor.posing.select(None)
-            editor.view.tool = ToolName.SELECT
+            editor.view.tool, editor.view.selecting.level = ToolName.SELECT, USUAL_LEVEL
 
     def choose(self, k: int) -> None:
         """The tools change object `k` now."""

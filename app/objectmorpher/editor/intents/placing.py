@@ -100,9 +100,14 @@ class Placing:
         return document.photo.size[1] / 2 if document.horizon is None else document.horizon
 
     @property
+    def is_grounded(self) -> bool:
+        """Whether moving the current object slides it over the ground."""
+        return self._editor.object is not None and self._editor.object.is_grounded
+
+    @property
     def ground(self) -> Ground | None:
         """What the object is to stand on; None where it need not, or cannot."""
-        return self._find_ground()[0] if self._editor.view.is_grounded else None
+        return self._find_ground()[0] if self.is_grounded else None
 
     @property
     def why_no_ground(self) -> str | None:
@@ -142,14 +147,18 @@ class Placing:
         return (thing.lifted.world_points(points) - thing.lifted.centre) @ linear.T
 
     def toggle_ground(self) -> None:
-        """The object stands on the ground while it is moved, or not any more."""
-        view = self._editor.view
-        view.is_grounded = not view.is_grounded
+        """The object slides over the ground while it is moved, or not any more; one step."""
+        editor = self._editor
+        if editor.document is None or not editor.is_lifted or editor.hand.is_busy:
+            return
+        is_on = not self.is_grounded
+        label = t("Move over the ground") if is_on else t("Move freely")
+        editor.apply(label, edits.set_grounded(editor.document, editor.current, is_on))
         self.say_why_no_ground()
 
     def say_why_no_ground(self) -> None:
         reason = self.why_no_ground
-        if self._editor.view.is_grounded and reason is not None:
+        if self.is_grounded and reason is not None:
             self._editor.say(reason)
 
     def drag_horizon(self, row: float) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import turn_about, turned_by
-from objectmorpher_core.document import edits
+from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.document.pose import turn_at
 
@@ -20,6 +20,7 @@ from .mirroring import Mirroring
 
 if TYPE_CHECKING:
     from objectmorpher_core.deform.puppet import SurfacePoint
+    from objectmorpher_core.document.hold_edits import Stays
 
     from ..editor import Editor
 
@@ -39,7 +40,8 @@ class Posing:
         self.mirroring = Mirroring(editor)
         self.readout = ""  # of the turn in progress: "34°"
         self._selected: tuple[int, ...] = ()
-        self._restless: Document | None = None  # the preview, as long as its pose is not at rest
+        self._solved: Document | None = None  # the preview, if its pose was solved for
+        self._restless: Document | None = None  # the same, as long as its pose is not at rest
 
     # What there is
 
@@ -83,7 +85,8 @@ class Posing:
 
     def forget(self) -> None:
         """The document is closed."""
-        self._restless = None
+        self._solved = self._restless = None
+        self.mirroring.forget()
 
     @property
     def is_restless(self) -> bool:
@@ -134,7 +137,7 @@ class Posing:
     ) -> int | None:
         """Previews a new handle on the surface; its index, or None beside the object.
 
-        It is selected instead of the others, or with them.
+        It holds what is there as it is, and is selected instead of the others, or with them.
         """
         editor = self._editor
         seen = self.surface_at(canvas_xy)
@@ -153,18 +156,40 @@ class Posing:
             editor.say(_frozen())
             return None
         target = editor.derived.unplaced(editor.document, k, seen.world)
-        changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
         added = len(item.handles)
-        self.change(self.mirroring.followed(changed, (added,)))
+        changed = edits.add_handle(editor.document, k, seen.rest, target, is_pin)
+        changed = editor.derived.held(changed, k, (added,))
+        changed = self.mirroring.followed(changed, (added,))
+        self.hold(changed, tuple(range(added, len(changed.objects[k].handles))))
         self.select(*others, added)
         return added
+
+    def pin(self) -> None:
+        """A pin where the pointer is, or the handle that it is at becomes one, or none; a step."""
+        editor = self._editor
+        if editor.pointer is None or editor.document is None or editor.hand.is_busy:
+            return
+        h = editor.hover.handle
+        if h is not None and editor.object is not None:
+            is_pin = not editor.object.handles[h].is_pin
+            self.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
+            editor.commit(t("Make it a pin") if is_pin else t("Make it a handle"))
+        elif self.start_handle(editor.pointer.xy, is_pin=True) is not None:
+            editor.commit(t("Add pin"))
 
     def unpin(self, handle: int) -> None:
         """Previews a pin as a handle: it is dragged."""
         editor = self._editor
         if editor.document is not None:
             changed = edits.set_pin(editor.document, editor.current, handle, False)
-            editor.preview = self.mirroring.followed(changed, (handle,))
+            self.hold(self.mirroring.followed(changed, (handle,)), (handle,))
+
+    def let_go(self, handles: tuple[int, ...]) -> None:
+        """Previews what is to be dragged without anchors around it, such as a pin may have."""
+        editor, k = self._editor, self._editor.current
+        if editor.document is not None:
+            deformer = editor.derived.deformer(editor.document, k)
+            editor.preview = hold_edits.let_go(editor.document, k, deformer, handles)
 
     def drag(self, handle: int, spot: Spot) -> None:
         """Previews the handle at another place of the picture."""
@@ -201,9 +226,11 @@ class Posing:
         editor = self._editor
         if editor.document is None or editor.object is None or self._is_frozen(handle):
             return
-        k = editor.current
-        own = editor.derived.facts.turn_of(editor.document, k).T @ turn
-        changed = edits.turn_handle(editor.document, k, handle, turned_by(start, own))
+        k, document = editor.current, editor.document
+        if editor.object.handles[handle].turn is None:  # from now on it is held as it is turned
+            document = editor.derived.held(edits.turn_handle(document, k, handle, start), k)
+        own = editor.derived.facts.turn_of(document, k).T @ turn
+        changed = edits.turn_handle(document, k, handle, turned_by(start, own))
         self.change(self.mirroring.followed(changed, (handle,)))
 
     def _is_frozen(self, handle: int) -> bool:
@@ -216,11 +243,15 @@ class Posing:
 
     def change(self, changed: Document) -> None:
         """Previews the handles of `changed`, solved for from the pose that is shown."""
-        editor = self._editor
+        editor, k = self._editor, self._editor.current
         assert editor.object is not None
-        start = editor.object.pose
-        solved = editor.derived.solved(changed, editor.current, start, **DRAG)
-        editor.preview = self._restless = solved
+        start = editor.object.pose or editor.derived.deformer(changed, k).rest()
+        solved = editor.derived.solved(changed, k, start, **DRAG)
+        editor.preview = self._solved = self._restless = solved
+
+    def hold(self, changed: Document, added: tuple[int, ...] = ()) -> None:
+        """Previews `changed`, whose handles, some just `added`, hold the pose that is shown."""
+        self._editor.preview = self._editor.derived.held(changed, self._editor.current, added)
 
     def relax(self) -> None:
         """Goes on with a drag's solve: for a frame in which the pointer holds still."""
@@ -233,7 +264,7 @@ class Posing:
         after = editor.derived.solved(document, editor.current, before, **REST)
         changed = after.objects[editor.current]
         assert before is not None and changed.pose is not None and changed.lifted is not None
-        editor.preview = after
+        editor.preview = self._solved = after
         motion = np.abs(changed.pose.points - before.points).max()
         if motion > AT_REST * changed.lifted.diameter:
             self._restless = after
@@ -242,8 +273,9 @@ class Posing:
         """Lets the preview's pose come to rest: at the end of a stroke that changed something."""
         editor = self._editor
         preview = editor.preview
-        if preview is not None and preview is not editor.committed and editor.object is not None:
+        if preview is not None and preview is self._solved and editor.object is not None:
             editor.preview = editor.derived.solved(preview, editor.current, editor.object.pose)
+        self._solved = None
 
     # Steps
 
@@ -260,7 +292,7 @@ class Posing:
             self.finish(t("Nudge point"))
 
     def remove(self, handle: int | None = None) -> None:
-        """Removes a handle, or all selected ones; the object relaxes to what is left."""
+        """Removes a handle, or all selected ones; the object stays as it is."""
         editor = self._editor
         gone = self.selected if handle is None else (handle,)
         if not gone or editor.document is None or editor.object is None or editor.hand.is_busy:
@@ -274,10 +306,13 @@ class Posing:
             changed = edits.remove_handle(changed, editor.current, h)
         left = [h for h in self.selected if h not in gone]
         self.select(*(h - sum(g < h for g in gone) for h in left))
-        editor.apply(label, editor.derived.solved(changed, editor.current, None))
+        editor.apply(label, editor.derived.held(changed, editor.current))
 
     def send_back(self, handles: tuple[int, ...], label: str) -> None:
-        """These handles to where their points were in the photo; all but pins free to turn."""
+        """These handles to where their points were in the photo; all but pins free to turn.
+
+        With all of them the object is back, whatever was done to it before.
+        """
         editor = self._editor
         if editor.document is None or editor.object is None or not handles:
             return
@@ -287,15 +322,17 @@ class Posing:
             changed = edits.move_handle(changed, k, h, own.point)
             changed = edits.turn_handle(changed, k, h, np.zeros(3) if own.is_pin else None)
         changed = self.mirroring.followed(changed, handles)
+        if len(set(handles)) == len(changed.objects[k].handles):
+            changed = edits.forget_base(changed, k)
         editor.apply(label, editor.derived.solved(changed, k, None))
 
-    def set_auto_anchors(self, has_auto_anchors: bool) -> None:
-        """Whether the far side of the object holds still by itself."""
-        editor = self._editor
+    def set_stays(self, stays: Stays) -> None:
+        """What of the object stays where it is by itself; it is shown as before."""
+        editor, k = self._editor, self._editor.current
         if editor.document is not None and editor.is_lifted:
-            changed = edits.set_auto_anchors(editor.document, editor.current, has_auto_anchors)
-            solved = editor.derived.solved(changed, editor.current, None)
-            editor.apply(t("Hold far side") if has_auto_anchors else t("Free far side"), solved)
+            deformer = editor.derived.deformer(editor.document, k)
+            changed = hold_edits.set_stays(editor.document, k, deformer, stays)
+            editor.apply(t("What stays"), changed)
 
     def reset(self) -> None:
         """The object's shape as it was in the photo, without handles."""
@@ -375,12 +412,11 @@ class HandleNumbers:
         posing.turn(h, posing.turn_of(h), more * SIGHT)
 
     def soften(self, softness: float) -> None:
-        """Previews the handle giving way: 0 = not at all."""
+        """Previews the handle giving way from now on: 0 = not at all."""
         editor = self._editor
         h = editor.posing.handle
         assert h is not None and editor.document is not None
-        changed = edits.soften_handle(editor.document, editor.current, h, softness)
-        editor.posing.change(changed)
+        editor.posing.hold(edits.soften_handle(editor.document, editor.current, h, softness))
 
     def set_free(self, is_free: bool) -> None:
         """Whether it turns as the object does, or stays as it is turned now; one step."""
@@ -388,7 +424,7 @@ class HandleNumbers:
         h = editor.posing.handle
         assert h is not None and editor.document is not None
         turn = None if is_free else editor.posing.turn_of(h)
-        editor.posing.change(edits.turn_handle(editor.document, editor.current, h, turn))
+        editor.posing.hold(edits.turn_handle(editor.document, editor.current, h, turn))
         editor.posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
 
     def set_pin(self, is_pin: bool) -> None:
@@ -396,5 +432,5 @@ class HandleNumbers:
         editor = self._editor
         h = editor.posing.handle
         assert h is not None and editor.document is not None
-        editor.posing.change(edits.set_pin(editor.document, editor.current, h, is_pin))
+        editor.posing.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
         editor.posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))

@@ -11,7 +11,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64, I32, Mask
 from objectmorpher_core.document import edits
-from objectmorpher_core.document.model import Document, Pose
+from objectmorpher_core.document.model import Document
 from objectmorpher_core.document.rig import Rig
 
 from ...system.texts import t
@@ -103,9 +103,8 @@ class Rigging:
             self._group(nodes)
 
     def _hold(self, label: str, edit: Callable[..., Document], nodes: I32) -> None:
-        """Freezes or thaws; the pose goes on from what is seen, so that nothing jumps."""
-        thing = self._editor.object
-        self._apply(label, edit, nodes, start=None if thing is None else thing.pose)
+        """Freezes or thaws; the object stays as it is seen."""
+        self._apply(label, edit, nodes, is_held=True)
 
     def _group(self, nodes: I32) -> None:
         """A group of its own, or more of the group that the stroke began on."""
@@ -196,18 +195,26 @@ class Rigging:
         self._apply(label, edits.set_rig, rig)
 
     def _apply(
-        self, label: str, edit: Callable[..., Document], *arguments: Any, start: Pose | None = None
+        self, label: str, edit: Callable[..., Document], *arguments: Any, is_held: bool = False
     ) -> None:
-        """One step by an edit of the object, with the same handles at the same places."""
-        editor = self._editor
+        """One step by an edit of the object, with the same handles at the same places.
+
+        What was posed and let go of has nothing else that holds it: it stays as it is, too.
+        """
+        editor, k = self._editor, self._editor.current
         if editor.document is None:
             return
         try:
-            changed = edit(editor.document, editor.current, *arguments)
+            changed = edit(editor.document, k, *arguments)
         except edits.EditError as error:
             editor.complain(str(error))
             return
-        editor.apply(label, editor.derived.solved(changed, editor.current, start))
+        before, after = editor.document.objects[k], changed.objects[k]
+        is_held = is_held or (before.base.pose is not None and not after.rig.bodies)
+        if before.pose is None or not is_held:
+            editor.apply(label, editor.derived.solved(changed, k, None))
+            return
+        editor.apply(label, editor.derived.held(edits.set_pose(changed, k, before.pose), k))
 
 
 def gaps_to_way(points: F64, way: F64) -> F64:

@@ -118,10 +118,11 @@ class Selection:
         self._ask(Prompt(is_subject=True), t("Select subject"), Combine.ANEW)
 
     def set_level(self, level: str) -> None:
-        """How much around a click is meant: of this selection, and of the next ones."""
+        """How much around a click is meant: of this selection, or of the next one."""
         prompt = self.prompt
-        self._editor.view.selecting.level = level
-        if prompt.clicks and prompt.level != level:
+        if not prompt.clicks:
+            self._editor.view.selecting.level = level
+        elif prompt.level != level:
             self._ask(replace(prompt, level=level), _LEVEL_LABELS[level]())
 
     def clear(self) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
 from objectmorpher_core.document.model import Placement
 
+from ...canvas.ghost import ghost
 from ...system.texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..widgets.theme import theme
@@ -30,15 +32,17 @@ def draw_frame(canvas: Canvas) -> None:
         return
     part = editor.hover.part
     draw_other(canvas)
+    for line in ghost(editor):
+        canvas.dashes(canvas.at(line), WHITE)
     if shown.horizon is not None:
         _draw_horizon(canvas, shown.horizon, part == "horizon")
     corners = canvas.on_canvas(shown.corners)
     canvas.polyline(corners, WHITE, width=1.0, alpha=0.5)
     names = [name for name in TURNS if part == name or not editor.hand.is_busy]
     for name in names:
-        _draw_back(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
+        _draw_back(canvas, shown, name, ACCENT if part == name else COLOURS[name])
     for name in names:
-        _draw_front(canvas, shown.rings[name], ACCENT if part == name else COLOURS[name])
+        _draw_front(canvas, shown, name, ACCENT if part == name else COLOURS[name])
     if part == "depth" or not editor.hand.is_busy:  # what is not dragged is out of the way
         _draw_arrow(canvas, shown.arrow, ACCENT if part == "depth" else WHITE)
     for corner in corners:
@@ -62,15 +66,24 @@ def _runs(ring: Ring, is_wanted: bool) -> list[np.ndarray]:
     return [angles[first] + (angles[1] - angles[0]) * np.arange(count + 1)] if count else []
 
 
-def _draw_back(canvas: Canvas, ring: Ring, color: str) -> None:
-    for angles in _runs(ring, False):
-        points = canvas.on_canvas(ring.seen(angles))
-        canvas.polyline(points, color, width=1.0, is_closed=False, alpha=0.5)
+def _draw_back(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+    for angles in _runs(shown.rings[name], False):
+        for points in _around(shown, shown.rings[name].seen(angles)):
+            canvas.polyline(canvas.on_canvas(points), color, 1.0, is_closed=False, alpha=0.5)
 
 
-def _draw_front(canvas: Canvas, ring: Ring, color: str) -> None:
-    for angles in _runs(ring, True):
-        canvas.polyline(canvas.on_canvas(ring.seen(angles)), color, 2.0, is_closed=False)
+def _draw_front(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+    for angles in _runs(shown.rings[name], True):
+        for points in _around(shown, shown.rings[name].seen(angles)):
+            canvas.polyline(canvas.on_canvas(points), color, 2.0, is_closed=False)
+
+
+def _around(shown: Gizmo, points: np.ndarray) -> list[np.ndarray]:
+    """The pieces of a line (N, 2) canvas px that do not run over a small object."""
+    is_outside = np.linalg.norm(points - shown.centre, axis=1) >= shown.hole
+    ends = np.flatnonzero(np.diff(is_outside)) + 1
+    pieces = zip(np.split(points, ends), np.split(is_outside, ends), strict=True)
+    return [piece for piece, outside in pieces if outside[0] and len(piece) > 1]
 
 
 def _draw_arrow(canvas: Canvas, arrow: Arrow, color: str) -> None:
@@ -120,6 +133,9 @@ def _draw_value(canvas: Canvas, part: str | None) -> None:
         return
     if editor.hand.is_busy:
         text = _value(part, placement, editor.placing.horizon)
+        before = editor.committed
+        if part == "ball" and before is not None and editor.current < len(before.objects):
+            text = f"{_angle(before.objects[editor.current].placement, placement):.0f}°"
     else:
         text = {"yaw": t("Yaw"), "pitch": t("Pitch"), "roll": t("Roll")}.get(part, "")
     if text:
@@ -137,8 +153,15 @@ def _value(part: str, placement: Placement, horizon: float) -> str:
         "yaw": f"{t('Yaw')} {yaw:.1f}°",
         "pitch": f"{t('Pitch')} {pitch:.1f}°",
         "roll": f"{t('Roll')} {roll:.1f}°",
+        "ball": "",
         "turn": f"{t('Yaw')} {yaw:.0f}°  {t('Pitch')} {pitch:.0f}°",
         "horizon": f"{horizon:.0f} px",
     }
     is_deeper = part == "move" and placement.depth != 0
     return f"{values[part]}  ·  {away}" if is_deeper else values[part]
+
+
+def _angle(before: Placement, now: Placement) -> float:
+    """Degrees by which an object was turned, about whatever axis."""
+    both = turn_matrix(*now.turn) @ turn_matrix(*before.turn).T
+    return float(np.degrees(np.linalg.norm(vector_from_matrix(both))))

@@ -19,7 +19,8 @@ from .rig import draw_brush, draw_regions
 from .select import draw_other, draw_rubber
 
 MAX_LINKED = 3  # links drawn from each control point
-APART = 11.0  # points between two marks of anchors
+APART = 11.0  # points between two marks of anchors, or two control points
+HINTS_APART = 14.0  # points between the dots that say: here is something to drag
 MOVES = 0.02  # of the handle's way: what follows less is not marked
 COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the influence
 
@@ -31,7 +32,7 @@ def draw_pose(canvas: Canvas) -> None:
     if document is None or thing is None or thing.lifted is None:
         return
     pose, is_dragging = editor.view.pose, editor.view.pose.mode is PoseMode.DRAG
-    if pose.is_mirrored:
+    if editor.posing.mirroring.is_on:
         _draw_mirror(canvas)
     if pose.has_influence and editor.posing.handle is not None:
         _draw_influence(canvas, editor.posing.handle)
@@ -76,13 +77,16 @@ def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
         mark_on_canvas(f"Handle {h + 1}", end, end)
 
 
-def _apart(places: list[ImVec2]) -> list[ImVec2]:
-    """As many of them as do not touch: on a small object they would be one white patch."""
-    least, kept = theme.pt(APART) ** 2, list[tuple[float, float]]()
-    for x, y in ((at.x, at.y) for at in places):
-        if all((x - a) * (x - a) + (y - b) * (y - b) >= least for a, b in kept):
-            kept.append((x, y))
-    return [ImVec2(x, y) for x, y in kept]
+def _apart(places: list[ImVec2], points: float = APART) -> list[ImVec2]:
+    """As many of them as are so many points apart: a small object they would cover."""
+    least = theme.pt(points)
+    cells = dict[tuple[int, int], ImVec2]()  # of that size: no two of one are apart
+    for at in places:
+        i, j = int(at.x // least), int(at.y // least)
+        near = (cells.get((i + a, j + b)) for a in (-1, 0, 1) for b in (-1, 0, 1))
+        if all(n is None or np.hypot(at.x - n.x, at.y - n.y) >= least for n in near):
+            cells[i, j] = at
+    return list(cells.values())
 
 
 def _draw_mirror(canvas: Canvas) -> None:
@@ -120,7 +124,8 @@ def draw_control_points(canvas: Canvas) -> None:
     for start, end in zip(ends[::2], ends[1::2], strict=True):
         canvas.draw.add_line(start, end, dark, 2.5)
         canvas.draw.add_line(start, end, white, 1.0)
-    for at in canvas.on_photo(editor.derived.control_points(editor.document, editor.current)):
+    places = canvas.on_photo(editor.derived.control_points(editor.document, editor.current))
+    for at in _apart(places):
         canvas.dot(at, 1.8, alpha=0.8)
 
 
@@ -128,7 +133,8 @@ def _draw_hint_points(canvas: Canvas, share: float) -> None:
     """The control points, quietly, while there is no handle: here is something to drag."""
     editor = canvas.editor
     assert editor.document is not None
-    for at in canvas.on_photo(editor.derived.control_points(editor.document, editor.current)):
+    places = canvas.on_photo(editor.derived.control_points(editor.document, editor.current))
+    for at in _apart(places, HINTS_APART):
         canvas.dot(at, 1.7, alpha=0.9 * share)
 
 

@@ -9,10 +9,14 @@ from ...system.texts import t
 from ...tools.navigate import LARGEST_BRUSH, SMALLEST_BRUSH
 from ..widgets.widgets import Number, number_field
 
+STEP = 0.2  # x the radius, of the - and + buttons
+
 
 def draw_radius(editor: Editor) -> None:
-    number = Number(t("Radius"), "%.1f px", 0.25, 5.0, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
-    change = number_field(number, editor.view.brush.radius)
+    radius = editor.view.brush.radius
+    step = max(STEP * radius, 0.5)  # a fifth of a large one is seen, and of a small one is left
+    number = Number(t("Radius"), "%.1f px", 0.25, step, 20.0, SMALLEST_BRUSH, LARGEST_BRUSH)
+    change = number_field(number, radius)
     if change.is_changed:
         editor.view.brush = replace(editor.view.brush, radius=change.value)
 

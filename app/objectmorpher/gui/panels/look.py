@@ -173,7 +173,7 @@ def _draw_symmetry(editor: Editor) -> None:
 
 def _draw_standing(editor: Editor) -> None:
     is_standing = editor.shaping.settings.is_standing
-    chosen = checkbox(t("Feet on the ground"), is_standing)
+    chosen = checkbox(t("It stands in the photo"), is_standing)
     tooltip(t("Its feet show which end is nearer. Untick this for things that fly or hang"))
     if chosen != is_standing:
         editor.shaping.say(t("Standing"), is_standing=chosen)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 
 from objectmorpher_core.deform.rigidity import Rigidity, rigidity_of
+from objectmorpher_core.document.hold_edits import Stays, stays_of
 from objectmorpher_core.document.model import EditObject
 
 from ...canvas.painter import shown_now
@@ -36,6 +37,12 @@ from ..widgets.widgets import (
 )
 from .brush import draw_radius
 
+STAYS = {Stays.FAR: "Far side", Stays.ELSE: "All else", Stays.NOTHING: "Only pins"}
+WHAT_STAYS = {
+    Stays.FAR: "The part farthest from the first handle stays where it is",
+    Stays.ELSE: "Only what is near a handle moves, everything else stays",
+    Stays.NOTHING: "Nothing stays by itself: only pins and handles hold",
+}
 NAMES = {Rigidity.RIGID: "Rigid", Rigidity.NORMAL: "Normal", Rigidity.SOFT: "Soft"}
 
 
@@ -63,22 +70,25 @@ def draw_pose(editor: Editor) -> None:
 
 def _draw_material(editor: Editor, thing: EditObject) -> None:
     heading(t("Rigidity"))
-    now = rigidity_of(thing.deform)
+    now, held = rigidity_of(thing.deform), stays_of(thing)
     presets: tuple[Choice[Rigidity | None], ...] = tuple(Choice(r, t(NAMES[r])) for r in Rigidity)
     chosen = segmented("rigidity", presets, now)
     if chosen is not None and chosen is not now:
         editor.rigging.set_rigidity(chosen)
-    is_on = checkbox(t("Hold the far side still"), thing.has_auto_anchors)
-    tooltip(t("With one handle, the part farthest from it is anchored by itself"))
-    if is_on != thing.has_auto_anchors:
-        editor.posing.set_auto_anchors(is_on)
+    gap(8)
+    heading(t("What stays"))
+    kinds = tuple(Choice(s, t(STAYS[s]), t(WHAT_STAYS[s])) for s in Stays)
+    stays = segmented("stays", kinds, held)
+    if stays is not held:
+        editor.posing.set_stays(stays)
 
 
 def _draw_symmetry(editor: Editor) -> None:
     heading(t("Symmetry"))
-    pose, mirroring = editor.view.pose, editor.posing.mirroring
-    pose.is_mirrored = checkbox(t("Drag the mirrored point too"), pose.is_mirrored)
-    if pose.is_mirrored and not mirroring.is_found():
+    mirroring = editor.posing.mirroring
+    if checkbox(t("Drag the mirrored point too"), mirroring.is_on) != mirroring.is_on:
+        mirroring.toggle()
+    if mirroring.is_on and not mirroring.is_found():
         note(t("No mirror plane was found: an upright one through the middle is used."))
     gap(12)
 
@@ -101,6 +111,7 @@ def _draw_overlays(editor: Editor) -> None:
 ROW = 28.0  # points
 VISIBLE_ROWS = 6
 PER_PX = 0.5  # px per point that a field is dragged
+_revealed: list[int | None] = [None]  # the handle that the list was scrolled to last
 
 
 def draw_handles(editor: Editor) -> None:
@@ -117,7 +128,10 @@ def draw_handles(editor: Editor) -> None:
         return
     step = theme.pt(ROW + BETWEEN)
     imgui.begin_child("##handles", ImVec2(0, VISIBLE_ROWS * step + step / 2))
+    is_new, _revealed[0] = _revealed[0] != editor.posing.handle, editor.posing.handle
     for h in range(count):
+        if is_new and h == editor.posing.handle:
+            imgui.set_scroll_from_pos_y(imgui.get_cursor_pos_y() - imgui.get_scroll_y() + step / 2)
         if editor.object is not None and h < len(editor.object.handles):  # one may be removed
             _draw_row(editor, h)
     imgui.end_child()

@@ -83,7 +83,7 @@ def _drag(document: Document, k: int, puppet: Puppet, start: float) -> list[Even
         handles = tuple(_on_the_way(handle, share) for handle in item.handles)
         if any(not handle.is_pin for handle in handles):
             before = pose or puppet.deformer.rest()
-            solution = puppet.deformer.solve(handles, item.has_auto_anchors, before, BUDGET)
+            solution = puppet.deformer.solve(handles, item.footing, before, BUDGET)
             pose = solution.pose
         splats = puppet.posed(pose, _part_of(item.placement, share))
         tiles.draw_rgba(tiles.prepare(splats, view, camera), texture)

@@ -168,8 +168,8 @@ class Chain:
 def _pose(puppet: Puppet, document: Document, way: Way) -> Pose:
     item, deformer = document.objects[0], puppet.deformer
     if way.iterations is not None:
-        return deformer.iterated(item.handles, way.iterations, item.has_auto_anchors)
-    return deformer.solve(item.handles, item.has_auto_anchors).pose
+        return deformer.iterated(item.handles, way.iterations, item.footing)
+    return deformer.solve(item.handles, item.footing).pose
 
 
 def _settings(way: Way) -> DeformSettings:
