@@ -30,6 +30,7 @@ uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
 uniform bool has_colors;
+uniform bool is_edged;
 uniform bool is_layered;    // see PosedSplats
 uniform float tail;
 uniform float least;
@@ -38,6 +39,8 @@ uniform float least_front;
 uniform float facing_ramp;
 uniform float brim_start;
 uniform float brim_end;
+uniform float edged_start;
+uniform float edged_end;
 uniform float matte_start;
 uniform float matte_end;
 uniform float turned_start;
@@ -137,15 +140,19 @@ void main() {
 
     // the rules that decide weights and shares
     float solidity = is_layered ? look.z : 1.0;  // no brim where no photo is carried
-    float cosine = facing(f, at);
+    float cosine = facing(f, at), turn = cosine - size.w;
+    if (is_edged && seen == 0.0) cosine = min(cosine, turn);
     float fdet = area + low_pass * (sxx + syy) + low_pass * low_pass;
     float fxx = sxx + low_pass, fyy = syy + low_pass;
     float weight = opacity * (is_compensated ? sqrt(area / fdet) : 1.0);
     float photo = ramp(stretch, streak_end, streak_start);
     float front = 1.0, brim = ramp(abs(cosine), brim_end, brim_start);
+    if (is_edged) brim = ramp(abs(cosine), edged_end, edged_start);
     if (is_surface)
         front = clamp((cosine - facing_ramp * (1.0 - seen)) / facing_ramp + 1.0, 0.0, 1.0);
     weight *= solidity * front + (1.0 - solidity) * brim;
+    float matted = ramp(stretch, matte_end, matte_start);
+    matted *= is_edged ? seen : ramp(turn, turned_end, turned_start);
     if (has_colors) {
         photo *= seen;
         seen = 1.0;
@@ -155,8 +162,6 @@ void main() {
     bool is_there = at.z > nearest && weight * both > 0.0 && ends < 1.0 && weight < 1e30;
     float cut = is_there ? -2.0 * log(ends) : 0.0;
     float first = tail + max(least_front / (weight * both), least / weight);
-    float matted = ramp(stretch, matte_end, matte_start)
-        * ramp(cosine - size.w, turned_end, turned_start);
 
     p_centre = vec4(view.x * straight + view.yz, fyy / fdet, -sxy / fyy);
     p_kernel = vec4(1.0 / fyy, is_there ? weight : 0.0, cut, first < 1.0 ? -2.0 * log(first) : -1.0);

@@ -23,6 +23,7 @@ uniform float apart;
 uniform float visible;
 uniform float opaque;
 uniform float least_front;
+uniform bool is_edged;           // rules.Splatting
 
 layout(location = 0) out vec4 color;   // added up: premultiplied
 layout(location = 1) out vec4 detail;  // added up: the first visible layer's depth, shift (zw)
@@ -68,7 +69,7 @@ void main() {
 
     // the layer's alpha and colour
 #ifdef IS_SURFACE
-    float whole = coverage(total, covers.zw), solid = coverage(body, places.xy);
+    float whole = coverage(total, covers.zw), solid = coverage(body + (is_edged ? colors.a : 0.0), places.xy);
 #else
     float whole = 1.0 - exp(covers.z), solid = 1.0 - exp(covers.w);
 #endif

@@ -7,12 +7,13 @@
 flat in vec4 v_color;  // RED, GREEN, BLUE, how much is not SEEN
 flat in vec2 v_edge;   // how much is not MATTED, SOLID of that
 
+uniform bool is_edged;  // rules.Splatting
 #ifndef IS_LAST
 uniform sampler2D front;  // of this layer
 #endif
 
 layout(location = 0) out vec4 sum_cover;  // total, body; gradient of total or logs of what is clear
-layout(location = 1) out vec4 sum_place;  // gradient of body, depth, shift x
+layout(location = 1) out vec4 sum_place;  // gradient of what ends with the surface, depth, shift x
 layout(location = 2) out vec4 sum_photo;  // shift y; excess of MAGNIFIED, not SEEN, not MATTED
 layout(location = 3) out vec4 sum_color;  // of the body; SOLID of what is not MATTED
 layout(location = 4) out float sum_left;  // for later layers; of the last one: its fronts
@@ -47,7 +48,8 @@ void main() {
     vec2 clear = max(1.0 - vec2(alpha * both, body), 1e-30);
     sum_cover = vec4(photo + body, body, log(clear));
 #endif
-    sum_place = vec4(gradient * v_shift.w, (photo + body) * depth, photo * shift.x);
+    float ended = v_shift.w + (is_edged ? v_shift.z * v_edge.x * v_edge.y : 0.0);
+    sum_place = vec4(gradient * ended, (photo + body) * depth, photo * shift.x);
     sum_photo = photo * vec4(shift.y, v_depth.w, v_color.w, v_edge.x);
     sum_color = vec4(body * v_color.rgb, photo * v_edge.x * v_edge.y);
 }

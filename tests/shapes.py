@@ -51,7 +51,8 @@ PLACEMENTS = {  # of an object that is drawn
     "small": Placement(scale=0.05, turn=(50.0, 0.0, 0.0)),
 }
 KINDS = [  # of splatting, and whether the photo is shown
-    ("surface", True), ("solid", True), ("mip", True), ("classic", True),
+    ("surface", True), ("solid", True), ("edged surface", True), ("edged solid", True),
+    ("mip", True), ("classic", True),
     ("mip", False), ("classic", False),
 ]  # fmt: skip
 MASKS = ("disc", "ellipse", "thin", "frame", "parts", "ring", "star")

@@ -1,8 +1,9 @@
 """Writes docs/lifting/README.md: how much of the third dimension one photo gives.
 
-python docs/lifting/make_lifting.py [figures]
+python docs/lifting/make_lifting.py [figures | quick [NAME ...]]
 
-`figures` prints, as JSON, the means over the solids for which nothing has to be fetched.
+`figures` prints, as JSON, the means over the solids for which nothing has to be fetched. `quick`
+prints how turned outlines and newly shown sides look, of the product alone: a few minutes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from motorcycle import results
 from page import write_page
 from pictures import draw_backs, draw_real, draw_solids, draw_thickness
 from solids import MADE, SOLIDS
+from turned_looks import looks
 from turning import Row, make_scene, means, measured, row_of
 
 FOLDER = Path(__file__).resolve().parent
@@ -30,6 +32,13 @@ def figures() -> None:
     rows = [row_of(name, measured(make_scene(name, FOLDER))) for name in MADE]
     told = {f"{way} {group}": (s.iou, s.psnr) for (group, way), s in means(rows).items()}
     print(json.dumps(told))
+
+
+def quick(names: list[str]) -> None:
+    meshes = fetched() if set(names) - set(MADE) else FOLDER
+    for name in names:
+        for key, look in looks(make_scene(name, meshes)).items():
+            print(f"{name:8} {key:9} {look}", flush=True)
 
 
 def main() -> None:
@@ -53,4 +62,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    figures() if "figures" in sys.argv else main()
+    if "quick" in sys.argv:
+        quick(sys.argv[sys.argv.index("quick") + 1 :] or list(SOLIDS))
+    else:
+        figures() if "figures" in sys.argv else main()

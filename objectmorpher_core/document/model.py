@@ -150,7 +150,8 @@ class LiftSettings:
 
 AS_SEEN = LiftSettings()
 
-SPLATTINGS = ("surface", "solid", "mip", "classic")  # see raster/rules.py
+# see raster/rules.py
+SPLATTINGS = ("surface", "solid", "edged surface", "edged solid", "mip", "classic")
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,15 +25,18 @@ def composite_layer(
 
     Returns the first row, and the last + 1, in which a further layer may be seen.
     """
+    edged = ONE if kind.is_edged else ZERO
     for strip in range(m.STRIPS):
-        _settle(s, *m.strip_pixels(strip, first, last))
+        start, end = m.strip_pixels(strip, first, last)
+        _settle(s, start, end, edged)
     look_up(s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top)
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
         if kind.is_surface:
             _cover(s, start, end, m.TOTAL, m.GX, m.GY, m.CLEAR, rules)
-            _cover(s, start, end, m.BODIED, m.BGX, m.BGY, m.BODY_CLEAR, rules)
+            bodied = m.BODY_CLEAR if kind.is_edged else m.BODIED
+            _cover(s, start, end, bodied, m.BGX, m.BGY, m.BODY_CLEAR, rules)
         if layer == 0:
             _put_first(s, start, end, visible, opaque)
         else:
@@ -52,8 +55,11 @@ def composite_layer(
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def _settle(s, start, end):
-    """What the sums say of the photo, for a share of the layer that is 1."""
+def _settle(s, start, end, edged):
+    """What the sums say of the photo, for a share of the layer that is 1.
+
+    BODY_CLEAR holds the sum of all that ends with the surface; `edged` 1: also of the photo.
+    """
     for k in range(start, end):
         total = s[m.TOTAL + k]
         shown = max(total - s[m.BODIED + k], ZERO)
@@ -65,6 +71,7 @@ def _settle(s, start, end):
         s[m.SHY + k] *= inverse
         s[m.MAG + k] = ONE + s[m.MAG + k] * inverse
         s[m.MATTES + k] = max(ONE - s[m.MATTES + k] * inverse, ZERO)  # not below 0 by rounding
+        s[m.BODY_CLEAR + k] += edged * (s[m.BODIED + k] + s[m.SOLIDS + k] - s[m.BODY_CLEAR + k])
         s[m.SOLIDS + k] *= inverse
         s[m.SEES + k] = max(ONE - s[m.SEES + k] * inverse, ZERO)
 

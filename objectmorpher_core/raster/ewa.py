@@ -169,19 +169,23 @@ def weigh_textured(s, rest, base, scale, rules, kind):
         r, o = base + k, OUT * LANES + k
         seen, solidity = rest[r + VISIBILITY * LANES], rest[r + SOLIDITY * LANES]
         cosine, volume = s[FACING * LANES + k], s[VOLUME * LANES + k]
-        s[o + p.WEIGHT * LANES] *= facing_weight(cosine, seen, solidity, rules, kind.is_surface)
+        turned = cosine - rest[r + COSINE * LANES]
+        if kind.is_edged and seen == 0.0:
+            cosine = min(cosine, turned)
+        s[o + p.WEIGHT * LANES] *= facing_weight(
+            cosine, seen, solidity, rules, kind.is_surface, kind.is_edged
+        )
         photo = matted = 1.0
         stretch = s[SMALLEST * LANES + k] * scale
         if stretch * stretch * stretch * volume < whole * whole * whole:
             stretch *= volume ** (1.0 / 3.0)
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
+        matted *= seen if kind.is_edged else ramp(turned, rules.turned_end, rules.turned_start)
         if kind.has_colors:
             photo *= seen
             seen = 1.0
         body = (1.0 - photo) * solidity
-        turned = cosine - rest[r + COSINE * LANES]
-        matted *= ramp(turned, rules.turned_end, rules.turned_start)
         s[o + p.PHOTO * LANES], s[o + p.BODY * LANES] = photo, body
         s[o + p.SEEN * LANES], s[o + p.SOLID * LANES] = seen, solidity
         s[o + p.MATTED * LANES] = matted

@@ -139,6 +139,7 @@ def add_more(s, spans, g, limits):
     photo, unseen = g[p.PHOTO], (ONE - g[p.SEEN]) * g[p.PHOTO]
     magnified = max(g[p.MAGNIFIED] / limits.sharp - ONE, ZERO) * photo
     unmatted, solid = (ONE - g[p.MATTED]) * photo, (ONE - g[p.MATTED]) * g[p.SOLID] * photo
+    edged = solid if limits.is_edged else ZERO
     for at, count in spans:
         for k in range(count):
             alpha = s[m.ALPHA + at + k]
@@ -146,6 +147,8 @@ def add_more(s, spans, g, limits):
             s[m.MATTES + at + k] += alpha * unmatted
             s[m.SOLIDS + at + k] += alpha * solid
             s[m.SEES + at + k] += alpha * unseen
+            s[m.BGX + at + k] -= s[m.SLOPE_X + at + k] * edged
+            s[m.BGY + at + k] -= s[m.SLOPE_Y + at + k] * edged
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -19,7 +19,8 @@
    as colours.
 6. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
    towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
-   by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets).
+   by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets). Of an edged
+   surface all that the photo has shown keeps the matte, and the rest covers what lies beneath.
 7. Layers are composited front to back, premultiplied. As far as two successive layers show the
    same point of the photo they are one surface that was split, and their coverage adds up under
    one matte.
@@ -65,14 +66,22 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     carried = smoothstep(stretch, RULES.streak_end, RULES.streak_start)
     seen = texture.visibility[index].astype(np.float64)
     cosine = _cosines(rest.normals[index], motion, means)
+    turned = cosine - rest.cosines[index]
+    if kind.is_edged:
+        cosine = np.where(seen == 0, np.minimum(cosine, turned), cosine)
     solidity = texture.solidity[index].astype(np.float64)
     if not splats.is_layered:  # no brim where no photo is carried
         solidity = np.ones(len(index))
     ramp, front = RULES.facing_ramp, np.ones(len(index))
     if kind.is_surface:
         front = np.clip((cosine - ramp * (1 - seen)) / ramp + 1, 0, 1)
-    brim = smoothstep(np.abs(cosine), RULES.brim_end, RULES.brim_start)
+    fades = (RULES.brim_end, RULES.brim_start)
+    if kind.is_edged:
+        fades = (RULES.edged_end, RULES.edged_start)
+    brim = smoothstep(np.abs(cosine), *fades)
     facing = solidity * front + (1 - solidity) * brim
+    matted = smoothstep(stretch, RULES.matte_end, RULES.matte_start)
+    matted *= seen if kind.is_edged else smoothstep(turned, RULES.turned_end, RULES.turned_start)
     photo = seen * carried if kind.has_colors else carried
     body = (1 - photo) * solidity
     seen = np.ones(len(index)) if kind.has_colors else seen
@@ -95,9 +104,9 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         weight=weight,
         photo=photo,
         body=body,
-        matted=smoothstep(stretch, RULES.matte_end, RULES.matte_start)
-        * smoothstep(cosine - rest.cosines[index], RULES.turned_end, RULES.turned_start),
+        matted=matted,
         solidity=solidity,
+        edged=(1 - matted) * solidity * kind.is_edged,
         seen=seen,
         color=gaussians.colors[index].astype(np.float64),
     )

@@ -44,6 +44,7 @@ class Projected:
     body: F64  # (N,) share that shows the Gaussian's own colour
     matted: F64  # (N,) how much the matte's edge is to be trusted
     solidity: F64  # (N,) alpha of the photo part where it is not
+    edged: F64  # (N,) share of the photo part that ends with the surface, as bodies do
     seen: F64  # (N,) 1 = the photo part was visible in the photo
     color: F64  # (N, 3)
 
@@ -66,7 +67,8 @@ class Sums:
         self.total = np.zeros((height, width))  # of alpha
         self.body = np.zeros((height, width))  # of it, what the photo does not give
         self.slope = np.zeros((height, width, 2))  # gradient of `total`
-        self.body_slope = np.zeros((height, width, 2))
+        self.ended = np.zeros((height, width))  # of it, what ends with the surface
+        self.ended_slope = np.zeros((height, width, 2))
         self.clear = np.ones((height, width))  # product of 1 - alpha
         self.body_clear = np.ones((height, width))
         self.depth = np.zeros((height, width))
@@ -86,7 +88,9 @@ class Sums:
         self.total[at] += alpha * both
         self.body[at] += body
         self.slope[at] += gradient * both
-        self.body_slope[at] += gradient * p.body[i]
+        ended = p.body[i] + p.photo[i] * p.edged[i]
+        self.ended[at] += alpha * ended
+        self.ended_slope[at] += gradient * ended
         self.clear[at] *= 1 - np.minimum(alpha * both, 1)
         self.body_clear[at] *= 1 - np.minimum(body, 1)
         self.depth[at] += alpha * both * s.depth
@@ -135,7 +139,8 @@ class Composite:
         matte = np.where(is_photo, matte, 0.0)
         if self.is_surface:
             whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
-            solid = _coverage(body, np.linalg.norm(layer.body_slope[at], axis=1))
+            slope = np.linalg.norm(layer.ended_slope[at], axis=1)
+            solid = _coverage(layer.ended[at], slope)
         else:
             whole, solid = 1 - layer.clear[at], 1 - layer.body_clear[at]
         alpha = matte * whole + (1 - matte) * solid

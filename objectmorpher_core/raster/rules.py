@@ -32,6 +32,10 @@ class Splatting(NamedTuple):
     tail: float = 0.0  # subtracted: the kernel ends without a step
     most: float = 0.99  # alpha
     least: float = 1 / 255  # alpha
+    # Whether what the photo has not shown ends with the surface, and all that it has with the
+    # matte, however far they turn; else both change from the one to the other as they turn.
+    # What it has not shown is nowhere seen at rest, also where it would face the camera a little.
+    is_edged: bool = False
 
 
 SPLATTINGS = {
@@ -40,6 +44,13 @@ SPLATTINGS = {
     "surface": Splatting(True, 0.15, True, False, math.exp(-CUTOFF / 2), 1e30, 0.0),
     # The same of a whole object, whose other side the photo has not seen.
     "solid": Splatting(True, 0.15, True, True, math.exp(-CUTOFF / 2), 1e30, 0.0),
+    # Both with rims that are whole lines, which older shapes do not have.
+    "edged surface": Splatting(
+        True, 0.15, True, False, math.exp(-CUTOFF / 2), 1e30, 0.0, is_edged=True
+    ),
+    "edged solid": Splatting(
+        True, 0.15, True, True, math.exp(-CUTOFF / 2), 1e30, 0.0, is_edged=True
+    ),
     # Mip-Splatting (Yu et al. 2024), with which TRELLIS was trained
     "mip": Splatting(False, 0.1, True, True),
     # 3D Gaussian Splatting (Kerbl et al. 2023)
@@ -69,6 +80,9 @@ class Rules(NamedTuple):
     facing_ramp: float = 0.25
     brim_start: float = 0.22
     brim_end: float = 0.42
+    # Of edged shapes it goes on over what turns into view, and fades when it is seen edge-on.
+    edged_start: float = 0.5
+    edged_end: float = 0.8
 
     # Where the motion magnifies the photo, the matte's edge would become a translucent band:
     # below matte_start the surface's own edge takes over from the matte's, wholly at matte_end.
@@ -115,6 +129,7 @@ class Limits(NamedTuple):
     end: np.float32  # so many squared gaps from its front a layer ends, ...
     fall: np.float32  # ... so steeply
     is_surface: bool
+    is_edged: bool
 
 
 @numba.njit(nogil=True)
@@ -125,7 +140,7 @@ def limits_of(rules, kind, gap, texture_gap):
         np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least),
         np.float32(rules.least_front), np.float32(rules.sharp), np.float32(1.0 / (gap * gap)),
         np.float32(1.0 / (texture_gap * texture_gap)), np.float32(end),
-        np.float32(1.0 / (end - 1.0)), kind.is_surface,
+        np.float32(1.0 / (end - 1.0)), kind.is_surface, kind.is_edged,
     )  # fmt: skip
 
 
@@ -137,7 +152,7 @@ def ramp(value, zero, one):
 
 
 @numba.njit(nogil=True)
-def facing_weight(cosine, is_seen, solidity, rules, is_surface=True):
+def facing_weight(cosine, is_seen, solidity, rules, is_surface=True, is_edged=False):
     """Weight of a Gaussian whose normal makes this cosine with the way to the camera.
 
     A cloud has no normals, but its soft edge has.
@@ -146,6 +161,8 @@ def facing_weight(cosine, is_seen, solidity, rules, is_surface=True):
     if is_surface:
         front = min(max((cosine - width * (1.0 - is_seen)) / width + 1.0, 0.0), 1.0)
     brim = ramp(abs(cosine), rules.brim_end, rules.brim_start)
+    if is_edged:
+        brim = ramp(abs(cosine), rules.edged_end, rules.edged_start)
     return solidity * front + (1.0 - solidity) * brim
 
 

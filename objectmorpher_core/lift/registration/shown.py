@@ -72,7 +72,7 @@ def rest_picture(lifted: LiftedObject, camera: Camera, matte: Matte) -> RestPict
 def visibilities(lifted: LiftedObject, picture: RestPicture, matte: Matte) -> F32:
     """(N,) how much of each Gaussian the photo shows."""
     world = lifted.world_points(lifted.gaussians.means.astype(np.float64))
-    has_normals = lifted.splatting in ("surface", "solid")
+    has_normals = lifted.splatting not in ("mip", "classic")
     normals = lifted.gaussians.normals.astype(np.float64) @ lifted.world_from_object[:3, :3].T
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
     shown = _unhidden(lifted, picture, world, normals if has_normals else None)

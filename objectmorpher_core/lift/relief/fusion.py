@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ...base.arrays import F64, Mask
+from ...base.arrays import F32, F64, Mask
 from ...base.camera import Camera
 from ...base.distances import nearest_in
 from ..crop import SIDE, rays
@@ -16,6 +16,7 @@ from .bilinear import bilinear
 from .body import Body
 from .cuts import find_cuts
 from .integration import integrated
+from .settling import Settling
 from .shape_look import SeenShape
 from .silhouette import Silhouette
 from .standing import Standing
@@ -30,6 +31,8 @@ FLOATING, STANDING = (4.0, 4.0), (2.0, 4.0)  # x, of the front and of what is be
 CYLINDER, BOX = (1.5, 2.0), (0.4, 0.8)
 ROUND = (0.35, 0.6)  # cosine to the ray, near the outline: the surface turns away; it ends there
 RIM = 0.035  # x extent from the outline, over which a body that is round there closes
+ROUND_WIDTH = 0.1  # x extent, over which a round body is one multiple of the silhouette's
+COMB = 1.5  # px of the crop, over which what the network says is evened
 INNER = 1.5  # px of the crop from the outline, nearer to which its pixels mix
 
 
@@ -77,18 +80,36 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
             _doubts(body.standing), (sheets.front_error, sheets.back_error), strict=True
         )
     )
-    half = 0.5 * (sheets.front - sheets.back)
-    middle = (1 - front_share) * body.middle + front_share * (sheets.front - half)
+    settling = Settling(outline, outline.inside * np.clip(1 - 2 * sheets.edge, 0.01, 1))
+    front_share, back_share = (settling.mean(share, RIM) for share in (front_share, back_share))
     if cuts is not None:
         body = replace(
             body, front=replace(body.front, cuts=cuts), back=replace(body.back, cuts=cuts)
         )
-    sides = [
-        side.towards(thickness * closing(half, sheets.facing, outline, own), back_share)
-        for side, own in zip((body.front, body.back), halves, strict=True)
-    ]
+
+    def blended(middle: F64, half: F64) -> tuple[F64, list[Thickness]]:
+        sides = [
+            side.towards(thickness * closing(half, sheets.facing, outline, own), back_share)
+            for side, own in zip((body.front, body.back), halves, strict=True)
+        ]
+        return (1 - front_share) * body.middle + front_share * middle, sides
+
+    raw = 0.5 * (sheets.front - sheets.back)
+    before, sides = blended(sheets.front - raw, raw)
+    gap = before + _half(sides[0], outline) / thickness
+    square = sum(np.maximum(side.square, 0.0) for side in (body.front, body.back))
+    balls = np.sqrt(0.5 * square) / thickness
+    half = _settled_half(raw, sheets.facing, balls, settling)
+    middle, sides = blended(settling.settled(sheets.front - half), half)
+    # What is seen stays, but for rims that turn away: there the sheets meet.
+    gap -= middle + _half(sides[0], outline) / thickness
+    gap *= thickness * (1 - _is_round(settling.mean(sheets.facing, RIM)) * (1 - _inward(outline)))
+    whole = _half(sides[0], outline) + gap
+    middle += np.minimum(whole, 0.0)  # it is never in front of what is seen
+    front = sides[0].towards(np.maximum(whole, 0.0), outline.inside.astype(np.float64))
+    back = sides[1]
     own = None if cuts is None else 1 - front_share * (1 - np.clip(sheets.own, 0, 1))
-    return replace(body, middle=middle, front=sides[0], back=sides[1], cuts=cuts, own=own)
+    return replace(body, middle=middle, front=front, back=back, cuts=cuts, own=own)
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
@@ -108,10 +129,28 @@ def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
             seen.thickness / np.maximum(seen.depth, 1e-4), seen.edge,
         ], -1,
     )  # fmt: skip
-    fields = _continued(stacked.astype(np.float64), mask)
+    fields = _continued(_evened(stacked.astype(np.float64), seen.edge, mask), mask)
     cells = crop.grid_xy(outline.photo_xy(outline.cells)).reshape(-1, 2)
     found = bilinear(fields, cells).reshape(*outline.shape, -1)
     return Sheets(*np.moveaxis(found, -1, 0))
+
+
+def _settled_half(half: F64, facing: F64, inflated: F64, settling: Settling) -> F64:
+    """(h, w) px: half the thickness. What is behind is a guess, and need not have waves.
+
+    Where it closes at the outline it is smooth as a multiple of the silhouette's body `inflated`,
+    else as it is.
+    """
+    outline = settling.outline
+    ratio = settling.multiple(half, inflated, ROUND_WIDTH)
+    rim = np.exp(-outline.depth / (RIM * outline.extent)) * outline.inside
+    closes = settling.multiple(_is_round(facing) * rim, rim, ROUND_WIDTH)
+    found = closes * ratio * inflated + (1 - closes) * settling.settled(half)
+    return np.maximum(found, 0.0)
+
+
+def _is_round(facing: F64) -> F64:
+    return np.clip((ROUND[1] - facing) / (ROUND[1] - ROUND[0]), 0, 1)
 
 
 def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
@@ -120,18 +159,22 @@ def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
     A pixel is too wide to tell how. There it closes as the silhouette's body does, `inflated`,
     times as much as `half` is thicker than that farther in.
     """
-    reach = RIM * outline.extent
-    share = np.clip(outline.depth / reach, 0, 1)
+    reach, share = RIM * outline.extent, _inward(outline)
     weight = share * outline.inside
     sigma = max(0.5 * reach / outline.cell, 0.5)
     ratio = np.clip(half / np.maximum(inflated, 1e-3 * outline.extent), 0.0, 4.0)
     blurred = cv2.GaussianBlur(ratio * weight, (0, 0), sigma)
     ratio = blurred / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)
-    is_round = np.clip((ROUND[1] - facing) / (ROUND[1] - ROUND[0]), 0, 1)
+    is_round = _is_round(facing)
     is_round = cv2.GaussianBlur(is_round, (0, 0), sigma)
     closed = np.minimum(ratio * inflated, half.max())
     amount = is_round * (1 - share)
     return np.maximum(half + amount * (closed - half), 0.0)
+
+
+def _inward(outline: Silhouette) -> F64:
+    """(h, w) from 0 at the outline to 1, from where on nothing closes any more."""
+    return np.clip(outline.depth / (RIM * outline.extent), 0, 1)
 
 
 def _doubts(standing: Standing) -> tuple[float, float]:
@@ -149,6 +192,18 @@ def _share(error: F64, own: F64) -> F64:
 def _half(side: Thickness, outline: Silhouette) -> F64:
     """(h, w) px."""
     return side.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
+
+
+def _evened(fields: F64, edge: F32, mask: Mask) -> F64:
+    """`fields` (s, s, c) without what changes from pixel to pixel, and not across an edge (s, s).
+
+    A network that draws its picture up by twos leaves a comb of two pixels in it.
+    """
+    weight = np.where(mask, np.maximum(1 - 2 * edge.astype(np.float64), 0.0), 0.0)[..., None]
+    total = cv2.GaussianBlur(fields * weight, (0, 0), COMB)
+    share = cv2.GaussianBlur(weight, (0, 0), COMB)[..., None]
+    trust = np.minimum(weight, share)  # of what is beside an edge nothing is mixed
+    return fields + trust * (total / np.maximum(share, 1e-6) - fields)
 
 
 def _continued(fields: F64, mask: Mask) -> F64:

@@ -32,6 +32,7 @@ from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
+from .rim import evened
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -94,7 +95,8 @@ class ReliefLifter:
         progress(0.8, "Choosing control points")
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
-        return lifted if is_mirrored and hidden is None else replace(lifted, splatting="solid")
+        is_carried = is_mirrored and hidden is None
+        return replace(lifted, splatting="edged surface" if is_carried else "edged solid")
 
     def body(self, subject: Subject, settings: LiftSettings) -> Body:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -116,6 +118,7 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
+        body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)

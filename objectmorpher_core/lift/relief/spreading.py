@@ -17,10 +17,13 @@ from ...base.poisson_disk import thin_to_spacing
 from ...base.threads import in_threads
 from .bilinear import bilinear
 from .body import BACK, FRONT, MIDDLE, Body
+from .rim import RimLine, rim_lines
 from .silhouette import Silhouette
 
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
+INSET = 0.6  # x mean spacing: so far beyond its outermost points a surface is drawn
+IN_LINE = 0.85  # x mean spacing: how far points along an outline are apart
 BRIM = 1.8  # x mean spacing: how far points reach past the matte's soft band
 WITHIN = 0.45  # cells from a near cell to its wall: just before the far one begins
 MIN_SPACING = 1.0  # px: more points than pixels carry nothing
@@ -49,30 +52,33 @@ def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tup
     proportion to the true area, then thinned to one spacing in 3D.
     """
     areas = [_area(body, side) for side in (FRONT, BACK)]
-    wall = _wall_area(body)
-    total = sum(area.sum() for area in areas) + wall.sum() + _inner_area(body)
+    lines = rim_lines(body.silhouette.inside)
+    total = sum(area.sum() for area in areas) + _wall_area(body, lines) + _inner_area(body)
     spacing = max(float(np.sqrt(total / count)), MIN_SPACING)
     density = OVERSAMPLING / spacing**2  # candidates per px^2
+    chains = [_chain(body, lines, side, spacing) for side in (FRONT, BACK)]
     drawn = [_draw(body.silhouette, area * density, rng) for area in areas]
-    around = [
-        _wall(body, wall * density, rng),
-        _brim(body, band + BRIM * spacing, density, rng),
-        *_inner(body, density, rng),
-    ]
+    drawn = [np.vstack([chain, xy]) for chain, xy in zip(chains, drawn, strict=True)]
+    around = [_brim(body, band + BRIM * spacing, density, rng), *_inner(body, density, rng)]
     # Most candidates of the sheets are dropped: their normals are found when that is done.
     clouds = [(xy, body.height(xy, side)) for xy, side in zip(drawn, (FRONT, BACK), strict=True)]
     clouds += [(surface.xy, surface.height) for surface in around]
-    front, back, *others = _thinned(clouds, spacing, rng)
+    first = [len(chain) for chain in chains] + [0] * len(around)
+    front, back, *others = _thinned(clouds, first, spacing, rng)
     sheets = [_sheet(body, drawn[0][front], FRONT), _sheet(body, drawn[1][back], BACK)]
     sheets += [surface.select(kept) for surface, kept in zip(around, others, strict=True)]
+    sheets.append(_wall(body, lines, spacing))
     return _joined(sheets), spacing
 
 
 def _thinned(
-    clouds: list[tuple[F64, F64]], spacing: float, rng: np.random.Generator
+    clouds: list[tuple[F64, F64]], first: list[int], spacing: float, rng: np.random.Generator
 ) -> list[np.ndarray]:  # fmt: skip
-    """Which points of each cloud, xy (N, 2) and height (N,), are kept."""
-    orders = [rng.permutation(len(xy)) for xy, _ in clouds]
+    """Which points of each cloud, xy (N, 2) and height (N,), are kept; its `first` go first."""
+    orders = [
+        np.r_[np.arange(n), n + rng.permutation(len(xy) - n)]
+        for (xy, _), n in zip(clouds, first, strict=True)
+    ]
     kept = [np.empty(0, np.int64)] * len(clouds)
 
     def thin(first: int, last: int) -> None:
@@ -119,24 +125,67 @@ def _sheet(body: Body, xy: F64, side: float) -> Surface:
     return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
 
 
-def _wall_area(body: Body) -> F64:
-    """(n,) px^2 between the sheets at each stretch of the outline."""
-    middles, offsets = body.silhouette.contour
-    front, _ = body.sample(middles, FRONT)
-    back, _ = body.sample(middles, BACK)
-    return np.linalg.norm(offsets, axis=1) * np.maximum(front - back, 0.0)
+def _wall_area(body: Body, lines: list[RimLine]) -> float:
+    """px^2 between the sheets where they do not meet at the outlines."""
+    total = 0.0
+    for line in lines:
+        xy = body.silhouette.photo_xy(line.xy)
+        front, back = (body.sample(xy, side)[0] for side in (FRONT, BACK))
+        wide = body.silhouette.cell * np.diff(line.length)
+        total += float((wide * np.maximum(front - back, 0.0)).sum())
+    return total
 
 
-def _wall(body: Body, expected: F64, rng: np.random.Generator) -> Surface:
-    """What joins the sheets where they do not meet at the outline, `expected` (n,) a stretch."""
-    middles, offsets = body.silhouette.contour
-    counts = np.floor(expected + rng.random(len(expected))).astype(int)
-    xy = np.repeat(middles, counts, axis=0)
-    xy = xy + np.repeat(offsets, counts, axis=0) * (rng.random((len(xy), 1)) - 0.5)
-    height, _ = body.sample(xy, rng.uniform(BACK, FRONT, len(xy)))
+def _chain(body: Body, lines: list[RimLine], side: float, spacing: float) -> F64:
+    """Photo px (N, 2) along the outlines, evenly apart on a sheet: an edge is a line.
+
+    They lie so far inside that what is drawn of them ends at the outline.
+    """
+    found = [np.zeros((0, 2))]
+    for line in lines:
+        closed, inward = (np.vstack([part, part[:1]]) for part in (line.xy, line.inward))
+        xy = body.silhouette.photo_xy(closed)
+        _, gradient = body.sample(xy, side)
+        flat = 1 / np.sqrt(1 + (gradient**2).sum(1))  # how much of a point's width is across
+        xy = xy + (INSET * spacing * flat)[:, None] * inward
+        height, _ = body.sample(xy, side)
+        steps = np.hypot(np.linalg.norm(np.diff(xy, axis=0), axis=1), np.diff(height))
+        length = np.r_[0.0, np.cumsum(steps)]
+        found.append(_along(length, IN_LINE * spacing, xy[:-1]))
+    return np.concatenate(found)
+
+
+def _wall(body: Body, lines: list[RimLine], spacing: float) -> Surface:
+    """What joins the sheets at the outlines: rows of points along them, as many as fit in.
+
+    One at least: where the sheets meet it is what one sees of the rim when it turns.
+    """
+    step = IN_LINE * spacing
+    places = [(np.zeros((0, 2)), np.zeros(0))]
+    for line in lines:
+        at = _along(line.length, step / body.silhouette.cell, line.xy)
+        xy = body.silhouette.photo_xy(at)
+        front, back = (body.sample(xy, side)[0] for side in (FRONT, BACK))
+        rows = np.maximum(np.floor((front - back) / step), 1)
+        for row in range(int(rows.max(initial=0))):
+            there = row < rows
+            share = (row + 0.5) / rows[there]
+            places.append((xy[there], back[there] + share * (front - back)[there]))
+    xy, height = (np.concatenate(part) for part in zip(*places, strict=True))
+    points, order = np.column_stack([xy, height]), np.arange(len(xy))
+    kept = thin_to_spacing(points, spacing * np.sqrt(PACKING), order)
+    xy, height = xy[kept], height[kept]
     normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
     no = np.zeros(len(xy), bool)
     return Surface(xy, height, normals, no, no, no, xy)
+
+
+def _along(length: F64, step: float, values: F64) -> F64:
+    """`values` (n, c) of a closed line, `length` (n + 1,), evenly `step` apart on it."""
+    count = max(int(length[-1] / step), 1)
+    at = np.linspace(0, length[-1], count, endpoint=False)
+    closed = np.vstack([values, values[:1]])
+    return np.column_stack([np.interp(at, length, column) for column in closed.T])
 
 
 def _inner_area(body: Body) -> float:

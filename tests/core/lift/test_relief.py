@@ -267,11 +267,13 @@ def test_a_profile_is_mirrored_and_a_face_goes_on():
     mask[100:160, 60:260] = True
     mask[150:210, 80:110] = mask[150:210, 200:230] = True  # legs
     mask[60:120, 220:290] = True  # a head
-    assert _lift(mask).splatting == "surface"
-    assert _lift(shapes.mask("disc", 320, 240)).splatting == "solid"
+    assert _lift(mask).splatting == "edged surface"
+    assert _lift(shapes.mask("disc", 320, 240)).splatting == "edged solid"
 
 
-@pytest.mark.parametrize(("back", "splatting"), [("mirrored", "surface"), ("continued", "solid")])
+@pytest.mark.parametrize(
+    ("back", "splatting"), [("mirrored", "edged surface"), ("continued", "edged solid")]
+)
 def test_the_user_says_what_the_back_is(back, splatting):
     inside = shapes.mask("ellipse")
     settings = LiftSettings(800, back=back)
