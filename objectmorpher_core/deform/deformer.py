@@ -12,7 +12,7 @@ from ..base.arrays import F64, I32, Sparse, frozen, frozen_rows
 from ..base.kernel_files import numba
 from ..base.rotations import matrix_from_vector
 from ..base.threads import FAST
-from ..document.model import DeformSettings, LiftedObject, Pose
+from ..document.model import DeformSettings, LiftedObject
 from ..document.pose import UNHELD, Base, Handle, Pose, turn_at
 from ..document.rig import Rig
 from .anderson import Anderson
