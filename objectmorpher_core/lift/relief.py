@@ -31,6 +31,7 @@ from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
+from .shapes import completed, recognised
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -115,6 +116,8 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
+                if (shape := recognised(seen, settings.kind)) is not None:
+                    body = completed(body, shape, camera, settings.thickness, settings.trust)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)
