@@ -172,6 +172,7 @@ class LiftedObject:
     # (N, 3) world: depth of the middle sheet on each Gaussian's ray, and how it changes per px of
     # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
     middle: F32 | None = None
+    kind: str = ""  # of KINDS, what it was recognised as; empty: nobody looked
 
     def __post_init__(self) -> None:
         if self.middle is not None:

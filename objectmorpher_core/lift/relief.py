@@ -31,7 +31,7 @@ from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
-from .shapes import completed, recognised
+from .shapes import completed, flattened, recognised, rounded
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -118,6 +118,10 @@ class ReliefLifter:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
                 if (shape := recognised(seen, settings.kind)) is not None:
                     body = completed(body, shape, camera, settings.thickness, settings.trust)
+        if settings.kind == "tube":
+            body = rounded(body, settings.thickness)
+        elif settings.kind == "flat" and body.kind != "flat":
+            body = flattened(body, settings.thickness)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)
@@ -258,8 +262,15 @@ def _assemble(
     height, slope = body.sample(surface.xy, MIDDLE)
     middle = np.column_stack([depth - height * unit, -slope * unit]).astype(np.float32)
     return LiftedObject(
-        gaussians, texture, points, world_from_object, sigma, "relief", middle=middle
-    )
+        gaussians,
+        texture,
+        points,
+        world_from_object,
+        sigma,
+        "relief",
+        middle=middle,
+        kind=body.kind,
+    )  # fmt: skip
 
 
 def _world_normals(normals: F64, ray: F64, z: F64, unit: float, focal: float) -> F64:

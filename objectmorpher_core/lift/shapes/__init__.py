@@ -8,7 +8,7 @@ gives the object's front and back as far as it explains them; the rest stays fre
 
 from __future__ import annotations
 
-from .completing import completed
+from .completing import completed, flattened, rounded
 from .recognition import Recognised, recognised
 
-__all__ = ["Recognised", "completed", "recognised"]
+__all__ = ["Recognised", "completed", "flattened", "recognised", "rounded"]

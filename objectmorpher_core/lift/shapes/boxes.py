@@ -1,4 +1,4 @@
-"""A box that looks like the photo: its faces from the network's normals, its edges by the outline."""
+"""A box that looks like the photo: faces from the network's normals, edges by the outline."""
 
 from __future__ import annotations
 

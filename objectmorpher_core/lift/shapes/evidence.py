@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 
 from ...arrays import F64, Mask
+from ...kernel_files import numba
 from ..crop import rays
 from ..shape_look import SeenShape
-from ...kernel_files import numba
 from .drawing import Grid, Mesh, drawn, face_normals
 
 STRIDE = 4  # px of the crop per cell
@@ -27,6 +27,8 @@ LEAST_ERROR = 0.012  # crop units, of the network's front
 TAIL = 2.5  # errors, from which a pixel counts less
 BLUR = 1  # cells to either side, over which the network's normals are blurred
 LENGTH = 3.0  # x extent, of a usual outline
+CORNERED = 0.03  # x its length, that an outline may stray from four lines
+FILLED = 0.06  # x its area, likewise
 LEAST_CELLS = 12  # that are compared
 
 
@@ -116,7 +118,7 @@ class Evidence:
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
         opened = cv2.morphologyEx(self.mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
         rest = (self.mask & (opened == 0)).astype(np.uint8)
-        count, pieces, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=4)
+        _, pieces, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=4)
         is_far = np.asarray(stats)[:, cv2.CC_STAT_AREA] > LEAST_PIECE * self.mask.sum()
         is_far[0] = False
         core = self.mask & ~is_far[np.asarray(pieces)]
@@ -134,6 +136,16 @@ class Evidence:
         ring += 0.5 * steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
         step = self.grid.step / STRIDE
         return np.array(self.grid.start) + step * (ring - STRIDE // 2)
+
+    @property
+    def is_four_cornered(self) -> bool:
+        """Whether the outline is a quadrilateral: what a flat rectangle looks like."""
+        hull = cv2.convexHull(self.outline.astype(np.float32))
+        quad = cv2.approxPolyDP(hull, CORNERED * cv2.arcLength(hull, True), True)
+        if len(quad) != 4:
+            return False
+        area = float(self.fine.sum()) * (self.grid.step / STRIDE) ** 2
+        return abs(cv2.contourArea(quad) / area - 1) < FILLED
 
     @property
     def points(self) -> F64:
@@ -154,6 +166,14 @@ class Evidence:
         # px^3: the outline's length times half the square of its offset
         square = 2 * stray * STRIDE**2 / (LENGTH * self.extent)
         return Misfit(square / error**2, depth, normal)
+
+
+class Fitted(NamedTuple):
+    """A shape, and the part of the object that it was fitted to."""
+
+    mesh: Mesh
+    misfit: Misfit
+    evidence: Evidence
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

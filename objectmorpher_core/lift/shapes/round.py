@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import cv2
+import numpy as np
 
 from ...arrays import F64, Mask
 from .drawing import Mesh
-from .evidence import Evidence, Misfit
+from .evidence import Evidence, Fitted, Misfit
 from .refining import refined
 from .solids import ellipsoid, revolved
 
@@ -102,7 +102,7 @@ class Lathe:
         return even, np.concatenate([radii[:1], inner[1:-1], radii[-1:]])
 
 
-def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit] | None:
+def fit_revolution(evidence: Evidence) -> Fitted | None:
     """The best of several axes and leanings; None where nothing is alike on both sides."""
     trials = []
     for lathe in _lathes(evidence):
@@ -114,8 +114,11 @@ def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit] | None:
     if not trials:
         return None
     trials.sort(key=lambda trial: trial[0])
-    fits = [(_refined(*trial[2:]), trial[1]) for trial in trials[:KEPT]]
-    return min(fits, key=lambda fit: fit[0][1].total + fit[1])[0]
+    fits = [
+        (Fitted(*_refined(lathe, lean, own), own), left_out)
+        for _, left_out, lathe, lean, own in trials[:KEPT]
+    ]
+    return min(fits, key=lambda fit: fit[0].misfit.total + fit[1])[0]
 
 
 def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit]:
@@ -210,7 +213,8 @@ def _both_sides(evidence: Evidence, middle: F64, way: F64) -> Mask:
     at = evidence.grid.tangents
     normal = np.array([-way[1], way[0]])
     image = at - 2 * ((at - middle) @ normal)[..., None] * normal
-    j, i = np.rint((image - evidence.grid.start) / evidence.grid.step).astype(int).transpose(2, 0, 1)
+    cells = (image - evidence.grid.start) / evidence.grid.step
+    j, i = np.moveaxis(np.rint(cells).astype(int), -1, 0)
     h, w = evidence.mask.shape
     inside = (i >= 0) & (i < h) & (j >= 0) & (j < w)
     return evidence.mask & inside & evidence.mask[i.clip(0, h - 1), j.clip(0, w - 1)]
