@@ -168,14 +168,6 @@ class Evidence:
         return Misfit(square / error**2, depth, normal)
 
 
-class Fitted(NamedTuple):
-    """A shape, and the part of the object that it was fitted to."""
-
-    mesh: Mesh
-    misfit: Misfit
-    evidence: Evidence
-
-
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blurred(normals, face):
     """(h, w, 3) the normals of what is met, each the mean of those around it, unit."""

@@ -14,7 +14,7 @@ from ..shape_look import SeenShape
 from ..silhouette import Silhouette
 from .boxes import fit_box
 from .drawing import Grid, Mesh, drawn
-from .evidence import Evidence, Fitted, Misfit
+from .evidence import Evidence, Misfit
 from .flats import fit_flat
 from .round import fit_ellipsoid, fit_revolution
 
@@ -89,12 +89,12 @@ def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
         return None
     if kind != "auto":
         found = _sheet(evidence) if kind == "flat" else _solid(kind, evidence)
-        return None if found is None else replace(found, weight=1.0)
+        return replace(found, weight=1.0)
     sheet, box = _sheet(evidence), _solid("box", evidence)
     # No sheet shows two sides.
     if sheet.weight >= 0.5 and not _shows_sides(box):
         return sheet
-    best = min((found for found in (box, _solid("round", evidence)) if found), key=_length)
+    best = min(box, _solid("round", evidence), key=_length)
     if sheet.weight > best.weight and not _shows_sides(box):
         best = sheet
     return best if best.weight >= LEAST else None
@@ -115,28 +115,26 @@ def _sheet(evidence: Evidence) -> Recognised:
     return Recognised("flat", misfit, _believed(-float(odds)), evidence, None, plane)
 
 
-def _solid(kind: str, evidence: Evidence) -> Recognised | None:
+def _solid(kind: str, evidence: Evidence) -> Recognised:
     """The best box, or the best round thing."""
     core = evidence.core()
+    left_out = LEFT_OUT * (1 - float(core.mask.sum()) / float(evidence.mask.sum()))
     if kind == "box":
-        mesh, misfit = fit_box(core)
-        return _described(kind, Fitted(mesh, misfit, core), evidence, 0.0)
-    fits = [
-        _described(kind, Fitted(*fit_ellipsoid(core), core), evidence, 0.0),
-        _described(kind, fit_revolution(core), evidence, PROFILE),
-    ]
-    return min((fit for fit in fits if fit is not None), key=_length, default=None)
+        return _described(kind, fit_box(core), evidence, left_out)
+    turned = fit_revolution(core)
+    fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
+    if turned is not None:
+        fits.append(_described(kind, turned, evidence, left_out + PROFILE))
+    return min(fits, key=_length)
 
 
 def _described(
-    kind: str, found: Fitted | None, evidence: Evidence, more: float
-) -> Recognised | None:
-    if found is None:
-        return None
-    description = sum(w * m for w, m in zip(WEIGHTS, found.misfit, strict=True)) + more
-    description += LEFT_OUT * (1 - found.evidence.mask.sum() / evidence.mask.sum())
+    kind: str, found: tuple[Mesh, Misfit], evidence: Evidence, more: float
+) -> Recognised:
+    mesh, misfit = found
+    description = sum(w * m for w, m in zip(WEIGHTS, misfit, strict=True)) + more
     weight = _believed((description - LONGEST) / WIDTH)
-    return Recognised(kind, found.misfit, weight, evidence, found.mesh, None, description)
+    return Recognised(kind, misfit, weight, evidence, mesh, None, description)
 
 
 def _believed(doubt: float) -> float:
@@ -144,9 +142,9 @@ def _believed(doubt: float) -> float:
     return float(1 / (1 + np.exp(np.clip(doubt, -30, 30))))
 
 
-def _shows_sides(found: Recognised | None) -> bool:
+def _shows_sides(found: Recognised) -> bool:
     """Whether it is surely a box of which more than one side is seen."""
-    if found is None or found.misfit.outline > OUTLINED or found.mesh is None:
+    if found.misfit.outline > OUTLINED or found.mesh is None:
         return False
     seen = drawn(found.mesh, found.evidence.grid)
     shares = np.bincount(seen.face[seen.face >= 0] // 2, minlength=6)

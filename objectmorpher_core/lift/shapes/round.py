@@ -15,7 +15,7 @@ import numpy as np
 
 from ...arrays import F64, Mask
 from .drawing import Mesh
-from .evidence import Evidence, Fitted, Misfit
+from .evidence import Evidence, Misfit
 from .refining import refined
 from .solids import ellipsoid, revolved
 
@@ -25,7 +25,6 @@ ACROSS = 64  # rows in which outlines are compared
 FINE = 48  # of them, at which its ends are looked for
 TRIM = 0.004  # x the outline's area, that trimmed ends may lose
 KEPT = 2  # leanings that are refined
-LEFT_OUT = 8.0  # misfit, of what sticks out on one side, as a share of the whole
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
 CAPS = (0.0, 0.35, 1.0)  # height of the end that is seen, x its radius
 
@@ -71,7 +70,6 @@ class Lathe:
     middle: F64  # (2,) tangents
     along: F64  # (2,) unit, in the picture
     outline: F64  # (n, 2) across and along
-    own: Mask  # (h, w) what is alike on both sides
     low: float  # ends of the mask along the axis
     high: float
 
@@ -102,23 +100,16 @@ class Lathe:
         return even, np.concatenate([radii[:1], inner[1:-1], radii[-1:]])
 
 
-def fit_revolution(evidence: Evidence) -> Fitted | None:
+def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit] | None:
     """The best of several axes and leanings; None where nothing is alike on both sides."""
     trials = []
     for lathe in _lathes(evidence):
-        own = evidence.within(lathe.own)
-        left_out = LEFT_OUT * (1 - lathe.own.sum() / evidence.mask.sum())
         for lean in np.concatenate([LEANS, -LEANS]):
-            mesh = _built(lathe, lean, np.zeros(6), 0.0, own)
-            trials.append((own.misfit(mesh).total + left_out, left_out, lathe, lean, own))
-    if not trials:
-        return None
+            mesh = _built(lathe, lean, np.zeros(6), 0.0, evidence)
+            trials.append((evidence.misfit(mesh).total, lathe, lean))
     trials.sort(key=lambda trial: trial[0])
-    fits = [
-        (Fitted(*_refined(lathe, lean, own), own), left_out)
-        for _, left_out, lathe, lean, own in trials[:KEPT]
-    ]
-    return min(fits, key=lambda fit: fit[0].misfit.total + fit[1])[0]
+    fits = [_refined(lathe, lean, evidence) for _, lathe, lean in trials[:KEPT]]
+    return min(fits, key=lambda fit: fit[1].total, default=None)
 
 
 def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit]:
@@ -188,7 +179,7 @@ def _lathes(evidence: Evidence) -> list[Lathe]:
         outline = evidence.within(mirrored).outline - middle
         outline = np.column_stack([outline @ [-way[1], way[0]], outline @ way])[::4]
         low, high = outline[:, 1].min(), outline[:, 1].max()
-        found.append(Lathe(middle, way, outline, mirrored, low, high))
+        found.append(Lathe(middle, way, outline, low, high))
     return found
 
 
