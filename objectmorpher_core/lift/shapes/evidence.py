@@ -38,17 +38,19 @@ class Misfit(NamedTuple):
     outline: float
     depth: float
     normal: float
+    thick: float  # which the network knows least of all
 
     @property
     def total(self) -> float:
         """What the fits minimise."""
-        return 2.0 * self.outline + self.depth + self.normal
+        return 2.0 * self.outline + self.depth + self.normal + 0.1 * self.thick
 
 
+BESIDE = 4  # cells from what sticks out, nearer to which an outline is not the core's own
 THIN = 0.45  # x the largest disc's radius, that of what is thin
 LEAST_PIECE = 0.025  # x the mask's area, of what sticks out; a corner is less
 LEAST_CORE = 0.55  # x the mask's area, that a core has
-FAR = Misfit(1e3, 1e3, 1e3)
+FAR = Misfit(1e3, 1e3, 1e3, 1e3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ class Evidence:
     error: F64  # expected, over the depth
     normal: F64  # (h, w, 3) unit, camera axes
     facing: F64  # (h, w, 3) unit rays
-    thick: F64  # through the whole object along the ray, crop units
+    thick: F64  # along the axis through the whole object, crop units
     thick_error: F64
     extent: float  # px of the crop, longer side of the mask's box
     fine: Mask  # (s, s) the mask on the crop's own pixels
@@ -90,7 +92,8 @@ class Evidence:
             np.where(mask, inside - 0.5, outside - 0.5)[own, own].astype(np.float64),
             (distance * ways[..., 2])[own, own], error[own, own],
             seen.normal.astype(np.float64)[own, own], ways[own, own],
-            seen.depth.astype(np.float64)[own, own], seen.depth_error.astype(np.float64)[own, own],
+            (seen.depth * ways[..., 2])[own, own],
+            np.maximum(seen.depth_error.astype(np.float64), LEAST_ERROR)[own, own],
             extent, mask,
         )  # fmt: skip
 
@@ -104,7 +107,7 @@ class Evidence:
         # on in the rest, or behind it, there is none.
         away = np.where(self.mask == mask, np.minimum(away, self.outside), away)
         rest = (self.mask & ~mask).astype(np.uint8)
-        away = np.where(cv2.dilate(rest, np.ones((5, 5), np.uint8)) > 0, 0.0, away)
+        away = np.where(cv2.dilate(rest, np.ones((2 * BESIDE + 1,) * 2, np.uint8)) > 0, 0.0, away)
         near = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8))
         whole = cv2.resize(near, self.fine.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
         fine = self.fine & whole
@@ -159,13 +162,13 @@ class Evidence:
             return FAR
         seen = drawn(mesh, self.grid)
         error = OUTLINE_ERROR * self.extent
-        stray, depth, normal = _compared(
+        stray, depth, normal, thick = _compared(
             seen, face_normals(mesh), self.mask, self.sure, self.outside, FARTHEST * error,
-            self.depth, self.error, self.normal, self.facing,
+            self.depth, self.error, self.normal, self.facing, self.thick, self.thick_error,
         )  # fmt: skip
         # px^3: the outline's length times half the square of its offset
         square = 2 * stray * STRIDE**2 / (LENGTH * self.extent)
-        return Misfit(square / error**2, depth, normal)
+        return Misfit(square / error**2, depth, normal, thick)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -190,16 +193,18 @@ def _blurred(normals, face):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _compared(seen, normals, mask, sure, outside, farthest, depth, error, normal, facing):
-    """What is off: the outline (sum), and robust means of the front and its normals.
+def _compared(
+    seen, normals, mask, sure, outside, farthest, depth, error, normal, facing, thick, thick_error
+):
+    """What is off: the outline (sum), and robust means of front, normals, thickness.
 
     The mean square in which no value counts more than a tail is Geman and McClure's (1987).
     """
-    near, _, face = seen
+    near, far, face = seen
     height, width = mask.shape
     smooth = _blurred(normals, face)  # as the network's are
     offsets, errors = np.zeros(height * width), np.zeros(height * width)
-    count, stray, apart = 0, 0.0, 0.0
+    count, stray, apart, through = 0, 0.0, 0.0, 0.0
     for i in range(height):
         for j in range(width):
             is_met = near[i, j] > 0.0
@@ -215,11 +220,14 @@ def _compared(seen, normals, mask, sure, outside, farthest, depth, error, normal
             sign = -1.0 if away > 0 else 1.0
             square = ((sign * n - normal[i, j]) ** 2).sum() / NORMAL_ERROR**2
             apart += square / (1.0 + square / TAIL**2)
+            own = (near[i, j] / far[i, j] - 1.0) * depth[i, j]
+            square = ((own - thick[i, j]) / thick_error[i, j]) ** 2
+            through += square / (1.0 + square / TAIL**2)
     if count < LEAST_CELLS:
-        return 1e3, 1e3, 1e3
+        return 1e3, 1e3, 1e3, 1e3
     middle = np.median(offsets[:count])
     total = 0.0
     for k in range(count):
         square = ((offsets[k] - middle) / errors[k]) ** 2
         total += square / (1.0 + square / TAIL**2)
-    return stray, total / count, apart / count
+    return stray, total / count, apart / count, through / count

@@ -35,4 +35,4 @@ def fit_flat(evidence: Evidence) -> tuple[F64, Misfit]:
         apart = np.linalg.norm(normals + unit, axis=1) / NORMAL_ERROR
         heed = 1 / (1 + (apart / TAIL) ** 2) ** 2
     depth, normal = ((r**2 / (1 + (r / TAIL) ** 2)).mean() for r in (off, apart))
-    return plane, Misfit(0.0, float(depth), float(normal))
+    return plane, Misfit(0.0, float(depth), float(normal), 0.0)

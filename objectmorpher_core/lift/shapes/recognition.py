@@ -132,7 +132,7 @@ def _described(
     kind: str, found: tuple[Mesh, Misfit], evidence: Evidence, more: float
 ) -> Recognised:
     mesh, misfit = found
-    description = sum(w * m for w, m in zip(WEIGHTS, misfit, strict=True)) + more
+    description = sum(w * m for w, m in zip(WEIGHTS, misfit[:3], strict=True)) + more
     weight = _believed((description - LONGEST) / WIDTH)
     return Recognised(kind, misfit, weight, evidence, mesh, None, description)
 

@@ -11,7 +11,7 @@ from ...arrays import F64
 from .drawing import Mesh
 from .evidence import Evidence, Misfit
 
-TRIALS = 14  # of the simplex, for each number
+TRIALS = 18  # of the simplex, for each number
 CLOSE = 0.004  # difference of misfits that no longer matters
 
 Build = Callable[[F64], Mesh]

@@ -17,12 +17,12 @@ from ...arrays import F64, Mask
 from .drawing import Mesh
 from .evidence import Evidence, Misfit
 from .refining import refined
-from .solids import ellipsoid, revolved
+from .solids import AROUND, FINE, ellipsoid, revolved
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane
 PLACES = 16  # on the axis
 ACROSS = 64  # rows in which outlines are compared
-FINE = 48  # of them, at which its ends are looked for
+TRIED = 48  # of them, at which its ends are looked for
 TRIM = 0.004  # x the outline's area, that trimmed ends may lose
 KEPT = 2  # leanings that are refined
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
@@ -40,16 +40,16 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
     start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.log(np.sqrt(half[0] * half[1])), 0.0, 0.0])
     steps = np.array([0.02, 0.02, 0.06, 0.06, 0.06, 0.3, 0.15 * half[0], 0.15 * half[1]])
 
-    def build(numbers: F64) -> Mesh:
+    def build(numbers: F64, around: int = AROUND) -> Mesh:
         x, y, grow_a, grow_b, skew, deep, lean_a, lean_b = numbers
         flat = spread @ np.array([[np.exp(grow_a), skew], [skew, np.exp(grow_b)]])
         columns = np.column_stack(
             [flat + np.outer(forward, [lean_a, lean_b]), np.exp(deep) * forward]
         )
-        return ellipsoid(middle + away * (frame[:, 0] * x + frame[:, 1] * y), columns)
+        return ellipsoid(middle + away * (frame[:, 0] * x + frame[:, 1] * y), columns, around)
 
     best, misfit = refined(build, start, steps, evidence)
-    return build(best), misfit
+    return build(best, FINE), misfit
 
 
 def _moments(evidence: Evidence) -> tuple[F64, F64, F64, float]:
@@ -75,16 +75,18 @@ class Lathe:
 
     def radii(self, lean: float) -> tuple[F64, F64]:
         """Places (PLACES,) of circles along the axis in the picture, and their radii."""
-        flat = max(np.sin(abs(lean)), 0.02)
-        places = np.linspace(self.low, self.high, FINE + 2)[1:-1]
+        places = np.linspace(self.low, self.high, TRIED + 2)[1:-1]
+        # The camera looks at each circle along another ray.
+        own = lean + places / float(np.hypot(1.0, np.linalg.norm(self.middle)))
+        flat = np.maximum(np.abs(np.sin(own)), 0.02)
         away = np.hypot(self.outline[:, :1], (self.outline[:, 1:] - places) / flat)
         return self._trimmed(places, away.min(0), flat)
 
-    def _trimmed(self, places: F64, radii: F64, flat: float) -> tuple[F64, F64]:
+    def _trimmed(self, places: F64, radii: F64, flat: F64) -> tuple[F64, F64]:
         """Without the ends that are seen edge-on: what is left still has the same outline."""
         grid = np.linspace(self.low, self.high, ACROSS)
         half = radii[:, None] * np.sqrt(
-            np.clip(1 - ((grid - places[:, None]) / (flat * radii[:, None] + 1e-9)) ** 2, 0, 1)
+            np.clip(1 - ((grid - places[:, None]) / ((flat * radii)[:, None] + 1e-9)) ** 2, 0, 1)
         )
         # The outline that is left when so many are trimmed from an end, after each other
         least = (1 - TRIM) * half.max(0).sum()
@@ -116,33 +118,41 @@ def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfi
     size = lathe.high - lathe.low
     steps = np.array([0.15, 0.06, 0.02 * size, 0.02 * size, 0.05, 0.05])
     best, _ = refined(lambda n: _built(lathe, lean, n, 0.0, evidence), np.zeros(6), steps, evidence)
-    meshes = [_built(lathe, lean, best, cap, evidence) for cap in CAPS]
-    fits = [(mesh, evidence.misfit(mesh)) for mesh in meshes]
-    return min(fits, key=lambda fit: fit[1].total)
+    fits = [(cap, evidence.misfit(_built(lathe, lean, best, cap, evidence))) for cap in CAPS]
+    cap, misfit = min(fits, key=lambda fit: fit[1].total)
+    return _built(lathe, lean, best, cap, evidence, FINE), misfit
 
 
-def _built(lathe: Lathe, lean: float, change: F64, cap: float, evidence: Evidence) -> Mesh:
+def _built(
+    lathe: Lathe, lean: float, change: F64, cap: float, evidence: Evidence, around: int = AROUND
+) -> Mesh:
     """`change` (6,): of leaning, turn in the picture, place, and logarithms of width and length."""
     lean = float(np.clip(lean + change[0], -1.5, 1.5))
     places, radii = lathe.radii(lean)
     middle = np.append(lathe.middle + change[2:4], 1.0)
     forward = middle / np.linalg.norm(middle)
     cosine, sine = np.cos(change[1]), np.sin(change[1])
-    along = np.array([[cosine, -sine], [sine, cosine]]) @ lathe.along
-    inside = np.append(along, 0.0)
-    inside -= forward * (inside @ forward)
+    along = np.append(np.array([[cosine, -sine], [sine, cosine]]) @ lathe.along, 0.0)
+    inside = along - forward * (along @ forward)
     inside /= np.linalg.norm(inside)
-    depth = float(np.median(evidence.depth[evidence.sure]))
     axis = np.cos(lean) * inside + np.sin(lean) * forward
-    own = 0.5 * (places[0] + places[-1])
-    centre = depth * (middle + np.append(along * own, 0.0))
-    steps = depth * np.exp(change[5]) * (places - own) / max(np.cos(lean), 0.08)
-    radii = depth * np.exp(change[4]) * radii
+    depth = float(np.median(evidence.depth[evidence.sure]))
+    centre = depth * (middle + along * 0.5 * (places[0] + places[-1]))
+    # Where the axis meets the rays of the circles' middles, and how far away that is
+    rays = middle + places[:, None] * along
+    across = np.cross(axis, rays)
+    steps = -(np.cross(centre, rays) * across).sum(1) / np.maximum((across**2).sum(1), 1e-9)
+    most = 2 * depth * (lathe.high - lathe.low) / max(np.cos(lean), 0.1)
+    steps = np.clip(steps, -most, most)
+    away = np.maximum(centre[2] + steps * axis[2], 0.2 * depth)
+    radii = np.exp(change[4]) * radii * away
+    steps = np.exp(change[5]) * steps
     if cap > 0:
         steps, radii = _capped(steps, radii, cap, lean > 0)
-    away = np.linalg.norm(centre)
-    radii = radii * np.sqrt(np.clip(1 - (radii / away) ** 2, 0.5, 1))  # seen wider than it is
-    return revolved(centre + steps[:, None] * axis, radii, axis)
+    # Seen from near, a circle's rim is wider than it is far away.
+    far = np.linalg.norm(centre + steps[:, None] * axis, axis=1)
+    radii = radii * np.sqrt(np.clip(1 - (radii / far) ** 2, 0.5, 1))
+    return revolved(centre + steps[:, None] * axis, radii, axis, around)
 
 
 def _capped(steps: F64, radii: F64, cap: float, is_first_seen: bool) -> tuple[F64, F64]:

@@ -9,8 +9,9 @@ import numpy as np
 from ...arrays import F64, I64
 from .drawing import Mesh
 
-AROUND = 28  # corners of a ring
-RINGS = 14  # of a ball
+AROUND = 28  # corners of a ring, while its numbers are looked for
+FINE = 96  # of one that is shown
+RINGS = 14  # of a ball; of one that is shown so many times more as it has corners
 
 
 def box(centre: F64, axes: F64, half: F64) -> Mesh:
@@ -18,23 +19,23 @@ def box(centre: F64, axes: F64, half: F64) -> Mesh:
     return Mesh(centre + (_CORNERS * half) @ axes, _SIDES)
 
 
-def ellipsoid(centre: F64, columns: F64) -> Mesh:
+def ellipsoid(centre: F64, columns: F64, around: int = AROUND) -> Mesh:
     """The unit ball about `centre` (3,) under a linear map (3, 3)."""
-    vertices, faces = _ball()
+    vertices, faces = _ball(around)
     return Mesh(centre + vertices @ columns.T, faces)
 
 
-def revolved(places: F64, radii: F64, axis: F64) -> Mesh:
+def revolved(places: F64, radii: F64, axis: F64, around: int = AROUND) -> Mesh:
     """Rings of `radii` (n,) about `places` (n, 3) on an axis with the direction `axis` (3,)."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     across = np.cross(axis, helper)
     across /= np.linalg.norm(across)
     over = np.cross(axis, across)
-    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    turn = 2 * np.pi * np.arange(around) / around
     ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * over
     rings = places[:, None] + radii[:, None, None] * ways
     vertices = np.concatenate([rings.reshape(-1, 3), places[[0, -1]]])
-    return Mesh(vertices, _rings(len(places)))
+    return Mesh(vertices, _rings(len(places), around))
 
 
 def sheet(corner_rays: F64, inverse: F64, share: float) -> Mesh:
@@ -55,25 +56,26 @@ _SIDES = np.array(
 
 
 @cache
-def _rings(count: int) -> I64:
+def _rings(count: int, around: int) -> I64:
     """(F, 3) faces between `count` rings, and two caps about the last two vertices."""
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
+    k = np.arange(around)
+    after = (k + 1) % around
     faces = []
     for ring in range(count - 1):
-        a, b = ring * AROUND, (ring + 1) * AROUND
+        a, b = ring * around, (ring + 1) * around
         faces += [np.column_stack([a + k, b + k, b + after]),
                   np.column_stack([a + k, b + after, a + after])]  # fmt: skip
-    last = (count - 1) * AROUND
-    first_middle, last_middle = count * AROUND, count * AROUND + 1
-    faces.append(np.column_stack([np.full(AROUND, first_middle), k, after]))
-    faces.append(np.column_stack([np.full(AROUND, last_middle), last + after, last + k]))
+    last = (count - 1) * around
+    first_middle, last_middle = count * around, count * around + 1
+    faces.append(np.column_stack([np.full(around, first_middle), k, after]))
+    faces.append(np.column_stack([np.full(around, last_middle), last + after, last + k]))
     return np.concatenate(faces).astype(np.int64)
 
 
 @cache
-def _ball() -> tuple[F64, I64]:
-    angles = np.pi * (np.arange(RINGS) + 0.5) / RINGS
+def _ball(around: int) -> tuple[F64, I64]:
+    rings = RINGS * around // AROUND
+    angles = np.pi * (np.arange(rings) + 0.5) / rings
     places = np.column_stack([0 * angles, -np.cos(angles), 0 * angles])
-    mesh = revolved(places, np.sin(angles), np.array([0.0, 1.0, 0.0]))
+    mesh = revolved(places, np.sin(angles), np.array([0.0, 1.0, 0.0]), around)
     return mesh.vertices, mesh.faces
