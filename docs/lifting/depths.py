@@ -13,6 +13,7 @@ from objectmorpher_core.document import LiftSettings
 from objectmorpher_core.lift import shape_look
 from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.fusion import fused
+from objectmorpher_core.lift.shapes import completed, recognised
 from objectmorpher_core.lift.silhouette import Silhouette
 from objectmorpher_core.training.shape_eval import Score, Surfaces, score, surfaces_of
 
@@ -39,8 +40,11 @@ def _scores(solid: Solid) -> dict[str, Score]:
     standing = Body.of(outline, CAMERA, LiftSettings())
     seen = shape_look.look(pixels, mask, CAMERA)
     assert seen is not None, "the network's weights are here"
+    network = fused(standing, seen, CAMERA, 1.0, 1.0)
+    if (shape := recognised(seen)) is not None:
+        network = completed(network, shape, CAMERA, 1.0, 1.0)
     bodies = {
-        "network": fused(standing, seen, CAMERA, 1.0, 1.0),
+        "network": network,
         "relief": standing,
         "inflation": Body.of(outline, CAMERA, LiftSettings(is_standing=False)),
     }

@@ -30,7 +30,8 @@ class Grid:
     def tangents(self) -> F64:
         """(h, w, 2) x / z and y / z of the rays."""
         i, j = np.indices(self.shape)
-        return np.stack([self.start[0] + self.step * j, self.start[1] + self.step * i], -1)
+        found = np.stack([self.start[0] + self.step * j, self.start[1] + self.step * i], -1)
+        return np.asarray(found, np.float64)
 
 
 class Drawn(NamedTuple):

@@ -43,7 +43,7 @@ class Misfit(NamedTuple):
     @property
     def total(self) -> float:
         """What the fits minimise."""
-        return 2.0 * self.outline + self.depth + self.normal + 0.1 * self.thick
+        return 2.0 * self.outline + self.depth + self.normal + 0.3 * self.thick
 
 
 BESIDE = 4  # cells from what sticks out, nearer to which an outline is not the core's own

@@ -20,6 +20,7 @@ def fit_flat(evidence: Evidence) -> tuple[F64, Misfit]:
     weight = np.ones(len(rays))
     normals, heed = evidence.normal[own], np.ones(len(rays))
     plane = np.array([0.0, 0.0, mean])
+    off = apart = np.zeros(len(rays))
     for _ in range(ROUNDS):
         # A plane's normal is that of its inverse depths; a unit one, times its distance.
         scaled = weight / error / mean

@@ -24,15 +24,16 @@ REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
 # counts most: the network's depth and normals are blurred, and rounder than what they are of.
 WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, 0.4
-LONGEST = 2.8  # description, of which half are what they are said to be
-WIDTH = 0.35  # of descriptions, over which that changes
-LEAST = 0.05  # weight, below which an object is free
+LONGEST = 2.5  # description, of which half are what they are said to be
+WIDTH = 0.25  # of descriptions, over which that changes
+LEAST = 0.3  # weight, below which an object is free
 # Log odds of a sheet over a solid: the logarithms of its thickness as the network sees it, over the
 # root of its area, and of the spread of its normals. By logistic regression on 150 made cut-outs
 # and 200 made solids; 0.7 less than there, so that hardly a solid is taken for a sheet.
 FLATNESS = (-2.71, -3.25, -12.6)
 RECTANGLE = 1.5  # log odds, of an outline that is one in perspective
 OUTLINED = 0.4  # misfit of an outline that is surely a box's
+EXPLAINED = 0.95  # weight, from which no other shape is tried
 LEAST_SURE = 20  # cells, from which anything is recognised
 SECOND = 0.1  # x what is seen of a box, of its second side
 
@@ -61,7 +62,8 @@ class Recognised:
         seen = drawn(self.mesh, grid)
         met = (seen.near > 0) & outline.inside
         if not met.any():
-            return Places(*np.ones((2, *outline.shape)), np.zeros(outline.shape), 0.0)
+            ones = np.ones(outline.shape)
+            return Places(ones, ones, 0 * ones, 0.0)
         nearest = nearest_in(met)
         near, far = (1 / field.ravel()[nearest] for field in (seen.near, seen.far))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
@@ -94,6 +96,8 @@ def recognised(seen: SeenShape, kind: str = "auto") -> Recognised | None:
     # No sheet shows two sides.
     if sheet.weight >= 0.5 and not _shows_sides(box):
         return sheet
+    if _shows_sides(box) and box.weight > EXPLAINED:
+        return box
     best = min(box, _solid("round", evidence), key=_length)
     if sheet.weight > best.weight and not _shows_sides(box):
         best = sheet
@@ -121,9 +125,8 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     left_out = LEFT_OUT * (1 - float(core.mask.sum()) / float(evidence.mask.sum()))
     if kind == "box":
         return _described(kind, fit_box(core), evidence, left_out)
-    turned = fit_revolution(core)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
-    if turned is not None:
+    if fits[0].weight < EXPLAINED and (turned := fit_revolution(core)) is not None:
         fits.append(_described(kind, turned, evidence, left_out + PROFILE))
     return min(fits, key=_length)
 

@@ -12,6 +12,7 @@ from .drawing import Mesh
 from .evidence import Evidence, Misfit
 
 TRIALS = 18  # of the simplex, for each number
+HOPELESS = 60.0  # misfit, from which nothing comes of refining
 CLOSE = 0.004  # difference of misfits that no longer matters
 
 Build = Callable[[F64], Mesh]
@@ -26,6 +27,8 @@ def refined(build: Build, start: F64, steps: F64, evidence: Evidence) -> tuple[F
     def cost(change: F64) -> float:
         return evidence.misfit(build(start + steps * change)).total
 
+    if (first := evidence.misfit(build(start))).total > HOPELESS:
+        return start, first
     best, size = np.zeros(len(start)), 1.0
     for _ in range(2):  # begun again where it ended, as it may have collapsed (Kelley 1999)
         simplex = best + size * np.vstack([np.zeros(len(start)), np.eye(len(start))])

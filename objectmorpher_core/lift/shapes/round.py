@@ -96,7 +96,7 @@ class Lathe:
         last = max(first + int(np.flatnonzero(left >= (1 - TRIM) * left[-1])[0]), first + 5)
         ends = (first, last + 1)
         own = slice(*ends)
-        even = np.linspace(*places[own][[0, -1]], PLACES)
+        even = np.linspace(float(places[ends[0]]), float(places[ends[1] - 1]), PLACES)
         radii = np.interp(even, places[own], radii[own])
         inner = np.convolve(radii, [0.25, 0.5, 0.25], "same")  # the ends stay: there are its rims
         return even, np.concatenate([radii[:1], inner[1:-1], radii[-1:]])

@@ -35,7 +35,7 @@ def revolved(places: F64, radii: F64, axis: F64, around: int = AROUND) -> Mesh:
     ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * over
     rings = places[:, None] + radii[:, None, None] * ways
     vertices = np.concatenate([rings.reshape(-1, 3), places[[0, -1]]])
-    return Mesh(vertices, _rings(len(places), around))
+    return Mesh(np.asarray(vertices, np.float64), _rings(len(places), around))
 
 
 def sheet(corner_rays: F64, inverse: F64, share: float) -> Mesh:
