@@ -41,8 +41,8 @@ __all__ = ["Edit", "Result", "Shape", "open", "read_scripts", "replay"]
 File = str | os.PathLike[str]
 IN_MEMORY = "photo"  # name of a photo that is no file
 OF_THE_SHAPE = {
-    "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "trust",
-    "no_depth", "hidden",
+    "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "shape",
+    "trust", "no_depth", "hidden",
 }  # fmt: skip
 
 
@@ -55,6 +55,7 @@ class Shape(TypedDict, total=False):
     back: str  # auto, mirrored or continued
     symmetry: str  # auto, yes or no
     floating: bool
+    shape: str  # auto, free, round, flat, box or tube
     trust: float  # in the shape network, 0 to 1
     no_depth: bool
     hidden: str  # file

@@ -14,6 +14,7 @@ from objectmorpher_core.lift.relief import shape_look
 from objectmorpher_core.lift.relief.body import Body
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.shapes import completed, recognised
 from objectmorpher_research.training.shape_eval import Score, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
@@ -39,8 +40,11 @@ def _scores(solid: Solid) -> dict[str, Score]:
     standing = Body.of(outline, CAMERA, LiftSettings())
     seen = shape_look.look(pixels, mask, CAMERA)
     assert seen is not None, "the network's weights are here"
+    network = fused(standing, seen, CAMERA, 1.0, 1.0)
+    if (shape := recognised(seen)) is not None:
+        network = completed(network, shape, CAMERA, 1.0, 1.0)
     bodies = {
-        "network": fused(standing, seen, CAMERA, 1.0, 1.0),
+        "network": network,
         "relief": standing,
         "inflation": Body.of(outline, CAMERA, LiftSettings(is_standing=False)),
     }

@@ -41,6 +41,12 @@ to do without a shape:
 All may be shifted, so that the middles of their boxes agree with the truth's: about which
 depth a thing turns is not in the photo.
 
+What is seen is then explained by a few plain shapes, each fitted to outline, depth and normals: a
+flat sheet, a box, an ellipsoid and a surface of revolution. Each is drawn as the camera would see
+it and compared; the one that describes the object in the fewest words takes the place of the
+network's surface as far as it explains it, and gives the far side that no photo shows. Where none
+does, the shape stays free. `--shape`, or Kind in the Shape panel, overrules that.
+
 Seven of the solids are meshes of the package pybullet (zlib licence), which are fetched and not
 kept here; the figure, the mug and the box are made by `solids.py`. The thresholds in
 `lift/relief/prism.py` and `lift/relief/standing.py` were chosen while looking at these ten, so they

@@ -114,6 +114,7 @@ class PhotoTexture:
 
 GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
 BACKS = ("auto", "mirrored", "continued")  # what the side looks like that the photo does not show
+KINDS = ("auto", "free", "round", "flat", "box", "tube")  # of shapes; see lift.shapes
 LEAST_THICKNESS, MOST_THICKNESS = 0.05, 3.0  # x what the silhouette says
 
 
@@ -131,10 +132,13 @@ class LiftSettings:
     horizon: float | None = None  # px, the row of the photo it lies in; None: not known
     uses_depth: bool = True  # whether a depth network, where one is installed, may tell its relief
     trust: float = 1.0  # in the shape network, of [0, 1]; 0: the silhouette alone tells the shape
+    kind: str = "auto"  # of KINDS: what it is
 
     def __post_init__(self) -> None:
         if self.back not in BACKS:
             raise ValueError(f"a back is {self.back!r}, not one of {', '.join(BACKS)}")
+        if self.kind not in KINDS:
+            raise ValueError(f"a shape is {self.kind!r}, not one of {', '.join(KINDS)}")
         if not LEAST_THICKNESS <= self.thickness <= MOST_THICKNESS:
             raise ValueError(
                 f"a thickness of {self.thickness:g} is not between {LEAST_THICKNESS:g} and"
@@ -168,6 +172,7 @@ class LiftedObject:
     # (N, 3) world: depth of the middle sheet on each Gaussian's ray, and how it changes per px of
     # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
     middle: F32 | None = None
+    kind: str = ""  # of KINDS, what it was recognised as; empty: nobody looked
 
     def __post_init__(self) -> None:
         if self.middle is not None:

@@ -120,6 +120,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
         horizon=document.horizon,
         uses_depth=not script.no_depth,
         trust=script.trust,
+        kind=script.shape,
     )
 
 

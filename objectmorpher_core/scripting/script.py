@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.quoting import shown
-from ..document.model import BACKS, LEAST_THICKNESS, MOST_THICKNESS
+from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 
 XY = tuple[float, float]
 MOST_NUMBER = 1e9  # px, degrees, diameters
@@ -63,6 +63,7 @@ class EditScript:
     back: str = "auto"
     symmetry: str = "auto"
     floating: bool = False  # not turned as its feet on the ground tell
+    shape: str = "auto"  # what it is: of KINDS
     trust: float = 1.0  # in the shape network, of [0, 1]
     no_depth: bool = False  # not as a depth network sees it, where one is installed
     hidden: str | None = None  # file
@@ -357,7 +358,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "fill_from": _sources,
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
-    "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
+    "shape": _one_of(*KINDS), "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles,
     "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,

@@ -100,6 +100,22 @@ def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
     assert lifted_of(editor).splatting == "solid"
 
 
+@pytest.mark.slow
+def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(editor: Editor) -> None:
+    lift_ball(editor)
+    before = depth_range(editor)
+    assert editor.shaping.recognised_as == "round", "it is a ball"
+    editor.shaping.say("Kind of shape", kind="flat")
+    wait_for_jobs(editor)
+    assert editor.history is not None and editor.history.undo_label == "Kind of shape"
+    assert editor.shaping.recognised_as == "flat"
+    assert depth_range(editor) < 0.25 * before
+    assert editor.document is not None
+    (thing,) = decode_session(encode_session(editor.document)).objects
+    assert thing.shape.kind == "flat"
+    assert thing.lifted is not None and thing.lifted.kind == "flat"
+
+
 def test_what_is_painted_nearer_comes_nearer(editor: Editor) -> None:
     lift_ball(editor)
     x, y = CENTRE

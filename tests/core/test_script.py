@@ -24,8 +24,8 @@ FULL = {
     "links": "euclidean", "faithful": True, "nodes": 300, "stiffness": 0.5, "stretch-limit": 1.5,
     "split": True, "shadow": "none", "fov": 60, "seed": 7,
     "flip": True, "thickness": 0.5, "back": "mirrored", "symmetry": "no", "floating": True,
-    "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]], "front-mask": "f.png",
-    "remove": True, "refine-strength": 0.5,
+    "shape": "box", "trust": 0.5, "no-depth": True, "hidden": "h.png", "front": [[9, 9]],
+    "front-mask": "f.png", "remove": True, "refine-strength": 0.5,
     "fill-from": [{"source": [1, 2], "to": [3, 4], "radius": 5}, {"source": [1, 2], "to": [3, 4]}],
 }  # fmt: skip
 

@@ -143,6 +143,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
     add("--floating", action="store_true", default=None,
         help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
+    add("--shape", metavar="KIND", help="what it is: auto, free, round, flat, box or tube")
     add(
         "--trust",
         type=float,

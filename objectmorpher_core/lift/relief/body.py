@@ -35,6 +35,7 @@ class Body:
     detail: F64 | None = None  # (h, w) px, height of the front beyond its thickness; None: 0
     cuts: Cuts | None = None  # between cells where one part ends before another
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
+    kind: str = "free"  # what it was recognised as: see `shapes`
 
     @staticmethod
     def of(

@@ -23,6 +23,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
 from .. import LiftError, Subject
+from ..shapes import completed, flattened, recognised, rounded
 from . import shape_look
 from .bilinear import bilinear
 from .body import MIDDLE, Body
@@ -118,7 +119,14 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
-        body = evened(body)
+                if (shape := recognised(seen, settings.kind)) is not None:
+                    body = completed(body, shape, camera, settings.thickness, settings.trust)
+        if settings.kind == "tube":
+            body = rounded(body, settings.thickness)
+        elif settings.kind == "flat" and body.kind != "flat":
+            body = flattened(body, settings.thickness)
+        if body.kind == "free":  # a shape that was recognised has its own rim
+            body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)
@@ -259,8 +267,15 @@ def _assemble(
     height, slope = body.sample(surface.xy, MIDDLE)
     middle = np.column_stack([depth - height * unit, -slope * unit]).astype(np.float32)
     return LiftedObject(
-        gaussians, texture, points, world_from_object, sigma, "relief", middle=middle
-    )
+        gaussians,
+        texture,
+        points,
+        world_from_object,
+        sigma,
+        "relief",
+        middle=middle,
+        kind=body.kind,
+    )  # fmt: skip
 
 
 def _world_normals(normals: F64, ray: F64, z: F64, unit: float, focal: float) -> F64:

@@ -59,6 +59,13 @@ class Thickness:
             np.asarray(square[own, own] * cell**2, np.float64), crease[own, own] * cell
         )
 
+    @staticmethod
+    def balls(silhouette: Silhouette) -> F64:
+        """(h, w) px^2, height squared of the union of the balls of all discs that fit into it."""
+        depth = silhouette.continued(silhouette.depth, MARGIN) / silhouette.cell
+        square = _balls(depth, np.ones(depth.shape)) * silhouette.cell**2
+        return np.asarray(square[MARGIN:-MARGIN, MARGIN:-MARGIN], np.float64)
+
     def times(self, factor: F64) -> Thickness:
         """Thicker by `factor` (h, w)."""
         return Thickness(self.square * factor**2, self.crease * factor, self.cuts)

@@ -80,6 +80,12 @@ class Shaping:
             return t("This shape comes from a 3D file and stays as it is there")
         return None
 
+    @property
+    def recognised_as(self) -> str | None:
+        """Of `document.KINDS`, what the lift took the object for; None where it did not look."""
+        thing = self._editor.object
+        return thing.lifted.kind or None if thing is not None and thing.lifted else None
+
     # Words
 
     def preview_thickness(self, thickness: float) -> None:

@@ -102,11 +102,12 @@ def _draw_zooms(editor: Editor) -> None:
 
 
 def draw_shape(editor: Editor) -> None:
-    """Thickness, the other side, symmetry; and an object out of a file instead."""
+    """Its kind, thickness, the other side, symmetry; and an object out of a file instead."""
     if not editor.is_lifted:
         return
     heading(t("Shape"))
     if (reason := editor.shaping.why_fixed) is None:
+        _draw_kind(editor)
         _draw_thickness(editor)
         _draw_trust(editor)
         _draw_back(editor)
@@ -119,6 +120,25 @@ def draw_shape(editor: Editor) -> None:
     label = t(COMMANDS["import_shape"].label)
     command_button(editor, "import_shape", f"{Icon.CUBE}  {label}")
     gap(12)
+
+
+def _draw_kind(editor: Editor) -> None:
+    """What the object is, and what it was recognised as."""
+    choices = (
+        Choice("auto", t("Auto"), t("What its outline and the learned shape say")),
+        Choice("round", t("Round"), t("Turned about an axis: a cup, a plate, a bottle, a ball")),
+        Choice("flat", t("Flat"), t("A thin sheet: a leaf, a poster, a butterfly, a drawing")),
+        Choice("box", t("Box"), t("Six flat sides at right angles")),
+        Choice("tube", t("Tube"), t("Every cross-section is a circle: a branch, a limb, a hose")),
+        Choice("free", t("Free"), t("Nothing in particular")),
+    )
+    note(t("Kind"))
+    kind = segmented("kind", choices, editor.shaping.settings.kind)
+    if (seen := editor.shaping.recognised_as) is not None and kind == "auto":
+        labels = {choice.value: choice.label for choice in choices}
+        note(t("Recognised as: {kind}", kind=labels[seen]))
+    if kind != editor.shaping.settings.kind:
+        editor.shaping.say(t("Kind of shape"), kind=kind)
 
 
 def _draw_thickness(editor: Editor) -> None:

@@ -1,0 +1,14 @@
+"""What an object is: explicit shapes fitted to what a photo shows of it, and chosen among.
+
+Analysis by synthesis: a flat sheet, a box, and a round thing (a surface of revolution or an
+ellipsoid) are each drawn as the camera would see them, and their numbers found for which outline,
+depth and normals are nearest to the photo's and the shape network's. The one that explains most
+gives the object's front and back as far as it explains them; the rest stays free.
+"""
+
+from __future__ import annotations
+
+from .completing import completed, flattened, rounded
+from .recognition import Recognised, recognised
+
+__all__ = ["Recognised", "completed", "flattened", "recognised", "rounded"]

@@ -1,0 +1,93 @@
+"""A box that looks like the photo: faces from the network's normals, edges by the outline."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...base.arrays import F64
+from .drawing import Mesh
+from .evidence import Evidence, Misfit
+from .refining import Build, refined
+from .solids import box
+
+STARTS = 60  # rotations that are tried
+PITCHES, YAWS = (-10, 8, 20, 35), (12, 35, 55, 78)  # degrees, of those that stand
+KEPT = 2  # of them, that are refined
+TRIED = 10  # of them, that are drawn
+APART = 0.3  # radians between two that are kept
+ENDS = (2, 98)  # percentiles of what is seen along an axis
+STEPS = np.array([0.15, 0.15, 0.15, 0.03, 0.03, 0.03, 0.15, 0.15, 0.15])
+
+
+def fit_box(evidence: Evidence) -> tuple[Mesh, Misfit]:
+    """The best of boxes that were refined from different rotations."""
+    turns, scores = _turns(evidence)
+    kept: list[Rotation] = []
+    for k in np.argsort(-scores):
+        if all(_between(turns[k], other) > APART for other in kept):
+            kept.append(turns[k])
+        if len(kept) == TRIED:
+            break
+    guesses = [_guess(turn, evidence) for turn in [*kept, *_upright(evidence)]]
+    guesses.sort(key=lambda guess: evidence.misfit(guess(np.zeros(9))).total)
+    fits = [refined(guess, np.zeros(9), STEPS, evidence) for guess in guesses[:KEPT]]
+    best = int(np.argmin([misfit.total for _, misfit in fits]))
+    return guesses[best](fits[best][0]), fits[best][1]
+
+
+def _turns(evidence: Evidence) -> tuple[Rotation, F64]:
+    """Rotations and how well the normals lie along their axes."""
+    normals = evidence.normal[evidence.sure]
+    normals = normals[:: max(1, len(normals) // 150)]
+    turns = Rotation.random(STARTS, rng=np.random.default_rng(0))
+    # The faces pull the axes: a step towards the mean of the normals that are nearest to each.
+    for _ in range(5):
+        own = turns.as_matrix()  # (n, 3, 3), columns are axes
+        along = np.einsum("pk,nka->npa", normals, own)
+        which = np.abs(along).argmax(2)
+        weight = np.where(np.arange(3) == which[..., None], along**3, 0.0)
+        pulled = np.einsum("npa,pk->nka", weight, normals) + 0.05 * len(normals) * own
+        u, _, vt = np.linalg.svd(pulled)
+        det = np.linalg.det(u @ vt)
+        u[:, :, 2] *= det[:, None]
+        turns = Rotation.from_matrix(u @ vt)
+    along = np.abs(np.einsum("pk,nka->npa", normals, turns.as_matrix())).max(2)
+    return turns, (along**8).mean(1)
+
+
+def _upright(evidence: Evidence) -> list[Rotation]:
+    """Of boxes that stand as the box around the outline does, seen from a little above."""
+    angle = float(cv2.minAreaRect(evidence.outline.astype(np.float32))[2])
+    roll = (angle + 45.0) % 90.0 - 45.0  # degrees, the nearest to upright
+    return [
+        Rotation.from_euler("yxz", [yaw, pitch, tilt], degrees=True)
+        for tilt in {0.0, roll} for pitch in PITCHES for yaw in YAWS
+    ]  # fmt: skip
+
+
+def _between(one: Rotation, other: Rotation) -> float:
+    """Radians between two frames of which any axis may be any."""
+    apart = np.abs(one.as_matrix().T @ other.as_matrix())
+    return float(np.arccos(np.clip(apart.max(0).min(), 0, 1)))
+
+
+def _guess(turn: Rotation, evidence: Evidence) -> Build:
+    """Boxes by how they differ (9,) from one that holds what is seen: turn, place, size."""
+    axes = turn.as_matrix().T
+    along = evidence.points @ axes.T
+    low, high = np.percentile(along, ENDS, axis=0)
+    # Of faces that are not seen nothing is known yet: no thinner than what is seen through.
+    half = np.maximum(0.5 * (high - low), 0.06 * np.ptp(along, 0).max())
+    towards = evidence.points.mean(0) / np.linalg.norm(evidence.points.mean(0))
+    middle = 0.5 * (low + high)
+    middle += np.where(high - low < 2 * half, np.sign(axes @ towards) * half, 0.0)
+    away = float(np.linalg.norm(evidence.points.mean(0)))
+    place, size = middle @ axes / away, np.log(half / away)
+
+    def build(change: F64) -> Mesh:
+        own = Rotation.from_rotvec(change[:3]).as_matrix() @ axes.T
+        return box(away * (place + change[3:6]), own.T, away * np.exp(size + change[6:9]))
+
+    return build
