@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from objectmorpher_core import edits
 from objectmorpher_core.arrays import Mask, Selection
 from objectmorpher_core.document import Prompt
 from objectmorpher_core.segment import Found
@@ -74,7 +75,9 @@ class CloserLook:
 
     def _ask(self, owed: _Glance) -> None:
         editor = self._editor
-        assert editor.document is not None
+        document = editor.document
+        assert document is not None
+        asked = edits.beside(document, owed.question.k, owed.asked)
 
         def accept(found: Found) -> None:
             if self._owed is owed:
@@ -86,7 +89,7 @@ class CloserLook:
                 self._owed = None
 
         editor.jobs.start(
-            "Looking closer", job_functions.closer_look, editor.document.photo.pixels, owed.asked,
+            "Looking closer", job_functions.closer_look, document.photo.pixels, asked,
             choice_of(editor), done=accept, failed=fail, kind=LOOK, is_quiet=True, is_spare=True,
         )  # fmt: skip
 

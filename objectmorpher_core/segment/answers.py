@@ -14,7 +14,7 @@ from .edges import BAND, sharpen_band
 from .piece_choice import Choice, Ground, Region
 from .pieces import Pieces
 from .relabel import relabel
-from .selection import SMALLEST, fill_small_holes, keep_touched
+from .selection import SMALLEST, fill_small_holes, is_bounded, keep_touched
 
 OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's edge
 NEARBY = 6  # px of the reduced photo beyond what a click changes where the edge is found anew
@@ -58,7 +58,8 @@ def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Ans
         return answer
     changed = before.copy()
     found = wrong(ground, image, before, prompt)
-    changed[found.mask] = click.is_foreground
+    wrong_there = found.mask & ground.free(prompt) if is_bounded(prompt) else found.mask
+    changed[wrong_there] = click.is_foreground
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEARBY + 1, 2 * NEARBY + 1))
     near = cv2.dilate(found.mask.astype(np.uint8), kernel) > 0
     mask = sharpen_band(image, changed, near, _band(pieces))

@@ -16,11 +16,22 @@ import numpy as np
 
 from ..arrays import RGB, Mask
 from ..document import Prompt
-from .piece_choice import Choice, Ground, Region, correct
+from .piece_choice import (
+    LARGER_CORRECTION,
+    LARGER_FINE,
+    MINOR_CORRECTION,
+    MINOR_FINE,
+    Choice,
+    Correction,
+    Ground,
+    Region,
+    Taste,
+    correct,
+)
 from .piece_features import crop_tokens
 from .piece_places import depth
 from .pieces import PIECES, WORK_AREA, Pieces
-from .relabel import relabel, touching
+from .relabel import relabel, touching, votes
 
 DEEP = 2.0  # x side of a piece: a click that is less deep in what it means needs finer pieces
 NARROW = 1.0  # the same: less deep, the coarser pieces are not heard
@@ -115,9 +126,22 @@ def _meant(
     `guess` (h, w): what coarser pieces say, which is heard as one thing more that may be meant.
     """
     click = prompt.clicks[-1]
-    walls = said(ground.pieces, prompt, not click.is_foreground)
-    guessed = None if guess is None else ground.pieces.mean(guess) > 0.5
-    return correct(ground, click, _flippable(ground, before, prompt), walls, reach, guessed)
+    pieces = ground.pieces
+    walls = said(pieces, prompt, not click.is_foreground)
+    guessed = None if guess is None else pieces.mean(guess) > 0.5
+    had = pieces.mean(before) > 0.5
+    had[pieces.at(click.x, click.y)] = click.is_foreground
+    chance = None
+    if had.any() and not had.all():
+        chance = votes(pieces, had, pieces.at(click.x, click.y))
+        chance = chance if click.is_foreground else 1 - chance
+    taste = (
+        Taste(MINOR_FINE, LARGER_FINE, reach)
+        if reach
+        else Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    )
+    allowed = _flippable(ground, before, prompt)
+    return correct(ground, Correction(click, allowed, walls, chance, taste, guessed))
 
 
 def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask:
@@ -223,12 +247,15 @@ def _moved(pieces: Pieces, prompt: Prompt, window: _Window) -> Prompt:
     right, bottom = FINER * window.right - left, FINER * window.bottom - top
     moved = (replace(c, x=c.x * across - left, y=c.y * down - top) for c in prompt.clicks)
     clicks = tuple(c for c in moved if 0 <= c.x < right and 0 <= c.y < bottom)
+    prompt = Prompt(
+        clicks, prompt.box, prompt.is_subject, prompt.level
+    )  # `wrong` minds what is taken
     if prompt.box is None:
-        return replace(prompt, clicks=clicks)
+        return prompt
     x0, y0, x1, y1 = prompt.box
     xs = np.clip([x0 * across - left, x1 * across - left], 0, right)
     ys = np.clip([y0 * down - top, y1 * down - top], 0, bottom)
-    return replace(prompt, clicks=clicks, box=(xs[0], ys[0], xs[1], ys[1]))
+    return replace(prompt, box=(xs[0], ys[0], xs[1], ys[1]))
 
 
 def _enlarged(mask: Mask) -> Mask:

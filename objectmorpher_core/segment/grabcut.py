@@ -11,7 +11,7 @@ from ..progress import Progress, silent
 from .choice import guess
 from .edges import cut
 from .level import at_level
-from .selection import SelectionError, box_mask, check_prompt
+from .selection import SelectionError, check_prompt, free_mask
 from .subject import SubjectNet
 from .walk import Walk
 
@@ -97,7 +97,7 @@ class GrabCut:
 
 def _box_guess(rgb: RGB, prompt: Prompt) -> F32:
     """(BOX_SIDE, BOX_SIDE) guess of a box alone: outside is ground, inside is for GrabCut."""
-    inside = box_mask(rgb.shape, prompt).astype(np.float32)
+    inside = free_mask(rgb.shape, prompt).astype(np.float32)
     small = cv2.resize(inside, (BOX_SIDE, BOX_SIDE), interpolation=cv2.INTER_AREA)
     return np.asarray(UNDECIDED * small, np.float32)
 

@@ -17,6 +17,7 @@ from .edges import enlarge
 from .piece_choice import Choice, Ground, Region, choose
 from .piece_features import crop_tokens
 from .pieces import PIECES, Pieces, reduced
+from .selection import cropped
 
 REMEMBERED = 8  # answers of a photo
 MASKS = 3  # of its own size
@@ -334,6 +335,7 @@ def _is_in(box: Box, click: Click) -> bool:
 
 def _moved(prompt: Prompt, box: Box) -> Prompt:
     """The prompt in px of a box; clicks outside are left out."""
+    prompt = cropped(prompt, box)
     left, top = box[:2]
     clicks = tuple(replace(c, x=c.x - left, y=c.y - top) for c in prompt.clicks if _is_in(box, c))
     if prompt.box is None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -83,9 +82,14 @@ def _background(name: str) -> F32:
         wide = cv2.resize(np.hstack([grey, grey[:, ::-1]]), (2 * HEIGHT, HEIGHT))[:, :WIDTH]
         image = wide[..., None] * np.array(tint[name]) / 255
     else:
-        places = {"leaves": ("china", 290, 0, 427, 192), "sky": ("china", 5, 330, 205, 610),
-                  "wood": ("coffee", 0, 0, 180, 126), "garden": ("flower", 0, 380, 186, 640),
-                  "garage": ("motorcycle", 0, 330, 293, 740), "lake": ("china", 0, 80, 400, 640)}  # fmt: skip
+        places = {
+            "leaves": ("china", 290, 0, 427, 192),
+            "sky": ("china", 5, 330, 205, 610),
+            "wood": ("coffee", 0, 0, 180, 126),
+            "garden": ("flower", 0, 380, 186, 640),
+            "garage": ("motorcycle", 0, 330, 293, 740),
+            "lake": ("china", 0, 80, 400, 640),
+        }
         photo_name, top, left, bottom, right = places[name]
         crop = photo(photo_name)[top:bottom, left:right]
         image = cv2.resize(crop, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC) / 255
@@ -145,7 +149,9 @@ def _tube(points: Points, begin: float, end: float, blur: float = BLUR) -> F32:
 
     def draw(fine: np.ndarray) -> None:
         for a, b, width in zip(x, y, np.linspace(begin, end, len(t)), strict=True):
-            cv2.circle(fine, (round(a * FINER), round(b * FINER)), round(width * FINER / 2), (1,), -1)
+            cv2.circle(
+                fine, (round(a * FINER), round(b * FINER)), round(width * FINER / 2), (1,), -1
+            )
 
     return _shape(draw, blur)
 
@@ -168,8 +174,9 @@ def _furry(alpha: F32, color: Color, seed: int, length: float = 9.0) -> Layer:
         far = length * rng.uniform(0.3, 1.0)
         tip = x + far * np.cos(angle), y + far * np.sin(angle)
         hair, ends = np.zeros_like(soft), np.round(np.array([[x, y], tip]) * 16).astype(int)
-        box = np.s_[max(int(y - far) - 3, 0) : int(y + far) + 4,
-                    max(int(x - far) - 3, 0) : int(x + far) + 4]  # fmt: skip
+        box = np.s_[
+            max(int(y - far) - 3, 0) : int(y + far) + 4, max(int(x - far) - 3, 0) : int(x + far) + 4
+        ]
         cv2.line(hair, ends[0].tolist(), ends[1].tolist(), (0.7,), 1, cv2.LINE_AA, 4)
         tone = np.array(color, np.float32) * np.float32(rng.uniform(0.6, 1.4))
         lit[box] += hair[box][..., None] * (tone - lit[box])
@@ -204,12 +211,27 @@ def _horse(height: float, x: float, y: float) -> F32:
 
 def _squirrel(x: float, y: float, color: Color, seed: int) -> list[Layer]:
     """Its tail curls up behind and over it: tail, back and head enclose a gap."""
-    tail = _tube([(x - 50, y + 60), (x - 95, y + 20), (x - 105, y - 50), (x - 70, y - 105),
-                  (x - 10, y - 118), (x + 32, y - 88)], 30, 40)  # fmt: skip
-    body = _union(_ellipse(x, y + 30, 40, 62, 20), _ellipse(x + 45, y - 45, 30, 24, 20),
-                  _ellipse(x + 34, y - 70, 7, 12, -10))  # fmt: skip
-    limbs = _union(_tube([(x + 25, y + 5), (x + 62, y + 20), (x + 66, y + 8)], 14, 8),
-                   _tube([(x, y + 80), (x + 50, y + 90)], 18, 10))  # fmt: skip
+    tail = _tube(
+        [
+            (x - 50, y + 60),
+            (x - 95, y + 20),
+            (x - 105, y - 50),
+            (x - 70, y - 105),
+            (x - 10, y - 118),
+            (x + 32, y - 88),
+        ],
+        30,
+        40,
+    )
+    body = _union(
+        _ellipse(x, y + 30, 40, 62, 20),
+        _ellipse(x + 45, y - 45, 30, 24, 20),
+        _ellipse(x + 34, y - 70, 7, 12, -10),
+    )
+    limbs = _union(
+        _tube([(x + 25, y + 5), (x + 62, y + 20), (x + 66, y + 8)], 14, 8),
+        _tube([(x, y + 80), (x + 50, y + 90)], 18, 10),
+    )
     paler = tuple(min(1.25 * c, 1.0) for c in color)
     return [_furry(tail, paler, seed), _furry(_union(body, limbs), color, seed + 1, 6.0)]
 
@@ -218,25 +240,38 @@ def _kitten(x: float, y: float, color: Color) -> list[Layer]:
     ears = [_tube([(x + a, y - 95), (x + 1.35 * a, y - 150)], 40, 4) for a in (-38, 38)]
     head, body = _ellipse(x, y - 70, 66, 54), _ellipse(x, y + 45, 78, 86)
     tail = _tube([(x + 60, y + 95), (x + 135, y + 70), (x + 150, y + 5)], 26, 16)
-    return [_furry(_union(body, tail), color, 7), _furry(_union(head, *ears), color, 8, 6.0),
-            _solid(_ellipse(x - 26, y - 76, 12, 12), (0.45, 0.5, 0.1), 9, 0.03, 12),
-            _solid(_ellipse(x + 26, y - 76, 12, 12), (0.45, 0.5, 0.1), 9, 0.03, 12),
-            _solid(_ellipse(x, y - 48, 8, 6), (0.55, 0.3, 0.28), 9, 0.03, 6)]  # fmt: skip
+    return [
+        _furry(_union(body, tail), color, 7),
+        _furry(_union(head, *ears), color, 8, 6.0),
+        _solid(_ellipse(x - 26, y - 76, 12, 12), (0.45, 0.5, 0.1), 9, 0.03, 12),
+        _solid(_ellipse(x + 26, y - 76, 12, 12), (0.45, 0.5, 0.1), 9, 0.03, 12),
+        _solid(_ellipse(x, y - 48, 8, 6), (0.55, 0.3, 0.28), 9, 0.03, 6),
+    ]
 
 
 def _figure(x: float, y: float, shirt: Color, shorts: Color) -> list[Layer]:
     """Hands on the hips, legs apart: arms and trunk enclose two gaps."""
-    legs = _union(_tube([(x - 14, y + 40), (x - 28, y + 100), (x - 34, y + 155)], 24, 12),
-                  _tube([(x + 14, y + 40), (x + 30, y + 100), (x + 40, y + 155)], 24, 12))  # fmt: skip
-    arms = _union(_tube([(x - 30, y - 55), (x - 66, y - 12), (x - 26, y + 22)], 15, 11),
-                  _tube([(x + 30, y - 55), (x + 66, y - 12), (x + 26, y + 22)], 15, 11))  # fmt: skip
+    legs = _union(
+        _tube([(x - 14, y + 40), (x - 28, y + 100), (x - 34, y + 155)], 24, 12),
+        _tube([(x + 14, y + 40), (x + 30, y + 100), (x + 40, y + 155)], 24, 12),
+    )
+    arms = _union(
+        _tube([(x - 30, y - 55), (x - 66, y - 12), (x - 26, y + 22)], 15, 11),
+        _tube([(x + 30, y - 55), (x + 66, y - 12), (x + 26, y + 22)], 15, 11),
+    )
     trunk = _tube([(x, y - 50), (x, y + 25)], 62, 50)
     hips = _tube([(x - 10, y + 35), (x + 10, y + 35), (x + 16, y + 70)], 50, 34)
     hips = _union(hips, _tube([(x - 10, y + 35), (x - 18, y + 70)], 50, 34))
     head = _union(_ellipse(x, y - 110, 21, 26), _tube([(x, y - 90), (x, y - 70)], 18, 20))
     hair = _tube([(x - 18, y - 118), (x, y - 132), (x + 18, y - 118)], 16, 16)
-    return [_solid(legs, SKIN, 1), _solid(arms, SKIN, 2), _solid(hips, shorts, 3),
-            _solid(trunk, shirt, 4), _solid(head, SKIN, 5), _solid(hair, (0.13, 0.09, 0.06), 6)]  # fmt: skip
+    return [
+        _solid(legs, SKIN, 1),
+        _solid(arms, SKIN, 2),
+        _solid(hips, shorts, 3),
+        _solid(trunk, shirt, 4),
+        _solid(head, SKIN, 5),
+        _solid(hair, (0.13, 0.09, 0.06), 6),
+    ]
 
 
 def _stool(x: float, y: float, color: Color) -> list[Layer]:
@@ -262,33 +297,65 @@ def _tree(x: float, y: float, seed: int, color: Color, depth: int = 6) -> list[L
 
 
 def _bird(x: float, y: float) -> list[Layer]:
-    legs = [_tube([(x + a, y + 45), (x + a + 6, y + 85), (x + a - 4, y + 125)], 5, 4) for a in (-14, 14)]
-    feet = [_tube([(x + a - 20, y + 128), (x + a - 4, y + 124), (x + a + 14, y + 129)], 3, 3) for a in (-14, 14)]
+    legs = [
+        _tube([(x + a, y + 45), (x + a + 6, y + 85), (x + a - 4, y + 125)], 5, 4) for a in (-14, 14)
+    ]
+    feet = [
+        _tube([(x + a - 20, y + 128), (x + a - 4, y + 124), (x + a + 14, y + 129)], 3, 3)
+        for a in (-14, 14)
+    ]
     tail = _tube([(x - 60, y + 10), (x - 150, y + 55)], 30, 14)
     beak = _tube([(x + 92, y - 58), (x + 150, y - 50)], 10, 2)
     breast = (0.72, 0.38, 0.20)
-    return [_solid(_union(*legs, *feet), BARK, 1), _solid(tail, (0.25, 0.22, 0.2), 2),
-            _solid(_ellipse(x, y, 82, 52, -15), (0.42, 0.36, 0.3), 3),
-            _solid(_ellipse(x + 30, y + 12, 50, 34, -25), breast, 4),
-            _solid(_ellipse(x + 70, y - 55, 32, 29), (0.36, 0.30, 0.26), 5),
-            _solid(beak, (0.2, 0.18, 0.15), 6)]  # fmt: skip
+    return [
+        _solid(_union(*legs, *feet), BARK, 1),
+        _solid(tail, (0.25, 0.22, 0.2), 2),
+        _solid(_ellipse(x, y, 82, 52, -15), (0.42, 0.36, 0.3), 3),
+        _solid(_ellipse(x + 30, y + 12, 50, 34, -25), breast, 4),
+        _solid(_ellipse(x + 70, y - 55, 32, 29), (0.36, 0.30, 0.26), 5),
+        _solid(beak, (0.2, 0.18, 0.15), 6),
+    ]
 
 
 def _mug(x: float, y: float, color: Color) -> list[Layer]:
-    ring = _shape(lambda fine: cv2.ellipse(fine, (round((x + 78) * FINER), round(y * FINER)),
-                                           (42 * FINER, 48 * FINER), 0, 0, 360, (1,), 15 * FINER))  # fmt: skip
-    corners = np.round(np.array([(x - 78, y - 95), (x + 78, y - 95), (x + 68, y + 95), (x - 68, y + 95)]) * FINER)
+    ring = _shape(
+        lambda fine: cv2.ellipse(
+            fine,
+            (round((x + 78) * FINER), round(y * FINER)),
+            (42 * FINER, 48 * FINER),
+            0,
+            0,
+            360,
+            (1,),
+            15 * FINER,
+        )
+    )
+    corners = np.round(
+        np.array([(x - 78, y - 95), (x + 78, y - 95), (x + 68, y + 95), (x - 68, y + 95)]) * FINER
+    )
     wall = _shape(lambda fine: cv2.fillPoly(fine, [corners.astype(np.int32)], (1,)))
     wall = _union(wall, _ellipse(x, y + 95, 68, 16), _ellipse(x, y - 95, 78, 20))
-    return [_solid(ring, color, 1, 0.03, 12), _solid(wall, color, 2, 0.03),
-            _solid(_ellipse(x, y - 95, 68, 14), (0.25, 0.14, 0.08), 3, 0.03, 10)]  # fmt: skip
+    return [
+        _solid(ring, color, 1, 0.03, 12),
+        _solid(wall, color, 2, 0.03),
+        _solid(_ellipse(x, y - 95, 68, 14), (0.25, 0.14, 0.08), 3, 0.03, 10),
+    ]
 
 
 def _aloe(x: float, y: float, color: Color) -> list[Layer]:
     angles = np.linspace(0.12, np.pi - 0.12, 11)
-    leaves = [_tube([(x, y), (x + 75 * np.cos(a), y - 90 * np.sin(a)),
-                     (x + 150 * np.cos(a) ** 3 + 40 * np.cos(a), y - 200 * np.sin(a))], 30, 2)
-              for a in (*angles[::2], *angles[1::2])]  # fmt: skip
+    leaves = [
+        _tube(
+            [
+                (x, y),
+                (x + 75 * np.cos(a), y - 90 * np.sin(a)),
+                (x + 150 * np.cos(a) ** 3 + 40 * np.cos(a), y - 200 * np.sin(a)),
+            ],
+            30,
+            2,
+        )
+        for a in (*angles[::2], *angles[1::2])
+    ]
     return [_solid(leaf, color, k, 0.06, 14) for k, leaf in enumerate(leaves)]
 
 
@@ -298,8 +365,15 @@ def _wreath(x: float, y: float, seed: int) -> list[Layer]:
     for angle in rng.permutation(np.linspace(0, 2 * np.pi, 46, endpoint=False)):
         far = 105 + rng.normal(0, 9)
         at = x + far * np.cos(angle), y + far * np.sin(angle)
-        parts.append(_solid(_ellipse(*at, 26, 10, float(np.degrees(angle) + rng.uniform(30, 120))),
-                            (0.5 + rng.uniform(0, 0.2), 0.3, 0.12), seed, 0.05, 8))  # fmt: skip
+        parts.append(
+            _solid(
+                _ellipse(*at, 26, 10, float(np.degrees(angle) + rng.uniform(30, 120))),
+                (0.5 + rng.uniform(0, 0.2), 0.3, 0.12),
+                seed,
+                0.05,
+                8,
+            )
+        )
     return parts
 
 
@@ -307,37 +381,87 @@ def _fruit(x: float, y: float, radius: float, color: Color, seed: int, long: flo
     return _solid(_ellipse(x, y, radius * long, radius, 15), color, seed, 0.05, round(radius))
 
 
-LEMON, ORANGE, APPLE, PLUM = (0.90, 0.78, 0.18), (0.90, 0.50, 0.10), (0.72, 0.13, 0.10), (0.34, 0.15, 0.30)
+LEMON, ORANGE, APPLE, PLUM = (
+    (0.90, 0.78, 0.18),
+    (0.90, 0.50, 0.10),
+    (0.72, 0.13, 0.10),
+    (0.34, 0.15, 0.30),
+)
 
 COMPOSITES = (
-    Composite("lemon", False, "wood", lambda: (
-        [_fruit(330, 220, 78, LEMON, 1, 1.2)], [_fruit(175, 200, 95, ORANGE, 2)])),
-    Composite("orange", True, "garden", lambda: (
-        [_fruit(200, 210, 95, ORANGE, 3)], [_fruit(350, 240, 70, LEMON, 4, 1.25)])),
-    Composite("apple", False, "leaves", lambda: (
-        [_fruit(215, 210, 88, APPLE, 5)], [_fruit(375, 225, 84, APPLE, 6)])),
-    Composite("plum", True, "wood", lambda: (
-        [_fruit(280, 190, 80, PLUM, 7)], [_fruit(150, 235, 78, PLUM, 8), _fruit(405, 245, 82, PLUM, 9)])),
+    Composite(
+        "lemon",
+        False,
+        "wood",
+        lambda: ([_fruit(330, 220, 78, LEMON, 1, 1.2)], [_fruit(175, 200, 95, ORANGE, 2)]),
+    ),
+    Composite(
+        "orange",
+        True,
+        "garden",
+        lambda: ([_fruit(200, 210, 95, ORANGE, 3)], [_fruit(350, 240, 70, LEMON, 4, 1.25)]),
+    ),
+    Composite(
+        "apple",
+        False,
+        "leaves",
+        lambda: ([_fruit(215, 210, 88, APPLE, 5)], [_fruit(375, 225, 84, APPLE, 6)]),
+    ),
+    Composite(
+        "plum",
+        True,
+        "wood",
+        lambda: (
+            [_fruit(280, 190, 80, PLUM, 7)],
+            [_fruit(150, 235, 78, PLUM, 8), _fruit(405, 245, 82, PLUM, 9)],
+        ),
+    ),
     Composite("squirrel", False, "leaves", lambda: (_squirrel(285, 215, FUR, 1), [])),
-    Composite("red squirrel", True, "brick", lambda: (_squirrel(270, 215, (0.55, 0.27, 0.12), 5), [])),
-    Composite("horse", False, "grass", lambda: (
-        [_solid(_horse(330, 280, 200), (0.36, 0.22, 0.13), 1)], [])),
-    Composite("grey horse", True, "gravel", lambda: (
-        [_solid(_horse(310, 280, 200), (0.66, 0.64, 0.62), 2)], [])),
+    Composite(
+        "red squirrel", True, "brick", lambda: (_squirrel(270, 215, (0.55, 0.27, 0.12), 5), [])
+    ),
+    Composite(
+        "horse",
+        False,
+        "grass",
+        lambda: ([_solid(_horse(330, 280, 200), (0.36, 0.22, 0.13), 1)], []),
+    ),
+    Composite(
+        "grey horse",
+        True,
+        "gravel",
+        lambda: ([_solid(_horse(310, 280, 200), (0.66, 0.64, 0.62), 2)], []),
+    ),
     Composite("stool", False, "gravel", lambda: (_stool(280, 200, (0.62, 0.42, 0.22)), [])),
     Composite("bird", True, "sky", lambda: (_bird(270, 170), [])),
     Composite("tree", False, "sky", lambda: (_tree(280, 395, 3, BARK), [])),
     Composite("bare tree", True, "lake", lambda: (_tree(270, 395, 8, (0.36, 0.3, 0.25)), [])),
     Composite("mug", False, "wood", lambda: (_mug(260, 210, (0.80, 0.80, 0.78)), [])),
     Composite("wreath", True, "grass", lambda: (_wreath(280, 200, 2), [])),
-    Composite("player", False, "garage", lambda: (
-        _figure(280, 215, (0.75, 0.12, 0.14), (0.88, 0.88, 0.9)), [])),
-    Composite("walker", True, "lake", lambda: (
-        _figure(240, 215, (0.30, 0.38, 0.25), (0.22, 0.24, 0.30)), [])),
-    Composite("front dahlia", False, "grass", lambda: (
-        [_cut_out("dahlia", 230, 215, 200)], [_cut_out("dahlia", 200, 400, 225, True)])),
+    Composite(
+        "player",
+        False,
+        "garage",
+        lambda: (_figure(280, 215, (0.75, 0.12, 0.14), (0.88, 0.88, 0.9)), []),
+    ),
+    Composite(
+        "walker",
+        True,
+        "lake",
+        lambda: (_figure(240, 215, (0.30, 0.38, 0.25), (0.22, 0.24, 0.30)), []),
+    ),
+    Composite(
+        "front dahlia",
+        False,
+        "grass",
+        lambda: ([_cut_out("dahlia", 230, 215, 200)], [_cut_out("dahlia", 200, 400, 225, True)]),
+    ),
     Composite("aloe", True, "gravel", lambda: (_aloe(280, 340, (0.36, 0.52, 0.32)), [])),
     Composite("kitten", False, "leaves", lambda: (_kitten(290, 235, (0.50, 0.43, 0.33)), [])),
-    Composite("cup", True, "brick", lambda: (
-        [_cut_out("coffee", 240, 210, 220)], [_cut_out("coffee", 220, 440, 210, True)])),
-)  # fmt: skip
+    Composite(
+        "cup",
+        True,
+        "brick",
+        lambda: ([_cut_out("coffee", 240, 210, 220)], [_cut_out("coffee", 220, 440, 210, True)]),
+    ),
+)
