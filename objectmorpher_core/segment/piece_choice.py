@@ -36,7 +36,8 @@ SHARP_PART = 20.0
 SHARP_CORRECTION = 6.0
 TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
 KNOWN = 1e4  # the same of a click: a walk that comes there ends
-LIKELY = 1.0  # exponent: how much a correction's pieces are what it says by the vote of their like
+LIKELY_GONE = 1.0  # exponent: how much what a click takes away is background by its like's vote
+LIKELY_ADDED = 0.25  # the same of what a click adds, which may be like nothing selected so far
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
 LARGER = 0.03  # exponent: how much a larger region is preferred
@@ -258,7 +259,8 @@ def _rated(ground: Ground, ask: Correction, mask: Mask) -> Region:
     score = contrast * centred(pieces, mask, ask.click) ** CENTRED_PART
     score *= share**taste.larger * left**taste.minor
     if ask.chance is not None:
-        score *= np.average(ask.chance[mask], weights=pieces.area[mask]) ** LIKELY
+        likely = LIKELY_ADDED if ask.click.is_foreground else LIKELY_GONE
+        score *= np.average(ask.chance[mask], weights=pieces.area[mask]) ** likely
     return Region(mask, float(score))
 
 
