@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import segment
-from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.document import BesidePrompt, Click, Prompt
 from objectmorpher_core.pipeline import Reading
 from objectmorpher_core.progress import Cancelled, silent
+from tests.core.segment.composites import composite, picture
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
@@ -156,6 +157,32 @@ def test_a_click_on_a_narrow_error_spoils_nothing_beside_it(name):
     """The error is narrower than the photo's pieces, and what is right lies in the same ones."""
     ious = [step.iou for step in steps(name)]
     assert min(np.diff(ious)) > -SPOILS
+
+
+def test_a_click_into_a_gap_spares_the_parts_around_it():
+    """Grass between a horse's legs, which the first answer holds, at random places of it."""
+    rgb, mask = picture("horse")
+    known, first = dino().encode(rgb, silent), Click(*inmost(mask))
+    before = dino().segment(rgb, Prompt((first,)), known, silent)
+    wrong = cv2.distanceTransform((before & ~mask).astype(np.uint8), cv2.DIST_L2, 3) > 2
+    places = np.argwhere(wrong) + 0.5
+    assert len(places) > 50
+    for y, x in np.random.default_rng(0).permutation(places)[:RANDOM_CLICKS]:
+        asked = Prompt((first, Click(x, y, False)))
+        after = dino().segment(rgb, asked, known, silent)
+        assert not after[int(y), int(x)]
+        assert overlap(after, mask) > overlap(before, mask) - HELPS
+
+
+def test_another_object_is_not_the_one_that_is_there_already():
+    """A lemon that touches an orange: alone, a click on the lemon means both."""
+    rgb, lemon = picture("lemon")
+    orange = composite("lemon").draw()[1][0].alpha > 0.5
+    known, click = dino().encode(rgb, silent), Click(*inmost(lemon))
+    found = dino().segment(rgb, BesidePrompt((click,), taken=orange), known, silent)
+    assert overlap(found, lemon) > 0.95
+    again = dino().segment(rgb, BesidePrompt((click,), taken=orange.copy()), known, silent)
+    np.testing.assert_array_equal(again, found)
 
 
 def test_a_thing_that_is_held_stays_whole_when_who_holds_it_is_taken_away():
