@@ -11,6 +11,7 @@ import numpy as np
 
 from objectmorpher_core.arrays import RGB, Mask
 from objectmorpher_core.document import Click, Prompt
+from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import Segmenter, SelectionError
 from tests.core.segment.composites import COMPOSITES, picture
 from tests.core.segment.simulated_user import overlap, worst_click
@@ -53,6 +54,20 @@ class Made:
         return self.after - self.before
 
 
+class Encoded:
+    """Pictures as a segmenter sees them, each of them encoded once."""
+
+    def __init__(self, segmenter: Segmenter) -> None:
+        self._segmenter = segmenter
+        self._known: dict[int, tuple[RGB, Any]] = {}  # by the identity of the picture, held here
+
+    def __call__(self, case: Case) -> Any:
+        """The embedding of a case's picture."""
+        if id(case.rgb) not in self._known:
+            self._known[id(case.rgb)] = case.rgb, self._segmenter.encode(case.rgb, silent)
+        return self._known[id(case.rgb)][1]
+
+
 def cases() -> list[Case]:
     """The outlined things, and the composites."""
     outlined = [
@@ -87,7 +102,7 @@ def _run(
             break
         prompt = replace(prompt, clicks=(*prompt.clicks, click))
         try:
-            after = segmenter.segment(case.rgb, prompt, embedding)
+            after = segmenter.segment(case.rgb, prompt, embedding, silent)
             sureness = segmenter.confidence(case.rgb, prompt, embedding)
         except SelectionError:
             after, sureness = nothing, None

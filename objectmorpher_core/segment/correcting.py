@@ -4,7 +4,9 @@ Pieces of the photo say it where the click is deep in what it may mean. Where it
 pieces deep in that, it is decided anew in finer pieces of a window around, in which a walk goes as
 far as before: what the coarser pieces say is then one of the things that may be meant. Less than
 one deep, a thing there is as narrow as the pieces, which hold some of what was right too, and are
-not asked. A window that cuts off what is found in it is widened.
+not asked. A window that cuts off what is found in it is widened. What a click may mean is weighed
+by the votes of like pieces elsewhere: a click into the gap between two legs does not take the legs,
+which are like the rest of the object, and takes the grass, which is like the grass around.
 """
 
 from __future__ import annotations

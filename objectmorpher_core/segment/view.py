@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import F32, RGB, Mask, frozen
 from ..document import Click, Prompt
 from ..progress import Progress, part
-from .answers import Answer, add_click, begin, confidence, vote
+from .answers import Answer, add_click, begin, confidence, expected_overlap, vote
 from .edges import enlarge
 from .piece_choice import Choice, Ground, Region, choose
 from .piece_features import crop_tokens
@@ -21,7 +21,7 @@ from .selection import cropped
 
 REMEMBERED = 8  # answers of a photo
 MASKS = 3  # of its own size
-LOOK_AGAIN = 0.8  # confidence: a small whole less sure is recognised anew, in a second or so
+LOOK_AGAIN = 0.8  # expected overlap: a small whole less sure is recognised anew, in a second or so
 DETAILS = 4  # closer looks that are kept
 DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
 SMALL = 0.03  # x photo's area: such a thing is looked at more closely
@@ -111,6 +111,10 @@ class View:
         """(H, W) an answer at the photo's size."""
         return enlarge(self.rgb, answer.mask)
 
+    def expected_overlap(self, prompt: Prompt, answer: Answer) -> float:
+        """See `answers.expected_overlap`."""
+        return expected_overlap(self.ground, answer, prompt.clicks)
+
     def confidence(self, prompt: Prompt, answer: Answer) -> float:
         """See `answers.confidence`."""
         return confidence(self.ground, answer, prompt.clicks)
@@ -199,7 +203,7 @@ class PhotoView:
         else:
             detail = self._detail(box, False, progress)
             first = detail.answer(moved[0], inside, rest)
-            is_unsure = detail.confidence(moved[0], first) < LOOK_AGAIN
+            is_unsure = detail.expected_overlap(moved[0], first) < LOOK_AGAIN
             if is_unsure and steps[0].level == "object":
                 is_final = not at_once or (box, True) in self._details
                 if is_final:
