@@ -27,8 +27,8 @@ def _intro(rows: list[Row], later: list[Row], large: Large, machine: str) -> str
 {len(rows)} objects in photos that scikit-image and scikit-learn carry, outlined by hand
 ([how](../tests/core/segment/truth/README.md)). *Held out* are things on
 which the first answer's constants were not tuned. That says less of later clicks: how a correction
-is found was mended by looking at the errors of all, and the constants of the vote of like pieces, of
-the closer look and of the finer pieces were chosen with all in view.
+is found was mended by looking at the errors of all, and the constants of the vote of like pieces,
+of the closer look and of the finer pieces were chosen with all in view.
 
 The simulated user first clicks the inmost point of the object (farthest from its edge; the photo's
 frame is an edge), at the level *object*. Each further click is on the inmost point of the largest
