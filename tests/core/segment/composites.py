@@ -98,7 +98,7 @@ def _background(name: str) -> F32:
 
 def _over(image: F32, layer: Layer) -> F32:
     alpha = layer.alpha[..., None]
-    return image * (1 - alpha) + layer.color * alpha
+    return np.asarray(image * (1 - alpha) + layer.color * alpha, np.float32)
 
 
 # Things -----------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def _noise(seed: int, *scales: float) -> F32:
     return np.asarray(total / len(scales) ** 0.5, np.float32)
 
 
-def _shape(draw: Callable[[np.ndarray], None], blur: float = BLUR) -> F32:
+def _shape(draw: Callable[[np.ndarray], object], blur: float = BLUR) -> F32:
     """(HEIGHT, WIDTH) coverage of what `draw` draws as ones into a finer picture."""
     fine = np.zeros((HEIGHT * FINER, WIDTH * FINER), np.uint8)
     draw(fine)
@@ -197,16 +197,18 @@ def _cut_out(name: str, height: float, x: float, y: float, flip: bool = False) -
     size, how = (WIDTH, HEIGHT), cv2.INTER_AREA
     color = cv2.warpAffine(seen.astype(np.float32) / 255, move, size, flags=cv2.INTER_LINEAR)
     alpha = cv2.warpAffine(own, move, size, flags=how)
-    return Layer(np.asarray(color, np.float32), cv2.GaussianBlur(alpha, (0, 0), BLUR))
+    soft = cv2.GaussianBlur(alpha, (0, 0), BLUR)
+    return Layer(np.asarray(color, np.float32), np.asarray(soft, np.float32))
 
 
 def _horse(height: float, x: float, y: float) -> F32:
     from skimage import data
 
-    own = 1 - data.horse().astype(np.float32)
+    own = 1 - np.atleast_2d(data.horse()).astype(np.float32)
     scale = height / own.shape[0]
     move = np.array([[scale, 0, x - scale * own.shape[1] / 2], [0, scale, y - height / 2]])
-    return np.asarray(cv2.GaussianBlur(cv2.warpAffine(own, move, (WIDTH, HEIGHT)), (0, 0), BLUR))
+    moved = cv2.warpAffine(own, move, (WIDTH, HEIGHT))
+    return np.asarray(cv2.GaussianBlur(moved, (0, 0), BLUR), np.float32)
 
 
 def _squirrel(x: float, y: float, color: Color, seed: int) -> list[Layer]:
@@ -232,7 +234,7 @@ def _squirrel(x: float, y: float, color: Color, seed: int) -> list[Layer]:
         _tube([(x + 25, y + 5), (x + 62, y + 20), (x + 66, y + 8)], 14, 8),
         _tube([(x, y + 80), (x + 50, y + 90)], 18, 10),
     )
-    paler = tuple(min(1.25 * c, 1.0) for c in color)
+    paler = (1.25 * color[0], 1.25 * color[1], 1.25 * color[2])
     return [_furry(tail, paler, seed), _furry(_union(body, limbs), color, seed + 1, 6.0)]
 
 
