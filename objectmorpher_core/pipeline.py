@@ -310,7 +310,8 @@ class _Run:
                 found, backend = read_mask(mask, self.document.photo.size), "mask"
             else:
                 reading = self._reading(script.segment, part(progress, 0.0, 0.6))
-                got = reading.segment(prompt, part(progress, 0.6, 1.0), script.seed)
+                wanted = edits.beside(self.document, len(self.document.objects), prompt)
+                got = reading.segment(wanted, part(progress, 0.6, 1.0), script.seed)
                 found, backend = got.mask, got.backend
         k = len(self.document.objects)
         document = edits.set_mask(edits.add_object(self.document), k, found, prompt)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+from correcting import Made
+from correcting_page import corrections
 from measure import BOX_CLICKS, Clicked, Large, Measure, Row, boundary, encoding_seconds, iou
 
-from objectmorpher_core.segment import UNSURE
-
-BAD = 0.75  # IoU below which a mask is not what was meant
-BINS = ((0.0, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01))
 CHANGED = 0.005  # IoU
 KINDS = (("whole", "Whole objects"), ("part", "Parts"))
 
 
-def write_page(rows: list[Row], later: list[Row], large: Large, machine: str) -> str:
+def write_page(
+    rows: list[Row], later: list[Row], large: Large, made: list[Made], machine: str
+) -> str:
     """Markdown."""
     intro = _intro(rows, later, large, machine)
-    return "\n".join([intro, _means(rows), _tables(rows), _later(later), _sureness(rows),
+    return "\n".join([intro, _means(rows), _tables(rows), _later(later), corrections(made),
                       _large(large)])  # fmt: skip
 
 
@@ -25,17 +25,10 @@ def _intro(rows: list[Row], later: list[Row], large: Large, machine: str) -> str
     return f"""# Selecting, measured
 
 {len(rows)} objects in photos that scikit-image and scikit-learn carry, outlined by hand
-([how](../tests/core/segment/truth/README.md)). *Held out* are objects on which no constant was
-tuned but those of the vote of like pieces (NEAR, TRUST, KEEPS, LIKE_COLOR, LIKE_KIND), of the
-closer look (LOOK_AGAIN, DETAIL_PIECES, SMALL_BOX) and of the finer pieces around a later click
-(DEEP, NARROW, MARGIN, MINOR_FINE, LARGER_FINE), which were chosen with the means of all in view, so
-that "held out" says less of these; their figures were read while it was built, and a click on one
-that gave no answer was mended. How a correction is found was mended by looking at the errors of
-all, the tripod's first: what the second and third clicks give is no longer held out. DEEP, NARROW
-and the last two were chosen among some twenty settings: a dozen by the corrections of six clicks on
-each of the 25, nine by the whole way of ten objects (rocket, tower, tripod, motorcycle, shuttle,
-cameraman, pagoda, cat, and flag and mast of those drawn later). The tripod alone is most of what
-they gained.
+([how](../tests/core/segment/truth/README.md)). *Held out* are things on
+which the first answer's constants were not tuned. That says less of later clicks: how a correction
+is found was mended by looking at the errors of all, and the constants of the vote of like pieces,
+of the closer look and of the finer pieces were chosen with all in view.
 
 The simulated user first clicks the inmost point of the object (farthest from its edge; the photo's
 frame is an edge), at the level *object*. Each further click is on the inmost point of the largest
@@ -158,42 +151,6 @@ def _later(rows: list[Row]) -> str:
         each = row.ours.truth
         lines.append(_line([each.name, each.kind, *(f"{v:.3f}" for v in values)]))
     return "\n".join([*lines, ""])
-
-
-def _sureness(rows: list[Row]) -> str:
-    pairs = np.array(
-        [
-            (told, step.iou)
-            for row in rows
-            for told, step in zip(row.ours.confidences, row.ours.steps, strict=True)
-            if row.ours.truth.kind == "whole" or step.prompt.level == "part"
-        ]
-    )
-    if not len(pairs):
-        return ""
-    ranks = np.argsort(np.argsort(pairs, axis=0), axis=0)
-    lines = [_line(["It says", "Answers", "it says, mean", "IoU, mean", "IoU, least"]),
-             "|---" + "|---:" * 4 + "|"]  # fmt: skip
-    for low, high in BINS:
-        chosen = pairs[(pairs[:, 0] >= low) & (pairs[:, 0] < high)]
-        if len(chosen):
-            values = (*chosen.mean(0), chosen[:, 1].min())
-            span = f"{low:.2f} to {min(high, 1):.2f}"
-            lines.append(_line([span, str(len(chosen)), *(f"{v:.2f}" for v in values)]))
-    table = "\n".join(lines)
-    is_bad, is_told = pairs[:, 1] < BAD, pairs[:, 0] < UNSURE
-    return f"""## How sure it is
-
-The segmenter tells the overlap with what is meant that is to be expected. Over all answers above
-(parts: those at the level *part*), the correlation of what it tells with the true IoU is
-{np.corrcoef(pairs.T)[0, 1]:.2f} (of the ranks: {np.corrcoef(ranks.T)[0, 1]:.2f}).
-
-{table}
-
-Below {UNSURE:.2f} the status line says what helps: so it does for {(is_bad & is_told).sum()} of the
-{is_bad.sum()} answers with an IoU below {BAD:.2f}, and for {(~is_bad & is_told).sum()} of the
-{(~is_bad).sum()} others.
-"""
 
 
 def _large(large: Large) -> str:

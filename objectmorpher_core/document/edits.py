@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import Mask, Selection
+from ..base.arrays import Mask, Selection, frozen
 from ..base.camera import Camera
 from .model import (
     SELECTED,
+    BesidePrompt,
     DeformSettings,
     Document,
     EditObject,
@@ -77,6 +78,20 @@ def change_mask(document: Document, k: int, mask: Selection) -> Document:
     item = document.objects[k]
     found = item.mask if item.found is None and not item.prompt.is_empty else item.found
     return _with_mask(document, k, mask, item.prompt, found)
+
+
+def beside(document: Document, k: int, prompt: Prompt) -> Prompt:
+    """What to ask for object `k`: what the others cover is background.
+
+    Another object that a positive click is on is not: what is clicked is meant.
+    """
+    wanted = [(int(c.y), int(c.x)) for c in prompt.clicks if c.is_foreground]
+    masks = [o.mask for j, o in enumerate(document.objects) if j != k and o.mask is not None]
+    masks = [mask for mask in masks if not any(mask[place] for place in wanted)]
+    if not masks:
+        return prompt
+    taken = masks[0] if len(masks) == 1 else np.logical_or.reduce(masks)
+    return BesidePrompt(prompt.clicks, prompt.box, prompt.is_subject, prompt.level, frozen(taken))
 
 
 def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Document:

@@ -8,6 +8,7 @@ handles and pose invalidate nothing that is stored.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -72,6 +73,22 @@ class Prompt:
     @property
     def is_empty(self) -> bool:
         return not self.clicks and self.box is None and not self.is_subject
+
+
+@dataclass(frozen=True)
+class BesidePrompt(Prompt):
+    """A prompt in a photo where other objects are already: what they cover is background.
+
+    It is asked, and not kept with a document.
+    """
+
+    taken: Mask | None = field(default=None, compare=False)  # (H, W)
+    digest: str = ""  # of `taken`: prompts are compared by it
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        packed = b"" if self.taken is None else np.packbits(self.taken).tobytes()
+        object.__setattr__(self, "digest", hashlib.sha256(packed).hexdigest())
 
 
 @dataclass(frozen=True, eq=False)

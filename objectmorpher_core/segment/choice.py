@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import F32, RGB, Mask
 from ..document.model import Click, Prompt
-from .selection import SelectionError, box_mask
+from .selection import SelectionError, free_mask
 from .walk import Region, Walk
 
 SIDE = 320  # px, the guess is a square over the whole photo, as the subject map is
@@ -67,7 +67,7 @@ def guess(
     guess of a box without clicks, which they add to and take from.
     """
     walk, strict = walks
-    inside = _to_cells(box_mask(rgb.shape, prompt).astype(np.float32), walk.shape) > 0.5
+    inside = _to_cells(free_mask(rgb.shape, prompt).astype(np.float32), walk.shape) > 0.5
     wanted = [_cell(c, rgb, walk) for c in prompt.clicks if c.is_foreground]
     unwanted = [_cell(c, rgb, walk) for c in prompt.clicks if not c.is_foreground]
     for cell in wanted:

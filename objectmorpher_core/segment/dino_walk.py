@@ -21,7 +21,7 @@ from .matting.edges import rehearse
 from .pieces.features import main_directions
 from .pieces.pieces import Pieces
 from .pieces.view import PhotoView, Seen, Tokens
-from .selection import SelectionError, box_mask, check_mask, check_prompt
+from .selection import SelectionError, check_mask, check_prompt, free_mask, is_bounded
 from .subject import SubjectNet
 
 Look = Callable[[PhotoView, Prompt, Progress], Seen]
@@ -92,7 +92,9 @@ class DinoWalk:
             raise SelectionError(f"the subject cannot be found: {self._subject.missing()}")
         progress(0.7, "walking from the clicks")
         seen = look(self._view_of(rgb, embedding), prompt, part(progress, 0.7, 1.0))
-        mask = seen.mask.copy() if prompt.box is None else seen.mask & box_mask(rgb.shape, prompt)
+        mask = seen.mask.copy()
+        if is_bounded(prompt):
+            mask &= free_mask(rgb.shape, prompt)
         for click in prompt.clicks:
             mask[int(click.y), int(click.x)] = click.is_foreground
         progress(1.0, "cut out the object")

@@ -10,7 +10,7 @@ from ..base.progress import Progress, silent
 from ..document.model import Prompt
 from .choice import guess
 from .matting.edges import cut
-from .selection import SelectionError, at_level, box_mask, check_prompt
+from .selection import SelectionError, at_level, check_prompt, free_mask
 from .subject import SubjectNet
 from .walk import Walk
 
@@ -96,7 +96,7 @@ class GrabCut:
 
 def _box_guess(rgb: RGB, prompt: Prompt) -> F32:
     """(BOX_SIDE, BOX_SIDE) guess of a box alone: outside is ground, inside is for GrabCut."""
-    inside = box_mask(rgb.shape, prompt).astype(np.float32)
+    inside = free_mask(rgb.shape, prompt).astype(np.float32)
     small = cv2.resize(inside, (BOX_SIDE, BOX_SIDE), interpolation=cv2.INTER_AREA)
     return np.asarray(UNDECIDED * small, np.float32)
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ..base.arrays import RGB, Mask, Selection
-from ..document.model import Prompt
+from ..document.model import BesidePrompt, Prompt
 
 SMALLEST = 16  # px; less is no object
 SMALL_HOLE = 0.002  # x area of the mask; smaller holes are specks, larger ones are meant
@@ -49,11 +49,13 @@ def _check_contradiction(prompt: Prompt) -> None:
             raise SelectionError(f"the clicks at {at} say both that it is the object and is not")
 
 
-def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
-    """(H, W) True inside the prompt's box; everywhere where none limits what is meant.
+def free_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
+    """(H, W) True where what is meant may be: inside the prompt's box, beside other objects.
 
     A click on the object beside the box says that the box was drawn too small.
     """
+    if isinstance(prompt, BesidePrompt) and prompt.taken is not None:
+        return ~prompt.taken & free_mask(shape, _alone(prompt))
     if prompt.box is None:
         return np.ones(shape[:2], bool)
     x0, y0, x1, y1 = prompt.box
@@ -62,6 +64,23 @@ def box_mask(shape: tuple[int, ...], prompt: Prompt) -> Mask:
     inside = np.zeros(shape[:2], bool)
     inside[max(int(y0), 0) : int(np.ceil(y1)), max(int(x0), 0) : int(np.ceil(x1))] = True
     return inside
+
+
+def is_bounded(prompt: Prompt) -> bool:
+    """Whether `free_mask` is not everywhere."""
+    return prompt.box is not None or isinstance(prompt, BesidePrompt)
+
+
+def cropped(prompt: Prompt, box: tuple[int, int, int, int]) -> Prompt:
+    """The prompt, what other objects cover cut to a box left, top, right, bottom px of it."""
+    if not isinstance(prompt, BesidePrompt) or prompt.taken is None:
+        return prompt
+    return replace(prompt, taken=prompt.taken[box[1] : box[3], box[0] : box[2]])
+
+
+def _alone(prompt: Prompt) -> Prompt:
+    """The prompt without what other objects cover."""
+    return Prompt(prompt.clicks, prompt.box, prompt.is_subject, prompt.level)
 
 
 def box_around(selection: Selection, px: float) -> tuple[slice, slice] | None:

@@ -14,7 +14,7 @@ from ..base.progress import Progress, part, silent
 from ..document.model import Prompt
 from ..models.onnx_session import open_session
 from .matting.edges import cut
-from .selection import SelectionError, box_mask, check_prompt
+from .selection import SelectionError, check_prompt, free_mask
 
 WEIGHT = "u2netp"
 INPUT_SIDE = 320  # px, as it was trained
@@ -103,7 +103,7 @@ class Subject:
 
 def subject_guess(rgb: RGB, prompt: Prompt, salience: F32) -> F32:
     """(320, 320) guess: salience inside the box; SelectionError where there is no subject."""
-    inside = box_mask(rgb.shape, prompt).astype(np.float32)
+    inside = free_mask(rgb.shape, prompt).astype(np.float32)
     size = (salience.shape[1], salience.shape[0])
     guess = salience * cv2.resize(inside, size, interpolation=cv2.INTER_AREA)
     if guess.max() < 0.5:

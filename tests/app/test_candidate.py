@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+import pytest
 
 from conftest import CENTRE, wait_for_jobs, wait_until
 from objectmorpher.commands import run, take_next_step
@@ -63,17 +64,39 @@ def test_the_users_own_request_ends_the_search_for_a_candidate(editor: Editor) -
     assert editor.mask is not None
 
 
-def test_nothing_is_asked_while_the_worker_works_or_something_is_selected(editor: Editor) -> None:
+def test_nothing_is_asked_while_the_worker_works(editor: Editor) -> None:
     wait_for_jobs(editor)
     editor.selection.add_click(*CENTRE, True)
     rest_on(editor, 20.0, 20.0)
-    end = time.monotonic() + 0.2
-    while time.monotonic() < end:
-        editor.poll()
+    while editor.selection.pending is not None:
         assert not editor.jobs.is_busy(CANDIDATE)
+        editor.poll()
+        time.sleep(0.005)
+    assert editor.mask is not None
+
+
+@pytest.mark.parametrize("takes_away", [True, False])
+def test_what_a_correction_would_change_is_shown_and_is_what_it_changes(
+    editor: Editor, takes_away: bool
+) -> None:
     wait_for_jobs(editor)
-    editor.poll()
-    assert not editor.candidates.is_due
+    editor.selection.add_click(*CENTRE, True)
+    wait_for_jobs(editor)
+    before = editor.mask
+    assert before is not None and before[int(CENTRE[1]), int(CENTRE[0])]
+    places = np.argwhere(before == takes_away)
+    far = np.hypot(*(places + 0.5 - np.array(CENTRE[::-1])).T)
+    y, x = places[int(np.argsort(far)[len(far) // 2])] + 0.5
+    rest_on(editor, x, y)
+    wait_until(editor, lambda: editor.candidates.shown is not None)
+    shown = editor.candidates.shown
+    assert shown is not None and shown.takes_away == takes_away
+    assert shown.changed[int(y), int(x)]
+    assert not (shown.changed & (before != takes_away)).any()
+    assert editor.mask is before, "nothing is changed by looking"
+    editor.selection.add_click(x, y, not takes_away)
+    assert editor.mask is not before, "at once"
+    np.testing.assert_array_equal(editor.mask, shown.mask)
 
 
 def test_a_pointer_that_leaves_leaves_no_candidate(editor: Editor) -> None:

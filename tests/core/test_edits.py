@@ -8,6 +8,7 @@ import pytest
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import (
+    BesidePrompt,
     Click,
     DeformSettings,
     Document,
@@ -30,6 +31,18 @@ def _point(document: Document, index: int) -> np.ndarray:
 
 
 REGIONS = np.array([0, 1, 2], np.int32), np.array([5, 6], np.int32)
+
+
+def test_other_objects_are_background_but_the_one_that_is_clicked(document):
+    mask = document.objects[0].mask
+    (y, x), (far_y, far_x) = np.argwhere(mask)[0], np.argwhere(~mask)[0]
+    beside = edits.beside(document, 1, Prompt((Click(far_x, far_y),)))
+    assert isinstance(beside, BesidePrompt)
+    np.testing.assert_array_equal(beside.taken, mask)
+    assert beside == edits.beside(document, 1, Prompt((Click(far_x, far_y),)))
+    on_it, own = Prompt((Click(x, y),)), Prompt((Click(far_x, far_y),))
+    assert edits.beside(document, 1, on_it) is on_it
+    assert edits.beside(document, 0, own) is own
 
 
 def test_a_handle_turns_and_softens(document):

@@ -1,4 +1,7 @@
-"""What a click under the pointer would select, found while the pointer rests.
+"""What a click under the pointer would select or correct, found while the pointer rests.
+
+Where nothing is selected, that is what a click would select; inside a selection, what a right-click
+would take away; outside it, what a click would add.
 
 The worker is asked only while it has nothing else to do, and any request of the user ends it. A
 click on what is shown uses the answer that is there. One that was found at a glance is looked at
@@ -9,11 +12,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from objectmorpher_core.base.arrays import Mask, Selection
+from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Click, Photo, Prompt
 from objectmorpher_core.segment import Found
 
@@ -41,10 +46,24 @@ class Candidate:
     photo: Photo
     prompt: Prompt
     found: Found
+    before: Mask | None  # (H, W) what is selected, which a click would correct
 
     @property
     def mask(self) -> Mask:
+        """(H, W) what would be selected."""
         return self.found.mask
+
+    @property
+    def takes_away(self) -> bool:
+        """Whether it is a right-click that would do it."""
+        return not self.prompt.clicks[-1].is_foreground
+
+    @cached_property
+    def changed(self) -> Mask:
+        """(H, W) what the click would select, add or take away: the place itself is in it."""
+        if self.before is None:
+            return self.mask
+        return self.before & ~self.mask if self.takes_away else self.mask & ~self.before
 
 
 class Candidates:
@@ -73,8 +92,10 @@ class Candidates:
         assert place is not None
         if place != self._place:
             self._place, self._since = place, now
-            if self.shown is not None and not self.shown.mask[int(place[1]), int(place[0])]:
+            if self.shown is not None and not self.shown.changed[int(place[1]), int(place[0])]:
                 self.shown = None
+        if self.shown is not None and self.shown.before is not self._editor.mask:
+            self.shown = self._asked = None
         prompt = self._next_prompt()
         if prompt is not None and now - self._since >= REST and self._is_free():
             self._ask(prompt, now)
@@ -106,7 +127,7 @@ class Candidates:
         """Whether the user may want to know what a click here would select."""
         editor = self._editor
         return (
-            editor.is_click_awaited
+            (editor.is_click_awaited or editor.is_correction_awaited)
             and editor.document is not None
             and editor.document.photo is not self._slow
             and editor.hover.place is not None
@@ -117,21 +138,29 @@ class Candidates:
         """What a click would say now, where that was not asked yet."""
         if self._place is None:
             return None
-        prompt = Prompt((Click(*self._place),), level=self._editor.view.selecting.level)
+        editor, mask = self._editor, self._editor.mask
+        if mask is None:
+            prompt = Prompt((Click(*self._place),), level=editor.view.selecting.level)
+        else:  # a click where the mask is right says nothing new
+            is_selected = bool(mask[int(self._place[1]), int(self._place[0])])
+            before = editor.selection.prompt
+            click = Click(*self._place, is_foreground=not is_selected)
+            prompt = replace(before, clicks=(*before.clicks, click))
         return None if prompt == self._asked else prompt
 
     def _is_same(self, known: Prompt, prompt: Prompt) -> bool:
-        """Whether both are one click at one place."""
-        if len(prompt.clicks) != 1 or prompt.box is not None or known.level != prompt.level:
+        """Whether both have the last click at one place, and are alike but for that."""
+        if not prompt.clicks:
             return False
-        a, b, view = known.clicks[0], prompt.clicks[0], self._editor.view
+        a, b, view = known.clicks[-1], prompt.clicks[-1], self._editor.view
         gap = float(np.hypot(a.x - b.x, a.y - b.y)) * view.zoom
-        return b.is_foreground and gap <= SAME_PLACE * view.scale
+        is_near = a.is_foreground == b.is_foreground and gap <= SAME_PLACE * view.scale
+        return is_near and replace(known, clicks=(*known.clicks[:-1], b)) == prompt
 
     def _ask(self, prompt: Prompt, now: float) -> None:
         editor, document = self._editor, self._editor.document
         assert document is not None
-        photo = document.photo
+        photo, before = document.photo, editor.mask
         self._asked = prompt
         editor.jobs.cancel(CLOSER, RELUCTANCE)
 
@@ -148,8 +177,8 @@ class Candidates:
                     editor.complain(answer)
             elif wanted is not None:
                 editor.selection.take(wanted, answer, prompt)
-            elif self._is_wished():
-                self.shown = Candidate(photo, prompt, answer)
+            elif self._is_wished() and editor.mask is before:
+                self.shown = Candidate(photo, prompt, answer, before)
                 self._look_closer(self.shown)
 
         def fail(error: JobError) -> None:
@@ -157,7 +186,8 @@ class Candidates:
                 editor.complain_of(error)
 
         editor.jobs.start(
-            "Selecting", job_functions.candidate, photo.pixels, prompt, choice_of(editor),
+            "Selecting", job_functions.candidate, photo.pixels,
+            edits.beside(document, editor.current, prompt), choice_of(editor),
             done=accept, failed=fail, cancelled=self._drop, kind=CANDIDATE, is_quiet=True,
             is_spare=True,
         )  # fmt: skip
@@ -169,11 +199,13 @@ class Candidates:
 
         def accept(answer: Found) -> None:
             if self.shown is shown:
-                self.shown = Candidate(shown.photo, shown.prompt, answer)
+                self.shown = replace(shown, found=answer)
 
         editor = self._editor
+        assert editor.document is not None
+        asked = edits.beside(editor.document, editor.current, shown.prompt)
         editor.jobs.start(
-            "Looking closer", job_functions.closer_look, shown.photo.pixels, shown.prompt,
+            "Looking closer", job_functions.closer_look, shown.photo.pixels, asked,
             choice_of(editor), done=accept, failed=lambda error: None, kind=CLOSER,
             is_quiet=True, is_spare=True,
         )  # fmt: skip
@@ -244,7 +276,9 @@ class CloserLook:
 
     def _ask(self, owed: _Glance) -> None:
         editor = self._editor
-        assert editor.document is not None
+        document = editor.document
+        assert document is not None
+        asked = edits.beside(document, owed.question.k, owed.asked)
 
         def accept(found: Found) -> None:
             if self._owed is owed:
@@ -256,7 +290,7 @@ class CloserLook:
                 self._owed = None
 
         editor.jobs.start(
-            "Looking closer", job_functions.closer_look, editor.document.photo.pixels, owed.asked,
+            "Looking closer", job_functions.closer_look, document.photo.pixels, asked,
             choice_of(editor), done=accept, failed=fail, kind=LOOK, is_quiet=True, is_spare=True,
         )  # fmt: skip
 

@@ -132,6 +132,20 @@ class Editor:
         )
 
     @property
+    def is_correction_awaited(self) -> bool:
+        """Whether a click would correct what clicks, a box or the subject have selected."""
+        return (
+            self.document is not None
+            and self.preview is None
+            and self.view.tool is ToolName.SELECT
+            and self.view.selecting.mode is SelectMode.CLICK
+            and self.object is not None
+            and self.object.mask is not None
+            and not self.object.prompt.is_empty
+            and self.tasks.question is None
+        )
+
+    @property
     def photo_size(self) -> tuple[int, int] | None:
         return self.document.photo.size if self.document else None
 

@@ -131,7 +131,8 @@ class Tasks:
                 editor.selection.take(question, found)
 
         editor.jobs.start(
-            t("Selecting"), job_functions.segment, photo.pixels, question.prompt,
+            t("Selecting"), job_functions.segment, photo.pixels,
+            edits.beside(document, question.k, question.prompt),
             Choice(editor.settings.backends.segment, document.seed),
             done=accept, failed=lambda error: self._fail_segment(error, question),
             cancelled=self._drop_question, kind=SELECT,

@@ -66,12 +66,12 @@ def table() -> Table:
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.segment import Found
 
-    asking = (Pixels, Prompt, Choice)
+    asking = (Pixels, Prompt | documents.BesidePrompt, Choice)
     rows = (
         Served(job_functions.read_photo, "segment", (Pixels, str), None, _check_photo),
-        Served(job_functions.segment, "segment", asking, Found, _check_photo),
-        Served(job_functions.closer_look, "segment", asking, Found, _check_photo),
-        Served(job_functions.candidate, "segment", asking, Found | str, _check_photo),
+        Served(job_functions.segment, "segment", asking, Found, _check_asking),
+        Served(job_functions.closer_look, "segment", asking, Found, _check_asking),
+        Served(job_functions.candidate, "segment", asking, Found | str, _check_asking),
         Served(
             job_functions.lift, "lift", (Cut, Choice, LiftSettings), tuple[Matte, LiftedObject],
             _check_lift,
@@ -102,9 +102,9 @@ def types() -> Mapping[str, type]:
     from objectmorpher_core.segment import Found
 
     kinds = (
-        Camera, Choice, documents.Click, CoarseEdit, Cut, Cutout, Found, Gaussians, Hint,
-        LiftedObject, LiftSettings, Matte, Patch, documents.PhotoTexture, Plate, Prompt, Refined,
-        Refining, Shadow, Variant,
+        documents.BesidePrompt, Camera, Choice, documents.Click, CoarseEdit, Cut, Cutout, Found,
+        Gaussians, Hint, LiftedObject, LiftSettings, Matte, Patch, documents.PhotoTexture, Plate,
+        Prompt, Refined, Refining, Shadow, Variant,
     )  # fmt: skip
     return {kind.__name__: kind for kind in kinds}
 
@@ -116,6 +116,12 @@ def _require(is_right: bool, sentence: str) -> None:
 
 def _check_photo(pixels: Any, *_: Any) -> None:
     _require(is_photo(pixels), f"a photo is of the shape {pixels.shape}")
+
+
+def _check_asking(pixels: Any, prompt: Any, *_: Any) -> None:
+    _check_photo(pixels)
+    if isinstance(prompt, documents.BesidePrompt) and prompt.taken is not None:
+        _check_mask(prompt.taken, pixels, "mask of other objects")
 
 
 def _check_mask(mask: Any, pixels: Any, what: str) -> None:

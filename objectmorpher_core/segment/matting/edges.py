@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.arrays import F32, RGB, Mask
 from ...document.model import Prompt
-from ..selection import box_around, box_mask, check_mask, fill_small_holes, keep_touched
+from ..selection import box_around, check_mask, fill_small_holes, free_mask, keep_touched
 from .closed_form import Expected, solve_alpha
 
 WORK_AREA = 300_000  # px that GrabCut sees at most
@@ -42,7 +42,7 @@ def cut(rgb: RGB, guess: F32, prompt: Prompt, seed: int = 0) -> Mask:
     size = (max(1, round(crop.shape[1] * scale)), max(1, round(crop.shape[0] * scale)))
     small = np.asarray(cv2.resize(crop, size, interpolation=cv2.INTER_AREA), np.uint8)
     trimap = _trimap(guess, (left, top, right, bottom), (height, width), size)
-    inside = box_mask((height, width), prompt)[top:bottom, left:right].astype(np.uint8)
+    inside = free_mask((height, width), prompt)[top:bottom, left:right].astype(np.uint8)
     trimap[cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST) == 0] = cv2.GC_BGD
     for click in prompt.clicks:
         x = int((click.x - left) * size[0] / crop.shape[1])
@@ -52,7 +52,7 @@ def cut(rgb: RGB, guess: F32, prompt: Prompt, seed: int = 0) -> Mask:
     found = _grabcut(small, trimap, seed)
     mask = np.zeros((height, width), bool)
     mask[top:bottom, left:right] = _sharpen(crop, found)
-    mask &= box_mask(mask.shape, prompt)
+    mask &= free_mask(mask.shape, prompt)
     for click in prompt.clicks:
         mask[int(click.y), int(click.x)] = click.is_foreground
     return check_mask(fill_small_holes(keep_touched(mask, prompt), prompt))

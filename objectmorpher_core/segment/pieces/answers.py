@@ -10,16 +10,17 @@ import numpy as np
 from ...base.arrays import RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import BAND, sharpen_band
-from ..selection import SMALLEST, fill_small_holes, keep_touched
+from ..selection import SMALLEST, fill_small_holes, is_bounded, keep_touched
 from .choice import Choice, Ground, Region
 from .correcting import said, wrong
 from .pieces import Pieces
-from .relabel import relabel
+from .relabel import relabel, votes
 
 OFF_EDGE = 0.4  # x side of a piece: how far its border may be off the picture's edge
 NEARBY = 6  # px of the reduced photo beyond what a click changes where the edge is found anew
 SHARPNESS = 3.0  # exponent: how much more a better region is likely to be meant than another
 BLUR = 1.0  # px of the reduced photo, how far the outline found may be from the one meant
+SURE = (-4.3, 0.5, 5.6)  # log odds of the IoU: alone, x those expected, x agreement; fitted
 ISLAND = 0.2  # x area of what clicks touch; smaller islands that a click cuts off go
 DIAGONAL = 0.79  # pi / 4: px of an outline for each step of its staircase, all directions alike
 
@@ -58,15 +59,16 @@ def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Ans
         return answer
     changed = before.copy()
     found = wrong(ground, image, before, prompt)
-    changed[found.mask] = click.is_foreground
+    wrong_there = found.mask & ground.free(prompt) if is_bounded(prompt) else found.mask
+    changed[wrong_there] = click.is_foreground
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEARBY + 1, 2 * NEARBY + 1))
     near = cv2.dilate(found.mask.astype(np.uint8), kernel) > 0
     mask = sharpen_band(image, changed, near, _band(pieces))
     return Answer(_tidy(mask, _reduced(pieces, prompt), near), (*answer.others, *found.others))
 
 
-def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
-    """The overlap (IoU) of the answer with what is meant that is to be expected, in [0, 1].
+def expected_overlap(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
+    """The overlap (IoU) of the answer with all that may be meant, in [0, 1].
 
     Every region that could have been chosen and that no click contradicts may be what is meant,
     and the outline of what is may lie a pixel beside the one found: much, where a thing is thin.
@@ -86,6 +88,30 @@ def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> flo
     down = np.count_nonzero(answer.mask[1:] != answer.mask[:-1])
     outline = DIAGONAL * (across + down) / max(int(answer.mask.sum()), 1)
     return float(expected / total / (1 + BLUR * outline))
+
+
+def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
+    """The overlap (IoU) of the answer with what is meant that is to be expected, in [0, 1].
+
+    What else may be meant says one half of it, and the other how well the pieces along the outline
+    agree with the vote of their like: a wedge of sky is like the sky beside it. The weights are
+    fitted to the answers of docs/selection.md, on the half of the things that was seen.
+    """
+    pieces = ground.pieces
+    chance = np.clip(expected_overlap(ground, answer, clicks), 0.02, 0.98)
+    agreement = _agreement(pieces, pieces.mean(answer.mask) > 0.5)
+    odds = SURE[0] + SURE[1] * np.log(chance / (1 - chance))
+    return float(1 / (1 + np.exp(-odds - SURE[2] * agreement)))
+
+
+def _agreement(pieces: Pieces, mask: Mask) -> float:
+    """How well pieces (n,) along their outline agree with the votes of their like, in [0, 1]."""
+    cut = mask[pieces.left] != mask[pieces.right]
+    if not cut.any():
+        return 0.5
+    edge = np.unique(np.concatenate([pieces.left[cut], pieces.right[cut]]))
+    chance = votes(pieces, mask)[edge]
+    return float(np.where(mask[edge], chance, 1 - chance).mean())
 
 
 def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask
 from ...document.model import Click, Prompt
-from ..selection import SelectionError, box_mask
+from ..selection import SelectionError, free_mask, is_bounded
 from .pieces import Pieces
 from .relabel import islands, touching
 
@@ -35,6 +35,8 @@ SHARP_PART = 20.0
 SHARP_CORRECTION = 6.0
 TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
 KNOWN = 1e4  # the same of a click: a walk that comes there ends
+LIKELY_GONE = 1.0  # exponent: how much what a click takes away is background by its like's vote
+LIKELY_ADDED = 0.25  # the same of what a click adds, which may be like nothing selected so far
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
 AGREEMENT = 1.5  # exponent: how much an outline should agree with the subject map
 LARGER = 0.03  # exponent: how much a larger region is preferred
@@ -73,7 +75,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class _Taste:
+class Taste:
     """Exponents of what a part leaves of its whole, and of what it takes."""
 
     minor: float
@@ -90,19 +92,47 @@ class Ground:
     is_of_large: bool = False  # of a large photo, or of a tile of one
     tokens: F32 | None = None  # (r, c, d) of the photo
 
+    def free(self, prompt: Prompt) -> Mask:
+        """(h, w) where the prompt lets what is meant be, at the pieces' size."""
+        height, width = self.pieces.shape
+        fine = free_mask(self.pieces.photo_shape, prompt).astype(np.float32)
+        return cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA) > 0.5
+
     def inside(self, prompt: Prompt) -> Mask:
-        """(n,) pieces most of which are in the prompt's box, and those of positive clicks."""
+        """(n,) pieces most of which may be meant, and those of positive clicks."""
         pieces = self.pieces
-        if prompt.box is None:
+        if not is_bounded(prompt):
             return np.ones(pieces.count, bool)
-        shape, photo = pieces.shape, pieces.photo_shape
-        fine = box_mask(photo, prompt).astype(np.float32)
-        small = cv2.resize(fine, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
-        inside = pieces.mean(small) > 0.5
+        inside = pieces.mean(self.free(prompt)) > 0.5
         for click in prompt.clicks:
             if click.is_foreground:
                 inside[pieces.at(click.x, click.y)] = True
         return inside
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """A click on a wrong place, and what may change by it."""
+
+    click: Click
+    allowed: Mask  # (n,) the pieces that may change
+    walls: tuple[int, ...] = ()  # the pieces of clicks that say the contrary: none of them changes
+    chance: F64 | None = None  # (n,) how likely each piece is what the click says, by its like
+    taste: Taste = Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    guess: Mask | None = None  # (n,) what the click may mean, too
+
+    def piece(self, ground: Ground) -> int:
+        """The one that the click is on."""
+        return ground.pieces.at(self.click.x, self.click.y)
+
+    def free(self, ground: Ground) -> Mask:
+        """(n,) what may change, with the click's own piece."""
+        return self.allowed | only(ground.pieces, self.piece(ground))
+
+    def others(self, ground: Ground) -> tuple[int, ...]:
+        """The walls but the click's own piece."""
+        piece = self.piece(ground)
+        return tuple(wall for wall in self.walls if wall != piece)
 
 
 def choose(ground: Ground, prompt: Prompt) -> Choice:
@@ -122,27 +152,11 @@ def choose(ground: Ground, prompt: Prompt) -> Choice:
     return whole
 
 
-def correct(
-    ground: Ground,
-    click: Click,
-    allowed: Mask,
-    walls: tuple[int, ...],
-    reach: float = 0.0,
-    guess: Mask | None = None,
-) -> Choice:
-    """The part of the pieces `allowed` (n,) that a click on a wrong place means.
-
-    It holds none of `walls`, the pieces of clicks that say the contrary. `reach`: px of all that
-    it could mean, where the pieces are a part of that only. `guess` (n,): what it may mean, too.
-    """
-    taste = _Taste(MINOR_CORRECTION, LARGER_CORRECTION)
-    if reach:
-        taste = _Taste(MINOR_FINE, LARGER_FINE, reach)
-    regions = _parts(ground, click, allowed, walls, taste)
-    regions += _left_over(ground, click, allowed, walls, taste)
-    regions += _reached(ground, click, allowed, walls, taste)
-    if guess is not None:
-        regions.append(_guessed(ground, click, allowed, walls, guess, taste))
+def correct(ground: Ground, ask: Correction) -> Choice:
+    """The part of the pieces it may change that a click on a wrong place means."""
+    regions = [*_parts(ground, ask), *_left_over(ground, ask), *_reached(ground, ask)]
+    if ask.guess is not None:
+        regions.append(_guessed(ground, ask, ask.guess))
     regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
     return Choice(regions[0].pieces, tuple(regions))
 
@@ -150,8 +164,8 @@ def correct(
 def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
     """The whole object that a click is on."""
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    growth = pieces.grow(piece)
-    masks = [pieces.region(growth, k) & inside for k in growth.peaks()]
+    growth = pieces.grow(piece) if inside.all() else pieces.grow(piece, inside)
+    masks = [pieces.region(growth, k) for k in growth.peaks()]
     subject = _subject_around(ground, piece)
     if subject is not None:
         subject = subject * inside
@@ -175,7 +189,7 @@ def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
     """The part of a whole that a click is on; the whole where it has none."""
     pieces = ground.pieces
     least = max(SMALLEST_PART * pieces.share(whole.pieces), SMALLEST_PIECES / pieces.count)
-    regions = _parts(ground, click, whole.pieces, (), _Taste(MINOR_PART, 0.0))
+    regions = _parts(ground, Correction(click, whole.pieces, taste=Taste(MINOR_PART, 0.0)))
     regions = [region for region in regions if pieces.share(region.pieces) > least]
     if not regions:
         return whole
@@ -183,84 +197,70 @@ def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
     return Choice(regions[0].pieces, tuple(regions))
 
 
-def _parts(
-    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
-) -> list[Region]:
-    """The parts of `allowed` (n,) around a click."""
-    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    allowed = allowed | only(pieces, piece)
-    growth = pieces.grow(piece, allowed, tuple(w for w in walls if w != piece))
-    masks = [pieces.region(growth, k) for k in growth.peaks()]
-    return [_rated(ground, click, allowed, mask, taste) for mask in masks]
+def _parts(ground: Ground, ask: Correction) -> list[Region]:
+    """The parts of what is allowed around a click."""
+    pieces, piece = ground.pieces, ask.piece(ground)
+    growth = pieces.grow(piece, ask.free(ground), ask.others(ground))
+    return [_rated(ground, ask, pieces.region(growth, k)) for k in growth.peaks()]
 
 
-def _left_over(
-    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
-) -> list[Region]:
-    """What is left of `allowed` (n,) around a click by each part of it around one of `walls`."""
-    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    alone = only(pieces, piece)
-    allowed = allowed | alone
+def _left_over(ground: Ground, ask: Correction) -> list[Region]:
+    """What is left around a click of what is allowed by each part of it around one of `walls`."""
+    pieces, piece = ground.pieces, ask.piece(ground)
+    alone, free, others = only(pieces, piece), ask.free(ground), ask.others(ground)
     regions = []
-    for wall in walls:
-        if wall == piece or not allowed[wall]:
+    for wall in others:
+        if not free[wall]:
             continue
-        growth = pieces.grow(wall, allowed, (piece,))
+        growth = pieces.grow(wall, free, (piece,))
         for k in growth.peaks():
-            rest = touching(pieces, allowed & ~pieces.region(growth, k), alone)
-            if not rest[[w for w in walls if w != piece]].any():
-                regions.append(_rated(ground, click, allowed, rest, taste))
+            rest = touching(pieces, free & ~pieces.region(growth, k), alone)
+            if not rest[list(others)].any():
+                regions.append(_rated(ground, ask, rest))
     return regions
 
 
-def _reached(
-    ground: Ground, click: Click, allowed: Mask, walls: tuple[int, ...], taste: _Taste
-) -> list[Region]:
-    """The pieces of `allowed` (n,) from which a walk is likelier to end at the click than to stay.
+def _reached(ground: Ground, ask: Correction) -> list[Region]:
+    """The allowed pieces from which a walk is likelier to end at the click than to stay.
 
     What is not allowed is, but for what a box leaves out, already what the click says: it draws.
     """
-    pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
-    alone = only(pieces, piece)
-    allowed = allowed | alone
+    pieces, piece = ground.pieces, ask.piece(ground)
+    alone, free = only(pieces, piece), ask.free(ground)
     regions = []
     for trust in TRUST:
-        wrong, right = np.where(allowed, 1e-9, trust), np.where(allowed, trust, 1e-9)
-        right[[w for w in walls if w != piece]] = KNOWN
+        wrong, right = np.where(free, 1e-9, trust), np.where(free, trust, 1e-9)
+        right[list(ask.others(ground))] = KNOWN
         wrong[piece], right[piece] = KNOWN, 1e-9
-        found = ((pieces.walk_home(wrong, right) > 0.5) & allowed) | alone
-        regions.append(_rated(ground, click, allowed, touching(pieces, found, alone), taste))
+        found = ((pieces.walk_home(wrong, right) > 0.5) & free) | alone
+        regions.append(_rated(ground, ask, touching(pieces, found, alone)))
     return regions
 
 
-def _guessed(
-    ground: Ground,
-    click: Click,
-    allowed: Mask,
-    walls: tuple[int, ...],
-    guess: Mask,
-    taste: _Taste,
-) -> Region:
-    """What of a guess (n,) hangs together with a click and is `allowed` (n,)."""
+def _guessed(ground: Ground, ask: Correction, guess: Mask) -> Region:
+    """What of a guess (n,) hangs together with a click and is allowed."""
     pieces = ground.pieces
-    alone = only(pieces, pieces.at(click.x, click.y))
-    free = guess & allowed
-    free[list(walls)] = False
-    mask = touching(pieces, free | alone, alone)
-    return _rated(ground, click, allowed | alone, mask, taste)
+    alone = only(pieces, ask.piece(ground))
+    free = guess & ask.allowed
+    free[list(ask.walls)] = False
+    return _rated(ground, ask, touching(pieces, free | alone, alone))
 
 
-def _rated(ground: Ground, click: Click, allowed: Mask, mask: Mask, taste: _Taste) -> Region:
-    """Pieces (n,), and how much a click on a place within `allowed` (n,) means just them."""
-    pieces = ground.pieces
+def _rated(ground: Ground, ask: Correction, mask: Mask) -> Region:
+    """Pieces (n,), and how much a click on a place within what is allowed means just them."""
+    pieces, allowed, taste = ground.pieces, ask.free(ground), ask.taste
     cut = (mask[pieces.left] != mask[pieces.right]) & allowed[pieces.left] & allowed[pieces.right]
     share = pieces.area[mask].sum() / max(pieces.area[allowed].sum(), taste.reach)
     contrast, left = ALL_OF_IT, 1.0
     if cut.any():
         contrast = (pieces.gap * pieces.length)[cut].sum() / pieces.length[cut].sum()
         left = max(1 - share, 1e-3)
-    near = centred(pieces, mask, click) ** CENTRED_PART
-    return Region(mask, float(contrast * near * share**taste.larger * left**taste.minor))
+    score = contrast * centred(pieces, mask, ask.click) ** CENTRED_PART
+    score *= share**taste.larger * left**taste.minor
+    if ask.chance is not None:
+        likely = LIKELY_ADDED if ask.click.is_foreground else LIKELY_GONE
+        score *= np.average(ask.chance[mask], weights=pieces.area[mask]) ** likely
+    return Region(mask, float(score))
 
 
 def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:

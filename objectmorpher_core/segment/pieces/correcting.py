@@ -4,7 +4,9 @@ Pieces of the photo say it where the click is deep in what it may mean. Where it
 pieces deep in that, it is decided anew in finer pieces of a window around, in which a walk goes as
 far as before: what the coarser pieces say is then one of the things that may be meant. Less than
 one deep, a thing there is as narrow as the pieces, which hold some of what was right too, and are
-not asked. A window that cuts off what is found in it is widened.
+not asked. A window that cuts off what is found in it is widened. What a click may mean is weighed
+by the votes of like pieces elsewhere: a click into the gap between two legs does not take the legs,
+which are like the rest of the object, and takes the grass, which is like the grass around.
 """
 
 from __future__ import annotations
@@ -16,10 +18,22 @@ import numpy as np
 
 from ...base.arrays import RGB, Mask
 from ...document.model import Prompt
-from .choice import Choice, Ground, Region, correct, depth
+from .choice import (
+    LARGER_CORRECTION,
+    LARGER_FINE,
+    MINOR_CORRECTION,
+    MINOR_FINE,
+    Choice,
+    Correction,
+    Ground,
+    Region,
+    Taste,
+    correct,
+    depth,
+)
 from .features import crop_tokens
 from .pieces import PIECES, WORK_AREA, Pieces
-from .relabel import relabel, touching
+from .relabel import relabel, touching, votes
 
 DEEP = 2.0  # x side of a piece: a click that is less deep in what it means needs finer pieces
 NARROW = 1.0  # the same: less deep, the coarser pieces are not heard
@@ -114,9 +128,22 @@ def _meant(
     `guess` (h, w): what coarser pieces say, which is heard as one thing more that may be meant.
     """
     click = prompt.clicks[-1]
-    walls = said(ground.pieces, prompt, not click.is_foreground)
-    guessed = None if guess is None else ground.pieces.mean(guess) > 0.5
-    return correct(ground, click, _flippable(ground, before, prompt), walls, reach, guessed)
+    pieces = ground.pieces
+    walls = said(pieces, prompt, not click.is_foreground)
+    guessed = None if guess is None else pieces.mean(guess) > 0.5
+    had = pieces.mean(before) > 0.5
+    had[pieces.at(click.x, click.y)] = click.is_foreground
+    chance = None
+    if had.any() and not had.all():
+        chance = votes(pieces, had, pieces.at(click.x, click.y))
+        chance = chance if click.is_foreground else 1 - chance
+    taste = (
+        Taste(MINOR_FINE, LARGER_FINE, reach)
+        if reach
+        else Taste(MINOR_CORRECTION, LARGER_CORRECTION)
+    )
+    allowed = _flippable(ground, before, prompt)
+    return correct(ground, Correction(click, allowed, walls, chance, taste, guessed))
 
 
 def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask:
@@ -222,12 +249,15 @@ def _moved(pieces: Pieces, prompt: Prompt, window: _Window) -> Prompt:
     right, bottom = FINER * window.right - left, FINER * window.bottom - top
     moved = (replace(c, x=c.x * across - left, y=c.y * down - top) for c in prompt.clicks)
     clicks = tuple(c for c in moved if 0 <= c.x < right and 0 <= c.y < bottom)
+    prompt = Prompt(
+        clicks, prompt.box, prompt.is_subject, prompt.level
+    )  # `wrong` minds what is taken
     if prompt.box is None:
-        return replace(prompt, clicks=clicks)
+        return prompt
     x0, y0, x1, y1 = prompt.box
     xs = np.clip([x0 * across - left, x1 * across - left], 0, right)
     ys = np.clip([y0 * down - top, y1 * down - top], 0, bottom)
-    return replace(prompt, clicks=clicks, box=(xs[0], ys[0], xs[1], ys[1]))
+    return replace(prompt, box=(xs[0], ys[0], xs[1], ys[1]))
 
 
 def _enlarged(mask: Mask) -> Mask:

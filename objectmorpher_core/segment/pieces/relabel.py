@@ -39,7 +39,7 @@ def relabel(
     """
     if not mask.any() or mask.all():
         return mask
-    chance = votes(pieces, mask, _heard(pieces, mask, doubted))
+    chance = votes(pieces, mask, doubted)
     odds = TRUST * np.log(chance / (1 - chance))
     is_object, is_ground = np.maximum(odds, 0) + 1e-9, np.maximum(-odds, 0) + 1e-9
     is_object[list(wanted)] = is_ground[list(unwanted)] = 1e4
@@ -48,11 +48,12 @@ def relabel(
     return found if stands_out else mask
 
 
-def votes(pieces: Pieces, mask: Mask, heard: F64) -> F64:
+def votes(pieces: Pieces, mask: Mask, doubted: int | None = None) -> F64:
     """(n,) how likely a piece is in the object by the labels `mask` (n,) of the others like it.
 
-    `heard` (n,): how much each vote counts, in [0, 1].
+    Of those on its side, what is like the piece `doubted` is not heard.
     """
+    heard = _heard(pieces, mask, doubted)
     size = float(np.sqrt(pieces.area[mask].sum()))
     places = _places(pieces, NEAR * size)
     squares = np.square(places).sum(1)

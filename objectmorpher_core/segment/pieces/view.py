@@ -13,14 +13,15 @@ from ...base.arrays import F32, RGB, Mask, frozen
 from ...base.progress import Progress, part
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge
-from .answers import Answer, add_click, begin, confidence, vote
+from ..selection import cropped
+from .answers import Answer, add_click, begin, confidence, expected_overlap, vote
 from .choice import Choice, Ground, Region, choose
 from .features import crop_tokens
 from .pieces import PIECES, Pieces, reduced
 
 REMEMBERED = 8  # answers of a photo
 MASKS = 3  # of its own size
-LOOK_AGAIN = 0.8  # confidence: a small whole less sure is recognised anew, in a second or so
+LOOK_AGAIN = 0.8  # expected overlap: a small whole less sure is recognised anew, in a second or so
 DETAILS = 4  # closer looks that are kept
 DETAIL_PIECES = 6000  # a narrow thing has few of a closer look's
 SMALL = 0.03  # x photo's area: such a thing is looked at more closely
@@ -110,6 +111,10 @@ class View:
         """(H, W) an answer at the photo's size."""
         return enlarge(self.rgb, answer.mask)
 
+    def expected_overlap(self, prompt: Prompt, answer: Answer) -> float:
+        """See `answers.expected_overlap`."""
+        return expected_overlap(self.ground, answer, prompt.clicks)
+
     def confidence(self, prompt: Prompt, answer: Answer) -> float:
         """See `answers.confidence`."""
         return confidence(self.ground, answer, prompt.clicks)
@@ -198,7 +203,7 @@ class PhotoView:
         else:
             detail = self._detail(box, False, progress)
             first = detail.answer(moved[0], inside, rest)
-            is_unsure = detail.confidence(moved[0], first) < LOOK_AGAIN
+            is_unsure = detail.expected_overlap(moved[0], first) < LOOK_AGAIN
             if is_unsure and steps[0].level == "object":
                 is_final = not at_once or (box, True) in self._details
                 if is_final:
@@ -334,6 +339,7 @@ def _is_in(box: Box, click: Click) -> bool:
 
 def _moved(prompt: Prompt, box: Box) -> Prompt:
     """The prompt in px of a box; clicks outside are left out."""
+    prompt = cropped(prompt, box)
     left, top = box[:2]
     clicks = tuple(replace(c, x=c.x - left, y=c.y - top) for c in prompt.clicks if _is_in(box, c))
     if prompt.box is None:

@@ -19,10 +19,10 @@ from ...models.hub import EXTRA
 from ..selection import (
     SelectionError,
     at_level,
-    box_mask,
     check_mask,
     check_prompt,
     fill_small_holes,
+    free_mask,
     keep_touched,
 )
 from ..subject import SubjectNet, subject_guess
@@ -120,7 +120,7 @@ class Sam:
             answer = self._answer(view, asked)
             mask, score = self._closer(rgb, view, asked, answer, part(progress, 0.75, 1.0))
             scores.append(score)
-            mask &= box_mask(rgb.shape, meant)
+            mask &= free_mask(rgb.shape, meant)
             for click in meant.clicks:
                 mask[int(click.y), int(click.x)] = click.is_foreground
             return check_mask(fill_small_holes(keep_touched(mask, meant), meant))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.progress import Cancelled, silent
-from objectmorpher_core.document.model import Click, Prompt
+from objectmorpher_core.document.model import BesidePrompt, Click, Prompt
 from objectmorpher_core.segment import SelectionError
 from objectmorpher_core.segment.selection import check_prompt
 
@@ -75,6 +75,16 @@ def test_nothing_outside_the_box_is_chosen(segmenter, disc, disc_embedding):
     assert mask[60, 80]
     assert not mask[:, 100:].any()
     assert not mask[75:].any()
+
+
+def test_what_other_objects_cover_is_not_chosen(segmenter, is_trained, disc, disc_embedding):
+    taken = np.zeros(disc.shape[:2], bool)
+    taken[:, 100:] = True
+    asked = BesidePrompt((Click(80, 75),), taken=taken)
+    mask = segmenter.segment(disc, asked, disc_embedding, silent)
+    assert mask[75, 80] and not (mask & taken).any()
+    half = ellipses(disc.shape, (100, 75, 40, 40)) & ~taken
+    assert not is_trained or overlap(mask, half) > SKETCH
 
 
 def test_a_click_beside_the_box_says_that_it_was_too_small(segmenter, is_trained, disc):

@@ -8,7 +8,7 @@ import pytest
 from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment.pieces import correcting
 from objectmorpher_core.segment.pieces.answers import Answer, add_click
-from objectmorpher_core.segment.pieces.choice import Ground, correct
+from objectmorpher_core.segment.pieces.choice import Correction, Ground, correct
 from objectmorpher_core.segment.pieces.pieces import Pieces
 
 GROUND, COAT, FACE, POLE = (120, 150, 90), (40, 40, 50), (210, 180, 160), (70, 70, 85)
@@ -38,7 +38,8 @@ def test_a_correction_may_be_what_the_other_click_leaves():
     is_man, is_pole = np.zeros(image.shape[:2]), np.zeros(image.shape[:2])
     is_man[coat] = is_man[face] = is_pole[pole] = 1
     man, thing = pieces.mean(is_man) > 0.5, pieces.mean(is_pole) > 0.5
-    choice = correct(Ground(pieces, None), Click(70, 95, False), man | thing, (pieces.at(210, 95),))
+    ask = Correction(Click(70, 95, False), man | thing, (pieces.at(210, 95),))
+    choice = correct(Ground(pieces, None), ask)
     regions = [region.pieces for region in choice.others]
     assert any(share(each, man) > 0.95 and share(each, thing) < 0.1 for each in regions)
 
@@ -52,7 +53,7 @@ def test_no_correction_holds_what_a_click_denies():
         click = Click(float(rng.uniform(20, 120)), float(rng.uniform(40, 150)), False)
         walls = tuple(rng.integers(0, pieces.count, 2))
         walls = tuple(int(wall) for wall in walls if wall != pieces.at(click.x, click.y))
-        choice = correct(Ground(pieces, None), click, allowed, walls)
+        choice = correct(Ground(pieces, None), Correction(click, allowed, walls))
         assert choice.pieces[pieces.at(click.x, click.y)]
         for region in choice.others:
             assert not region.pieces[list(walls)].any()
@@ -130,7 +131,7 @@ def test_what_coarser_pieces_say_is_heard_and_holds_no_denied_piece():
     guess = pieces.mean(whole) > 0.5
     everything = np.ones(pieces.count, bool)
     wall = pieces.at(120, 115)
-    heard = correct(ground, click, everything, (), 0.0, guess)
+    heard = correct(ground, Correction(click, everything, guess=guess))
     assert any((region.pieces == guess).all() for region in heard.others)
-    walled = correct(ground, click, everything, (wall,), 0.0, guess)
+    walled = correct(ground, Correction(click, everything, (wall,), guess=guess))
     assert not any(region.pieces[wall] for region in walled.others)

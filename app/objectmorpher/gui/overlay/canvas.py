@@ -86,11 +86,11 @@ class Canvas:
         self.draw.add_circle_filled(at, theme.pt(radius + 2), theme.u32(WHITE))
         self.draw.add_circle_filled(at, theme.pt(radius), theme.u32(fill))
 
-    def dot(self, at: ImVec2, radius: float, alpha: float = 0.9) -> None:
-        """A small white dot; `radius` is not rounded to whole pixels."""
+    def dot(self, at: ImVec2, radius: float, alpha: float = 0.9, color: str = WHITE) -> None:
+        """A small dot, white or of another colour; `radius` is not rounded to whole pixels."""
         r = theme.scale * radius
         self.draw.add_circle_filled(at, 1.5 * r, theme.u32(DARK, 0.55 * alpha), 8)
-        self.draw.add_circle_filled(at, r, theme.u32(WHITE, alpha), 8)
+        self.draw.add_circle_filled(at, r, theme.u32(color, alpha), 8)
 
     def ring(self, at: ImVec2, radius: float, color: str) -> None:
         self.draw.add_circle(at, theme.pt(radius), theme.u32(DARK, 0.6), 0, theme.pt(4))

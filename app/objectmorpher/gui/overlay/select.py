@@ -21,8 +21,9 @@ def draw_selection(canvas: Canvas) -> None:
     candidate, share = fades.shown("candidate", editor.candidates.shown)
     document = editor.document
     if candidate is not None and document is not None and candidate.photo is document.photo:
-        for outline in editor.derived.contours(candidate.mask):
-            _draw_dots(canvas, outline, share)
+        color = WARM if candidate.takes_away else WHITE
+        for outline in editor.derived.contours(candidate.changed):
+            _draw_dots(canvas, outline, color, share)
     prompt = editor.selection.prompt
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
@@ -50,14 +51,14 @@ def draw_edge(canvas: Canvas) -> None:
         canvas.polyline(canvas.at(outline), ACCENT)
 
 
-def _draw_dots(canvas: Canvas, outline: np.ndarray, share: float) -> None:
-    """A dotted closed line (N, 2) image px: what a click would select."""
+def _draw_dots(canvas: Canvas, outline: np.ndarray, color: str, share: float) -> None:
+    """A dotted closed line (N, 2) image px: what a click would select, add or take away."""
     corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))
     along = np.concatenate([[0.0], np.linalg.norm(np.diff(corners, axis=0), axis=1).cumsum()])
     places = np.arange(0, along[-1], theme.pt(DOTS) * canvas.ratio)
     dots = np.column_stack([np.interp(places, along, corners[:, axis]) for axis in (0, 1)])
     for at in canvas.on_canvas(dots):
-        canvas.dot(at, DOT, alpha=0.9 * share)
+        canvas.dot(at, DOT, 0.9 * share, color)
 
 
 def draw_rubber(canvas: Canvas) -> None:
