@@ -26,6 +26,7 @@ from .left_behind import has_left, with_plate
 from .pixels import crop, unit_pixels
 from .progress import Progress, part, silent
 from .puppet import Puppet, puppet_of
+from .raster.posed import PosedSplats
 from .refining import Refining, with_refinement
 from .report import Stopwatch, build_report
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
@@ -152,6 +153,7 @@ class Edited:
     puppets: dict[int, Puppet]  # by the indices of the lifted objects
     energies: dict[int, tuple[float, ...]]  # of the solves
     stopwatch: Stopwatch
+    notes: tuple[str, ...] = ()  # what one should know about the result, each a sentence
 
     @property
     def first(self) -> int:
@@ -165,9 +167,10 @@ class Edited:
 
     def report(self) -> dict[str, Any]:
         """The figures of DESIGN section 6, up to now."""
-        return build_report(
+        report = build_report(
             self.document, self.puppets, self.energies, self.composite, self.stopwatch
         )
+        return report | {"notes": list(self.notes)}
 
 
 def select(
@@ -243,11 +246,12 @@ def continue_script(
                 mask = Path(own.mask).read_bytes() if own.mask else None
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
-    document = scripted.ordered(run.document, others)
+    document, notes = scripted.ordered(run.document, others), run.doubts()
     if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
-            document = with_plate(document, script, frozenset(run.casting), step)
+            behind = with_plate(document, script, frozenset(run.casting), step)
+            document, notes = behind.document, (*notes, *behind.notes)
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")
@@ -255,7 +259,8 @@ def continue_script(
         with stopwatch.stage("refine"):
             how = Refining(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
-    return _finished(document, run.puppets, run.energies, progress, stopwatch)
+    edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
+    return replace(edited, notes=notes)
 
 
 class _Run:
@@ -330,6 +335,24 @@ class _Run:
             except ValueError as error:
                 raise ScriptError(f"--front {number}: {error}") from error
             self.document = edits.rename(self.document, k, f"Front {number}")
+
+    def doubts(self) -> tuple[str, ...]:
+        """What is odd about what stays in front, each a sentence."""
+        found = []
+        for k, item in enumerate(self.document.objects):
+            doubt = None
+            if item.stays_in_front:
+                doubt = front_edits.doubt(self.document, k, self._posed)
+            if doubt is not None:
+                found.append(
+                    f"what stays in front ({item.name}) {doubt}: if that is not what you mean, "
+                    "click nearer to its middle, or give its outline by --front-mask"
+                )
+        return tuple(found)
+
+    def _posed(self, k: int) -> PosedSplats:
+        item = self.document.objects[k]
+        return self.puppets[k].posed(item.pose, item.placement)
 
     def _keep(self, k: int) -> None:
         """Object `k` stays in front."""
