@@ -35,6 +35,7 @@ from .document.model import (
 from .document.settings import Hint
 from .lift.registration.importing import Scene, Source, place_import, register_file
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
+from .raster.posed import PosedSplats
 from .scripting import runner
 from .scripting.report import Stopwatch, build_report
 from .scripting.runner import Refining, has_left, prompt_of, with_plate, with_refinement
@@ -154,6 +155,7 @@ class Edited:
     puppets: dict[int, Puppet]  # by the indices of the lifted objects
     energies: dict[int, tuple[float, ...]]  # of the solves
     stopwatch: Stopwatch
+    notes: tuple[str, ...] = ()  # what one should know about the result, each a sentence
 
     @property
     def first(self) -> int:
@@ -167,9 +169,10 @@ class Edited:
 
     def report(self) -> dict[str, Any]:
         """The figures of DESIGN section 6, up to now."""
-        return build_report(
+        report = build_report(
             self.document, self.puppets, self.energies, self.composite, self.stopwatch
         )
+        return report | {"notes": list(self.notes)}
 
 
 def select(
@@ -245,11 +248,12 @@ def continue_script(
                 mask = Path(own.mask).read_bytes() if own.mask else None
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
-    document = runner.ordered(run.document, others)
+    document, notes = runner.ordered(run.document, others), run.doubts()
     if any(item.is_moved for item in document.objects) or needs_plate:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
-            document = with_plate(document, script, frozenset(run.casting), step)
+            behind = with_plate(document, script, frozenset(run.casting), step)
+            document, notes = behind.document, (*notes, *behind.notes)
     for k, wanted in enumerate(wishes):
         if wanted.script.refine == "harmonise":
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")
@@ -257,7 +261,8 @@ def continue_script(
         with stopwatch.stage("refine"):
             how = Refining(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
-    return _finished(document, run.puppets, run.energies, progress, stopwatch)
+    edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
+    return replace(edited, notes=notes)
 
 
 class _Run:
@@ -333,6 +338,24 @@ class _Run:
             except ValueError as error:
                 raise ScriptError(f"--front {number}: {error}") from error
             self.document = edits.rename(self.document, k, f"Front {number}")
+
+    def doubts(self) -> tuple[str, ...]:
+        """What is odd about what stays in front, each a sentence."""
+        found = []
+        for k, item in enumerate(self.document.objects):
+            doubt = None
+            if item.stays_in_front:
+                doubt = edits.doubt(self.document, k, self._posed)
+            if doubt is not None:
+                found.append(
+                    f"what stays in front ({item.name}) {doubt}: if that is not what you mean, "
+                    "click nearer to its middle, or give its outline by --front-mask"
+                )
+        return tuple(found)
+
+    def _posed(self, k: int) -> PosedSplats:
+        item = self.document.objects[k]
+        return self.puppets[k].posed(item.pose, item.placement)
 
     def _keep(self, k: int) -> None:
         """Object `k` stays in front."""

@@ -101,6 +101,15 @@ Two of the constants by which the light at a shadow's edge is evened were settle
 in view. What is not found stays, and can be painted out of the background (B). A ground with marks
 of its own as large as a shadow hides it; so does an outline that stands nowhere.
 
+Whether anything is imagined is asked of 360 further scenes (`python
+docs/compositing/imagined.py`): solids and upright pictures on photographed and drawn grounds,
+with walls, neighbours, edges of another material and dappled light, of which more than half have
+no shadow of the thing. On the half of them on which the score was fitted 3 of 105 shadows are
+imagined, and 10 of the 53 that are large are found; on the half that was held out 1 of 101, and
+24 of 63. The rule before this one imagined 6 % and 13 %, and found 34 % and 38 % (of the first
+182 scenes). In the window, where the shadow is outlined and one click refuses it, less is asked
+for: there about 9 % are imagined, and half are found.
+
 On photographs: the saucer's shadow, the motorcycle's, and a bowl's in the sun, seen from above. Its
 shadow is its outline, beside itself; where its hard edge is, and how dark it is, the photo tells px
 for px.

@@ -46,6 +46,7 @@ class Rows:
     moved: F32  # px, see `displacement`
     is_covered: Mask  # by an object, now or before
     touched: F32 | None = None  # in [0, 1], what is seen of shadows and repairs; None: of none
+    is_object: Mask | None = None  # what objects alone cover, where more is covered; None: all is
 
     @property
     def box(self) -> Box:
@@ -96,7 +97,8 @@ def with_touched(rows: Rows) -> Rows:
         return rows
     is_touched = rows.touched > SEEN
     moved = np.where(is_touched, np.maximum(rows.moved, np.float32(STILL)), rows.moved)
-    return replace(rows, moved=moved, is_covered=rows.is_covered | is_touched)
+    is_covered = rows.is_covered | is_touched
+    return replace(rows, moved=moved, is_covered=is_covered, is_object=rows.is_covered)
 
 
 def blend_weights(moved: F32, margin: float, feather: float = 1.0) -> F32:
@@ -169,6 +171,7 @@ class Blend:
         self._blended, self._bottom = box[1], box[3]  # px, rows of the photo
         self._least = rows or AT_A_TIME * self._reach
         self._sums: list[tuple[float, float, float]] = []  # of shares over changed pixels
+        self.beside = 0  # px changed by shadows and repairs, out of the reach of every object
 
     def add(self, rows: Rows) -> None:
         """Takes the next rows, and blends those whose surroundings are known, once enough are."""
@@ -182,15 +185,28 @@ class Blend:
             np.concatenate([r.moved for r in self._rows]), self._margin, self._feather
         )
         away = distance(np.concatenate([r.is_covered for r in self._rows]))
-        top = self._rows[0].top
+        beside, top = self._beside(), self._rows[0].top
 
         def mix(rows: Rows) -> tuple[float, float, float]:
             inner = slice(rows.top - top, rows.bottom - top)
             return self._mix(rows, weights[inner], away[inner] <= self._margin + 1)
 
         self._sums += map_in_threads(mix, ready)
+        if beside is not None:
+            x0, x1 = self._corner[0], self._corner[0] + beside.shape[1]
+            done = np.s_[ready[0].top : ready[-1].bottom, x0:x1]
+            is_changed = differ(self.pixels[done], self._photo[done])
+            is_beside = beside[ready[0].top - top : ready[-1].bottom - top]
+            self.beside += int(np.count_nonzero(is_changed & is_beside))
         self._blended = ready[-1].bottom
         self._rows = [r for r in self._rows if r.bottom > self._blended - self._reach]
+
+    def _beside(self) -> Mask | None:
+        """Where of the rows that wait no object reaches, but something else may show."""
+        if all(r.is_object is None for r in self._rows):
+            return None
+        own = [r.is_covered if r.is_object is None else r.is_object for r in self._rows]
+        return distance(np.concatenate(own)) > self._margin + 1
 
     def _mix(self, rows: Rows, weights: F32, footprint: Mask) -> tuple[float, float, float]:
         """Blends `rows` in by `weights` (h, w); the shares summed over the changed pixels."""

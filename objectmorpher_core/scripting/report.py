@@ -80,6 +80,7 @@ def build_report(
         "pixels": {
             "changed": result.changed,
             "outside_footprint_changed": result.outside_footprint_changed,
+            "shadow": result.shadow,
             "from_photo": shares.from_photo,
             "from_lifter": shares.from_lifter,
             "from_inpainter": shares.from_inpainter,

@@ -20,7 +20,7 @@ from ..compose.refine import refinement
 from ..compose.refine.refinement import CoarseEdit
 from ..compose.shadow.old_reflection import OldReflection
 from ..compose.shadow.old_shadow import OldShadow, traceless_plate
-from ..compose.shadow.old_traces import find_old_traces
+from ..compose.shadow.old_traces import OldTraces, find_old_traces
 from ..deform.puppet import Puppet, puppet_of
 from ..document import edits
 from ..document.model import (
@@ -255,12 +255,20 @@ def ordered(document: Document, others: Others) -> Document:
 USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
 
 
+@dataclass(frozen=True, eq=False)
+class LeftBehind:
+    """A document with its plate, and what of the photo was taken along or off the ground."""
+
+    document: Document
+    notes: tuple[str, ...]  # a sentence for each
+
+
 def with_plate(
     document: Document,
     script: EditScript,
     casting: frozenset[int],
     progress: Progress,
-) -> Document:
+) -> LeftBehind:
     """The document with what is behind all its objects, filled in as the script's hints say.
 
     Those of the numbers in `casting` take their own shadow along.
@@ -271,14 +279,17 @@ def with_plate(
     document = edits.set_hints(document, _hints(script, document.photo.size))
     covered, pixels = plate_cover(document), document.photo.pixels
     gone: list[OldShadow | OldReflection] = []
+    notes: list[str] = []
     for matte in _distinct(document, casting):
         alike = [k for k in casting if document.objects[k].matte is matte]
         old = find_old_traces(pixels, matte, covered)
         for k in alike:
             if old.shadow is not None and document.objects[k].is_visible:
                 document = edits.set_shadow(document, k, old.shadow.shadow)
-        if not any(o.matte is matte and not has_left(o) for o in document.objects):
+        has_gone = not any(o.matte is matte and not has_left(o) for o in document.objects)
+        if has_gone:
             gone += old.found
+        notes += _notes(document.objects[alike[0]], old, has_gone)
     inpainter = compose.load(script.inpaint)
     if gone:
         plate = traceless_plate(
@@ -286,7 +297,20 @@ def with_plate(
         )
     else:
         plate = build_plate(pixels, covered, inpainter, progress, script.seed, document.hints)
-    return edits.set_plate(document, plate)
+    return LeftBehind(edits.set_plate(document, plate), tuple(notes))
+
+
+def _notes(item: EditObject, old: OldTraces, has_gone: bool) -> list[str]:
+    """What becomes of an object's traces in the photo, and how to refuse."""
+    refuse = "--shadow none leaves the ground as it is in the photo"
+    notes = []
+    if old.shadow is not None:
+        goes = "goes along with it" if item.is_visible else "is removed with it"
+        goes = goes if has_gone else "is thrown by its copies, too"
+        notes.append(f"the shadow found beside {item.name} {goes}; {refuse}")
+    if old.reflection is not None and has_gone:
+        notes.append(f"the reflection found below {item.name} is removed; {refuse}")
+    return notes
 
 
 def has_left(item: EditObject) -> bool:

@@ -23,11 +23,12 @@ KEYS = {
     "handles": None,
     "energy": {"start", "end", "iterations"},
     "pixels": {"changed", "outside_footprint_changed", "from_photo", "from_lifter",
-               "from_inpainter", "from_refiner"},
+               "from_inpainter", "from_refiner", "shadow"},
     "backends": {"segment", "lift", "inpaint", "refine"},
     "seconds": {"load", "segment", "lift", "graph", "deform", "inpaint", "render", "refine",
                 "save", "total"},
     "peak_memory_mb": None,
+    "notes": None,
 }  # fmt: skip
 
 

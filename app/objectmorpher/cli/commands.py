@@ -31,7 +31,7 @@ from objectmorpher_core.scripting.script import (
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
 
-from .terminal import UsageError, progress_bar
+from .terminal import PROGRAM, UsageError, progress_bar
 
 SCRIPT_OPTIONS = tuple(EditScript.__dataclass_fields__)
 EXTRAS = {  # further outputs of `edit` and what each holds
@@ -88,6 +88,8 @@ def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path
                     outputs[path] = encode_output(EXTRAS[name], edited, path, clip)
         if "report" in extras:
             outputs[extras["report"]] = json_bytes(edited.report())
+    for note in edited.notes:
+        sys.stderr.write(f"{PROGRAM}: {out}: {note}\n")
     return outputs
 
 

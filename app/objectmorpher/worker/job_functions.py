@@ -307,9 +307,10 @@ def take_shadow(
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
     from objectmorpher_core.compose.shadow.old_traces import find_old_traces
+    from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY
 
     progress(0.0, "")
-    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground)
+    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
     if not old.found:
         return None
     inpainter = compose.load(choice.backend, bool(choice.hints))

@@ -9,6 +9,7 @@ from ...document.model import Matte
 from .old_reflection import OldReflection
 from .old_shadow import OldShadow
 from .reflection_fit import find_old_reflection
+from .shadow_evidence import SURE
 from .shadow_fit import find_old_shadow
 
 
@@ -25,11 +26,15 @@ class OldTraces:
 
 
 def find_old_traces(
-    pixels: Pixels, matte: Matte, others: Mask, seen_from: float | None = None
+    pixels: Pixels,
+    matte: Matte,
+    others: Mask,
+    seen_from: float | None = None,
+    margin: float = SURE,
 ) -> OldTraces:
     """As `find_old_shadow` and `find_old_reflection`; what is a reflection is no shadow."""
     height, width = others.shape
     reflection = find_old_reflection(pixels, matte, others)
     if reflection is not None:
         others = others | reflection.covers((0, 0, width, height))
-    return OldTraces(find_old_shadow(pixels, matte, others, seen_from), reflection)
+    return OldTraces(find_old_shadow(pixels, matte, others, seen_from, margin), reflection)

@@ -3,28 +3,28 @@
 Shadows of the object's own silhouette (`shadow`) are tried in all directions and lengths, each
 together with a smooth ground, against the logarithm of the brightness around the object. What
 explains it best, by a robust regression (Huber's loss, iteratively reweighted; Holland and Welsch
-1977), is the shadow, if it is dark enough, if the ground is even enough to tell, and if it takes
-light of all colours alike: another material begins with another colour. Its numbers are those of a
-shadow that looks like it, for where the object goes.
+1977), is the shadow, if enough speaks for it (`shadow_evidence`). Its numbers are those of a shadow
+that looks like it, for where the object goes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
-from ...base.arrays import F32, F64, Mask, Pixels
+from ...base.arrays import F32, Mask, Pixels
 from ...base.pixels import unit_pixels
 from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
+from .shadow_evidence import CORE, LIT, SURE, Found, Ground, Seen, fitted, score, taken
 from .shadow_flat import Flat, lie
-from .shadow_shear import Sheet, stand
+from .shadow_shear import stand
 
 SHEET_GROUND = 30.0  # degrees: a silhouette alone is told no ground
 CELLS = 64  # along the object's longer side
@@ -41,26 +41,19 @@ FLAT_LENGTHS = (0.1, 0.25, 0.5)  # x the shorter side of what is seen from above
 FLAT_HEIGHT = 6.0  # x that side's share, of a shadow's length in the rim's heights
 LEAST_FLAT = 0.4  # of the loss without a shadow, that such a one must explain
 SOFTNESS = 0.35
+WEIGHED, APART = 4, 30.0  # shadows of which the likeliest is taken; degrees between them
 FINER = ((10.0, 1.3), (5.0, 1.15))  # degrees, and factor of the length
 SOFTER = 0.2
-FULL = 0.75  # of the light, that a full shadow is taken to leave out
-LEAST_DARK = 0.25  # natural logarithm of light, that a shadow takes at its darkest
-LEAST_GAIN = 0.04  # of the loss without a shadow
-MOST_NOISE = 0.6  # natural logarithm: on a ground more varied than that nothing is told
-COARSE = 4.0  # cells, over which unevenness is measured
-STANDS_OUT = 4.0  # x that, for a shadow
-EXPLAINED = 0.6  # x what it would explain where it is, if it were all of it
 CUT_OFF = 0.15  # x its width, along the photo's lower edge
-MOST_COLOUR = 0.4  # x its darkness, that a shadow changes colours by
+MOST_COLOUR = (0.4, 3.0)  # natural logarithm, and x what is usual, by which ground may differ
+SHOWS = 0.08  # of linear light: darker ground has no colour to speak of
 DARKER = 0.12  # natural logarithm, from which a cell counts as dark
 LEAST_CELLS = 200
 MEASURED = 0.7  # least share of what is measured in what is taken off; the rest was fitted
 EDGE = (0.02, 0.1)  # natural logarithm of what was fitted, over which what is measured counts
 REACH = 2.0  # cells beyond that
 SMOOTH = (1.0, 4.0)  # cells, and for each unit of noise: over which the dark is measured
-SURE = 2.5  # x what is usual on lit ground
-CORE = 0.3  # of the darkest that was fitted
-LIT = 0.1  # of a shadow: what is less in it counts as lit
+USUAL = 2.5  # x what is usual on lit ground
 BRIGHTEST = 90  # percentile of lit ground: what it is at most where a shadow is taken off
 GROWN = 2  # times
 MOST_GROWN = 2.5  # x its area before
@@ -69,28 +62,33 @@ DEEPEST = 2.5  # natural logarithm of light that is ever given back
 
 
 def find_old_shadow(
-    pixels: Pixels, matte: Matte, others: Mask | None = None, seen_from: float | None = None
+    pixels: Pixels,
+    matte: Matte,
+    others: Mask | None = None,
+    seen_from: float | None = None,
+    margin: float = SURE,
 ) -> OldShadow | None:
     """The shadow of what was cut out of the photo `pixels` (H, W, 3); None where none is sure.
 
     `others` (H, W): what else hides the ground. `seen_from`: how many degrees above it one looks
     from; None where nobody knows: then it is SHEET_GROUND, and the shadow found says so.
+    `margin`: how much must speak for it, see `shadow_evidence`.
     """
     if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
     slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
     seen = _look(pixels, matte, others, slope)
-    told = _told(seen, LENGTHS) if seen_from is None or seen_from < STEEP else None
+    told = _told(seen, LENGTHS, margin) if seen_from is None or seen_from < STEEP else None
     if seen_from is None or seen_from >= STEEP:
         flat = replace(seen, standing=lie(seen.cover))
-        lying = _told(flat, FLAT_LENGTHS)
+        lying = _told(flat, FLAT_LENGTHS, margin)
         least = max(LEAST_FLAT, 0.0 if told is None else told[1].gain)
         if lying is not None and lying[1].gain > least:
             seen, told = flat, lying
     if told is None:
         return None
     ground, found = told
-    depth = _missing(seen, ground, found)
+    depth = _missing(seen, ground, found) * _of_one_colour(seen, ground, found)
     shadow = _imitated(found)
     if isinstance(seen.standing, Flat):
         length = min(FLAT_HEIGHT * shadow.length, MOST_SHADOW)
@@ -101,7 +99,7 @@ def find_old_shadow(
     return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
 
 
-def _told(seen: _Seen, lengths: tuple[float, ...]) -> tuple[_Ground, _Found] | None:
+def _told(seen: Seen, lengths: tuple[float, ...], margin: float) -> tuple[Ground, Found] | None:
     """The ground and the shadow on it; None where none is sure."""
     ground = _ground(seen)
     found = None if ground is None else _searched(seen, ground, lengths)
@@ -109,7 +107,7 @@ def _told(seen: _Seen, lengths: tuple[float, ...]) -> tuple[_Ground, _Found] | N
         return None
     if isinstance(seen.standing, Flat):  # a large part of what one sees may lie in its shadow
         ground = replace(ground, scale=min(ground.scale, found.scale))
-    if not _is_sure(seen, ground, found):
+    if score(seen, ground, found) <= margin:
         return None
     return ground, found
 
@@ -123,21 +121,7 @@ def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
     return bool(solid[max(last - 1, 0) : last + 1].any(0).sum() > CUT_OFF * solid.any(0).sum())
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The object's surroundings on a small grid."""
-
-    brightness: F32  # (h, w) natural logarithm of linear light
-    colour: F32  # (h, w, 2) logarithms of ratios
-    cover: F32  # (h, w) of the object
-    free: Mask  # (h, w) ground, or whatever else is not the object
-    standing: Sheet | Flat
-    left: float
-    top: float
-    pitch: float
-
-
-def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> _Seen:
+def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Seen:
     height, width = pixels.shape[:2]
     rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
     size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
@@ -174,26 +158,12 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> _S
     free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
     logarithm = np.log(light + BLACK)
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
-    return _Seen(
+    return Seen(
         logarithm @ LUMA, colour, cover, free, stand(cover, slope), float(left), float(top), pitch
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    """Where it is asked for, and how it varies without a shadow."""
-
-    index: np.ndarray  # (n,) of the cells
-    weight: F64  # (n,)
-    basis: F64  # (n, 6)
-    everywhere: F64  # (h, w, 6) the same of all cells
-    brightness: F64  # (n,)
-    contact: F64  # (n,) natural logarithm of the light that a contact takes
-    loss: float
-    scale: float  # of what is not explained
-
-
-def _ground(seen: _Seen) -> _Ground | None:
+def _ground(seen: Seen) -> Ground | None:
     """None where too little of it is seen."""
     rows, columns = seen.cover.shape
     base, height = seen.standing.base, seen.standing.height
@@ -207,34 +177,16 @@ def _ground(seen: _Seen) -> _Ground | None:
     everywhere = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
     weight = np.exp(-((away.ravel()[index] / NEAR) ** 2)).astype(np.float64)
     basis, brightness = everywhere.reshape(-1, 6)[index], seen.brightness.ravel()[index]
-    contact = _taken(seen.standing.contact()).ravel()[index].astype(np.float64)
+    contact = taken(seen.standing.contact()).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
-    _, loss, scale = regressed(basis, brightness, weight)
-    return _Ground(index, weight, basis, everywhere, brightness, contact, loss, scale)
+    alone, loss, scale = regressed(basis, brightness, weight)
+    return Ground(index, weight, basis, everywhere, brightness, contact, alone, loss, scale)
 
 
-def _taken(shadow: F32) -> F32:
-    """Natural logarithm of the light that a shadow of opacity (h, w) takes."""
-    return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A shadow that was tried."""
-
-    shadow: Shadow
-    gain: float  # of the loss
-    thrown: F32  # (h, w) natural logarithm of the light that it takes at strength 1
-    ground: F64  # (6,)
-    dark: float  # how much of it there is
-    contact: float
-    scale: float  # of what is not explained
-
-
-def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
+def _tried(seen: Seen, ground: Ground, shadow: Shadow) -> Found | None:
     """None where it would be no shadow but a light."""
-    taken = _taken(seen.standing.thrown(shadow))
-    column = taken.ravel()[ground.index].astype(np.float64)
+    thrown = taken(seen.standing.thrown(shadow))
+    column = thrown.ravel()[ground.index].astype(np.float64)
     if column.max() < DARKER:
         return None
     basis = np.column_stack([ground.basis, -column, -ground.contact])
@@ -246,24 +198,47 @@ def _tried(seen: _Seen, ground: _Ground, shadow: Shadow) -> _Found | None:
     if found[6] <= 0:
         return None
     gain = 1 - loss / max(ground.loss, 1e-12)
-    return _Found(shadow, gain, taken, found[:6], float(found[6]), float(found[7]), scale)
+    return Found(shadow, gain, thrown, found[:6], float(found[6]), float(found[7]), scale)
 
 
-def _searched(seen: _Seen, ground: _Ground, lengths: tuple[float, ...]) -> _Found | None:
-    """The best of all directions and lengths, then of some that lie around it."""
-    best: _Found | None = None
-    for shadow in _coarsely(lengths):
-        tried = _tried(seen, ground, shadow)
-        if tried is not None and (best is None or tried.gain > best.gain):
-            best = tried
-    if best is None:
+def _searched(seen: Seen, ground: Ground, lengths: tuple[float, ...]) -> Found | None:
+    """Of all directions and lengths what most speaks for, then the best that lies around it."""
+    few = _thinned(ground, seen.cover.shape[1])
+    tried = [_tried(seen, few, shadow) for shadow in _coarsely(lengths)]
+    gained = sorted((f for f in tried if f is not None), key=lambda f: -f.gain)
+    if not gained:
         return None
+    best = max(_distinct(gained), key=lambda f: score(seen, few, f))
     for step, factor in FINER:
         for shadow in _around(best.shadow, step, factor):
-            tried = _tried(seen, ground, shadow)
-            if tried is not None and tried.gain > best.gain:
-                best = tried
-    return best
+            other = _tried(seen, few, shadow)
+            if other is not None and other.gain > best.gain:
+                best = other
+    return _tried(seen, ground, best.shadow)
+
+
+def _thinned(ground: Ground, columns: int) -> Ground:
+    """Every other cell of every other row: enough to compare shadows by."""
+    row, column = np.divmod(ground.index, columns)
+    kept = (row % 2 == 0) & (column % 2 == 0)
+    parts = {
+        name: getattr(ground, name)[kept]
+        for name in ("index", "weight", "basis", "brightness", "contact")
+    }
+    few = replace(ground, **parts)
+    return replace(few, loss=regressed(few.basis, few.brightness, few.weight)[1])
+
+
+def _distinct(gained: list[Found]) -> list[Found]:
+    """The first few of which no two go nearly the same way."""
+    kept: list[Found] = []
+    for found in gained:
+        turns = [abs((found.shadow.direction - k.shadow.direction + 180) % 360 - 180) for k in kept]
+        if all(turn > APART for turn in turns):
+            kept.append(found)
+        if len(kept) == WEIGHED:
+            break
+    return kept
 
 
 def _coarsely(lengths: tuple[float, ...]) -> Iterator[Shadow]:
@@ -283,83 +258,60 @@ def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
                 )  # fmt: skip
 
 
-def _is_sure(seen: _Seen, ground: _Ground, found: _Found) -> bool:
-    """Whether it is darker than the ground is uneven, tells something, and has no colour."""
-    darkest = found.dark * float(found.thrown.max())
-    if darkest < LEAST_DARK or found.gain < LEAST_GAIN or ground.scale > MOST_NOISE:
-        return False
-    if darkest < STANDS_OUT * _unevenness(seen, ground, found):
-        return False
-    if not _is_where_it_is_dark(seen, ground, found):
-        return False
-    column = found.thrown.ravel()[ground.index].astype(np.float64)
-    basis = np.column_stack([ground.basis, -column])
-    changes = [
-        abs(float(regressed(basis, channel, ground.weight)[0][6]))
-        for channel in seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
-    ]
-    return max(changes) < MOST_COLOUR * found.dark
-
-
-def _is_where_it_is_dark(seen: _Seen, ground: _Ground, found: _Found) -> bool:
-    """Whether it explains of its own cells what one as dark would on a ground as varied."""
-    fitted = _fitted(seen, found).ravel()[ground.index].astype(np.float64)
-    without = ground.brightness - ground.basis @ found.ground
-    core = fitted > CORE * fitted.max()
-    explained = 1 - float(((without + fitted)[core] ** 2).mean() / (without[core] ** 2).mean())
-    dark = float(without[core].mean()) ** 2
-    return explained > EXPLAINED * dark / (dark + ground.scale**2)
-
-
-def _unevenness(seen: _Seen, ground: _Ground, found: _Found) -> float:
-    """How much the ground varies besides, over lengths as large as shadows."""
-    free = seen.free.astype(np.float32)
-    fitted = ground.everywhere @ found.ground - _fitted(seen, found)
-    rest = (seen.brightness - fitted).astype(np.float32) * free
-    spread = cv2.GaussianBlur(free, (0, 0), COARSE)
-    blurred = cv2.GaussianBlur(rest, (0, 0), COARSE) / np.maximum(spread, FREE)
-    squares = np.asarray(blurred, np.float64).ravel()[ground.index] ** 2
-    return float(np.sqrt(np.average(squares, weights=ground.weight)))
-
-
-def _fitted(seen: _Seen, found: _Found) -> F32:
-    """(h, w) natural logarithm of the light that the shadow takes which was found."""
-    contact = _taken(seen.standing.contact())
-    return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
-
-
-def _missing(seen: _Seen, ground: _Ground, found: _Found) -> F32:
+def _missing(seen: Seen, ground: Ground, found: Found) -> F32:
     """(h, w) natural logarithm of the light that is missing: mostly as it is measured.
 
     What was tried is only about where the shadow is. It grows over all that is as dark beside it,
     and the ground is told once more from what is left.
     """
-    fitted = _fitted(seen, found)
+    thrown = fitted(seen, found)
     low, high = EDGE
-    member = np.clip((fitted - low) / (high - low), 0, 1).astype(np.float32)
+    member = np.clip((thrown - low) / (high - low), 0, 1).astype(np.float32)
     coefficients, free = found.ground, seen.free.astype(np.float32)
     blur = SMOOTH[0] + SMOOTH[1] * ground.scale
     spread = cv2.GaussianBlur(free, (0, 0), blur)
-    smooth = np.zeros_like(fitted)
+    smooth = np.zeros_like(thrown)
     for _ in range(GROWN):
         measured = (ground.everywhere @ coefficients).astype(np.float32) - seen.brightness
         blurred = cv2.GaussianBlur(measured * free, (0, 0), blur)
         smooth = np.asarray(blurred / np.maximum(spread, 1e-3), np.float32)
         lit = smooth.ravel()[ground.index][member.ravel()[ground.index] < LIT]
         usual = 1.4826 * float(np.median(np.abs(lit))) if len(lit) else 0.0
-        member = _spread(member, smooth, fitted, max(DARKER, SURE * usual), seen.free)
+        member = _spread(member, smooth, thrown, max(DARKER, USUAL * usual), seen.free)
         weight = ground.weight * (1 - member.ravel()[ground.index])
         if weight.sum() > LEAST_LEFT * ground.weight.sum():
             coefficients, *_ = regressed(ground.basis, ground.brightness, weight)
     share = max(1 - ground.scale, MEASURED) * np.clip(spread, 0, 1)
-    depth = fitted + share * (np.clip(smooth, 0, DEEPEST) - fitted)
+    depth = thrown + share * (np.clip(smooth, 0, DEEPEST) - thrown)
     depth = np.clip(depth, 0, np.minimum(_room(seen, ground, member, blur), DEEPEST)) * member
     depth[[0, -1]] = 0
     depth[:, [0, -1]] = 0
     return np.asarray(depth, np.float32)
 
 
-def _room(seen: _Seen, ground: _Ground, member: F32, blur: float) -> F32:
+def _of_one_colour(seen: Seen, ground: Ground, found: Found) -> F32:
+    """(h, w) in [0, 1] where it is as coloured as the ground around the shadow.
+
+    What is not is another material, or stands upright on the ground: no shadow is taken off it.
+    """
+    lit = fitted(seen, found).ravel()[ground.index] < DARKER
+    green = seen.brightness - seen.colour @ LUMA[[0, 2]]
+    lightest = green + np.maximum(seen.colour.max(-1), 0)  # of the three, natural logarithm
+    is_told = lightest > np.log(SHOWS)
+    is_ground = np.ones(seen.cover.shape, np.uint8)
+    if lit.sum() > LEAST_CELLS:
+        basis = ground.basis[lit, :3]  # a plane: what is curved runs away where it is not told
+        for channel in np.moveaxis(seen.colour, -1, 0):
+            values = channel.ravel()[ground.index].astype(np.float64)
+            usual, _, spread = regressed(basis, values[lit], ground.weight[lit])
+            off = cv2.blur(np.abs(channel - ground.everywhere[..., :3] @ usual), (3, 3))
+            is_other = is_told & (off > max(MOST_COLOUR[0], MOST_COLOUR[1] * spread))
+            is_ground &= (~is_other).astype(np.uint8)
+    opened = cv2.morphologyEx(is_ground, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    return np.asarray(cv2.GaussianBlur(opened.astype(np.float32), (0, 0), 0.7), np.float32)
+
+
+def _room(seen: Seen, ground: Ground, member: F32, blur: float) -> F32:
     """(h, w) natural logarithm of the light that lacks until a cell is as bright as lit ground.
 
     Beneath the object, and beyond what is lit, the ground is only continued: it may be told too
@@ -376,9 +328,9 @@ def _room(seen: _Seen, ground: _Ground, member: F32, blur: float) -> F32:
     return np.asarray(room, np.float32)
 
 
-def _spread(member: F32, dark: F32, fitted: F32, least: float, free: Mask) -> F32:
+def _spread(member: F32, dark: F32, thrown: F32, least: float, free: Mask) -> F32:
     """(h, w) what belongs to the shadow: what is at least so dark and hangs together with it."""
-    core = (fitted > CORE * fitted.max()) & (dark > least)
+    core = (thrown > CORE * thrown.max()) & (dark > least)
     _, labels = cv2.connectedComponents(((dark > least) & free).astype(np.uint8))
     own = np.isin(labels, np.setdiff1d(np.unique(labels[core & free]), [0]))
     if own.sum() > MOST_GROWN * (member > 0.5).sum():  # it has run out over something dark
@@ -390,10 +342,10 @@ def _spread(member: F32, dark: F32, fitted: F32, least: float, free: Mask) -> F3
     return np.asarray(cv2.GaussianBlur(grown, (0, 0), REACH / 2), np.float32)
 
 
-def _imitated(found: _Found) -> Shadow:
+def _imitated(found: Found) -> Shadow:
     """The numbers of a shadow that takes as much light (see `shadow`)."""
     darkest = 1 - np.exp(-found.dark * float(found.thrown.max()))
-    below = 1 - np.exp(-found.contact * float(_taken(np.ones((1, 1), np.float32)).max()))
+    below = 1 - np.exp(-found.contact * float(taken(np.ones((1, 1), np.float32)).max()))
     strength = float(np.clip(max(darkest, below) / DARKEST, 0, 1))
     contact = float(np.clip(below / max(strength * DARKEST, 1e-6), 0, 1))
     return replace(found.shadow, strength=strength, contact=contact)

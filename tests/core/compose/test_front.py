@@ -176,3 +176,20 @@ def test_another_mask_is_cut_out_anew_and_a_lift_ends_it():
     assert disc.matte is not None and disc.lifted is not None
     lifted = replace(item, lifted=None).with_lifted(disc.matte, disc.lifted)
     assert not lifted.stays_in_front
+
+
+def test_a_front_that_hides_what_moves_or_is_the_background_is_doubted():
+    moved = edits.set_placement(_document(), 0, BEHIND)
+    posed = puppet_of(moved.objects[0], moved.photo.camera).posed(None, BEHIND)
+
+    def doubted(front: np.ndarray) -> str | None:
+        document = edits.set_mask(edits.add_object(moved), 2, front, Prompt())
+        return edits.doubt(document, 2, lambda _: posed)
+
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    assert edits.doubt(moved, 1, lambda _: posed) is None  # the post, as it is meant
+    hidden = doubted(np.abs(x - POST) < 2 * RADIUS)
+    assert hidden is not None and "hides" in hidden and moved.objects[0].name in hidden
+    around = doubted((x < 40) | (y < 20) | (y > HEIGHT - 20))
+    assert around == "touches 4 sides of the photo" or around == "touches 3 sides of the photo"
+    assert doubted((np.abs(x - POST) < HALF) & (y > 40) & (y < 60)) is None

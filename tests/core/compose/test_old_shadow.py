@@ -17,7 +17,9 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Matte, Placement
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.script import script_from
+from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
+from tests.shadow_scenes import scene
 from tests.shadowed import DARK, HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
 
 WAYS = [(35.0, 0.8), (150.0, 0.8), (-20.0, 1.1)]  # degrees and lengths of shadows
@@ -145,7 +147,11 @@ def test_a_script_that_moves_a_thing_takes_its_shadow_along():
     lit = photo_of(None).astype(float)
     error = [np.abs(e.composite.pixels.astype(float) - lit)[old].mean() for e in (with_it, without)]
     assert error[0] < 0.5 * error[1]
-    assert with_it.report()["pixels"]["outside_footprint_changed"] == 0
+    told, silent = with_it.report(), without.report()
+    assert told["pixels"]["outside_footprint_changed"] == 0
+    assert told["pixels"]["shadow"] > 300 and silent["pixels"]["shadow"] == 0
+    assert any("goes along" in n and "--shadow none" in n for n in told["notes"])
+    assert not silent["notes"]
     turned = run_script(
         photo, "a.png", script_from({**script, "move": [0, 0], "turn": [9, 0, 0]}), mask
     )
@@ -177,3 +183,29 @@ def test_the_cup_on_the_table():
     means = [p[where].mean() for p in (photo, result) for where in (lit, shaded)]
     assert means[1] < 0.4 * means[0]
     assert 0.55 * means[2] < means[3] < means[2]
+
+
+SHADOWLESS, SHADED = (0, 2, 4, 11, 14, 16, 17, 19), (3, 5, 13)  # seeds of scenes
+
+
+@pytest.mark.slow
+def test_what_is_dark_beside_a_thing_without_a_shadow_is_none():
+    """Neighbours, walls, edges of another material and busy grounds, photographed and drawn."""
+    found = {}
+    for seed in (*SHADOWLESS, *SHADED):
+        made = scene(seed)
+        assert made.has_shadow == (seed in SHADED)
+        found[seed] = find_old_shadow(made.photo, build_matte(made.photo, made.mask, 20))
+    assert all(found[seed] is None for seed in SHADOWLESS)
+    assert any(found[seed] is not None for seed in SHADED)
+
+
+def test_no_shadow_is_taken_off_another_material():
+    """A red book that lies in the shadow keeps its light."""
+    shade, book = thrown(35.0, 0.8), np.zeros((HEIGHT, WIDTH), bool)
+    book[150:165, 165:190] = True
+    ground = np.where(book[..., None], (0.6, 0.1, 0.1), ground_of())
+    dark = photo_of(shade, ground)
+    missing = _found(dark).missing((0, 0, WIDTH, HEIGHT))
+    inner = cv2.erode(book.astype(np.uint8), np.ones((5, 5))) > 0
+    assert missing[inner].max() < 0.1 < 0.3 < missing[(shade > 0.7) & ~book].mean()

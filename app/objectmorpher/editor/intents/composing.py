@@ -11,6 +11,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.brush import Stroke
+from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Hint, Shadow
@@ -21,6 +22,7 @@ from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_error import JobError
 from ...worker.job_functions import Choice, Variant
+from ..feedback import Action
 from ..tasks import PLATE
 
 if TYPE_CHECKING:
@@ -32,6 +34,7 @@ VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besi
 COUNT = 3  # variants
 USUAL_SHADOW = 0.55
 GRAIN = 2  # canvas px per px of the picture of a stroke
+SMOOTHED = np.ones((9, 9), np.uint8)  # px: the ground's own grain is no outline
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
@@ -45,11 +48,12 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
+        self._taken: tuple[Document, Mask] | None = None  # as it was made, and what it concerns
 
     def forget(self) -> None:
         """Another document is opened."""
         self._variants, self._ready = ((), ()), []
-        self._stroke, self._waiting = None, []
+        self._stroke, self._waiting, self._taken = None, [], None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
@@ -342,13 +346,32 @@ class Composing:
         self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow | None, plate: Plate
     ) -> None:
         editor, document = self._editor, self._editor.committed
-        if document is not None and same(masks, _masks(document)):
-            changed = edits.set_plate(document, plate)
-            if shadow is None:
-                editor.apply(t("Remove old reflection"), changed)
-            else:
-                changed = edits.set_shadow(changed, k, shadow)
-                editor.apply(t("Shadow as in the photo"), changed)
+        if document is None or not same(masks, _masks(document)):
+            return
+        changed = edits.set_plate(document, plate)
+        if shadow is None:
+            editor.apply(t("Remove old reflection"), changed)
+            text = t("What is outlined is taken off the background")
+        else:
+            editor.apply(t("Shadow as in the photo"), edits.set_shadow(changed, k, shadow))
+            text = t("The outlined shadow goes along")
+        if editor.committed is not None and plate.painted is not None:
+            whole = crop(plate.painted, plate.box, (0, 0, *document.photo.size))
+            closed = cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_CLOSE, SMOOTHED)
+            self._taken = editor.committed, closed > 0
+        editor.say(text, Action(t("Leave it in the photo"), self._refuse))
+
+    def _refuse(self) -> None:
+        """What was just taken along stays in the photo after all."""
+        if self.taken is not None:
+            self._editor.undo()
+
+    @property
+    def taken(self) -> Mask | None:
+        """(H, W) of the photo what was taken along last, until anything else is done."""
+        if self._taken is None or self._taken[0] is not self._editor.document:
+            return None
+        return self._taken[1]
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""

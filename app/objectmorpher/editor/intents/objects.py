@@ -13,6 +13,7 @@ from objectmorpher_core.document.model import Document
 
 from ...canvas.layers import is_front
 from ...system.texts import t
+from ..feedback import Action
 from ..tasks import LIFT, SELECT
 from ..view import USUAL_LEVEL, ToolName
 
@@ -167,7 +168,21 @@ class Objects:
         except edits.EditError as error:
             editor.complain(str(error))
             return
-        editor.say(t("{name} covers what moves behind it", name=item.name))
+        self._say_front(k)
+
+    def _say_front(self, k: int) -> None:
+        """What staying in front means, or that it is hardly what was meant; one click undoes it."""
+        editor, document = self._editor, self._editor.committed
+        assert document is not None
+        name, posed = document.objects[k].name, partial(self._editor.derived.posed, document)
+        if edits.doubt(document, k, posed) is None:
+            editor.say(t("{name} covers what moves behind it", name=name))
+            return
+        editor.say(
+            t("{name} covers most of the picture or of what you moved: is it the background?",
+              name=name),
+            Action(t("Do not keep in front"), self.toggle_front),
+        )  # fmt: skip
 
     # Which covers which
 

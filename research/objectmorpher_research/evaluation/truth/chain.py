@@ -142,7 +142,7 @@ class Chain:
         leaves = has_left(item)
         if leaves not in self._plates:
             casting = frozenset({0}) if leaves else frozenset[int]()
-            made = with_plate(document, EditScript(seed=self._seed), casting, silent)
+            made = with_plate(document, EditScript(seed=self._seed), casting, silent).document
             assert made.plate is not None
             self._plates[leaves] = made.plate, made.objects[0].shadow
         return self._plates[leaves]

@@ -1,0 +1,176 @@
+"""Whether what was fitted to the photo is the object's shadow, or something else that is dark.
+
+A shadow begins where the object touches the ground, ends at an edge all around, takes light of
+all colours alike, is darker than what else is beside the object, and the photo is explained by it
+better than by none. Each of these is a number; their weighted sum must exceed a margin. The
+weights are those of a logistic regression on half of the scenes of tests/shadow_scenes.py, and on
+those of docs/compositing, which says how often the other half is right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64, Mask
+from ...document.settings import Shadow
+from .robust_fit import regressed
+from .shadow_flat import Flat
+from .shadow_shear import Sheet
+
+FULL = 0.75  # of the light, that a full shadow is taken to leave out
+CORE = 0.3  # of the darkest that was fitted: what is darker is the shadow's core
+LIT = 0.1  # of it: what is lighter is lit ground
+OVER = 2.0  # cells, over which the ground's own texture is evened
+SIDE = 4.0  # cells, over which the two sides of an edge are compared
+WIDE = 5.0  # cells from an edge that belong to its sides
+FOOT = 0.2  # x the object's height, around the line on which it stands
+TOUCHING = 4.0  # cells from the object
+NEAR = 25.0  # cells from it, where other dark things count
+AS_DARK = 0.4  # x the shadow: what is darker beside it is as dark
+LEAST_OTHERS = 0.02  # of what is beside it
+WEIGHTS = {
+    "gain": 2.62, "others": -1.47, "joined": 1.79, "whole": 1.97, "tint": -1.08, "behind": 2.77,
+}  # fmt: skip
+BIAS = -4.81
+MOST_TINT = 0.6  # x its darkness: what changes colours by more is another material
+SURE = 2.1  # margin: one in fifty of the scenes without a shadow has a higher score
+LIKELY = 0.7  # margin where somebody has asked for the shadow, sees it outlined, and can refuse
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The object's surroundings on a small grid."""
+
+    brightness: F32  # (h, w) natural logarithm of linear light
+    colour: F32  # (h, w, 2) logarithms of ratios
+    cover: F32  # (h, w) of the object
+    free: Mask  # (h, w) ground, or whatever else is not the object
+    standing: Sheet | Flat
+    left: float
+    top: float
+    pitch: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Where it is asked for, and how it varies without a shadow."""
+
+    index: np.ndarray  # (n,) of the cells
+    weight: F64  # (n,)
+    basis: F64  # (n, 6)
+    everywhere: F64  # (h, w, 6) the same of all cells
+    brightness: F64  # (n,)
+    contact: F64  # (n,) natural logarithm of the light that a contact takes
+    alone: F64  # (6,) its brightness where there is no shadow
+    loss: float
+    scale: float  # of what is not explained
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A shadow that was tried."""
+
+    shadow: Shadow
+    gain: float  # of the loss
+    thrown: F32  # (h, w) natural logarithm of the light that it takes at strength 1
+    ground: F64  # (6,)
+    dark: float  # how much of it there is
+    contact: float
+    scale: float  # of what is not explained
+
+
+def taken(shadow: F32) -> F32:
+    """Natural logarithm of the light that a shadow of opacity (h, w) takes."""
+    return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
+
+
+def fitted(seen: Seen, found: Found) -> F32:
+    """(h, w) natural logarithm of the light that the shadow takes which was found."""
+    contact = taken(seen.standing.contact())
+    return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
+
+
+def score(seen: Seen, ground: Ground, found: Found) -> float:
+    """How much speaks for it, against something else that is dark (see SURE); -inf: it is none."""
+    numbers = evidence(seen, ground, found)
+    if numbers["tint"] > MOST_TINT:
+        return -np.inf
+    return sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
+
+
+def evidence(seen: Seen, ground: Ground, found: Found) -> dict[str, float]:
+    """What speaks for the shadow, by the names of WEIGHTS."""
+    thrown = fitted(seen, found)
+    lacking = (ground.everywhere @ found.ground).astype(np.float32) - seen.brightness
+    unlike = seen.brightness - (ground.everywhere @ ground.alone).astype(np.float32)
+    even, told, without = (_evened(v, seen.free) for v in (lacking, thrown, unlike))
+    weight = np.zeros(seen.cover.size)
+    weight[ground.index] = ground.weight
+    weight = weight.reshape(seen.cover.shape)
+    asked = weight > 0
+    most = float(thrown[asked].max())
+    away = cv2.distanceTransform((seen.cover < 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    beside = asked & (thrown < LIT * most) & (away < NEAR)
+    others = float((even[beside] > AS_DARK * most).mean()) if beside.any() else 1.0
+    near = asked & (thrown > CORE * most) & (away < TOUCHING)
+    rest = float((weight * np.abs(even - told)).sum())
+    is_flat = isinstance(seen.standing, Flat)
+    return {
+        "gain": float(np.log((weight * np.abs(without)).sum() / max(rest, 1e-6))),
+        "others": float(np.log(others + LEAST_OTHERS)),
+        "joined": _joined(seen, even, told, near),
+        "whole": _whole(lacking, thrown, asked, most),
+        "tint": min(_tint(seen, ground, found), 1.5),
+        "behind": 0.0 if is_flat else min(float(np.sin(np.radians(found.shadow.direction))), 0.0),
+    }
+
+
+def _evened(values: F32, free: Mask) -> F32:
+    """(h, w) means over some cells of what is seen."""
+    weight = free.astype(np.float32)
+    spread = np.maximum(cv2.GaussianBlur(weight, (0, 0), OVER), 0.05)
+    return np.asarray(cv2.GaussianBlur(values * weight, (0, 0), OVER) / spread, np.float32)
+
+
+def _joined(seen: Seen, even: F32, told: F32, near: Mask) -> float:
+    """The share of where the object touches the ground, in shadow, that is dark indeed."""
+    standing = seen.standing
+    if isinstance(standing, Sheet):
+        rows = np.arange(len(near))[:, None] + 0.5
+        near = near & (np.abs(rows - standing.ground) < FOOT * standing.height)
+    return float((even[near] > 0.5 * told[near]).mean()) if near.any() else 0.0
+
+
+def _whole(lacking: F32, thrown: F32, asked: Mask, most: float) -> float:
+    """The share of the shadow's edge at which the photo has a step of light, too."""
+    is_shade = thrown > 0.5 * most
+    inside, outside = (
+        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
+        for part in (is_shade, ~is_shade)
+    )
+    is_lit = ~is_shade & (thrown < AS_DARK * most)
+    sides = asked & is_shade & (inside < WIDE), asked & is_lit & (outside < WIDE)
+    weights = [cv2.GaussianBlur(side.astype(np.float32), (0, 0), SIDE) for side in sides]
+    edge = ~is_shade & (outside < 1.5) & (weights[0] > 0.03) & (weights[1] > 0.03)
+    if not edge.any():
+        return 0.0
+    steps = []
+    for values in (lacking, thrown):
+        inner, outer = (
+            cv2.GaussianBlur(values * side, (0, 0), SIDE)[edge] / weight[edge]
+            for side, weight in zip(sides, weights, strict=True)
+        )
+        steps.append(inner - outer)
+    return float((steps[0] > AS_DARK * steps[1]).mean())
+
+
+def _tint(seen: Seen, ground: Ground, found: Found) -> float:
+    """How much it changes colours, x its darkness: another material begins with another colour."""
+    column = found.thrown.ravel()[ground.index].astype(np.float64)
+    basis = np.column_stack([ground.basis, -column])
+    channels = seen.colour.reshape(-1, 2)[ground.index].T.astype(np.float64)
+    changes = [abs(float(regressed(basis, c, ground.weight)[0][6])) for c in channels]
+    return max(changes) / max(found.dark, 1e-6)
