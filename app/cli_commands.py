@@ -110,14 +110,14 @@ def run_select(options: argparse.Namespace) -> None:
 
 def run_replay(options: argparse.Namespace) -> None:
     """`objectmorpher replay`"""
-    from objectmorpher_core.session_file import decode_session
+    from objectmorpher_core.session_file import load_session
 
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
     check_outputs([options.session], wanted)
     with progress_bar("Opening") as progress:
-        edited = replay(decode_session(options.session.read_bytes()), progress)
+        edited = replay(load_session(options.session), progress)
         outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
         if options.report:
             outputs[options.report] = json_bytes(edited.report())
@@ -126,9 +126,9 @@ def run_replay(options: argparse.Namespace) -> None:
 
 def run_info(options: argparse.Namespace) -> None:
     """`objectmorpher info`"""
-    from objectmorpher_core.session_file import decode_session
+    from objectmorpher_core.session_file import load_session
 
-    info = describe(decode_session(options.session.read_bytes()))
+    info = describe(load_session(options.session))
     if options.json:
         sys.stdout.write(json_bytes(info).decode())
         return
