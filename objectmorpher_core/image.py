@@ -15,6 +15,7 @@ from PIL import Image, ImageCms
 
 from . import exif, png, tiff
 from .arrays import RGB, U8, Mask, Pixels, frozen
+from .library_output import logged_output
 from .limits import PICTURE_PIXELS as MAX_PIXELS
 
 FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "BMP", "GIF")  # plain pixels, no programs
@@ -58,6 +59,11 @@ def read_picture(data: bytes, most: int = MAX_PIXELS) -> Picture:
     """
     if not data:
         raise ImageError("the image file is empty")
+    with logged_output("a picture"):
+        return _read(data, most)
+
+
+def _read(data: bytes, most: int) -> Picture:
     try:
         image = Image.open(io.BytesIO(data), formats=FORMATS)
     except Image.DecompressionBombError:
