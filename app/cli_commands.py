@@ -148,7 +148,8 @@ def describe(document: Document) -> dict[str, Any]:
         objects.append({
             "name": item.name,
             "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
-            "gaussians": 0 if lifted is None else len(lifted.gaussians),
+            "gaussians": 0 if lifted is None else len(lifted.body),
+            "edge_gaussians": 0 if lifted is None else len(lifted.gaussians) - len(lifted.body),
             "control_points": 0 if lifted is None else len(lifted.control_points),
             "handles": sum(not h.is_pin for h in item.handles),
             "pins": sum(h.is_pin for h in item.handles),

@@ -269,7 +269,7 @@ def _with_copies(document: Document) -> Document:
     objects = []
     for item in document.objects:
         if item.mask is not None:
-            key = hashlib.sha256(item.mask).digest() + repr(item.mask.shape).encode()
+            key = hashlib.sha256(item.mask.data).digest() + repr(item.mask.shape).encode()
             mask = known.setdefault(key, item.mask)
             item = item if mask is item.mask else replace(item, mask=mask)
         objects.append(item)
