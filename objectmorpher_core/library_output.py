@@ -1,4 +1,4 @@
-"""What libraries print while a file is read goes to the log, not to whoever asked for the file.
+"""What libraries print about a file goes to the log, not to whoever asked for the file.
 
 libtiff and OpenCV write to the file descriptor itself, past `sys.stderr`. It is redirected for as
 long as something is read, for all threads: their output is logged, too.
@@ -23,7 +23,7 @@ MOST = 4000  # characters of it that are logged
 
 @contextmanager
 def logged_output(what: str) -> Iterator[None]:
-    """Logs what is printed on stderr inside, as of reading `what`; nothing of it is shown."""
+    """Logs what is printed on stderr inside, as about `what`; nothing of it is shown."""
     _capture.begin(what)
     try:
         yield
@@ -52,7 +52,7 @@ class _Capture:
             self._readers -= 1
             text = self._restored() if self._readers == 0 else ""
         if text:
-            log.info("While %s was read: %s", self._what, text[:MOST])
+            log.info("About %s: %s", self._what, text[:MOST])
 
     def _redirect(self) -> None:
         """Where there is no room for a file, or no stderr, everything stays as it is."""

@@ -55,7 +55,7 @@ def test_a_fault_of_ours_is_a_sentence_that_names_the_log(monkeypatch, capsys, c
     monkeypatch.setattr("app.cli_commands.run_info", fail)
     assert cli.main(["info", "x.omorph"]) == cli.FAILED
     told = capsys.readouterr().err
-    assert cli.UNFORESEEN in told and "(Fault)" in told and NAME in told
+    assert cli.UNFORESEEN in told and "(Fault: of ours)" in told and NAME in told
     assert told.count("\n") == 1
     assert "Traceback" in caplog.text
 
@@ -69,4 +69,4 @@ def test_output_of_native_code_while_a_picture_is_read_is_logged(capfd, caplog) 
         os.write(2, b"libtiff says this\n")
     os.write(2, b"said afterwards\n")
     assert capfd.readouterr().err == "said afterwards\n"
-    assert "While a picture was read: libtiff says this" in caplog.text
+    assert "About a picture: libtiff says this" in caplog.text
