@@ -204,6 +204,16 @@ figures: .make/test
 fuzz: .make/test
 	@$(PYTHON) -m tests.fuzz --seconds $(or $(SECONDS),600) $(ARGS)
 
+# Runs the command line with values that nobody means: docs/reliability.md. RUNS says how often.
+.PHONY: fuzz-options
+fuzz-options: .make/test
+	@$(PYTHON) -m tests.fuzz.options --runs $(or $(RUNS),20000) $(ARGS)
+
+# Has sessions read that an attacker made, and measures memory and time.
+.PHONY: fuzz-sessions
+fuzz-sessions: .make/test
+	@$(PYTHON) -m tests.fuzz.hostile $(ARGS)
+
 # Lets every system call go wrong with which something is written; ARGS=--power cuts the power.
 .PHONY: faults
 faults: .make/test

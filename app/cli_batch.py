@@ -21,6 +21,7 @@ from objectmorpher_core.script import (
     beside,
     files_of,
     parse_scripts,
+    read_scripts,
     script_text,
 )
 
@@ -175,7 +176,7 @@ def _tasks(options: argparse.Namespace) -> Iterator[Task]:
     taken: set[Path] = set()
     for script in _files(options.scripts, (".json",)):
         try:
-            items = parse_scripts(script.read_text(encoding="utf-8"))
+            items = read_scripts(script)
         except (ValueError, OSError) as error:
             yield Task(script, None, failure_sentence(error))
             continue

@@ -12,7 +12,7 @@ from typing import Any
 from objectmorpher_core.animation import Clip
 from objectmorpher_core.arrays import Mask
 from objectmorpher_core.document import Document
-from objectmorpher_core.files import write_all
+from objectmorpher_core.files import read_input, write_all
 from objectmorpher_core.image import ENDINGS, encode_mask, encode_picture
 from objectmorpher_core.outputs import NEED_PLATE, OUTPUTS, encode_output
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
@@ -24,7 +24,7 @@ from objectmorpher_core.script import (
     ScriptError,
     beside,
     files_of,
-    parse_scripts,
+    read_scripts,
     script_from,
 )
 from objectmorpher_core.scripted import refuse_missing
@@ -72,8 +72,8 @@ def run_edit(options: argparse.Namespace) -> None:
 def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
     """One edit of a batch, or the only one."""
     photo, script = Path(item.photo or ""), item.script
-    mask = Path(script.mask).read_bytes() if script.mask else None
-    data = photo.read_bytes()
+    mask = read_input(Path(script.mask)) if script.mask else None
+    data = read_input(photo)
     return run_script(data, photo.name, script, mask, progress, needs_plate, item.others)
 
 
@@ -101,9 +101,9 @@ def run_select(options: argparse.Namespace) -> None:
     inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
     check_outputs(inputs, {options.out: (".png",)})
     refuse_missing(script)
-    mask = Path(script.mask).read_bytes() if script.mask else None
+    mask = read_input(Path(script.mask)) if script.mask else None
     with progress_bar("Selecting") as progress:
-        document = open_photo(options.photo.read_bytes(), options.photo.name)
+        document = open_photo(read_input(options.photo), options.photo.name)
         document = select_object(document, script, mask, progress)
     write_all({options.out: encode_mask(_mask(document))})
 
@@ -207,7 +207,7 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
     if options.script is None:
         items = [BatchItem(said)]
     else:
-        read = parse_scripts(options.script.read_text(encoding="utf-8"))
+        read = read_scripts(options.script)
         folder = options.script.parent
         items = [beside(item, folder) for item in read]
         items = [replace(i, script=i.script.merged(said, _said(options))) for i in items]

@@ -10,6 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from objectmorpher_core.shown import named
+
 from .terminal import PROGRAM
 
 MISUSED = 2  # exit code
@@ -20,7 +22,8 @@ class Parser(argparse.ArgumentParser):
     """An ArgumentParser that suggests the nearest word, and names choices where one is missing."""
 
     def error(self, message: str) -> Any:
-        sys.stderr.write(f"{PROGRAM}: {self._helpful(message)}\n")
+        told = re.sub(r"\S+", lambda word: named(word[0]), self._helpful(message))
+        sys.stderr.write(f"{PROGRAM}: {told}\n")
         raise SystemExit(MISUSED)
 
     def _helpful(self, message: str) -> str:

@@ -19,6 +19,7 @@ from .camera import Camera
 from .compose.composite import OPAQUE, Composite, composite
 from .compose.plate import build_plate
 from .document import AS_SEEN, Document, LiftedObject, LiftSettings, Matte, Photo, Plate, Prompt
+from .files import read_input
 from .hint import Hint
 from .image import ImageError, Picture, read_mask, read_picture, to_u8
 from .importing import Scene, Source, place_import, register_file
@@ -240,7 +241,7 @@ def continue_script(
         own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
         with scripted.told_of(k + 1, others):
             if k > 0:
-                mask = Path(own.mask).read_bytes() if own.mask else None
+                mask = read_input(Path(own.mask)) if own.mask else None
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
     document = scripted.ordered(run.document, others)
@@ -320,7 +321,7 @@ class _Run:
             (replace(script, **NO_CHOICE | {"click": (xy,)}), None) for xy in script.front
         ]
         if script.front_mask is not None:
-            wishes.append((script, Path(script.front_mask).read_bytes()))
+            wishes.append((script, read_input(Path(script.front_mask))))
         for number, (wanted, mask) in enumerate(wishes, 1):
             progress(0.6, "Cutting out what stays in front")
             k = len(self.document.objects)

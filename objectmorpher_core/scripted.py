@@ -23,6 +23,7 @@ from .document import (
     Placement,
     Prompt,
 )
+from .files import read_input
 from .image import read_mask
 from .joining import Shadow
 from .progress import Progress
@@ -98,7 +99,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
     """What the script says about the object's shape. Raises ImageError."""
     hidden = None
     if script.hidden is not None:
-        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
+        hidden = read_mask(read_input(Path(script.hidden)), document.photo.size)
     return LiftSettings(
         count=script.gaussians or GAUSSIANS,
         thickness=script.thickness,

@@ -219,7 +219,8 @@ class _Filling:
         inside = np.pad(np.where(self.hole, np.float32(HOLE_WEIGHT), 1), self._radius)
         self._weight = inside[..., None] * weights
         depth = cv2.distanceTransform(self.hole.astype(np.uint8), cv2.DIST_L2, 5)
-        self._trust = np.maximum(np.float32(TRUST) ** -depth, LEAST_TRUST)
+        trust = np.maximum(np.float32(TRUST) ** -depth, LEAST_TRUST)
+        self._trust = np.asarray(trust, np.float32)
         self._costs = np.ones(self.hole.shape, np.float32)
         self._places = np.argwhere(self._usable).astype(np.int32)
         self.sources: I32 = np.full((*self.hole.shape, 3), -1, np.int32)
