@@ -199,12 +199,12 @@ docs: .make/docs.stamp
 figures: .make/test
 	@$(PYTHON) docs/concepts/make_figures.py
 
-# Damages files of every kind and has them read: docs/reliability.md. SECONDS says for how long.
+# Damages files of every kind and has them read: docs/reliability-tests.md. SECONDS says for how long.
 .PHONY: fuzz
 fuzz: .make/test
 	@$(PYTHON) -m tests.fuzz --seconds $(or $(SECONDS),600) $(ARGS)
 
-# Runs the command line with values that nobody means: docs/reliability.md. RUNS says how often.
+# Runs the command line with values that nobody means: docs/reliability-tests.md. RUNS says how often.
 .PHONY: fuzz-options
 fuzz-options: .make/test
 	@$(PYTHON) -m tests.fuzz.options --runs $(or $(RUNS),20000) $(ARGS)

@@ -2,7 +2,7 @@
 
 A file is written under a temporary name in its own folder, down to the disk, renamed, and the
 folder is brought down to the disk, too. Whatever fails in between, and wherever the power is cut,
-the file is the old one or the new one. (docs/reliability.md tells how that is tested.)
+the file is the old one or the new one. (docs/reliability-tests.md tells how that is tested.)
 """
 
 from __future__ import annotations

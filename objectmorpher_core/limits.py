@@ -1,6 +1,6 @@
 """What a file or a message may claim before it is believed: every limit on what is read.
 
-A limit is refused with one sentence, before anything is allocated for it. docs/reliability.md
+A limit is refused with one sentence, before anything is allocated for it. docs/reliability-tests.md
 lists them; a test keeps that list complete.
 """
 

@@ -131,6 +131,7 @@ def test_a_clock_that_jumps_back_takes_nothing_away(tmp_path: Path) -> None:
     assert left is not None and left.edited is not None and when(left.edited)
 
 
+@pytest.mark.slow
 def test_two_windows_on_one_session_leave_one_of_the_two(folder: Path, shared_editor) -> None:
     """Each saves whole; the last one stays, and what the other has open is its own."""
     path = folder / "both.omorph"
@@ -142,10 +143,13 @@ def test_two_windows_on_one_session_leave_one_of_the_two(folder: Path, shared_ed
             editor.filing.open(path)
             wait_until(editor, lambda editor=editor: editor.committed is not None)
         for by, editor in (("first", shared_editor), ("second", other), ("first", shared_editor)):
-            editor.apply("Mark", editor.committed.with_backend("segment", by))
+            document = editor.committed
+            assert document is not None
+            editor.apply("Mark", document.with_backend("segment", by))
             editor.filing.save()
             wait_until(editor, lambda editor=editor: editor.is_saved and editor.chores.is_idle)
             assert dict(load_session(path).backends)["segment"] == by
+        assert other.committed is not None
         assert dict(other.committed.backends)["segment"] == "second"
     finally:
         other.shut_down()

@@ -12,12 +12,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -48,6 +50,8 @@ FIRST = (  # what is imported and compiled late comes before the limits
 def verdict(words: list[str]) -> tuple[str, str]:
     """Whether a run gave a picture ("done"), one sentence ("refused"), or neither, and why."""
     for name in OUTPUTS:
+        if Path(name).is_dir():  # of a batch
+            shutil.rmtree(name)
         Path(name).unlink(missing_ok=True)
     with _redirected() as told:
         try:
@@ -84,18 +88,26 @@ def _check_outputs(words: list[str]) -> None:
 
 
 @contextmanager
-def _redirected():
+def _redirected() -> Iterator[str]:
     """What the process writes to stdout and stderr, native code included, goes to files."""
-    sys.stdout.flush(), sys.stderr.flush()
+    streams = sys.stdout, sys.stderr
+    for stream in streams:
+        stream.flush()
     saved = os.dup(1), os.dup(2)
     for number, name in ((1, "stdout"), (2, "stderr")):
         target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(target, number)
         os.close(target)
+    sys.stdout, sys.stderr = (
+        open(number, "w", closefd=False, encoding="utf-8")  # noqa: SIM115  a pytest's are not these
+        for number in (1, 2)
+    )
     try:
         yield "stderr"
     finally:
-        sys.stdout.flush(), sys.stderr.flush()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = streams
         for number, old in enumerate(saved, 1):
             os.dup2(old, number)
             os.close(old)
@@ -112,7 +124,7 @@ def child(number: int, count: int) -> None:
 
     @seed(number)
     @settings(max_examples=count, database=None, deadline=None, phases=[Phase.generate],
-              suppress_health_check=list(HealthCheck))  # fmt: skip
+              suppress_health_check=[*HealthCheck])  # fmt: skip
     @given(command_lines())
     def run(words: list[str]) -> None:
         Path(NOW).write_text(json.dumps({"words": words, "tally": tally}), encoding="utf-8")
