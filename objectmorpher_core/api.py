@@ -19,7 +19,7 @@ import numpy as np
 from .animation import Clip
 from .arrays import Mask, Pixels
 from .document import Document
-from .files import write_all
+from .files import read_input, write_all
 from .image import encode_mask
 from .outputs import encode_output
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
@@ -273,10 +273,10 @@ class Result:
 
 
 def _read(file: File) -> tuple[bytes, str]:
-    """The bytes of a file and its name without folder. Raises OSError of one sentence."""
+    """The bytes of a file and its name without folder. Raises OSError, InputError: one sentence."""
     path = Path(file)
     try:
-        return path.read_bytes(), path.name
+        return read_input(path), path.name
     except FileNotFoundError:
         raise FileNotFoundError(f"{path} does not exist") from None
     except IsADirectoryError:
