@@ -14,7 +14,7 @@ PYTHON := .venv/bin/python
 PIP := $(PYTHON) -m pip --disable-pip-version-check
 # Bytecode, also where PYTHONDONTWRITEBYTECODE says that no import writes any: every window has a
 # worker process, which would compile all sources anew.
-COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core tests
+COMPILE := $(PYTHON) -m compileall -q app objectmorpher_core research tests
 PHOTO ?=
 ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
@@ -54,24 +54,24 @@ test-slow: .make/test
 # tiny and with random weights. TORCH names the build that pip is to install.
 .PHONY: test-models
 TORCH ?= torch==2.13.0
-BESIDE := 'torchmetrics>=1.6' 'h5py>=3.11' # others' measures and files, to compare ours with
+BESIDE := 'torchmetrics>=1.6' # others' measures, to compare ours with
 test-models: .make/models
 	@$(COMPILE)
-	for part in tests/app tests/core; do # apart: each has a conftest.py of its own
-	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|h5py|"ray"' $$part --include='test_*.py' | sort)
+	for part in tests/app tests/core tests/research; do # apart: some have a conftest.py of their own
+	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart' $$part --include='test_*.py' | sort)
 	done
 
 .make/models: .make/test
-	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,train,cluster]'
+	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,research,cluster]' -e research
 	touch $@
 
 # The study's page in a real browser, which `make test` leaves out: Chromium is large.
 .PHONY: test-browser
 test-browser: .make/browser
-	@$(PYTHON) -m pytest -m "slow or not slow" $(ARGS) tests/app/test_study_browser.py
+	@$(PYTHON) -m pytest -m "slow or not slow" $(ARGS) tests/research/study/test_study_browser.py
 
 .make/browser: .make/test
-	@$(PIP) install -q -e '.[dev,browser]'
+	@$(PIP) install -q -e '.[dev,browser]' -e research
 	$(APT)
 	command -v chromedriver >/dev/null || apt_install chromium chromium-driver
 	touch $@
@@ -88,10 +88,10 @@ test-browser: .make/browser
 	$(PYTHON) -m app.warm_up
 	touch $@
 
-.make/test: .make/venv pyproject.toml
+.make/test: .make/venv pyproject.toml research/pyproject.toml
 	@echo "Installing ObjectMorpher and its test tools into .venv (minutes, the first time)"
 	if [ -n "$(LOCK)" ]; then $(PIP) install --progress-bar on --require-hashes -r "$(LOCK)"; fi
-	$(PIP) install --progress-bar on -e '.[dev]'
+	$(PIP) install --progress-bar on -e '.[dev]' -e research
 	$(APT)
 	missing=()
 	$(PYTHON) -c 'import ctypes; ctypes.CDLL("libGL.so.1")' 2>/dev/null || missing+=(libgl1)

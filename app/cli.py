@@ -20,7 +20,7 @@ from . import __version__
 from .cli_ray import add_ray
 from .command_parser import MISUSED, Parser, misspelt_command
 from .options import RENDERERS, WindowOptions
-from .subcommands import Subcommand, add_subcommands, lazily
+from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
 from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
@@ -33,6 +33,9 @@ log = logging.getLogger(__name__)
 
 def main(arguments: Sequence[str]) -> int:
     """Runs a subcommand; returns the exit code."""
+    if (absent := _absent(arguments)) is not None:
+        sys.stderr.write(f"{PROGRAM}: {absent}\n")
+        return FAILED
     options = build_parser().parse_args(_joined_negatives(arguments))
     try:
         options.run(options)
@@ -55,15 +58,25 @@ def _told(error: Exception, command: str) -> str:
     return f"{UNFORESEEN} ({type(error).__name__}: {reason(error)}); see {log_path()}"
 
 
+def _absent(arguments: Sequence[str]) -> str | None:
+    """Return why a command of the research package cannot run: one sentence, or None."""
+    word = next(iter(arguments), "")
+    if word not in RESEARCH or word in (command.name for command in research_commands()):
+        return None
+    from objectmorpher_core.installation import extra
+
+    return f"{word} is part of the research package, which is not installed: `{extra('research')}`"
+
+
 def build_parser() -> argparse.ArgumentParser:
-    """All subcommands and their options."""
+    """All subcommands and their options; those of the research package where it is installed."""
     parser = Parser(
         prog=PROGRAM,
         description="Open a photo, click an object, drag points on it in 3D, save the photo.",
         epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
-    add_subcommands(parser, "command", SUBCOMMANDS)
+    add_subcommands(parser, "command", (*SUBCOMMANDS, *research_commands()))
     return parser
 
 
@@ -249,13 +262,6 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
         help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
 
 
-def _add_bench(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("deform", "render", "pipeline"),
-        help="which part of the program; pipeline: the whole edit")  # fmt: skip
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write there, not to stdout")
-    parser.add_argument("--quick", action="store_true", help="few repetitions, one size")
-
-
 def _add_warm_up(parser: argparse.ArgumentParser) -> None:
     parser.description = "A minute or two after an installation, seconds afterwards."
 
@@ -356,7 +362,6 @@ SUBCOMMANDS = (
     _command("replay", "render a saved session again", _add_replay),
     _command("info", "what a session holds", _add_info),
     _command("convert", "turn splat and mesh files into each other", _add_convert),
-    _command("bench", "measure, on objects it makes itself", _add_bench),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
         lazily("cli_models", "run_models"),
@@ -366,11 +371,9 @@ SUBCOMMANDS = (
         lazily("cli_doctor", "run_doctor"),
     ),
     _command("warm-up", "compile the kernels now, not when needed", _add_warm_up),
-    Subcommand("train", "make the product's own networks", lazily("cli_train", "add_train")),
     Subcommand(
         "serve", "compute for the windows of other computers", lazily("cli_serve", "add_serve"),
         lazily("cli_serve", "run_serve"),
     ),
-    Subcommand("evaluate", "how good results are", lazily("cli_evaluate", "add_evaluate")),
 )  # fmt: skip
-COMMANDS = tuple(subcommand.name for subcommand in SUBCOMMANDS)
+COMMANDS = (*(subcommand.name for subcommand in SUBCOMMANDS), *RESEARCH)

@@ -190,17 +190,6 @@ def run_warm_up(options: argparse.Namespace) -> None:
     compile_kernels()
 
 
-def run_bench(options: argparse.Namespace) -> None:
-    """`objectmorpher bench`"""
-    from . import bench
-
-    figures = json_bytes(bench.run_bench(options.what, options.quick))
-    if options.json:
-        write_all({options.json: figures})
-    else:
-        sys.stdout.write(figures.decode())
-
-
 def _items(options: argparse.Namespace) -> list[BatchItem]:
     """The edits that the command line asks for, each with its photo and output."""
     said = _script(options)

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+GROUP = "objectmorpher.commands"  # of entry points, each a Subcommand
+RESEARCH = ("bench", "train", "evaluate")  # commands of research/, which is installed apart
+
 
 @dataclass(frozen=True)
 class Subcommand:
@@ -31,10 +34,24 @@ def add_subcommands(
             word.set_defaults(run=subcommand.run)
 
 
-def lazily(module: str, function: str) -> Callable[[Any], None]:
-    """A function of one of our modules, imported when it is called: `--help` stays instant."""
+def lazily(module: str, function: str, package: str = __package__) -> Callable[[Any], None]:
+    """A function of a module in `package`, imported when it is called: `--help` stays instant."""
 
     def call(argument: Any) -> None:
-        getattr(import_module(f".{module}", __package__), function)(argument)
+        getattr(import_module(f".{module}", package), function)(argument)
 
     return call
+
+
+def research_commands() -> tuple[Subcommand, ...]:
+    """Return those of RESEARCH that an installed package offers, in the order of RESEARCH.
+
+    A package whose files are gone, as those of a moved checkout are, counts as not installed.
+    """
+    from importlib.metadata import entry_points
+
+    offered = {point.name: point for point in entry_points(group=GROUP)}
+    try:
+        return tuple(offered[name].load() for name in RESEARCH if name in offered)
+    except ImportError:
+        return ()

@@ -10,8 +10,6 @@ from importlib.metadata import PackageNotFoundError, version
 
 from . import backends, compose, lift, models, segment
 from .compose import refine
-from .evaluation.measures import trunk_files
-from .evaluation.metrics import METRICS
 from .lift import depth_look, worker_file
 from .lift.trellis import weights
 from .models import device
@@ -82,7 +80,7 @@ def look_at_stages() -> tuple[Stage, ...]:
         (_filling(), compose.BACKENDS), (_harmonising(), refine.BACKENDS),
     )  # fmt: skip
     able = (replace(stage, able=_able(stage, table)) for stage, table in stages)
-    return *able, _evaluating()
+    return tuple(able)
 
 
 def _able(stage: Stage, table: Iterable[str]) -> tuple[str, ...]:
@@ -214,17 +212,3 @@ def _harmonising() -> Stage:
         better = f"a GPU of 12 GB, here or in a server (docs/serve.md): {better}"
     why = f"unless it is asked for by its name: {', '.join(others)}"
     return Stage("refine", "none", why, absent, better)
-
-
-def _evaluating() -> Stage:
-    """What `objectmorpher evaluate` can measure; the official networks are the user's to bring."""
-    reasons = {name: trunk_files.why_missing(name) for name in METRICS}
-    uses = ", ".join(name for name, reason in reasons.items() if reason is None)
-    absent = tuple(
-        (", ".join(name for name, of in reasons.items() if of == reason), reason)
-        for reason in dict.fromkeys(reasons.values())
-        if reason is not None
-    )
-    own = [id for id in trunk_files.OWN if models.path(id) is None]
-    better = f"`objectmorpher models get {own[0]}`" if own else ""
-    return Stage("evaluate", uses, "measures whose networks are here", absent, better)

@@ -25,7 +25,8 @@ from packaging.utils import canonicalize_name
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 PAGE = PROJECT.parent / "docs" / "licences.md"
-EXTRAS = ("models", "cluster", "train")  # that people install; the others are for our own tests
+EXTRAS = ("models", "cluster", "research")  # that people install; the others are for our own tests
+OWN = ("objectmorpher", "objectmorpher-research")
 START, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 TEXT = re.compile(r"(^|/)(LICEN[CS]E|COPYING|COPYRIGHT|NOTICE|AUTHORS)[^/]*$", re.I)
 COPYLEFT = re.compile(r"(?<!L)(AGPL|GPL|Affero|(?<!Lesser )General Public License)", re.I)
@@ -81,13 +82,20 @@ def of_extras(project: Path = PROJECT) -> dict[str, list[Licence]]:
     told = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     found: dict[str, list[Licence]] = {}
     for extra in EXTRAS:
-        found[extra] = []
-        for line in told[extra]:
-            try:
-                found[extra].append(licence_of(distribution(Requirement(line).name)))
-            except PackageNotFoundError as error:
-                raise LookupError(f"{line} is not installed here") from error
+        try:
+            others = [name for line in told[extra] for name in _others(Requirement(line).name)]
+            found[extra] = [licence_of(distribution(name)) for name in others]
+        except PackageNotFoundError as error:
+            raise LookupError(f"{error.name} is not installed here") from error
     return found
+
+
+def _others(name: str) -> list[str]:
+    """A package's name; of one of our own, the names of those that it asks for."""
+    if name not in OWN:
+        return [name]
+    asked = [Requirement(line).name for line in distribution(name).requires or ()]
+    return [other for other in asked if other not in OWN]
 
 
 def licence_of(package: Distribution) -> Licence:

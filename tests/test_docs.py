@@ -188,7 +188,7 @@ def test_every_target_of_make_exists(page):
 @every_page
 def test_every_file_that_is_named_exists(page):
     """`objectmorpher_core/deform/arap.py` and the like, in whole paths from the root."""
-    tops = "objectmorpher_core|app|tests|docs|packaging|shaders|assets"
+    tops = "objectmorpher_core|app|research|tests|docs|packaging|shaders|assets"
     for name in re.findall(rf"`((?:{tops})/[\w./-]*)`", FENCE.sub("", text_of(page))):
         assert (ROOT / name).exists(), name
 

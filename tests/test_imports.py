@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 CORE, APP = ROOT / "objectmorpher_core", ROOT / "app"
-TRAINING = CORE / "training"
+RESEARCH = ROOT / "research" / "objectmorpher_research"
 ONNX = CORE / "models" / "onnx_session.py"  # imports onnxruntime, with its telemetry off
 NETWORKS = {
     CORE / "lift" / "trellis",
@@ -81,21 +81,20 @@ def test_core_knows_no_window(path):
 @pytest.mark.parametrize("path", sources(CORE), ids=name_of)
 def test_core_starts_light(path):
     others = tops(path, is_at_import=True) - set(sys.stdlib_module_names)
-    if path.parent in {TRAINING, *NETWORKS}:  # networks are classes of torch's
+    if path.parent in NETWORKS:  # networks are classes of torch's
         others -= {"torch"}
     assert others <= CORE_AT_IMPORT, "import it inside the function that needs it"
 
 
 def test_onnxruntime_is_imported_in_one_place():
-    everywhere = {p for folder in (CORE, APP, ROOT / "tests") for p in sources(folder)}
+    everywhere = {p for folder in (CORE, APP, RESEARCH, ROOT / "tests") for p in sources(folder)}
     assert {p for p in everywhere if "onnxruntime" in tops(p)} == {ONNX}
 
 
 @pytest.mark.parametrize("path", [*sources(CORE), *sources(APP)], ids=name_of)
-def test_only_training_knows_of_training(path):
-    is_its_own = TRAINING in path.parents
-    reached = {".".join(name.split(".")[:2]) for name in imports(path, is_at_import=True)}
-    assert is_its_own or "objectmorpher_core.training" not in reached
+def test_the_program_knows_nothing_of_the_research_package(path):
+    """It finds that package's commands by entry points."""
+    assert RESEARCH.name not in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("path", sources(APP), ids=name_of)

@@ -18,7 +18,9 @@ from objectmorpher_core import models
 from objectmorpher_core.files import OutputError, write_all
 
 ROOT = Path(__file__).parents[1]
-SOURCES = [p for name in ("app", "objectmorpher_core") for p in (ROOT / name).rglob("*.py")]
+SOURCES = [
+    p for name in ("app", "objectmorpher_core", "research") for p in (ROOT / name).rglob("*.py")
+]
 RESERVED = re.compile(r'[<>:"|?*\x00-\x1f]|[. ]$|^(con|prn|aux|nul|com\d|lpt\d)(\.|$)', re.I)
 # Of OpenGL 4 and its shaders; macOS has 4.1 at most, and by our request 3.3.
 OPENGL_4 = re.compile(

@@ -22,10 +22,14 @@ print(len(sys.argv) - 1)
 """
 
 
+def clean() -> dict[str, str]:
+    """The environment, without what leads to the checkout."""
+    return {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+
+
 def run(*command: object, cwd: Path) -> str:
-    clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(
-        [str(part) for part in command], cwd=cwd, env=clean, capture_output=True, text=True
+        [str(part) for part in command], cwd=cwd, env=clean(), capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -58,6 +62,22 @@ def installed(tmp_path_factory) -> Path:
 @pytest.mark.slow
 def test_version(installed, tmp_path):
     assert run(installed / "objectmorpher", "--version", cwd=tmp_path).startswith("objectmorpher ")
+
+
+@pytest.mark.slow
+def test_the_research_package_is_apart(installed, tmp_path):
+    """The wheel holds none of it, does not list its commands, and says how to get them."""
+    files = run(installed / "python", "-m", "pip", "show", "--files", "objectmorpher", cwd=tmp_path)
+    files = files.partition("Files:")[2]
+    assert "app/cli.py" in files and "research" not in files
+    assert "evaluate" not in run(installed / "objectmorpher", "--help", cwd=tmp_path)
+    done = subprocess.run(
+        [installed / "objectmorpher", "bench", "deform"], cwd=tmp_path, env=clean(),
+        capture_output=True, text=True,
+    )  # fmt: skip
+    told = "bench is part of the research package, which is not installed"
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == f"objectmorpher: {told}: `pip install 'objectmorpher[research]'`\n"
 
 
 @pytest.mark.slow

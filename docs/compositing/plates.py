@@ -17,9 +17,9 @@ from sklearn.datasets import load_sample_image
 from objectmorpher_core import models
 from objectmorpher_core.arrays import Mask, Pixels
 from objectmorpher_core.compose import load
-from objectmorpher_core.evaluation.measures.hed_vgg import WEIGHT, HedVgg, read_hed_vgg
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment import dino_tokens
+from objectmorpher_research.evaluation.measures.hed_vgg import WEIGHT, HedVgg, read_hed_vgg
 
 SAMPLES = Path(__file__).resolve().parents[2] / "assets" / "samples"
 PATCH = 7  # px, of plain PatchMatch: the authors' usual

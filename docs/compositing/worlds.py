@@ -19,8 +19,8 @@ from solids import SOLIDS, Solid, load
 
 from objectmorpher_core.arrays import F64, Mask, Pixels
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.evaluation.truth.rasterise import rasterised
 from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_research.evaluation.truth.rasterise import rasterised
 
 SIDE = 512  # px
 CAMERA = Camera.from_fov(SIDE, SIDE)

@@ -36,7 +36,7 @@ from objectmorpher_core.lift.trellis.configs import Sampling
 from objectmorpher_core.lift.trellis.sampler import sample
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.progress import silent
-from objectmorpher_core.training.composition import edit_models
+from objectmorpher_research.training.composition import edit_models
 
 HERE = Path(__file__).parent
 KEPT, PAGE = HERE / "measured.json", HERE.parent / "models.md"

@@ -14,7 +14,7 @@ from objectmorpher_core.lift import shape_look
 from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.fusion import fused
 from objectmorpher_core.lift.silhouette import Silhouette
-from objectmorpher_core.training.shape_eval import Score, Surfaces, score, surfaces_of
+from objectmorpher_research.training.shape_eval import Score, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
 WAYS = ("network", "relief", "inflation", "flat")

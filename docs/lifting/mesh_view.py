@@ -9,7 +9,7 @@ from solids import Solid
 
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.camera import Camera
-from objectmorpher_core.evaluation.truth.rasterise import SAMPLES, pixel_means, rasterised
+from objectmorpher_research.evaluation.truth.rasterise import SAMPLES, pixel_means, rasterised
 
 
 @dataclass(frozen=True, eq=False)

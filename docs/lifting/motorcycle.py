@@ -22,7 +22,6 @@ from objectmorpher_core.document import (
     Matte,
     Placement,
 )
-from objectmorpher_core.evaluation.truth.stereo import FOCAL, OFFSET, StereoPair, read_pair
 from objectmorpher_core.lift import Subject
 from objectmorpher_core.lift.body import Body
 from objectmorpher_core.lift.depth_prior import Seen
@@ -36,6 +35,7 @@ from objectmorpher_core.pixels import crop
 from objectmorpher_core.progress import silent
 from objectmorpher_core.puppet import Puppet
 from objectmorpher_core.raster import tiles
+from objectmorpher_research.evaluation.truth.stereo import FOCAL, OFFSET, StereoPair, read_pair
 
 
 @dataclass(frozen=True)

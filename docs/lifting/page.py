@@ -7,7 +7,7 @@ from depths import WAYS as SURFACES
 from motorcycle import Result
 from turning import GROUPS, WAYS, Row, Score, means
 
-from objectmorpher_core.training import shape_eval
+from objectmorpher_research.training import shape_eval
 
 FAR = ("turn 20", "turn 35")  # of which every solid is told
 TOLD = ("network", "relief", "card", "affine")  # likewise

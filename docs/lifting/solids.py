@@ -11,9 +11,9 @@ import numpy as np
 import trimesh
 
 from objectmorpher_core.arrays import F64, I32, U8
-from objectmorpher_core.evaluation.truth.lookup import looked_up
-from objectmorpher_core.evaluation.truth.materials import veins
 from objectmorpher_core.rotations import turn_matrix
+from objectmorpher_research.evaluation.truth.lookup import looked_up
+from objectmorpher_research.evaluation.truth.materials import veins
 
 LIGHT = np.array([-0.45, -0.7, -0.55]) / np.linalg.norm([0.45, 0.7, 0.55])  # towards it
 AMBIENT = 0.55  # share of the light that comes from everywhere

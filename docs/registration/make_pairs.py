@@ -19,10 +19,10 @@ from objectmorpher_core.lift import Subject
 from objectmorpher_core.lift.placement import Hints, Registrar, Registration, register
 from objectmorpher_core.lift.placement_view import Target
 from objectmorpher_core.pipeline import lift_mask
-from objectmorpher_core.training.composition.made_pairs import FAMILIES, turn_of
-from objectmorpher_core.training.composition.pose_sources import Two, carried, matched
-from objectmorpher_core.training.composition.triplet import drawn_in
-from objectmorpher_core.training.shapes.views import View, make_views
+from objectmorpher_research.training.composition.made_pairs import FAMILIES, turn_of
+from objectmorpher_research.training.composition.pose_sources import Two, carried, matched
+from objectmorpher_research.training.composition.triplet import drawn_in
+from objectmorpher_research.training.shapes.views import View, make_views
 
 SEED, COUNT = 7, 12
 SIDE = 320  # px

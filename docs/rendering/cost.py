@@ -10,9 +10,9 @@ import numpy as np
 from panels import FONT_SIZE, INK
 from PIL import Image, ImageDraw, ImageFont
 
-from app.bench.render import tiles_row
-from app.bench.scenes import cloud_scene, lift_scene
-from app.bench.timing import Effort
+from objectmorpher_research.bench.render import tiles_row
+from objectmorpher_research.bench.scenes import cloud_scene, lift_scene
+from objectmorpher_research.bench.timing import Effort
 
 CLOUDS = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
 LIFTS = (1_000, 3_000, 10_000, 30_000, 100_000)

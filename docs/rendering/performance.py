@@ -15,14 +15,13 @@ import cv2
 import numpy as np
 from page import row
 
-from app.bench import run_bench
-from app.bench.machine import cpu_name
-from app.bench.scenes import made_mask, made_photo
-from app.bench.timing import seconds
 from objectmorpher_core import segment
 from objectmorpher_core.document import Click, Prompt
 from objectmorpher_core.image import Picture, encode_mask, encode_picture
 from objectmorpher_core.pipeline import read_photo
+from objectmorpher_research.bench.scenes import made_mask, made_photo
+from objectmorpher_research.bench.timing import cpu_name, seconds
+from objectmorpher_research.commands.bench import figures
 
 ROOT = Path(__file__).resolve().parents[2]
 PHOTO = 1024  # px, sides of the photo of 1 MP
@@ -92,8 +91,8 @@ def machine() -> str:
 
 def write_page() -> str:
     """Measures, for some minutes, and tells."""
-    edits = run_bench("pipeline", False)["rows"]
-    render, deform = run_bench("render", False), run_bench("deform", False)
+    edits = figures("pipeline", False)["rows"]
+    render, deform = figures("render", False), figures("deform", False)
     gl = render["machine"]["gl_renderer"] or "not to be had"
     has_gsplat = any(r["renderer"] == "gsplat-torch" for r in render["rows"])
     gsplat = "" if has_gsplat else " gsplat and torch were not installed: no rows of theirs."

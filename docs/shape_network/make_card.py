@@ -20,7 +20,7 @@ from objectmorpher_core.lift.crop import Crop, planes_of
 from objectmorpher_core.lift.shape_look import SeenShape, ShapeNet
 from objectmorpher_core.models import shipped
 from objectmorpher_core.segment import dino_tokens
-from objectmorpher_core.training.shapes.sample import Sample, make_sample
+from objectmorpher_research.training.shapes.sample import Sample, make_sample
 
 FOLDER = Path(__file__).resolve().parent
 FIGURES = FOLDER / "figures.json"  # of the weights that ship
@@ -57,7 +57,8 @@ where DINOv2's weights are not there).
 
 {samples} made-up objects of twelve families: creatures, figures, busts, lathe work, boxes,
 furniture, rings and tubes, plants, vehicles, sheets and cloth, superquadrics, extrusions. They are
-signed distances, drawn by sphere tracing (`objectmorpher_core/training/shapes`): bevels, holes,
+signed distances, drawn by sphere tracing
+(`research/objectmorpher_research/training/shapes`): bevels, holes,
 asymmetry, twists and bends; plain, printed, noisy, striped and photographic materials, matt to
 mirroring; one to three lamps with shadows; fields of view from 20 to 75 degrees, all pitches, often
 cut by the frame, over photographs of scikit-image and scikit-learn. Half of the masks are a little

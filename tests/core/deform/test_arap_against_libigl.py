@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from app.bench import even_sphere
 from objectmorpher_core.deform.arap import ArapSolver, minimise
 from objectmorpher_core.deform.constraints import Constraints, Targets
+from objectmorpher_research.bench.bodies import even_sphere
 
 igl = pytest.importorskip("igl", reason="libigl is a peer for measurements, not a dependency")
 

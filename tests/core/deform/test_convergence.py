@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.bench import BEND, five_limbs, limb_handles
 from objectmorpher_core.arrays import F64
 from objectmorpher_core.deform.arap import ArapSolver, iterate, minimise
 from objectmorpher_core.deform.deformer import Deformer
 from objectmorpher_core.document import DeformSettings
+from objectmorpher_research.bench.bodies import five_limbs, limb_handles
+from objectmorpher_research.bench.deform import BEND
 
 COLD, WARM = 9, 5  # iterations that fit into a frame of 10 ms here, with room
 

@@ -317,7 +317,7 @@ def test_values_that_are_no_numbers_are_refused():
 
 @pytest.mark.slow
 def test_five_million_gaussians_deform():
-    from app.bench import five_limbs, limb_handles
+    from objectmorpher_research.bench.bodies import five_limbs, limb_handles
 
     lifted = five_limbs(5_000_000, 512)
     deformer = Deformer(lifted, DeformSettings())

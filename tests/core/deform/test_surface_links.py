@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from app.bench import five_limbs
 from objectmorpher_core.deform.graph import LINK_RADIUS, Graph, Surface, build_graph
 from objectmorpher_core.document import DeformSettings
+from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
 
 FAITHFUL = DeformSettings(is_faithful=True)

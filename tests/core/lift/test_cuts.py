@@ -14,7 +14,7 @@ from objectmorpher_core.lift.cuts import REACH, find_cuts
 from objectmorpher_core.lift.fusion import fused
 from objectmorpher_core.lift.silhouette import Silhouette
 from objectmorpher_core.lift.spreading import spread
-from objectmorpher_core.training.shapes.sample import make_sample
+from objectmorpher_research.training.shapes.sample import make_sample
 from tests.core.lift.test_fusion import SIDE, camera_of, truth
 
 SIZE, CELL, EXTENT = 80, 1.0, 70.0

@@ -18,9 +18,9 @@ from objectmorpher_core.lift.shape_look import SeenShape
 from objectmorpher_core.lift.silhouette import Silhouette
 from objectmorpher_core.progress import silent
 from objectmorpher_core.segment.matte import build_matte
-from objectmorpher_core.training import shape_eval
-from objectmorpher_core.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
-from objectmorpher_core.training.shapes.sample import Sample, make_sample
+from objectmorpher_research.training import shape_eval
+from objectmorpher_research.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
+from objectmorpher_research.training.shapes.sample import Sample, make_sample
 from tests import shapes
 
 KINDS = ("boxes", "lathe", "superquadrics", "creatures", "rings", "figures")

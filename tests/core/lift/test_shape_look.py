@@ -18,14 +18,14 @@ from objectmorpher_core.lift.shape_look import SeenShape, ShapeNet
 from objectmorpher_core.models import shipped
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment import dino_tokens
-from objectmorpher_core.training.shape_eval import (
+from objectmorpher_research.training.shape_eval import (
     camera_of,
     relief,
     score,
     surfaces_of,
     true_surfaces,
 )
-from objectmorpher_core.training.shapes.sample import Sample, make_sample
+from objectmorpher_research.training.shapes.sample import Sample, make_sample
 from tests import shapes
 
 CARD = Path(__file__).parents[3] / "docs" / "shape_network"

@@ -1,0 +1,1 @@
+"""The laboratory beside the program: training, evaluation, benchmarks and the user study."""

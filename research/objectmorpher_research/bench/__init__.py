@@ -1,0 +1,1 @@
+"""Benchmarks of solver, renderers and the whole edit, on objects that they make themselves."""

@@ -1,0 +1,130 @@
+"""What an edit is meant to do: as arrows over the photo, as words, and as our own edit script."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from objectmorpher_core.image import ImageError, read_picture
+from objectmorpher_core.script import XY, BatchItem, EditScript, ScriptError, parse_scripts
+
+from ..error import EvaluationError
+
+Arrow = tuple[XY, XY]  # px of the image, from -> to
+TEXT = "text"  # key of guidance.json beside those of an edit script
+
+
+@dataclass(frozen=True)
+class Guidance:
+    """One edit that is asked of every method."""
+
+    arrows: tuple[Arrow, ...] = ()
+    words: str = ""
+    picture: Path | None = None  # one that shows it, in place of the arrows
+    item: BatchItem | None = None  # the same for `objectmorpher edit`
+    reason: str = "there is no guidance.json"  # why there is no `item`
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether a person can tell from it what is wanted."""
+        return bool(self.arrows or self.words or self.picture)
+
+
+def read_guidance(path: Path) -> Guidance:
+    """From a JSON file: an edit script, whose files are beside it, and perhaps a "text".
+
+    Raises EvaluationError: one sentence.
+    """
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        text = said.pop(TEXT, "") if isinstance(said, dict) else ""
+        (item,) = parse_scripts(json.dumps(said))
+    except (OSError, ValueError, RecursionError) as error:
+        told = str(error) if isinstance(error, ScriptError) else "it is no JSON object"
+        raise EvaluationError(f"{path}: {told}") from error
+    if not isinstance(text, str):
+        raise EvaluationError(f"{path}: {TEXT!r} is no text")
+    return from_item(_beside(item, path.parent), text)
+
+
+def from_item(item: BatchItem, text: str = "") -> Guidance:
+    """Of an edit script; without a `text` its placement is told in words."""
+    words = text or " ".join(words_of(script) for script in _scripts(item))
+    arrows = tuple(arrow for script in _scripts(item) for arrow in arrows_of(script))
+    return Guidance(arrows, words.strip(), item=item, reason="")
+
+
+def arrows_of(script: EditScript) -> tuple[Arrow, ...]:
+    """The drags of its handles, and the way that the whole object is to go in the picture."""
+    arrows = [(handle.at, handle.to) for handle in script.handle]
+    middle = _middle(script)
+    if script.move is not None and middle is not None and any(script.move[:2]):
+        (x, y), (dx, dy, _) = middle, script.move
+        arrows.append((middle, (x + dx, y + dy)))
+    return tuple(arrows)
+
+
+def words_of(script: EditScript) -> str:
+    """How the whole object is to be placed, for someone who looks at the photo."""
+    if script.remove:
+        return "Remove the object."
+    told = []
+    if script.move is not None:
+        dx, dy, dz = script.move
+        if any((dx, dy)) and _middle(script) is not None:
+            told.append("along the arrow")
+        else:
+            told += _way(dx, "to the right", "to the left", " px")
+            told += _way(dy, "down", "up", " px")
+        told += _way(dz, "diameters away", "diameters nearer", "")
+    told = ["move the object " + " and ".join(told)] if told else []
+    if script.turn is not None:
+        yaw, pitch, roll = script.turn  # positive yaw takes what faces us to the left
+        turned = _way(yaw, "so that its front goes left", "so that its front goes right", "°")
+        turned += _way(pitch, "so that its top comes nearer", "so that its top goes away", "°")
+        turned += _way(roll, "clockwise", "anticlockwise", "°")
+        told += ["turn it by " + " and by ".join(turned)] if turned else []
+    if script.scale is not None and script.scale != 1:
+        told.append(f"scale it to {script.scale:.0%} of its size")
+    sentence = ", ".join(told)
+    return sentence[:1].upper() + sentence[1:] + "." if told else ""
+
+
+def _middle(script: EditScript) -> XY | None:
+    """Where the object is, as far as the script tells; px."""
+    if script.mask is not None:
+        try:
+            ys, xs = np.nonzero(read_picture(Path(script.mask).read_bytes()).pixels[..., 0])
+        except (OSError, ImageError) as error:
+            raise EvaluationError(f"the mask {script.mask} cannot be read: {error}") from error
+        return ((xs.min() + xs.max() + 1) / 2, (ys.min() + ys.max() + 1) / 2) if len(xs) else None
+    if script.box is not None:
+        x0, y0, x1, y1 = script.box
+        return (x0 + x1) / 2, (y0 + y1) / 2
+    return script.click[0] if script.click else None
+
+
+def _way(value: float, more: str, less: str, unit: str) -> list[str]:
+    return [f"{abs(value):g}{unit} {more if value > 0 else less}"] if value else []
+
+
+def _scripts(item: BatchItem) -> tuple[EditScript, ...]:
+    return item.script, *(further.script for further in item.others.objects)
+
+
+def _beside(item: BatchItem, folder: Path) -> BatchItem:
+    """Its files are named relative to the guidance."""
+
+    def own(script: EditScript) -> EditScript:
+        named = {
+            name: str(folder / value)
+            for name in ("mask", "front_mask", "hidden", "splats")
+            if (value := getattr(script, name)) is not None
+        }
+        return replace(script, **named)
+
+    objects = tuple(replace(o, script=own(o.script)) for o in item.others.objects)
+    return replace(item, script=own(item.script), others=replace(item.others, objects=objects))

@@ -1,0 +1,95 @@
+"""The methods that are compared, and the ablations: each differs in what its name says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from objectmorpher_core.arrays import RGB
+from objectmorpher_core.document import Matte
+
+from . import flat_methods
+from .cases import Case
+from .chain import CARD, PLAIN, Chain, Way
+from .lifted_mesh import draw_mesh
+from .outcome import Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What all methods of a case share: the case, the mask's cut-out, the plate, the chain."""
+
+    case: Case
+    matte: Matte
+    plate: RGB
+    chain: Chain
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to make an edit."""
+
+    name: str
+    told: str  # what it is, for the report
+    apply: Callable[[Given], Outcome]
+    only_bends: bool = False  # otherwise the same as ours where the thing moves as a whole
+
+
+OURS = "ours"
+
+
+def _chain(name: str, told: str, way: Way, only_bends: bool = False) -> Method:
+    return Method(name, told, lambda given: given.chain.apply(given.case, way), only_bends)
+
+
+def _by_name(*methods: Method) -> Mapping[str, Method]:
+    return {method.name: method for method in methods}
+
+
+_OURS = _chain(OURS, "the product: lifted, deformed by ARAP, harmonised", Way())
+_UNHARMONISED = _chain("no-harmonise", "without harmonise", Way(is_harmonised=False))
+_MESH = Method(
+    "mesh", "a textured mesh of the lifted body instead of Gaussians",
+    lambda given: draw_mesh(given.chain, given.case, given.matte, given.plate),
+)  # fmt: skip
+_LAPLACIAN = _chain("laplacian", "Laplacian instead of ARAP", Way(deform="laplacian"), True)
+_EUCLIDEAN = _chain("euclidean", "Euclidean links", Way(links="euclidean"), True)
+
+METHODS = _by_name(
+    _OURS,
+    Method("nothing", "the photo as it is", lambda given: flat_methods.do_nothing(given.case)),
+    Method(
+        "paste", "best 2-D similarity of the cut-out",
+        lambda given: flat_methods.paste(given.case, given.matte, given.plate),
+    ),
+    Method(
+        "warp", "2-D as-rigid-as-possible warp of the cut-out",
+        lambda given: flat_methods.warp(given.case, given.matte, given.plate),
+    ),
+    _chain("card", "a flat card in 3D", Way(lift=CARD)),
+    _chain("plain", "plain-colour Gaussians, four times as many", Way(lift=PLAIN)),
+    _MESH,
+    _LAPLACIAN,
+    _EUCLIDEAN,
+    _UNHARMONISED,
+)  # fmt: skip
+
+STEPS = (1, 2, 4, 8, 16, 64)
+ABLATIONS: Mapping[str, Mapping[str, Method]] = {
+    "mesh": _by_name(_OURS, _MESH),
+    "harmonise": _by_name(_OURS, _UNHARMONISED),
+    "links": _by_name(_OURS, _EUCLIDEAN),
+    "deform": _by_name(
+        _OURS, _LAPLACIAN,
+        _chain("faithful", "ARAP as the paper prints it", Way(is_faithful=True), True),
+    ),
+    "iterations": _by_name(
+        _OURS,
+        *(_chain(f"{n}-iterations", f"{n} plain iterations from rest", Way(iterations=n), True)
+          for n in STEPS),
+    ),
+    "camera": _by_name(
+        _OURS,
+        _chain("usual-camera", "50 degrees of view, whatever it was", Way(knows_camera=False)),
+    ),
+}  # fmt: skip

@@ -1,0 +1,16 @@
+"""What a method makes of a case."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from objectmorpher_core.arrays import F64, RGB
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A result, and where the thing is in it."""
+
+    pixels: RGB  # (H, W, 3)
+    alpha: F64  # (H, W) the thing's coverage
+    reached: F64  # (n, 2) px at which the guidance's points are now

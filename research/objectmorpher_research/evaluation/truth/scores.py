@@ -1,0 +1,65 @@
+"""How near an outcome is to the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from objectmorpher_core.arrays import F64, RGB
+
+from ..measures.dino import Dino
+from ..measures.fidelity import psnr, ssim
+from .cases import Case
+from .outcome import Outcome
+
+CONTEXT = 14  # px around the region that measures may look at: a patch of DINOv2's
+PSNR_CAP = 60.0  # dB, of what is equal to the last bit, so that means exist
+FIGURES = ("psnr", "ssim", "dinov2", "iou", "reach", "outside", "changed")
+
+
+@dataclass(frozen=True)
+class Score:
+    """Of one outcome."""
+
+    psnr: float  # dB, inside the region
+    ssim: float  # inside
+    dinov2: float  # dinov2-perceptual, inside; nan where the network is not here
+    iou: float  # of the thing's coverages
+    reach: float  # px, mean distance of the guidance's points from where they must be
+    outside: float  # dB outside; nan where the truth does not tell
+    changed: float  # share of the pixels outside that differ from the photo
+
+
+def score(case: Case, outcome: Outcome, network: Dino | None) -> Score:
+    """All figures."""
+    window = _window(case.region)
+    inside, outer = case.region[window], case.region < 0.5
+    a, b = outcome.pixels[window], _cut(case)
+    without = psnr(outcome.pixels, case.truth, (outer.astype(np.float64),))[0]
+    smaller = np.minimum(outcome.alpha, case.shown).sum()
+    larger = np.maximum(outcome.alpha, case.shown).sum()
+    seen = network.perceptual(a, b, (inside,))[0] if network is not None else float("nan")
+    differs = (outcome.pixels != case.photo).any(-1) & outer
+    return Score(
+        min(psnr(a, b, (inside,))[0], PSNR_CAP), ssim(a, b, (inside,))[0], seen,
+        float(smaller / larger),
+        float(np.linalg.norm(outcome.reached - case.guidance.to, axis=1).mean()),
+        min(without, PSNR_CAP) if case.has_outside else float("nan"),
+        float(differs.sum() / max(outer.sum(), 1)) if case.has_outside else float("nan"),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=2)
+def _cut(case: Case) -> RGB:
+    """The truth about the region; the same array each time, whose features are then known."""
+    return case.truth[_window(case.region)]
+
+
+def _window(region: F64) -> tuple[slice, slice]:
+    """The box of a region and a little more."""
+    rows, columns = np.flatnonzero(region.any(1)), np.flatnonzero(region.any(0))
+    first = max(int(rows[0]) - CONTEXT, 0), max(int(columns[0]) - CONTEXT, 0)
+    last = int(rows[-1]) + 1 + CONTEXT, int(columns[-1]) + 1 + CONTEXT
+    return slice(first[0], last[0]), slice(first[1], last[1])

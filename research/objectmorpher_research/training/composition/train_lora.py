@@ -1,0 +1,254 @@
+"""Trains the composition LoRA: flow matching on [B, coarse A] -> A (paper 3.3).
+
+x_s = (1 - s) A + s noise, and the transformer learns noise - A at the noise levels s that its
+sampler visits. Every process of Accelerate holds the whole transformer and takes its part of each
+step's triplets; only the adapter's gradients travel.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from objectmorpher_core.progress import Progress, silent
+
+from . import TrainingError, adapter, edit_models
+from .checkpoint import State
+from .edit_models import EditModel, Latents
+from .latents_cache import Encoding, LatentsCache, weights_fingerprint
+from .lora_plan import LoraPlan, parted
+from .loss_log import LossLog
+from .randomness import chosen, drawn
+from .triplet_folder import Stored, triplets_in
+
+if TYPE_CHECKING:
+    from accelerate import Accelerator
+    from torch import Tensor, nn
+
+CHECK = 1 << 40  # the first number of the draws for what is held out
+SAMPLER = 50  # steps for which the scheduler's shift is told
+
+
+@dataclass(frozen=True)
+class Places:
+    """Folders."""
+
+    triplets: Path
+    out: Path
+    weights: Path  # the pipeline's
+    cache: Path  # of latents
+
+
+@dataclass(frozen=True)
+class Course:
+    """How long, and what is done on the way; may change when it goes on."""
+
+    steps: int = 2000
+    saved: int = 50  # steps between two checkpoints
+    looked: int = 250  # between two looks at what is held out; 0: never
+    sampled: int = 20  # steps of a picture's sampling; 0: losses alone
+
+
+class Trainer:
+    """A transformer with its LoRA, and what trains it."""
+
+    def __init__(self, places: Places, plan: LoraPlan, progress: Progress = silent) -> None:
+        """Encodes what is not encoded yet, loads, and goes on from a checkpoint.
+
+        Of several processes each calls it. Raises TrainingError.
+        """
+        plan.check()
+        _be_quiet()
+        self.places, self.plan = places, plan
+        self.model: EditModel = edit_models.load(plan.model)
+        self.accelerator = accelerator_of(plan.number)
+        self.device = str(self.accelerator.device)
+        everything = triplets_in(places.triplets)
+        self.trained_on, self.held_out = parted(everything, plan)
+        encoding = Encoding(self.model, places.weights, plan.side, plan.number, self.device)
+        self.cache = LatentsCache(places.cache, encoding)
+        self._encode(everything, progress)
+        self.scheduler = edit_models.scheduler_of(places.weights)
+        progress(0.0, "Loading the transformer")
+        self.transformer = adapter.with_adapter(
+            opened(self.model, places.weights, plan.number), self.model, plan.rank, plan.seed
+        ).to(self.device)
+        prepared(self.transformer)
+        self.parameters = adapter.parameters(self.transformer)
+        self.optimiser = optimiser_of(self.transformer, plan)
+        own = {name: p.detach().clone() for name, p in self.parameters.items()}
+        self.mean = own if plan.mean else None
+        weights = weights_fingerprint(places.weights, ("transformer",))
+        self._facts = plan.facts(everything, weights)
+        self.state = State(self.parameters, self.optimiser, self.mean)
+        self.step = self.state.load(places.out, self._facts)
+
+    def train(self, course: Course, progress: Progress = silent) -> Path:
+        """Up to `course.steps` in all; the file of the LoRA. Raises TrainingError."""
+        is_first = self.accelerator.is_main_process
+        log = LossLog(self.places.out, self.step) if is_first else None
+        while self.step < course.steps:
+            began = time.perf_counter()
+            row: dict[str, Any] = {"step": self.step, "loss": self._learn()}
+            row |= {"gradient": self.length, "rate": self.optimiser.param_groups[0]["lr"]}
+            row["seconds"] = round(time.perf_counter() - began, 3)
+            self.step += 1
+            if course.looked and self.step % course.looked == 0 and self.held_out:
+                row["checked"] = self.checked()
+                if is_first and course.sampled:
+                    self._show(course.sampled)
+            if log is not None:
+                log.add(row)
+                progress(self.step / course.steps, f"step {self.step}, loss {row['loss']:.4f}")
+                if self.step % course.saved == 0 or self.step == course.steps:
+                    self.save()
+        self.accelerator.wait_for_everyone()
+        if log is not None:
+            log.close()
+        return self.save() if is_first else self.places.out
+
+    def save(self) -> Path:
+        """A checkpoint, and the LoRA as it is now; its file."""
+        self.state.save(self.places.out, self.step, self._facts)
+        return adapter.save_adapter(
+            self.places.out / "lora", self.transformer, self.model, self.plan.number, self.mean
+        )
+
+    def losses(self, numbers: range) -> Tensor:
+        """Gradients of the mean loss of these samples, added to the parameters'; that loss.
+
+        Of several processes each computes its own part; all get the sum of both.
+        """
+        import torch
+
+        world, own = self.accelerator.num_processes, self.accelerator.process_index
+        total = torch.zeros((), device=self.device)
+        for place, number in enumerate(numbers):
+            if place % world == own:
+                triplet = self.trained_on[chosen(self.plan.seed, number, len(self.trained_on))]
+                loss = self._loss(self.cache.read(triplet, self.device), number) / len(numbers)
+                self.accelerator.backward(loss)
+                total += loss.detach()
+        for value in self.parameters.values():
+            if value.grad is None:  # of what the last block does with the text: nobody reads it
+                value.grad = torch.zeros_like(value)
+        if world > 1:
+            self._sum_up(total)
+        return total
+
+    def checked(self) -> float:
+        """Mean loss of the triplets held out, at noise that is always the same."""
+        import torch
+
+        with torch.no_grad():
+            found = [
+                self._loss(self.cache.read(triplet, self.device), CHECK + k)
+                for k, triplet in enumerate(self.held_out)
+            ]
+        return float(torch.stack(found).mean())
+
+    def _learn(self) -> float:
+        """One step; its loss."""
+        import torch
+
+        plan = self.plan
+        for group in self.optimiser.param_groups:
+            group["lr"] = group["full_rate"] * min(1.0, (self.step + 1) / max(plan.warm_up, 1))
+        self.optimiser.zero_grad(set_to_none=True)
+        loss = self.losses(range(self.step * plan.batch, (self.step + 1) * plan.batch))
+        own = list(self.parameters.values())
+        self.length = float(torch.nn.utils.clip_grad_norm_(own, plan.steepest))
+        if not (torch.isfinite(loss) and self.length < float("inf")):
+            raise TrainingError(f"the loss of step {self.step} is no number: lower --rate")
+        self.optimiser.step()
+        if self.mean is not None:
+            for name, value in self.parameters.items():
+                self.mean[name].lerp_(value.detach(), 1 - plan.mean)
+        return float(loss)
+
+    def _loss(self, at: Latents, number: int) -> Tensor:
+        import torch
+
+        moment, noise = drawn(self.plan.seed, number, tuple(at.target.shape))
+        mu = self.model.shift(self.scheduler, at.target.shape[1], SAMPLER)
+        level = edit_models.level(self.scheduler, mu, moment)
+        noise, target = noise.to(self.device), at.target.float()
+        noisy = ((1 - level) * target + level * noise).to(at.target.dtype)
+        sigma = torch.full((1,), level, device=self.device, dtype=torch.float32)
+        with self.accelerator.autocast():
+            found = self.model.velocity(self.transformer, noisy, sigma.to(noisy.dtype), at)
+        return torch.nn.functional.mse_loss(found.float(), noise - target)
+
+    def _sum_up(self, total: Tensor) -> None:
+        """Gradients and loss of all processes, added."""
+        import torch
+
+        own = list(self.parameters.values())
+        parts = [p.grad.reshape(-1) for p in own if p.grad is not None]
+        flat = torch.cat([total.reshape(1), *parts])
+        flat = self.accelerator.reduce(flat, reduction="sum")
+        assert isinstance(flat, torch.Tensor)
+        total.copy_(flat[0])
+        for p, part in zip(own, flat[1:].split([p.numel() for p in own]), strict=True):
+            p.grad = part.reshape(p.shape)
+
+    def _encode(self, triplets: tuple[Stored, ...], progress: Progress) -> None:
+        world, own = self.accelerator.num_processes, self.accelerator.process_index
+        self.cache.fill(triplets[own::world], progress)
+        self.accelerator.wait_for_everyone()
+
+    def _show(self, steps: int) -> None:
+        from .validation import write_pictures
+
+        write_pictures(self, steps)
+
+
+def _be_quiet() -> None:
+    """The libraries draw no bars of their own."""
+    import diffusers
+    import transformers
+
+    for library in (diffusers, transformers):
+        library.utils.logging.disable_progress_bar()
+        library.utils.logging.set_verbosity_error()
+
+
+def accelerator_of(number: str) -> Accelerator:
+    """The processes of this training, as `accelerate launch` (or torchrun) started them."""
+    from accelerate import Accelerator
+
+    from objectmorpher_core.models import device
+
+    is_cpu = "cuda" not in device.devices()
+    mixed = "bf16" if number == "bfloat16" else "no"
+    return Accelerator(mixed_precision=mixed, cpu=is_cpu)
+
+
+def opened(model: EditModel, weights: Path, number: str) -> nn.Module:
+    """The pipeline's transformer. Raises TrainingError."""
+    import torch
+
+    try:
+        return model.transformer_class().from_pretrained(
+            weights / "transformer", dtype=getattr(torch, number), local_files_only=True,
+            use_safetensors=True,
+        )  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        told = " ".join(str(error).split())[:300]
+        raise TrainingError(f"{weights}'s transformer cannot be opened: {told}") from error
+
+
+def prepared(transformer: Any) -> None:
+    """Ready to be trained in little memory: blocks are computed again on the way back."""
+    transformer.train()
+    transformer.enable_gradient_checkpointing()
+
+
+def optimiser_of(transformer: nn.Module, plan: LoraPlan) -> Any:
+    """AdamW with LoRA+'s two rates."""
+    import torch
+
+    found = adapter.groups(transformer, plan.rate, plan.ratio)
+    return torch.optim.AdamW(found, weight_decay=plan.decay)

@@ -1,0 +1,77 @@
+"""The trained decoder as one small ONNX file, which runs without torch, and back again."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import torch
+
+from objectmorpher_core.lift.crop import SIDE
+
+from .shape_net import GRID, PLANES, WIDTH, ShapeNet
+
+OPSET = 17
+INPUTS, OUTPUT = ("planes", "tokens"), "shape"
+HALF = ".half"  # ends the name of a weight that is kept in half precision
+
+
+def export(net: ShapeNet, path: Path) -> str:
+    """Writes `path`, its weights in half precision; their SHA-256.
+
+    They are widened again where they are read: what is computed is single precision. Every weight
+    keeps its name and its form, so that training can go on from the file (`weights_of`); what can
+    be joined, as normalisations into convolutions, onnxruntime joins when it opens it.
+    """
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    inputs = (torch.zeros(1, PLANES, SIDE, SIDE), torch.zeros(1, WIDTH, GRID, GRID))
+    torch.onnx.export(
+        net.eval(), inputs, path, input_names=list(INPUTS), output_names=[OUTPUT],
+        opset_version=OPSET, dynamo=False, do_constant_folding=False,
+        training=torch.onnx.TrainingMode.PRESERVE,
+    )  # fmt: skip
+    model = onnx.load(path)
+    graph = model.graph
+    narrow, casts = [], []
+    for weight in graph.initializer:
+        if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 2:
+            narrow.append(weight)
+            continue
+        half = numpy_helper.to_array(weight).astype("float16")
+        narrow.append(numpy_helper.from_array(half, weight.name + HALF))
+        casts.append(
+            helper.make_node("Cast", [weight.name + HALF], [weight.name], to=TensorProto.FLOAT)
+        )
+    nodes = [*casts, *graph.node]
+    del graph.initializer[:], graph.node[:]
+    graph.initializer.extend(narrow)
+    graph.node.extend(nodes)
+    onnx.checker.check_model(model)
+    data = model.SerializeToString()
+    path.write_bytes(data)
+    return hashlib.sha256(data).hexdigest()
+
+
+def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:
+    """The weights in a file that `export` wrote, as `net.state_dict()` names them.
+
+    Raises ValueError for weights of another network.
+    """
+    import onnx
+    from onnx import numpy_helper
+
+    kept = {
+        tensor.name.removesuffix(HALF): numpy_helper.to_array(tensor).astype("float32")
+        for tensor in onnx.load(path).graph.initializer
+        if tensor.data_type in (onnx.TensorProto.FLOAT, onnx.TensorProto.FLOAT16)
+    }
+    state = dict(net.state_dict())
+    for name, value in state.items():
+        if not value.is_floating_point():  # how many batches a normalisation has seen
+            continue
+        if name not in kept or kept[name].shape != tuple(value.shape):
+            raise ValueError(f"{path} holds weights of another network: {name} is not as here")
+        state[name] = torch.from_numpy(kept[name].copy())
+    return state

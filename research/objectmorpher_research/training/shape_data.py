@@ -1,0 +1,167 @@
+"""Samples for the shape network: made in processes, kept in files, read as batches."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.arrays import Mask
+from objectmorpher_core.lift.crop import planes_of
+from objectmorpher_core.progress import Progress, silent
+
+from .shapes.sample import Sample, make_sample
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+SHARD = 32  # samples in a file
+NORMAL_STEPS = 127.0  # a normal's coordinate is kept in a byte
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Tensors float32 for `shape_net.ShapeNet` and its losses, t = s or s / 2 (one phase)."""
+
+    planes: Tensor  # (n, 7, s, s)
+    tokens: Tensor  # (n, 768, g, g)
+    phase: tuple[int, int] | None  # of the pixels that are compared; None: all
+    mask: Tensor  # (n, 1, t, t), as are the next four
+    front: Tensor
+    thickness: Tensor
+    depth: Tensor
+    edge: Tensor
+    normal: Tensor  # (n, 3, t, t)
+    rays: Tensor  # (n, 3, t, t) unit
+    away: Tensor  # (n, 1, 1, 1) crop units to the mean of the object
+
+
+def write_shards(folder: Path, first: int, count: int, progress: Progress = silent) -> None:
+    """Files of samples with the seeds first.., those that are not there yet, in all cores."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = [
+        (folder / f"{seed:08d}.npz", seed)
+        for seed in range(first, first + count, SHARD)
+        if not (folder / f"{seed:08d}.npz").exists()
+    ]
+    with ProcessPoolExecutor(os.cpu_count(), initializer=_begin) as pool:
+        for number, _ in enumerate(pool.map(_write, wanted), 1):
+            progress(number / len(wanted), f"{number * SHARD} of {len(wanted) * SHARD} samples")
+
+
+def _begin() -> None:
+    cv2.setNumThreads(1)
+
+
+def _write(job: tuple[Path, int]) -> None:
+    file, seed = job
+    samples = [make_sample(k) for k in range(seed, seed + SHARD)]
+    arrays = packed(samples)
+    arrays["tokens"] = _tokens(np.stack([s.rgb for s in samples]))
+    partial = file.with_suffix(".part")
+    with partial.open("wb") as out:
+        np.savez(out, allow_pickle=False, **arrays)
+    partial.rename(file)
+
+
+def packed(samples: list[Sample]) -> dict[str, np.ndarray]:
+    """Arrays (n, ...) of samples, small."""
+    arrays: dict[str, np.ndarray] = {}
+    for field in fields(Sample):
+        values = [getattr(sample, field.name) for sample in samples]
+        array = np.array(values)
+        if field.name == "normal":
+            array = np.rint(array * NORMAL_STEPS).astype(np.int8)
+        elif field.name in ("front", "thickness", "depth"):
+            array = array.astype(np.float16)
+        arrays[field.name] = array
+    return arrays
+
+
+_ENCODER: list[Any] = []
+
+
+def _tokens(rgb: np.ndarray) -> np.ndarray:
+    """(n, 768, g, g) float16 of crops (n, s, s, 3)."""
+    from objectmorpher_core.segment.dino_tokens import TokenNet
+
+    if not _ENCODER:
+        _ENCODER.append(TokenNet(threads=1))
+    found = np.stack([_ENCODER[0].inner_tokens(one) for one in rgb])
+    return np.ascontiguousarray(found.transpose(0, 3, 1, 2), np.float16)
+
+
+def batches(
+    files: list[Path], size: int, rng: np.random.Generator, held_out: tuple[str, ...] = ()
+) -> Iterator[Batch]:
+    """The samples of the files, mixed within some files at a time, half of them mirrored.
+
+    `held_out`: families that are left out.
+    """
+    order = rng.permutation(len(files))
+    for begin in range(0, len(order), 8):
+        chosen = [dict(np.load(files[k])) for k in order[begin : begin + 8]]
+        joined = {name: np.concatenate([c[name] for c in chosen]) for name in chosen[0]}
+        mixed = rng.permutation(np.flatnonzero(~np.isin(joined["family"], held_out)))
+        for start in range(0, len(mixed) - size + 1, size):
+            rows = mixed[start : start + size]
+            picked = {name: array[rows] for name, array in joined.items()}
+            yield batch_of(_mirrored(picked, rng.random(size) < 0.5), rng)
+
+
+def _mirrored(arrays: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
+    """Packed samples, left and right exchanged in some (n,): a token goes with its place."""
+    found = {name: array.copy() for name, array in arrays.items()}
+    for name, array in arrays.items():
+        if array.ndim > 2:
+            axis = 3 if name == "tokens" else 2
+            found[name][which] = np.flip(array[which], axis)
+    found["normal"][which, ..., 0] *= -1
+    found["tangents"][which, 0] *= -1
+    return found
+
+
+def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = None) -> Batch:
+    """Of packed samples. With `rng` for training: of one phase, and with masks a little wrong."""
+    import torch
+
+    count = len(arrays["mask"])
+    masks = [m if rng is None else _worn(m, rng) for m in arrays["mask"]]
+    planes = [planes_of(arrays["rgb"][k], masks[k], arrays["tangents"][k]) for k in range(count)]
+    phase = None if rng is None else (int(rng.integers(2)), int(rng.integers(2)))
+    wanted = [slice(None)] * 2 if phase is None else [slice(at, None, 2) for at in phase]
+    own = (slice(None), *wanted)
+
+    def image(name: str) -> Tensor:
+        return torch.from_numpy(arrays[name][own].astype(np.float32))[:, None]
+
+    normal = arrays["normal"][own].astype(np.float32).transpose(0, 3, 1, 2) / NORMAL_STEPS
+    stacked = np.stack(planes)
+    x, y = (stacked[:, plane : plane + 1, wanted[0], wanted[1]] for plane in (5, 6))
+    ways = np.concatenate([x, y, np.ones_like(x)], 1)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    tangents = arrays["tangents"]
+    away = np.sqrt(1 + tangents[:, 0] ** 2 + tangents[:, 1] ** 2) / tangents[:, 2]
+    return Batch(
+        torch.from_numpy(stacked), torch.from_numpy(arrays["tokens"].astype(np.float32)), phase,
+        image("mask"), image("front"), image("thickness"), image("depth"), image("edge"),
+        torch.from_numpy(np.ascontiguousarray(normal)), torch.from_numpy(ways),
+        torch.from_numpy(away.astype(np.float32))[:, None, None, None],
+    )  # fmt: skip
+
+
+def _worn(mask: Mask, rng: np.random.Generator) -> Mask:
+    """A mask whose outline is up to two px off, smoothly."""
+    if rng.random() < 0.5:
+        return mask
+    noise = cv2.GaussianBlur(rng.normal(0, 1, mask.shape).astype(np.float32), (0, 0), 6)
+    noise *= rng.uniform(0, 2) / max(float(noise.std()), 1e-6)
+    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
+    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)
+    return inside - outside + noise.clip(-2, 2) > 0

@@ -1,0 +1,42 @@
+"""`objectmorpher evaluate truth` and `evaluate ablation` on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app import cli
+from objectmorpher_research.commands.truth import ABLATIONS
+from objectmorpher_research.evaluation.truth import methods
+
+
+def test_the_command_knows_every_ablation():
+    assert set(ABLATIONS) == set(methods.ABLATIONS)
+
+
+@pytest.mark.parametrize("what", [["truth"], ["ablation", "links"]])
+def test_a_folder_of_another_run_is_one_sentence(what, tmp_path, capsys):
+    (tmp_path / "run.json").write_text('{"cases": 1, "seed": 5}')
+    assert cli.main(["evaluate", *what, str(tmp_path), "--quick"]) == 1
+    told = capsys.readouterr().err
+    assert "run of other cases" in told and told.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_the_quick_set(tmp_path, capsys):
+    assert cli.main(["evaluate", "truth", str(tmp_path), "--quick"]) == 0
+    assert "report.html" in capsys.readouterr().out
+    told = json.loads((tmp_path / "report.json").read_text())
+    assert len({row["case"] for row in told["cases"]}) == 12
+    means = {(m["category"], m["method"], m["figure"]): m["value"] for m in told["means"]}
+    for other in ("nothing", "paste", "card", "warp"):
+        assert means["turn", "ours", "psnr"] > means["turn", other, "psnr"]
+    assert means["all", "ours", "psnr"] > means["all", "nothing", "psnr"]
+    assert means["all", "nothing", "changed"] == 0
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("src='data:image/jpeg;base64,") > 100 and "http" not in page
+    lines = (tmp_path / "report.csv").read_text().splitlines()
+    assert len(lines) == 1 + len(told["cases"])
+    assert cli.main(["evaluate", "ablation", "harmonise", str(tmp_path), "--quick"]) == 0
+    assert (tmp_path / "harmonise.html").exists()

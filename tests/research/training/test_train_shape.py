@@ -1,0 +1,163 @@
+"""The shape network learns, goes on where it was stopped, and runs without torch."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from objectmorpher_core.lift.crop import SIDE  # noqa: E402
+from objectmorpher_core.models.onnx_session import open_session  # noqa: E402
+from objectmorpher_research.training import shape_data, train_shape  # noqa: E402
+from objectmorpher_research.training.shape_data import batch_of, packed  # noqa: E402
+from objectmorpher_research.training.shape_losses import losses  # noqa: E402
+from objectmorpher_research.training.shape_net import (  # noqa: E402
+    GRID,
+    OUTPUTS,
+    PLANES,
+    WIDTH,
+    ShapeNet,
+)
+from objectmorpher_research.training.shapes.sample import make_sample  # noqa: E402
+
+COUNT = 4
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    """Packed samples with made-up tokens: no weights are needed here."""
+    found = packed([make_sample(seed, families=("boxes",)) for seed in range(COUNT)])
+    rng = np.random.default_rng(0)
+    found["tokens"] = rng.normal(size=(COUNT, WIDTH, GRID, GRID)).astype(np.float16)
+    return found
+
+
+def test_the_truth_has_no_loss_but_what_cannot_be_known(arrays):
+    batch = batch_of(arrays)
+    truth = torch.cat(
+        [batch.front + 0.3, batch.thickness, batch.depth, batch.normal,
+         40 * batch.edge - 20, torch.full_like(batch.mask, -7), torch.full_like(batch.mask, -7)], 1,
+    )  # fmt: skip
+    parts = losses(truth, batch)
+    for name in ("front", "thickness", "depth", "slope", "edge"):
+        assert abs(float(parts[name])) < 1e-4, name
+    assert float(parts["normal"]) < 1e-3
+    assert float(parts["agree"]) < 0.15  # bytes of normals, halves of depths, curves
+    wrong = truth.clone()
+    wrong[:, 0] *= -1
+    assert float(losses(wrong, batch)["all"]) > float(parts["all"]) + 0.1
+
+
+def test_it_learns(arrays):
+    torch.manual_seed(0)
+    net, batch = ShapeNet(), batch_of(arrays, np.random.default_rng(0))
+    optimiser = torch.optim.AdamW(net.parameters(), 2e-3)
+    seen = []
+    for _ in range(24):
+        loss = losses(net(batch.planes, batch.tokens, batch.phase), batch)["all"]
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        seen.append(float(loss.detach()))
+    assert seen[-1] < 0.6 * seen[0]
+
+
+def test_a_worn_mask_is_at_most_a_little_off(arrays):
+    rng = np.random.default_rng(0)
+    for mask in arrays["mask"]:
+        for _ in range(5):
+            worn = shape_data._worn(mask, rng)
+            assert (worn ^ mask).sum() < 0.3 * mask.sum()
+
+
+def test_stopped_and_resumed_it_is_where_it_was(arrays, tmp_path):
+    folder = tmp_path / "samples"
+    folder.mkdir()
+    np.savez(folder / "00000000.npz", **arrays)
+    plan = train_shape.Plan(samples=COUNT, passes=3, size=2)
+    state = train_shape._State.resumed(tmp_path, plan)
+    for batch in train_shape._endless([folder / "00000000.npz"], plan, 0):
+        state.learn(batch)
+        if state.step == 3:
+            break
+    state.save()
+    again = train_shape._State.resumed(tmp_path, plan)
+    assert again.step == 3 and len(again.history) == 3
+    for name, value in state.net.state_dict().items():
+        assert torch.equal(again.net.state_dict()[name], value)
+    other = train_shape._State.resumed(tmp_path, replace(plan, seed=1))
+    assert other.step == 0  # another plan begins anew
+
+
+def test_it_runs_without_torch(arrays, tmp_path):
+    pytest.importorskip("onnx")
+    from objectmorpher_research.training.export_shape import export
+
+    torch.manual_seed(0)
+    net, path = ShapeNet().eval(), tmp_path / "shape.onnx"
+    export(net, path)
+    assert path.stat().st_size < 12e6
+    batch = batch_of(arrays)
+    session = open_session(path)
+    inputs = {"planes": batch.planes[:1].numpy(), "tokens": batch.tokens[:1].numpy()}
+    found = session.run(None, inputs)[0]
+    with torch.inference_mode():
+        expected = net(batch.planes[:1], batch.tokens[:1]).numpy()
+    assert found.shape[1] == OUTPUTS
+    assert np.abs(found - expected).mean() < 2e-3 * max(1.0, np.abs(expected).mean())
+
+
+def test_training_goes_on_from_exported_weights(tmp_path):
+    pytest.importorskip("onnx")
+    from objectmorpher_research.training.export_shape import export, weights_of
+
+    torch.manual_seed(0)
+    net, path = ShapeNet().train(), tmp_path / "shape.onnx"
+    with torch.no_grad():  # no two weights are alike, as after training
+        for weight in net.parameters():
+            weight += 0.01 * torch.randn_like(weight)
+        net(torch.rand(2, PLANES, SIDE, SIDE), torch.randn(2, WIDTH, GRID, GRID))
+    export(net, path)
+    again = weights_of(path, ShapeNet())
+    for name, value in net.state_dict().items():
+        if value.is_floating_point():
+            assert torch.allclose(again[name], value, rtol=1e-3, atol=1e-3), name
+    state = train_shape._State.resumed(tmp_path, train_shape.Plan(), again)
+    assert torch.equal(state.net.state_dict()["tokens.weight"], again["tokens.weight"])
+    with pytest.raises(ValueError, match="all families"):
+        train_shape.train(tmp_path, train_shape.Plan(held_out=("boxes",)), weights=path)
+    other = ShapeNet()
+    other.tokens = torch.nn.Conv2d(WIDTH, 8, 1)
+    with pytest.raises(ValueError, match="another network"):
+        weights_of(path, other)
+
+
+def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("onnx")
+    from app.cli import main
+
+    for name, first in (("samples", 0), ("unseen", train_shape.UNSEEN)):
+        (tmp_path / name).mkdir()
+        four_times = {key: np.concatenate([array] * 4) for key, array in arrays.items()}
+        np.savez(tmp_path / name / f"{first:08d}.npz", **four_times)
+    monkeypatch.setattr(train_shape, "CHECKED", COUNT)
+    words = ["train", "shape", "--folder", str(tmp_path)]
+    assert main([*words, "--samples", "16", "--passes", "2"]) == 0
+    told = json.loads((tmp_path / "shape.json").read_text(encoding="utf-8"))
+    assert told["steps"] == 2
+    weights = (tmp_path / "shape.onnx").read_bytes()
+    assert told["sha256"] == hashlib.sha256(weights).hexdigest()
+    for way in ("network", "relief", "inflation"):
+        assert 0 < told["means"][way]["front"] < 2
+    capsys.readouterr()
+    assert main([*words, "--samples", "4"]) == 1
+    assert "fewer than" in capsys.readouterr().err
+    assert main([*words, "--hold-out", "boxes,unicorns"]) == 1
+    assert "no family 'unicorns'" in capsys.readouterr().err
+    assert main([*words, "--start", str(tmp_path / "none.onnx")]) == 1
+    assert "no file" in capsys.readouterr().err
