@@ -199,10 +199,20 @@ docs: .make/docs.stamp
 figures: .make/test
 	@$(PYTHON) docs/concepts/make_figures.py
 
-# Damages files of every kind and has them read: docs/reliability.md. SECONDS says for how long.
+# Damages files of every kind and has them read: docs/reliability-tests.md. SECONDS says for how long.
 .PHONY: fuzz
 fuzz: .make/test
 	@$(PYTHON) -m tests.fuzz --seconds $(or $(SECONDS),600) $(ARGS)
+
+# Runs the command line with values that nobody means: docs/reliability-tests.md. RUNS says how often.
+.PHONY: fuzz-options
+fuzz-options: .make/test
+	@$(PYTHON) -m tests.fuzz.options --runs $(or $(RUNS),20000) $(ARGS)
+
+# Has sessions read that an attacker made, and measures memory and time.
+.PHONY: fuzz-sessions
+fuzz-sessions: .make/test
+	@$(PYTHON) -m tests.fuzz.hostile $(ARGS)
 
 # Lets every system call go wrong with which something is written; ARGS=--power cuts the power.
 .PHONY: faults

@@ -17,7 +17,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 
 from .base.arrays import Mask, Pixels
-from .base.files import write_all
+from .base.files import read_input, write_all
 from .base.progress import Progress, silent
 from .document.model import Document
 from .pictures.image import encode_mask
@@ -274,10 +274,10 @@ class Result:
 
 
 def _read(file: File) -> tuple[bytes, str]:
-    """The bytes of a file and its name without folder. Raises OSError of one sentence."""
+    """The bytes of a file and its name without folder. Raises OSError, InputError: one sentence."""
     path = Path(file)
     try:
-        return path.read_bytes(), path.name
+        return read_input(path), path.name
     except FileNotFoundError:
         raise FileNotFoundError(f"{path} does not exist") from None
     except IsADirectoryError:

@@ -16,6 +16,7 @@ import numpy as np
 from . import compose, lift, segment
 from .base.arrays import RGB, Mask, Pixels, Selection
 from .base.camera import Camera
+from .base.files import read_input
 from .base.pixels import crop, unit_pixels
 from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
@@ -245,7 +246,7 @@ def continue_script(
         own = replace(wanted.script, seed=script.seed, fov=script.fov, inpaint=script.inpaint)
         with runner.told_of(k + 1, others):
             if k > 0:
-                mask = Path(own.mask).read_bytes() if own.mask else None
+                mask = read_input(Path(own.mask)) if own.mask else None
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
     document, notes = runner.ordered(run.document, others), run.doubts()
@@ -328,7 +329,7 @@ class _Run:
             (replace(script, **NO_CHOICE | {"click": (xy,)}), None) for xy in script.front
         ]
         if script.front_mask is not None:
-            wishes.append((script, Path(script.front_mask).read_bytes()))
+            wishes.append((script, read_input(Path(script.front_mask))))
         for number, (wanted, mask) in enumerate(wishes, 1):
             progress(0.6, "Cutting out what stays in front")
             k = len(self.document.objects)

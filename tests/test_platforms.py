@@ -1,4 +1,7 @@
-"""What Windows and macOS lack or do otherwise, as far as Linux can tell (docs/reliability.md)."""
+"""What Windows and macOS lack or do otherwise, as far as Linux can tell.
+
+See docs/reliability-tests.md.
+"""
 
 from __future__ import annotations
 

@@ -30,11 +30,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments and (
         arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
     ):
+        if not {"-h", "--help", "--version"} & set(arguments):
+            _start_log()
         return cli.main(arguments)
     options = cli.parse_window(arguments)
     if not has_display():
         return _edit_headless(options.file)
     return _run_window(cli.window_options(options))
+
+
+def _start_log() -> None:
+    """Imported late: the words of `--help` need none of it."""
+    from .system.logs import log_path, start_command_log
+
+    start_command_log(log_path().parent)
 
 
 def _forgive_characters() -> None:

@@ -2,18 +2,21 @@
 
 A file is written under a temporary name in its own folder, down to the disk, renamed, and the
 folder is brought down to the disk, too. Whatever fails in between, and wherever the power is cut,
-the file is the old one or the new one. (docs/reliability.md tells how that is tested.)
+the file is the old one or the new one. (docs/reliability-tests.md tells how that is tested.)
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+
+from .limits import FILE_BYTES
 
 UNFINISHED = ".unfinished"  # ending of what is being written
 STALE = 3600.0  # s; an unfinished file older than this belongs to a process that died
@@ -21,6 +24,10 @@ PIECE = 1 << 24  # bytes that one write takes
 NAMED = 50  # characters of a file's name that the temporary one has, too
 
 Parts = Iterable[bytes | memoryview]
+
+
+class InputError(ValueError):
+    """The file is none that can be read; one sentence."""
 
 
 class OutputError(OSError):
@@ -53,6 +60,22 @@ def write_all(outputs: Mapping[Path, bytes | Parts]) -> None:
     finally:
         for temporary, _ in written:
             _discard(temporary)
+
+
+def read_input(path: Path) -> bytes:
+    """A file that the user names, if it ends, and is no larger than FILE_BYTES.
+
+    Raises InputError for what is none, or too large; OSError.
+    """
+    about = path.stat()
+    if not (stat.S_ISREG(about.st_mode) or stat.S_ISFIFO(about.st_mode) or path.is_dir()):
+        raise InputError(f"{path} is no file")
+    if about.st_size > FILE_BYTES:
+        raise InputError(
+            f"{path} is {about.st_size / (1 << 30):.1f} GiB, more than the {FILE_BYTES >> 30} GiB "
+            "that can be opened"
+        )
+    return path.read_bytes()
 
 
 def write_new(target: Path, parts: Parts, mode: int | None = None) -> None:

@@ -1,6 +1,6 @@
 """What a file or a message may claim before it is believed: every limit on what is read.
 
-A limit is refused with one sentence, before anything is allocated for it. docs/reliability.md
+A limit is refused with one sentence, before anything is allocated for it. docs/reliability-tests.md
 lists them; a test keeps that list complete.
 """
 
@@ -9,7 +9,12 @@ from __future__ import annotations
 # Pictures and sessions
 PICTURE_PIXELS = 250_000_000  # a larger picture does not fit an ordinary machine's memory thrice
 FILE_BYTES = 4 << 30  # bytes of any file that is opened
-SESSION_UNPACKED = 4 << 30  # bytes of all members: more than any real session
+SESSION_UNPACKED = 4 << 30  # bytes of all that is read of it: more than any real session
+SESSION_DOCUMENT = 8 << 20  # bytes of document.json; 256 objects have 1 MB
+SESSION_DIRECTORY = 8 << 20  # bytes of the zip file's directory; 256 objects have 1 MB
+SESSION_RATIO = 16  # x a member's packed bytes, beyond which what it unpacks to is excess
+SESSION_EXCESS = 192 << 20  # bytes of excess, of all members
+SESSION_FILE_SHARE = 16  # bytes of excess more for each byte of the session's file
 SESSION_OBJECTS = 256  # each costs a moment when the session is opened
 
 # Gaussians

@@ -139,7 +139,7 @@ class Puppet:
         splats = self._posed_whole(pose, placement)
         motion = splats.linear @ self.lifted.world_from_object[:3, :3]
         moved = self.lifted.gaussians.moved(splats.means, motion)
-        return moved.select(self.lifted.texture.solidity > 0.5)
+        return moved.select(self.lifted.is_body)
 
     def draw(
         self, pose: Pose | None, placement: Placement, texture: TextureLevels, camera: Camera

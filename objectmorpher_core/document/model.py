@@ -210,8 +210,13 @@ class LiftedObject:
     @cached_property
     def body(self) -> Gaussians:
         """The Gaussians that are the object itself, not its soft edge."""
+        return self.gaussians.select(self.is_body)
+
+    @cached_property
+    def is_body(self) -> Mask:
+        """(N,) which Gaussians those are: all, where none is solid."""
         is_solid = self.texture.solidity > 0.5
-        return self.gaussians.select(is_solid) if is_solid.any() else self.gaussians
+        return is_solid if is_solid.any() else np.ones(len(is_solid), bool)
 
     @cached_property
     def scale(self) -> float:
@@ -258,6 +263,11 @@ class Placement:
         if self.is_identity:  # usual, and asked for a dozen times a frame
             return UNMOVED
         centre = lifted.centre
+        if centre[2] <= 0:
+            raise ValueError(
+                "the object reaches behind the camera: a smaller field of view helps, or less"
+                " thickness"
+            )
         depth = centre[2] + self.depth * lifted.diameter * lifted.scale
         if depth <= 1e-3 * centre[2]:
             raise ValueError(f"a depth of {self.depth:g} diameters is behind the camera")

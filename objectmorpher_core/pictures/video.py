@@ -7,10 +7,8 @@ an H.264 encoder of a free licence comes with no package. GIF has 256 colours.
 from __future__ import annotations
 
 import io
-import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import numpy as np
 from PIL import Image
 
 from ..base.arrays import RGB
+from ..base.library_output import logged_output
 from .image import at_most
 
 CODECS = {".webm": "VP90", ".mp4": "mp4v"}
@@ -61,7 +60,7 @@ def read_frames(path: Path, numbers: tuple[int, ...]) -> list[RGB]:
 def _opened(path: Path) -> cv2.VideoCapture:
     if not path.is_file():
         raise VideoError(f"there is no video {path}")
-    with _silent_stderr():
+    with logged_output("a video"):
         video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not video.isOpened():
         raise VideoError(f"{path.name} is no video that can be read here")
@@ -88,34 +87,33 @@ def encode_video(frames: Iterable[RGB], rate: float, ending: str) -> bytes:
 
 def _filmed(frames: Iterable[RGB], shape: tuple[int, ...], rate: float, ending: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:  # OpenCV writes to names only
-        path = Path(folder) / f"video{ending}"
+        path, count = Path(folder) / f"video{ending}", 0
         code, size = cv2.VideoWriter.fourcc(*CODECS[ending]), (shape[1], shape[0])
-        with _silent_stderr():  # FFmpeg tells there that it chooses WebM's tag itself
+        with logged_output("a video"):  # FFmpeg's words about its tags, and about a full disk
             writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate, size)
-        if not writer.isOpened():
-            raise VideoError(f"OpenCV has no encoder for {ending} here; choose .webp or .gif")
-        for frame in frames:
-            writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
-        writer.release()
+            if not writer.isOpened():
+                raise VideoError(f"OpenCV has no encoder for {ending} here; choose .webp or .gif")
+            for frame in frames:
+                writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+                count += 1
+            writer.release()
+        if _frames_in(path) != count:  # the encoder itself says nothing of what fails
+            raise VideoError(f"the video cannot be written: is the disk full that holds {folder}?")
         return path.read_bytes()
 
 
-@contextmanager
-def _silent_stderr() -> Iterator[None]:
-    """What is written to the file that stderr is, by no matter whom, is lost meanwhile."""
+def _frames_in(path: Path) -> int:
+    """How many frames of a video can be read; 0 where it cannot be opened."""
     try:
-        kept = os.dup(2)
-    except OSError:  # a program without a terminal
-        yield
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(nowhere)
-        os.close(kept)
+        video = _opened(path)
+    except VideoError:
+        return 0
+    count = 0
+    with logged_output("a video"):
+        while video.grab():
+            count += 1
+    video.release()
+    return count
 
 
 def _pictured(frames: Iterable[RGB], rate: float, ending: str) -> bytes:

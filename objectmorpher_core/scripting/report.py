@@ -140,7 +140,8 @@ def _of_object(
     return {
         "object": {
             "mask_area_px": int(item.mask.sum()),
-            "gaussians": len(lifted.gaussians),
+            "gaussians": len(lifted.body),
+            "edge_gaussians": len(lifted.gaussians) - len(lifted.body),
             "control_points": len(lifted.control_points),
             "links": puppet.deformer.graph.link_count,
             "components": puppet.deformer.graph.component_count,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import compose, lift, segment
+from ..base.files import read_input
 from ..base.progress import Progress, part, silent
 from ..compose import refine
 from ..compose.composite import composite, object_texture
@@ -109,7 +110,7 @@ def lift_settings(document: Document, script: EditScript) -> LiftSettings:
     """What the script says about the object's shape. Raises ImageError."""
     hidden = None
     if script.hidden is not None:
-        hidden = read_mask(Path(script.hidden).read_bytes(), document.photo.size)
+        hidden = read_mask(read_input(Path(script.hidden)), document.photo.size)
     return LiftSettings(
         count=script.gaussians or GAUSSIANS,
         thickness=script.thickness,

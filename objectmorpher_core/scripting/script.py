@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from ..base.files import read_input
 from ..base.quoting import shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 
@@ -134,6 +135,15 @@ def parse_scripts(text: str) -> tuple[BatchItem, ...]:
     if not items:
         raise ScriptError("the script is empty")
     return tuple(_batch_item(item) for item in items)
+
+
+def read_scripts(path: Path) -> tuple[BatchItem, ...]:
+    """The edits in a script's file. Raises ScriptError, InputError, OSError."""
+    try:
+        text = read_input(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ScriptError(f"{path} is no script: it is not UTF-8 text") from error
+    return parse_scripts(text)
 
 
 def script_text(item: BatchItem) -> str:

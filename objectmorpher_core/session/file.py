@@ -12,8 +12,10 @@ but a default, which is what older sessions get. The same document gives the sam
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
@@ -22,7 +24,7 @@ import numpy as np
 
 from ..base.camera import Camera
 from ..base.files import OutputError, reason_of, write_all
-from ..base.limits import SESSION_OBJECTS
+from ..base.limits import SESSION_DOCUMENT, SESSION_OBJECTS
 from ..base.quoting import named, shown
 from ..document.model import SELECTED, Document, EditObject, Photo
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
@@ -30,7 +32,10 @@ from ..pictures.image import ImageError, encode_picture, read_picture
 from .tree import ArrayError, Reader, SessionError, Writer, read_npy
 from .zip import Member, Npy, Pieces, Zip, digest, scratch_file, write_zip
 
-__all__ = ["SessionError", "decode_session", "encode_session", "read_session", "save_session"]
+__all__ = [
+    "SessionError", "decode_session", "encode_session", "load_session", "read_session",
+    "save_session",
+]  # fmt: skip
 
 VERSION = 1
 FORMAT = "objectmorpher session"
@@ -101,28 +106,99 @@ def decode_session(data: bytes) -> Document:
     return read_session(io.BytesIO(data))
 
 
+def load_session(path: Path) -> Document:
+    """The document of a session file. Raises SessionError, OSError."""
+    with path.open("rb") as file:
+        return read_session(file)
+
+
 def read_session(file: IO[bytes]) -> Document:
-    """The same of a file that is open; its arrays are unpacked one by one."""
+    """The same of a file that is open.
+
+    Only what its document names is unpacked, member by member (docs/formats.md).
+    """
     with Zip(file, "session") as archive:
-        members = {name: archive.read(name) for name in archive.names if name != ARRAYS}
-        head = _head(members)
+        head = _head(archive)
         hashes = head.get("sha256")
         if not isinstance(hashes, dict):
             raise SessionError("the session's document.json is damaged: sha256 is missing")
-        for name, expected in hashes.items():
-            if name not in archive.names:
-                raise SessionError(f"the session is incomplete: {named(name)} is missing")
-            own = members[name] if name in members else archive.pieces(name)
-            if digest(own) != expected:
-                raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
-        trusted = {name: members[name] for name in hashes if name in members}
-        if ARRAYS not in hashes:
-            raise SessionError(f"the session is incomplete: {ARRAYS} is missing")
-        arrays = _arrays(archive)
-    return build_document(head.get("document"), trusted, arrays)
+        members = _Members(archive, hashes)
+        members.demand(ARRAYS)
+        with archive.inner(ARRAYS) as inner:
+            members.check(ARRAYS)
+            return build_document(head.get("document"), members, _Arrays(inner))
 
 
-def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.ndarray]) -> Document:
+class _Members(Mapping[str, bytes]):
+    """What document.json names, unpacked when it is asked for: nothing else ever is."""
+
+    def __init__(self, archive: Zip, hashes: dict[str, Any]) -> None:
+        self._archive, self._hashes = archive, hashes
+
+    def __getitem__(self, name: str) -> bytes:
+        if name not in self._hashes:
+            raise KeyError(name)
+        self.demand(name)
+        data = self._archive.read(name)
+        self._compare(name, data)
+        return data
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._hashes
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._hashes)
+
+    def __len__(self) -> int:
+        return len(self._hashes)
+
+    def demand(self, name: str) -> None:
+        """Raises SessionError unless the member is there."""
+        if name not in self._hashes or name not in self._archive.names:
+            raise SessionError(f"the session is incomplete: {named(name)} is missing")
+
+    def check(self, name: str) -> None:
+        """Raises SessionError unless a member is as it was saved; it is not kept."""
+        self._compare(name, self._archive.pieces(name))
+
+    def _compare(self, name: str, data: bytes | Iterable[bytes]) -> None:
+        if digest(data) != self._hashes[name]:
+            raise SessionError(f"the session is damaged: {named(name)} is not what was saved")
+
+
+class _Arrays(Mapping[str, np.ndarray]):
+    """The arrays of arrays.npz by path, unpacked when they are asked for.
+
+    Never a pickle, never a value beyond numbers.
+    """
+
+    def __init__(self, archive: Zip) -> None:
+        self._archive = archive
+        self._names = {name.removesuffix(".npy"): name for name in archive.names}
+        self._known: dict[str, np.ndarray] = {}
+
+    def __getitem__(self, path: str) -> np.ndarray:
+        if path not in self._known:
+            name = self._names[path]
+            try:
+                self._known[path] = read_npy(self._archive.read(name))
+            except ArrayError as error:
+                raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
+        return self._known[path]
+
+    def __contains__(self, path: object) -> bool:
+        return path in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def build_document(
+    tree: Any, members: Mapping[str, bytes], arrays: Mapping[str, np.ndarray]
+) -> Document:
     """The document of document.json's tree; `members` hold the photo's file and the pictures.
 
     Raises SessionError where the parts do not fit each other.
@@ -130,6 +206,11 @@ def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.nd
     reader = Reader(members, arrays)
     if not isinstance(tree, dict):
         raise SessionError("the session's document.json is damaged: document is missing")
+    objects = tree.get("objects")
+    if isinstance(objects, list) and len(objects) > SESSION_OBJECTS:
+        raise SessionError(
+            f"the session is damaged: {len(objects):,} objects are more than {SESSION_OBJECTS}"
+        )
     photo = _photo(tree.get("photo"), members, reader)
     try:
         document = _with_copies(reader.value(Document, tree | {"photo": photo}, "document"))
@@ -141,12 +222,15 @@ def build_document(tree: Any, members: dict[str, bytes], arrays: dict[str, np.nd
     return document
 
 
-def _head(members: dict[str, bytes]) -> dict[str, Any]:
+def _head(archive: Zip) -> dict[str, Any]:
     """document.json, of this version."""
-    if DOCUMENT not in members:
+    if DOCUMENT not in archive.names:
         raise SessionError("the file is a zip archive but not a session: it has no document.json")
     try:
-        head = json.loads(members[DOCUMENT], parse_constant=_refuse_constant)
+        text = archive.read(DOCUMENT, SESSION_DOCUMENT)
+        head = json.loads(text, parse_constant=_refuse_constant)
+    except SessionError:
+        raise
     except (ValueError, RecursionError) as error:
         raise SessionError("the session's document.json is damaged") from error
     if not isinstance(head, dict) or head.get("format") != FORMAT:
@@ -163,45 +247,29 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
-def _photo(tree: object, members: dict[str, bytes], reader: Reader) -> Photo:
-    """The photo, its picture decoded from the original file's bytes."""
-    if not isinstance(tree, dict) or tree.get("source") not in members:
+def _photo(tree: object, members: Mapping[str, bytes], reader: Reader) -> Photo:
+    """The photo, its picture decoded from the original file's bytes, and no larger than it says."""
+    name = tree.get("source") if isinstance(tree, dict) else None
+    if not isinstance(tree, dict) or not isinstance(name, str) or name not in members:
         raise SessionError("the session is damaged: its photo is missing")
-    source = members[tree["source"]]
+    camera = reader.value(Camera, tree.get("camera"), "photo.camera")
+    reader.most = camera.width * camera.height
+    source = members[name]
     try:
-        picture = read_picture(source)
+        picture = read_picture(source, reader.most)
     except ImageError as error:
         raise SessionError(f"the session's photo cannot be read: {error}") from error
-    camera = reader.value(Camera, tree.get("camera"), "photo.camera")
-    name = reader.value(str, tree.get("name"), "photo.name")
-    return Photo(picture, camera, source, name)
-
-
-def _arrays(archive: Zip) -> dict[str, np.ndarray]:
-    """The arrays of arrays.npz by path; never a pickle, never a value beyond numbers."""
-    arrays = {}
-    with archive.inner(ARRAYS) as inner:
-        for name in inner.names:
-            data = bytearray()
-            for piece in inner.pieces(name):
-                data += piece
-            try:
-                arrays[name.removesuffix(".npy")] = read_npy(data)
-            except ArrayError as error:
-                raise SessionError(f"the session is damaged: {named(name)} is {error}") from error
-    return arrays
+    return Photo(picture, camera, source, reader.value(str, tree.get("name"), "photo.name"))
 
 
 def _with_copies(document: Document) -> Document:
     """Copies of an object share its mask, by which they are known as copies."""
-    if len(document.objects) > SESSION_OBJECTS:
-        raise ValueError(f"{len(document.objects):,} objects are more than {SESSION_OBJECTS}")
-    known: list[np.ndarray] = []
+    known: dict[bytes, np.ndarray] = {}
     objects = []
     for item in document.objects:
         if item.mask is not None:
-            mask = next((m for m in known if np.array_equal(m, item.mask)), item.mask)
-            known.append(mask)
+            key = hashlib.sha256(item.mask.data).digest() + repr(item.mask.shape).encode()
+            mask = known.setdefault(key, item.mask)
             item = item if mask is item.mask else replace(item, mask=mask)
         objects.append(item)
     return replace(document, objects=tuple(objects))

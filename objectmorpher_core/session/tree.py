@@ -8,13 +8,23 @@ from __future__ import annotations
 import io
 import math
 import types
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from functools import cache
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from ..base.arrays import all_finite, frozen
-from ..pictures.image import ImageError, Picture, encode_mask, encode_picture, read_picture
+from ..base.quoting import named
+from ..pictures.image import (
+    MAX_PIXELS,
+    ImageError,
+    Picture,
+    encode_mask,
+    encode_picture,
+    read_picture,
+)
 
 
 class SessionError(ValueError):
@@ -71,8 +81,10 @@ class Writer:
 class Reader:
     """Builds values of a given type from JSON values. Raises SessionError."""
 
-    members: dict[str, bytes]  # the PNG files by member name
-    arrays: dict[str, np.ndarray]  # by path
+    members: Mapping[str, bytes]  # the PNG files by member name
+    arrays: Mapping[str, np.ndarray]  # by path
+    most: int = MAX_PIXELS  # px of a picture
+    _pictures: dict[str, np.ndarray] = field(default_factory=dict)  # decoded, by member name
 
     def value(self, hint: Any, tree: Any, where: str) -> Any:
         """A value of the type `hint`; `where` names it in an error."""
@@ -114,7 +126,7 @@ class Reader:
     def _dataclass(self, kind: Any, tree: Any, where: str) -> Any:
         if not isinstance(tree, dict):
             raise _damaged(where)
-        hints = get_type_hints(kind)
+        hints = _hints(kind)
         given = {}
         for f in fields(kind):
             if f.name in tree:
@@ -137,11 +149,21 @@ class Reader:
         return frozen(array)
 
     def _picture(self, member: str) -> np.ndarray:
-        try:
-            picture = read_picture(self.members[member])
-        except ImageError as error:
-            raise SessionError(f"the session is damaged: {member}: {error}") from error
-        return picture.pixels[..., 0] > 127 if picture.is_grey else picture.pixels
+        """A member's pixels, or mask: the same array wherever it is named again."""
+        if member not in self._pictures:
+            try:
+                picture = read_picture(self.members[member], self.most)
+            except ImageError as error:
+                raise SessionError(f"the session is damaged: {named(member)}: {error}") from error
+            pixels = picture.pixels
+            self._pictures[member] = frozen(pixels[..., 0] > 127) if picture.is_grey else pixels
+        return self._pictures[member]
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of a dataclass's fields; looking them up costs more than reading one."""
+    return get_type_hints(kind)
 
 
 def _is_of(array: np.ndarray, hint: Any) -> bool:

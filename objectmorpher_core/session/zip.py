@@ -15,8 +15,9 @@ from typing import IO, TypeAlias
 
 import numpy as np
 
+from ..base.limits import SESSION_DIRECTORY, SESSION_EXCESS, SESSION_FILE_SHARE, SESSION_RATIO
 from ..base.limits import SESSION_UNPACKED as MAX_BYTES
-from ..base.quoting import shown
+from ..base.quoting import named, shown
 from .tree import SessionError
 
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the zip format's first day: no clock in the bytes
@@ -25,6 +26,7 @@ LEVEL = 1  # of zlib
 PIECE = 1 << 24  # bytes that are read at a time
 IN_MEMORY = 1 << 26  # bytes up to which a file that is needed for a moment is not on the disk
 LOCAL_HEADER, NAME_LENGTHS = 30, 26  # bytes of a member's own header; where its lengths are
+DIRECTORY_SIZE = 5  # which number of the zip file's last record that is
 
 
 class Npy:
@@ -100,18 +102,24 @@ def _parts(member: bytes | Iterable[bytes | memoryview]) -> Iterable[bytes | mem
 
 
 class Zip:
-    """A zip file that is read; its members have sound names and are within bounds.
+    """A zip file that is read: members have sound names, and only those that are asked for unpack.
 
-    Everything raises SessionError, in which the file is called `what`.
+    Everything raises SessionError, in which the file is called `what`. A zip file inside another
+    one shares the `budget` of the outer one.
     """
 
-    def __init__(self, file: IO[bytes], what: str) -> None:
+    def __init__(self, file: IO[bytes], what: str, budget: Budget | None = None) -> None:
         self._file, self._what = file, what
         with self._told():
+            size = file.seek(0, io.SEEK_END)
+            self._check_directory()
             self._archive = zipfile.ZipFile(file)
             infos = self._archive.infolist()
             self.names = [info.filename for info in infos]
-            self._check(sum(info.file_size for info in infos))
+            self._check_names()
+            if sum(info.compress_size for info in infos) > size:
+                raise zipfile.BadZipFile("members overlap")
+        self._budget = budget or Budget(size)
 
     def __enter__(self) -> Zip:
         return self
@@ -119,13 +127,23 @@ class Zip:
     def __exit__(self, *_: object) -> None:
         self._archive.close()
 
-    def read(self, name: str) -> bytes:
-        """A member, all of it."""
+    def read(self, name: str, most: int = MAX_BYTES) -> bytes:
+        """A member, all of it; one of more than `most` bytes is refused."""
         with self._told():
-            return self._archive.read(name)
+            info = self._archive.getinfo(name)
+        if info.file_size > most:
+            raise SessionError(
+                f"the {self._what} is damaged: {named(name)} has {info.file_size:,} bytes, "
+                f"more than {most:,}"
+            )
+        self._budget.take(name, info.file_size, info.compress_size)
+        data = io.BytesIO()
+        for piece in self.pieces(name):
+            data.write(piece)
+        return data.getvalue()
 
     def pieces(self, name: str) -> Iterator[bytes]:
-        """A member, piece by piece."""
+        """A member, piece by piece, of which none stays in the memory."""
         with self._told(), self._archive.open(name) as member:
             while piece := member.read(PIECE):
                 yield piece
@@ -135,14 +153,20 @@ class Zip:
         with self._told():
             info = self._archive.getinfo(name)
             if info.compress_type != zipfile.ZIP_STORED:
-                return Zip(io.BytesIO(self._archive.read(name)), name)
+                return Zip(io.BytesIO(self.read(name)), name, self._budget)
             self._file.seek(info.header_offset + NAME_LENGTHS)
             lengths = struct.unpack("<HH", self._file.read(4))
             start = info.header_offset + LOCAL_HEADER + sum(lengths)
             window = _Window(self._file, start, info.compress_size)
-            return Zip(io.BufferedReader(window), name)
+            return Zip(io.BufferedReader(window), name, self._budget)
 
-    def _check(self, size: int) -> None:
+    def _check_directory(self) -> None:
+        """Python reads the directory at once, and each entry takes ten times its bytes."""
+        end = getattr(zipfile, "_EndRecData")(self._file)  # noqa: B009  None where there is none
+        if end is not None and end[DIRECTORY_SIZE] > SESSION_DIRECTORY:
+            raise SessionError(f"the {self._what} holds too many members")
+
+    def _check_names(self) -> None:
         for name in self.names:
             if name.startswith("/") or "\\" in name or ".." in name.split("/"):
                 raise SessionError(
@@ -150,8 +174,6 @@ class Zip:
                 )
         if len(set(self.names)) < len(self.names):
             raise SessionError(f"the {self._what} holds two members of the same name")
-        if size > MAX_BYTES:
-            raise SessionError(f"the {self._what} would unpack to more than {MAX_BYTES >> 30} GiB")
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -162,9 +184,32 @@ class Zip:
             raise
         except (NotImplementedError, zlib.error) as error:
             raise SessionError(f"the {what} is damaged") from error
-        except (zipfile.BadZipFile, EOFError, OSError, ValueError, RuntimeError,
+        except (zipfile.BadZipFile, EOFError, OSError, ValueError, RuntimeError, KeyError,
                 struct.error) as error:  # fmt: skip
             raise SessionError(f"the {what} is not a zip file, is damaged or ends early") from error
+
+
+class Budget:
+    """How much a session may unpack to: what it really holds hardly shrinks when it is packed.
+
+    `file_size`: bytes of the session's file.
+    """
+
+    def __init__(self, file_size: int) -> None:
+        self._excess = SESSION_EXCESS + SESSION_FILE_SHARE * file_size
+        self._left = MAX_BYTES
+
+    def take(self, name: str, size: int, packed: int) -> None:
+        """Counts a member of `size` bytes before it is unpacked. Raises SessionError."""
+        self._left -= size
+        self._excess -= max(size - SESSION_RATIO * packed, 0)
+        if self._left < 0:
+            raise SessionError(f"the session would unpack to more than {MAX_BYTES >> 30} GiB")
+        if self._excess < 0:
+            raise SessionError(
+                f"the session is damaged: {named(name)} would unpack from {packed:,} "
+                f"to {size:,} bytes"
+            )
 
 
 class _Window(io.RawIOBase):

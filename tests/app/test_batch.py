@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from objectmorpher.cli import parser as cli
 from objectmorpher_core.pictures.image import read_picture
@@ -127,5 +128,17 @@ def test_two_edits_do_not_write_one_file(folder, capsys):
 def test_without_a_script_there_is_nothing_to_run(folder, capsys):
     assert _batch() == cli.FAILED
     assert "no script" in capsys.readouterr().err
-    assert cli.main(["batch", "scripts", "-o", "nowhere"]) == cli.FAILED
+    assert cli.main(["batch", "scripts", "-o", "scripts/mask.png"]) == cli.FAILED
     assert "is no folder" in capsys.readouterr().err
+
+
+def test_outputs_keep_their_photos_format_in_a_folder_that_is_made(folder):
+    Image.open("photos/two.png").convert("RGB").save("photos/three.JPG")
+    Path("photos/two.png").unlink()
+    Path("scripts/a.json").write_text(json.dumps(QUICK | {"move": [3, 1]}), encoding="utf-8")
+    photos = ("batch", "scripts", "--photo", "photos")
+    assert cli.main([*photos, "-o", "made/here"]) == 0
+    assert sorted(p.name for p in Path("made/here").iterdir()) == ["one-a.png", "three-a.jpg"]
+    assert Image.open("made/here/three-a.jpg").format == "JPEG"
+    assert cli.main([*photos, "-o", "tif", "--format", "tif"]) == 0
+    assert sorted(p.name for p in Path("tif").iterdir()) == ["one-a.tif", "three-a.tif"]

@@ -20,6 +20,7 @@ from objectmorpher.cli import parser as cli
 from objectmorpher_core.compose import BACKENDS
 from objectmorpher_core.pictures.image import read_picture
 from objectmorpher_core.scripting.script import EditScript
+from objectmorpher_core.splat_files.splats.ply import decode_ply
 from tests import shapes
 from tests.tree import PYTHONPATH
 
@@ -153,7 +154,9 @@ def test_every_further_output_is_written(folder):
     assert plate.dtype == PIXELS.dtype
     assert np.array_equal(plate[:10], PIXELS[:10])
     assert cv2.imread("o.png", cv2.IMREAD_UNCHANGED).shape == (120, 160, 4)
-    assert Path("s.ply").read_bytes().startswith(b"ply")
+    told = json.loads(Path("r.json").read_text())["object"]
+    assert len(decode_ply(Path("s.ply").read_bytes())) == told["gaussians"] > 0
+    assert told["edge_gaussians"] > 0
     depth = cv2.imread("d.png", cv2.IMREAD_UNCHANGED)
     assert depth.dtype == np.uint16 and depth.shape == (120, 160)
     assert depth.max() == 65535 and 0.2 < (depth > 0).sum() / MASK.sum() < 2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from objectmorpher_core.base import limits
 
-DOCS = Path(__file__).parents[2] / "docs" / "reliability.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reliability-tests.md"
 
 
 def test_the_docs_list_every_limit_with_its_value() -> None:

@@ -19,7 +19,8 @@ MASK = shapes.mask("ellipse")
 KEYS = {
     "version": None,
     "photo": {"width", "height"},
-    "object": {"mask_area_px", "gaussians", "control_points", "links", "components"},
+    "object": {"mask_area_px", "gaussians", "edge_gaussians", "control_points", "links",
+               "components"},
     "handles": None,
     "energy": {"start", "end", "iterations"},
     "pixels": {"changed", "outside_footprint_changed", "from_photo", "from_lifter",

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.files import make_folder, write_all
 from objectmorpher_core.pictures.image import ENDINGS, encode_picture
 from objectmorpher_core.scripting.script import (
     BatchItem,
     beside,
     files_of,
     parse_scripts,
+    read_scripts,
     script_text,
 )
 
@@ -28,7 +29,7 @@ from .commands import check_outputs, edited_by, json_bytes
 from .ray import check_ray
 from .terminal import FAILURES, UsageError, failure_sentence, progress_bar
 
-USUAL_ENDING = ".png"
+USUAL_ENDING = ".png"  # of edits of photos in formats that are only read
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,14 @@ def run_batch(options: argparse.Namespace) -> None:
     """`objectmorpher batch`. Raises RuntimeError at the end where an edit has failed."""
     if options.report:
         check_outputs([], {options.report: (".json",)})
-    if options.out is not None and not options.out.is_dir():
+    if options.out is not None and options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is no folder")
     check_ray(options)
     tasks = list(_tasks(options))
     if not tasks:
         raise UsageError("there is no script to run")
+    if options.out is not None:
+        make_folder(options.out)
     entries: dict[int, dict[str, Any]] = {}
     for number, entry in _entries(tasks, options):
         entries[number] = entry
@@ -173,14 +176,14 @@ def _tasks(options: argparse.Namespace) -> Iterator[Task]:
     taken: set[Path] = set()
     for script in _files(options.scripts, (".json",)):
         try:
-            items = parse_scripts(script.read_text(encoding="utf-8"))
+            items = read_scripts(script)
         except (ValueError, OSError) as error:
             yield Task(script, None, failure_sentence(error))
             continue
         for number, item in enumerate(items, 1):
             stem = script.stem if len(items) == 1 else f"{script.stem}-{number}"
             for each, name in _with_photos(beside(item, script.parent), stem, photos):
-                yield _task(script, _with_out(each, name, options.out), taken)
+                yield _task(script, _with_out(each, name, options), taken)
 
 
 def _task(script: Path, item: BatchItem, taken: set[Path]) -> Task:
@@ -204,10 +207,13 @@ def _with_photos(item: BatchItem, stem: str, photos: list[Path]) -> Iterator[tup
         yield replace(item, photo=str(photo)), f"{photo.stem}-{stem}"
 
 
-def _with_out(item: BatchItem, name: str, folder: Path | None) -> BatchItem:
-    if item.out is not None or folder is None:
+def _with_out(item: BatchItem, name: str, options: argparse.Namespace) -> BatchItem:
+    """In the folder for outputs, in the format that is asked for or else in the photo's own."""
+    if item.out is not None or options.out is None:
         return item
-    return replace(item, out=str(folder / f"{name}{USUAL_ENDING}"))
+    own = Path(item.photo or "").suffix.lower()
+    ending = f".{options.format}" if options.format else own if own in ENDINGS else USUAL_ENDING
+    return replace(item, out=str(options.out / f"{name}{ending}"))
 
 
 def _files(paths: list[Path], endings: tuple[str, ...]) -> list[Path]:

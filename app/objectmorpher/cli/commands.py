@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.base.files import write_all
+from objectmorpher_core.base.files import read_input, write_all
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
 from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_picture
@@ -25,7 +25,7 @@ from objectmorpher_core.scripting.script import (
     ScriptError,
     beside,
     files_of,
-    parse_scripts,
+    read_scripts,
     script_from,
 )
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
@@ -72,8 +72,8 @@ def run_edit(options: argparse.Namespace) -> None:
 def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
     """One edit of a batch, or the only one."""
     photo, script = Path(item.photo or ""), item.script
-    mask = Path(script.mask).read_bytes() if script.mask else None
-    data = photo.read_bytes()
+    mask = read_input(Path(script.mask)) if script.mask else None
+    data = read_input(photo)
     return run_script(data, photo.name, script, mask, progress, needs_plate, item.others)
 
 
@@ -103,23 +103,23 @@ def run_select(options: argparse.Namespace) -> None:
     inputs = [options.photo, *([Path(script.mask)] if script.mask else [])]
     check_outputs(inputs, {options.out: (".png",)})
     refuse_missing(script)
-    mask = Path(script.mask).read_bytes() if script.mask else None
+    mask = read_input(Path(script.mask)) if script.mask else None
     with progress_bar("Selecting") as progress:
-        document = open_photo(options.photo.read_bytes(), options.photo.name)
+        document = open_photo(read_input(options.photo), options.photo.name)
         document = select_object(document, script, mask, progress)
     write_all({options.out: encode_mask(_mask(document))})
 
 
 def run_replay(options: argparse.Namespace) -> None:
     """`objectmorpher replay`"""
-    from objectmorpher_core.session.file import decode_session
+    from objectmorpher_core.session.file import load_session
 
     wanted: dict[Path, tuple[str, ...]] = {options.out: ENDINGS}
     if options.report:
         wanted[options.report] = (".json",)
     check_outputs([options.session], wanted)
     with progress_bar("Opening") as progress:
-        edited = replay(decode_session(options.session.read_bytes()), progress)
+        edited = replay(load_session(options.session), progress)
         outputs = {options.out: encode_picture(edited.picture, options.out.suffix)}
         if options.report:
             outputs[options.report] = json_bytes(edited.report())
@@ -128,9 +128,9 @@ def run_replay(options: argparse.Namespace) -> None:
 
 def run_info(options: argparse.Namespace) -> None:
     """`objectmorpher info`"""
-    from objectmorpher_core.session.file import decode_session
+    from objectmorpher_core.session.file import load_session
 
-    info = describe(decode_session(options.session.read_bytes()))
+    info = describe(load_session(options.session))
     if options.json:
         sys.stdout.write(json_bytes(info).decode())
         return
@@ -150,7 +150,8 @@ def describe(document: Document) -> dict[str, Any]:
         objects.append({
             "name": item.name,
             "mask_area_px": 0 if item.mask is None else int(item.mask.sum()),
-            "gaussians": 0 if lifted is None else len(lifted.gaussians),
+            "gaussians": 0 if lifted is None else len(lifted.body),
+            "edge_gaussians": 0 if lifted is None else len(lifted.gaussians) - len(lifted.body),
             "control_points": 0 if lifted is None else len(lifted.control_points),
             "handles": sum(not h.is_pin for h in item.handles),
             "pins": sum(h.is_pin for h in item.handles),
@@ -197,7 +198,7 @@ def _items(options: argparse.Namespace) -> list[BatchItem]:
     if options.script is None:
         items = [BatchItem(said)]
     else:
-        read = parse_scripts(options.script.read_text(encoding="utf-8"))
+        read = read_scripts(options.script)
         folder = options.script.parent
         items = [beside(item, folder) for item in read]
         items = [replace(i, script=i.script.merged(said, _said(options))) for i in items]

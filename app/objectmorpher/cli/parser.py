@@ -6,6 +6,7 @@ A failure is one sentence on stderr and a non-zero exit; nothing is then written
 from __future__ import annotations
 
 import argparse
+import logging
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -13,22 +14,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from objectmorpher_core.base.quoting import reason
+
 from .. import __version__
+from .command_parser import MISUSED, Parser, misspelt_command
 from .options import RENDERERS, WindowOptions
 from .ray import add_ray
 from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
-from .terminal import FAILURES, PROGRAM, failure_sentence
+from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
-FAILED, MISUSED = 1, 2  # exit codes
+FAILED = 1  # exit code
+FORMATS = ("png", "jpg", "tif", "webp")  # of a batch's outputs
+UNFORESEEN = "something went wrong that should not have"
 
-
-class _Parser(argparse.ArgumentParser):
-    """An ArgumentParser whose errors are one sentence."""
-
-    def error(self, message: str) -> Any:
-        sys.stderr.write(f"{PROGRAM}: {message}\n")
-        raise SystemExit(MISUSED)
+log = logging.getLogger(__name__)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -42,10 +42,20 @@ def main(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write(f"{PROGRAM}: interrupted\n")
         return 130
-    except FAILURES as error:
-        sys.stderr.write(f"{PROGRAM}: {failure_sentence(error)}\n")
+    except Exception as error:
+        sys.stderr.write(f"{PROGRAM}: {_told(error, options.command)}\n")
         return FAILED
     return 0
+
+
+def _told(error: Exception, command: str) -> str:
+    """What the user is told of it; a fault of ours is told in full in the log."""
+    if isinstance(error, FAILURES) and not is_librarys(error):
+        return failure_sentence(error)
+    from ..system.logs import log_path
+
+    log.error("%s failed", command, exc_info=error)
+    return f"{UNFORESEEN} ({type(error).__name__}: {reason(error)}); see {log_path()}"
 
 
 def _absent(arguments: Sequence[str]) -> str | None:
@@ -60,7 +70,7 @@ def _absent(arguments: Sequence[str]) -> str | None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All subcommands and their options; those of the research package where it is installed."""
-    parser = _Parser(
+    parser = Parser(
         prog=PROGRAM,
         description="Open a photo, click an object, drag points on it in 3D, save the photo.",
         epilog="Without a subcommand the editor opens: objectmorpher [FILE]",
@@ -72,7 +82,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def window_parser() -> argparse.ArgumentParser:
     """The options of the editor's window: `objectmorpher [FILE]`."""
-    parser = _Parser(prog=PROGRAM, description="Open the editor.")
+    parser = Parser(prog=PROGRAM, description="Open the editor.")
     add = parser.add_argument
     add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
     add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
@@ -90,6 +100,10 @@ def window_parser() -> argparse.ArgumentParser:
 
 def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
     """What they say on this command line."""
+    wrong = misspelt_command(arguments, COMMANDS)
+    if wrong is not None:
+        sys.stderr.write(f"{PROGRAM}: {wrong}\n")
+        raise SystemExit(MISUSED)
     return window_parser().parse_args(list(arguments))
 
 
@@ -208,9 +222,12 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     )
     add = parser.add_argument
     add("scripts", type=Path, nargs="+", metavar="SCRIPT", help="edit scripts, or folders of them")
-    add("-o", "--out", type=Path, metavar="FOLDER", help="of outputs that a script does not name")
+    add("-o", "--out", type=Path, metavar="FOLDER",
+        help="of outputs that a script does not name; it is made where there is none")  # fmt: skip
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
+    add("--format", choices=FORMATS, metavar="ENDING",
+        help="of those outputs: png, jpg, tif or webp; default the photo's own")  # fmt: skip
     add("--overwrite", action="store_true", help="also what is newer already")
     add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
     add_ray(parser)

@@ -6,11 +6,15 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from traceback import walk_tb
 
 from objectmorpher_core.base.progress import Progress, silent
 
 PROGRAM = "objectmorpher"
 FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
+
+
+OURS = ("app", "objectmorpher_core")
 
 
 class UsageError(ValueError):
@@ -27,6 +31,14 @@ def failure_sentence(error: BaseException) -> str:
             return f"{error.filename} {reason.get(type(error), 'is a folder, not a file')}"
     text = str(error) or type(error).__name__
     return json.dumps(text)[1:-1] if "\n" in text else text
+
+
+def is_librarys(error: BaseException) -> bool:
+    """Whether a library found fault with what we gave it: its words are not for the user."""
+    if isinstance(error, OSError | MemoryError) or error.__traceback__ is None:
+        return False
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    return frame.f_globals.get("__name__", "").partition(".")[0] not in OURS
 
 
 @contextmanager

@@ -139,19 +139,20 @@ class Recovery:
 
 def _left_in(folder: Path) -> Left | None:
     """What a crashed editor left in its folder; None where there is nothing, or one runs."""
-    if not (folder / DOCUMENT).exists():
-        if time.time() - folder.stat().st_mtime > STALE:
-            shutil.rmtree(folder, ignore_errors=True)
-        return None
+    is_stale = time.time() - folder.stat().st_mtime > STALE  # also where the clock was put forward
     lock = FileLock.take(folder / LOCK)
     if lock is None:
         return None
     lock.release()
+    if not (folder / DOCUMENT).exists():
+        if is_stale:
+            shutil.rmtree(folder, ignore_errors=True)
+        return None
     try:
         about = read_about(folder)
         path, source = about.get("path"), about.get("source")
         return Left(
-            folder, str(about["name"]), datetime.fromisoformat(about["edited"]),
+            folder, str(about["name"]), _local(datetime.fromisoformat(about["edited"])),
             int(about["objects"]), Path(path) if path else None, Path(source) if source else None,
         )  # fmt: skip
     except (SessionError, KeyError, TypeError, ValueError) as error:
@@ -159,10 +160,15 @@ def _left_in(folder: Path) -> Left | None:
         return Left(folder, problem=t("It is damaged and cannot be recovered"))
 
 
+def _local(time: datetime) -> datetime:
+    """The same time without a zone: times of this machine are compared."""
+    return time if time.tzinfo is None else time.astimezone().replace(tzinfo=None)
+
+
 def when(edited: datetime | None) -> str:
     """The time of today, or day and time of earlier."""
     if edited is None:
         return ""
-    if datetime.now() - edited < timedelta(hours=18):
+    if abs(datetime.now() - edited) < timedelta(hours=18):  # a clock may have jumped back
         return f"{edited:%H:%M}"
     return f"{edited:%d %b %Y, %H:%M}"

@@ -6,7 +6,7 @@ import faulthandler
 import logging
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from ..editor.settings import settings_path
 
@@ -37,6 +37,28 @@ def start_log(folder: Path) -> None:
     file.setFormatter(logging.Formatter(FORMAT))
     logging.getLogger().addHandler(file)
     note_crashes(folder)
+
+
+def start_command_log(folder: Path) -> None:
+    """Libraries' warnings and faults of ours into the same file: the terminal has our own words.
+
+    The file is made when something is written; where it cannot be, nobody is bothered.
+    """
+    handler = _QuietFile(folder / NAME, maxBytes=SIZE, backupCount=1, delay=True)
+    handler.setFormatter(logging.Formatter(FORMAT))
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.captureWarnings(True)
+
+
+class _QuietFile(RotatingFileHandler):
+    """A log file whose folder is made with it."""
+
+    def _open(self) -> Any:
+        Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
+        return super()._open()
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """A full disk, or a folder that is read-only."""
 
 
 def note_crashes(folder: Path) -> None:

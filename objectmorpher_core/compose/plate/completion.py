@@ -41,6 +41,7 @@ SLANTS = slice(-len(SLANT_SIGMAS), None)  # of the channels: they change sign in
 ROUGHNESS_WEIGHT = 8.0  # x a colour channel's
 HOLE_WEIGHT = 0.4  # x a known pixel's, of one that is only guessed, when patches are compared
 TRUST = 1.3  # x less a patch's vote counts for each px that it lies deeper in the hole
+LEAST_TRUST = np.float32(1e-30)  # deep in a hole; less would be no whole float32 any more
 USUAL_COST = 75  # percentile of the patches' costs, at which a vote loses
 LEAST_SHARE = 1e-12
 SIGMAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # px, of the first guess; each weighs a hundredth
@@ -218,7 +219,8 @@ class _Filling:
         inside = np.pad(np.where(self.hole, np.float32(HOLE_WEIGHT), 1), self._radius)
         self._weight = inside[..., None] * weights
         depth = cv2.distanceTransform(self.hole.astype(np.uint8), cv2.DIST_L2, 5)
-        self._trust = np.float32(TRUST) ** -depth
+        trust = np.maximum(np.float32(TRUST) ** -depth, LEAST_TRUST)
+        self._trust = np.asarray(trust, np.float32)
         self._costs = np.ones(self.hole.shape, np.float32)
         self._places = np.argwhere(self._usable).astype(np.int32)
         self.sources: I32 = np.full((*self.hole.shape, 3), -1, np.int32)

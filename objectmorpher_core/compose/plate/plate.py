@@ -18,7 +18,7 @@ from ...base.pixels import crop, pixels_from_unit, unit_pixels
 from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
-from .. import Inpainter, LooksFar, TakesHints
+from .. import Inpainter, InpaintError, LooksFar, TakesHints
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -61,10 +61,13 @@ def build_plate(
     seed: int = 0,
     hints: tuple[Hint, ...] = (),
 ) -> Plate:
-    """The photo (H, W, 3) without what hides it at `covered` (H, W), which must not be empty.
+    """The photo (H, W, 3) without what hides it at `covered` (H, W).
 
-    `Plate.hole` is where anything is invented. Hints are for inpainters that take them.
+    `Plate.hole` is where anything is invented. Hints are for inpainters that take them. Raises
+    InpaintError where nothing is covered.
     """
+    if not covered.any():
+        raise InpaintError("the object is too thin to be cut out of the photo")
     height, width = covered.shape
     margin = hole_margin(width, height)
     away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)

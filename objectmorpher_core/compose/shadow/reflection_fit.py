@@ -95,6 +95,8 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None) -> _Seen | None:
     x0, x1 = max(columns[0] - reach, 0), min(columns[-1] + 1 + reach, width)
     y0, y1 = max(rows[0] - reach // 2, 0), min(rows[-1] + 1 + int(BELOW * high), height)
     shape = (int(x1 - x0) // pitch, int(y1 - y0) // pitch)
+    if min(shape) < 1:  # a photo that is thinner than a cell
+        return None
     x1, y1 = int(x0 + shape[0] * pitch), int(y0 + shape[1] * pitch)
     box = (int(x0), int(y0), x1, y1)
 

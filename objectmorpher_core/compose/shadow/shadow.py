@@ -41,6 +41,7 @@ LAST_BLURS = (0.008, 0.035)  # x height, of all of it, at softness 0 and 1
 BAND = 0.07  # x height, of what touches the ground
 BAND_BLUR = 0.03  # x height
 BAND_DROP = 0.015  # x height that the contact lies below the object
+FARTHEST = 2.0  # x the photo's diagonal, of an object whose shadow is cast
 DARKEST = 0.97  # of the light, at strength 1
 FAINTEST = 1 / 255  # what is weaker is none: the footprint ends somewhere
 
@@ -113,7 +114,8 @@ class Standing:
         self._right = np.array([1.0, 0.0, 0.0])
         self._nearer = np.cross(normal, self._right)  # on the ground, towards the viewer
         self._camera = camera
-        self._size = self._height * camera.focal / max(float(middle[2]), 1e-9)  # photo px
+        size = self._height * camera.focal / max(float(middle[2]), 1e-9)
+        self._size = min(size, float(FARTHEST * np.hypot(camera.width, camera.height)))  # photo px
         # Lengths on the ground, towards the viewer, look so much shorter.
         self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
 

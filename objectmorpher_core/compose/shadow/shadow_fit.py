@@ -77,7 +77,10 @@ def find_old_shadow(
     if not (matte.alpha > 0.5).any() or _leaves_below(pixels, matte):
         return None
     slope = float(np.sin(np.radians(SHEET_GROUND if seen_from is None else seen_from)))
-    seen = _look(pixels, matte, others, slope)
+    try:
+        seen = _look(pixels, matte, others, slope)
+    except ValueError:  # it is thinner than what is looked at
+        return None
     told = _told(seen, LENGTHS, margin) if seen_from is None or seen_from < STEEP else None
     if seen_from is None or seen_from >= STEEP:
         flat = replace(seen, standing=lie(seen.cover))

@@ -62,6 +62,8 @@ def stand(alpha: F32, slope: float) -> Sheet:
     Raises ValueError where it has none.
     """
     solid = alpha > SOLID
+    if not solid.any():
+        raise ValueError("nothing of the silhouette is solid")
     rows = np.arange(1, alpha.shape[0] + 1, dtype=np.float64)[:, None]
     lower = (solid * rows).max(0)  # of each column; 0 where there is none
     ground, height = float(lower.max()), float(lower.max() - rows[solid.any(1)].min() + 1)

@@ -50,7 +50,10 @@ class SeenShape:
 
 
 def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
-    """What is seen where `mask` (H, W) of a photo is; None where the network cannot run."""
+    """What is seen where `mask` (H, W) of a photo is.
+
+    None where the network cannot run, or the object is too thin for its pixels.
+    """
     if missing() is not None or not mask.any():
         return None
     return _memory.look(pixels, mask, Crop.around(mask, camera))
@@ -87,8 +90,10 @@ class _Memory:
         self._net: ShapeNet | None = None
         self._last: tuple[bytes, SeenShape] | None = None
 
-    def look(self, pixels: Pixels, mask: Mask, crop: Crop) -> SeenShape:
+    def look(self, pixels: Pixels, mask: Mask, crop: Crop) -> SeenShape | None:
         rgb, seen = crop.seen(pixels), crop.seen_mask(mask)
+        if not seen.any():
+            return None
         digest = hashlib.sha256(rgb.tobytes() + seen.tobytes() + crop.tangents.tobytes()).digest()
         digest += bytes(str(crop[:3]), "ascii")
         with self._lock:

@@ -1,0 +1,91 @@
+"""A parser of the command line whose errors are one sentence that names what was meant."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from objectmorpher_core.base.quoting import named
+
+from .terminal import PROGRAM
+
+MISUSED = 2  # exit code
+LIKENESS = 0.6  # of difflib, from which on a word is taken for a misspelt one
+
+
+class Parser(argparse.ArgumentParser):
+    """An ArgumentParser that suggests the nearest word, and names choices where one is missing."""
+
+    def error(self, message: str) -> Any:
+        told = re.sub(r"\S+", lambda word: named(word[0]), self._helpful(message))
+        sys.stderr.write(f"{PROGRAM}: {told}\n")
+        raise SystemExit(MISUSED)
+
+    def _helpful(self, message: str) -> str:
+        """argparse's message with what would have been right."""
+        wrong = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message, re.S)
+        if wrong is not None:
+            known = wrong[2].replace("'", "")
+            return f"there is no {wrong[1]!r} here{meant(wrong[1], known.split(', '))}: {known}"
+        missing = message.removeprefix("the following arguments are required: ")
+        if missing == message:
+            return message
+        choices = self._choices_of(missing.split(", ")[0])
+        return f"{self.prog.partition(' ')[2] or 'the command line'} needs {choices or missing}"
+
+    def _choices_of(self, name: str) -> str:
+        """The words that an argument may be, where there are only some."""
+        for action in self._actions:
+            if name in (action.dest, action.metavar) and action.choices is not None:
+                words = ", ".join(map(str, action.choices))
+                return f"a {action.dest}, one of {words}" if self._is_top() else f"one of {words}"
+        return ""
+
+    def _is_top(self) -> bool:
+        return " " not in self.prog
+
+    def parse_args(self, args: Sequence[str], namespace: Any = None) -> argparse.Namespace:  # type: ignore[override]
+        """Of a command line; an option that does not exist is told with the one that was meant."""
+        options, rest = self.parse_known_args(list(args), namespace)
+        if rest:
+            parser = self._chosen(options)
+            known = [o for a in parser._actions for o in a.option_strings]
+            command = parser.prog.partition(" ")[2] or PROGRAM
+            word = next((w for w in rest if w.startswith("-")), rest[0]).partition("=")[0]
+            what = "has no option" if word.startswith("-") else "cannot do anything with"
+            self.error(f"{command} {what} {word}{meant(word, known)}")
+        return options
+
+    def _chosen(self, options: argparse.Namespace) -> argparse.ArgumentParser:
+        """The parser of the word that stands on the command line, or of the word below it."""
+        parser: argparse.ArgumentParser = self
+        while True:
+            below = next(
+                (a for a in parser._actions if isinstance(a, argparse._SubParsersAction)), None
+            )
+            name = None if below is None else getattr(options, below.dest, None)
+            if below is None or name is None:
+                return parser
+            parser = below.choices[name]
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """`, did you mean edit?`; nothing where no known word is like it."""
+    near = get_close_matches(word, list(known), n=1, cutoff=LIKENESS)
+    return f", did you mean {near[0]}?" if near else ""
+
+
+def misspelt_command(arguments: Sequence[str], commands: Sequence[str]) -> str | None:
+    """The sentence about a first word that is neither a command nor a file; None where it is."""
+    word = arguments[0] if arguments else ""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z-]*", word) or Path(word).exists():
+        return None
+    suggestion = meant(word, commands)
+    if not suggestion and len(arguments) == 1:
+        return None  # a file that is not there, which the window says
+    return f"there is no command and no file {word}{suggestion or ': ' + ', '.join(commands)}"
