@@ -13,6 +13,7 @@ from PIL import Image
 
 from objectmorpher.cli import parser as cli
 from objectmorpher.system.logs import NAME
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,7 +35,7 @@ def without_strips(path: Path) -> Path:
 def test_a_tiff_without_strips_is_one_sentence_and_the_rest_is_in_the_log(tmp_path: Path) -> None:
     photo = without_strips(tmp_path / "none.tif")
     environment = os.environ | {"XDG_CONFIG_HOME": str(tmp_path), "HOME": str(tmp_path),
-                                "PYTHONPATH": str(ROOT)}  # fmt: skip
+                                "PYTHONPATH": PYTHONPATH}  # fmt: skip
     command = [sys.executable, "-m", "objectmorpher", "select", str(photo), "--box", "1,1,9,9"]
     done = subprocess.run([*command, "-o", str(tmp_path / "m.png")], env=environment,
                           capture_output=True, text=True, cwd=tmp_path)  # fmt: skip

@@ -24,6 +24,7 @@ from objectmorpher_core.session.file import load_session, save_session
 from objectmorpher_core.session.journal import Journal
 from tests import shapes
 from tests.fuzz.documents import mere_photo
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[2]
 PHOTO = "Größe & Maß.png"
@@ -108,9 +109,10 @@ def test_every_home_and_language_gives_the_same_picture(folder: Path) -> None:
     made = set()
     for name, changed in homes(folder).items():
         out = folder / "öut.png"
-        command = [sys.executable, "-m", "objectmorpher", "edit", PHOTO, "-o", str(out), "--mask", "mask.png",
-                   "--gaussians", "300", "--inpaint", "telea", "--move=9.5,4"]  # fmt: skip
-        done = subprocess.run(command, env=kept | changed | {"PYTHONPATH": str(ROOT)},
+        command = [sys.executable, "-m", "objectmorpher", "edit", PHOTO, "-o", str(out),
+                   "--mask", "mask.png", "--gaussians", "300", "--inpaint", "telea",
+                   "--move=9.5,4"]  # fmt: skip
+        done = subprocess.run(command, env=kept | changed | {"PYTHONPATH": PYTHONPATH},
                               capture_output=True)  # fmt: skip
         assert (done.returncode, done.stderr) == (0, b""), name
         made.add(out.read_bytes())

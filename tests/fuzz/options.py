@@ -29,6 +29,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from objectmorpher import __main__ as program
 from objectmorpher.cli.parser import UNFORESEEN
 from objectmorpher_core.pictures.image import ENDINGS, read_picture
+from tests.tree import PYTHONPATH
 
 from .checks import check_picture, check_sentence
 from .child import bound, say
@@ -164,7 +165,7 @@ def _one_process(
     folder: Path, number: int, count: int, seconds: float, found: list[dict[str, Any]]
 ) -> dict[str, int]:
     (folder / NOW).unlink(missing_ok=True)
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1",
+    environment = os.environ | {"PYTHONPATH": PYTHONPATH, "OPENBLAS_NUM_THREADS": "1",
                                 "XDG_CONFIG_HOME": str(folder / "config")}  # fmt: skip
     environment.pop("DISPLAY", None)
     command = [sys.executable, "-m", "tests.fuzz.options", "--child", str(number), str(count)]
