@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.arrays import Mask, Selection, frozen
 from ..base.camera import Camera
-from ..raster.posed import PosedSplats
 from .model import (
     SELECTED,
     BesidePrompt,
@@ -39,6 +39,9 @@ from .settings import (
     Refined,
     Shadow,
 )
+
+if TYPE_CHECKING:
+    from ..raster.posed import PosedSplats
 
 SAME_THING = 0.15  # IoU of two masks, below which they are of two things
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one

@@ -28,7 +28,7 @@ from objectmorpher_core.session.file import decode_session
 WIDTH, HEIGHT = 240, 160  # px of the made photo
 AROUND = (48 + 300, 32 + 28)  # points of the window beside the canvas
 CORNER = (48, 32)  # points, of the canvas in the window
-CANVAS = (640, 420)
+CANVAS = (660, 420)  # with what is beside it wide enough for the panel
 LARGE = (780, 780)  # of a session's pictures
 TILE, GAP = 440, 6  # px, of the montage
 NAMES = (

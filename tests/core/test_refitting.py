@@ -52,7 +52,7 @@ def _posed(name: str) -> Posed:
     document = edits.add_handle(edits.set_plate(document, plate), 0, low, is_pin=True)
     document = edits.add_handle(document, 0, high, high + [0.12, 0.02, 0.0])
     puppet = puppet_of(document.objects[0], camera)
-    pose = puppet.deformer.solve(document.objects[0].handles, True).pose
+    pose = puppet.deformer.solve(document.objects[0].handles, document.objects[0].footing).pose
     document = edits.set_pose(document, 0, pose)
     document = edits.set_placement(document, 0, Placement((9, -4), 0.1, (12, 5, 4), 1.04))
     return Posed(document, puppet, composite(document, {0: puppet}).pixels)

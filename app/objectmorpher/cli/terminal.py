@@ -14,7 +14,7 @@ PROGRAM = "objectmorpher"
 FAILURES = (ValueError, OSError, RuntimeError, MemoryError)  # that are one sentence for the user
 
 
-OURS = ("app", "objectmorpher_core")
+OURS = ("objectmorpher", "objectmorpher_core")
 
 
 class UsageError(ValueError):

@@ -23,7 +23,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
 from .. import LiftError, Subject
-from ..shapes import completed, flattened, recognised, rounded
+from ..shapes import Recognised, completed, flattened, recognised, rounded
 from . import shape_look
 from .bilinear import bilinear
 from .body import MIDDLE, Body
@@ -119,7 +119,8 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
-                if (shape := recognised(seen, settings.kind)) is not None:
+                shape = recognised(seen, settings.kind)
+                if shape is not None and not _contradicts(shape, body, settings):
                     body = completed(body, shape, camera, settings.thickness, settings.trust)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
@@ -147,6 +148,11 @@ class ReliefLifter:
             limit = np.array(hidden.shape[::-1]) - 1
             cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
+
+
+def _contradicts(shape: Recognised, body: Body, settings: LiftSettings) -> bool:
+    """Whether a thing that is seen as a sheet has the outline of a prism that stands upright."""
+    return settings.kind == "auto" and shape.kind == "flat" and body.standing.prism is not None
 
 
 def _hidden(subject: Subject, settings: LiftSettings) -> Mask | None:

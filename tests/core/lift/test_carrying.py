@@ -9,7 +9,7 @@ import pytest
 
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
-from objectmorpher_core.document.model import Click, Document, LiftedObject, LiftSettings, Prompt
+from objectmorpher_core.document.model import Document, LiftedObject, LiftSettings
 from objectmorpher_core.document.rig import Rig
 from objectmorpher_core.pipeline import lift_mask
 from tests import shapes
@@ -184,7 +184,7 @@ def test_the_pose_is_gone_and_the_settings_are_told():
 
 def test_an_object_that_is_not_lifted_has_no_thickness_to_change():
     document = _document()
-    bare = edits.set_mask(document, 0, MASK, Prompt((Click(78, 62),)))
+    bare = document.with_object(0, replace(document.objects[0], lifted=None))
     with pytest.raises(EditError, match="lift the object"):
         edits.set_thickness(bare, 0, 1.4)
 

@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from objectmorpher_core.training.shape_eval import Surfaces, camera_of, score, surfaces_of
 
 from objectmorpher_core.base.arrays import Mask
 from objectmorpher_core.base.camera import Camera
@@ -21,6 +20,7 @@ from objectmorpher_core.lift.relief.silhouette import Silhouette
 from objectmorpher_core.lift.shapes import completed, flattened, recognised, rounded
 from objectmorpher_core.lift.shapes.drawing import Grid, Mesh, drawn, face_normals
 from objectmorpher_core.lift.shapes.solids import box, ellipsoid, revolved, sheet
+from objectmorpher_research.training.shape_eval import Surfaces, camera_of, score, surfaces_of
 
 WIDTH = 0.8  # tangents, of the crop
 TANGENTS = np.array([0.05, 0.1, WIDTH], np.float32)
