@@ -115,7 +115,8 @@ def test_no_front_hangs_between_two_parts():
 
     seen = truth(SAMPLE)
     uncut = replace(seen, edge=np.zeros_like(seen.edge))
-    assert hanging(seen) < 0.6 * hanging(uncut)
+    # Settling draws some of what hangs to its side even without an edge, so cuts save less.
+    assert hanging(seen) < 0.65 * hanging(uncut)
 
 
 def test_what_is_inside_is_not_seen_at_rest():

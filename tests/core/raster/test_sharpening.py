@@ -15,6 +15,9 @@ from tests import shapes
 
 LEVEL = 1 / 255
 SOFT = 12 * LEVEL  # bilinear is softer than the exact picture's filter
+# At half the photo's size the thing is 60 px wide and a quarter draft of it 15: its outline, which
+# is drawn as an edge where it has turned into view, is a whole px of the draft wide (15.4 levels).
+SMALL = 16 * LEVEL
 
 
 def _draft(scene: shapes.Scene, placement: Placement, factor: int, zoom: float) -> np.ndarray:
@@ -43,7 +46,7 @@ def test_a_draft_is_nearly_the_exact_picture(name: str, factor: int, zoom: float
     scene, placement = shapes.scene("ellipse", 1500), shapes.PLACEMENTS[name]
     draft, exact = _draft(scene, placement, factor, zoom), _exact(scene, placement, zoom)
     difference = np.abs(draft - exact)[exact[..., 3] > 0]
-    assert difference.mean() < SOFT
+    assert difference.mean() < (SMALL if zoom < 1 else SOFT)
     assert np.abs(draft[..., 3] - exact[..., 3]).mean() < 0.04  # at the edge
 
 
