@@ -94,7 +94,7 @@ def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
     wait_for_jobs(editor)
     assert lifted_of(editor) is not first
     assert editor.history is not None and editor.history.undo_label == "Other side"
-    assert lifted_of(editor).splatting == "surface"
+    assert lifted_of(editor).splatting == "edged surface"
     editor.shaping.say("Other side", back="continued")
     wait_for_jobs(editor)
     assert lifted_of(editor).splatting == "solid"
@@ -190,7 +190,7 @@ def test_an_object_out_of_a_file_takes_the_place_of_what_is_selected(
     editor.filing.drop([figure])
     wait_for_jobs(editor)
     assert lifted_of(editor).middle is None, editor.message
-    assert editor.message is not None and "agrees" in editor.message.text
+    assert editor.message is not None and "outline" in editor.message.text
     fitting = editor.shaping.fitting
     assert fitting is not None and fitting.chosen.iou > 0.8
     assert why_not(editor, "fit_again") is None

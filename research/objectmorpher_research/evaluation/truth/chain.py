@@ -204,9 +204,12 @@ def _placed(puppet: Puppet, points: F64, guidance: Guidance) -> Placement:
 
 
 def unpainted(lifted: LiftedObject) -> LiftedObject:
-    """The same with nothing of the photo on its Gaussians but their own colours."""
+    """The same with nothing of the photo on its Gaussians but their own colours.
+
+    Edged kinds leave it to the photo to cover what the photo shows: without it there is nothing.
+    """
     texture = replace(lifted.texture, visibility=np.zeros_like(lifted.texture.visibility))
-    return replace(lifted, texture=texture)
+    return replace(lifted, texture=texture, splatting=lifted.splatting.removeprefix("edged "))
 
 
 def coverage(result: Composite, document: Document) -> F64:
