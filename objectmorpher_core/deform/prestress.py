@@ -77,7 +77,8 @@ def _links_of(links: Links, q: F64) -> tuple[np.ndarray, F64, F64]:
 
 def _summed(starts: np.ndarray, values: F64, count: int) -> F64:
     """(count, 3) sums of (E, 3) over the links of each control point."""
-    return np.column_stack([np.bincount(starts, values[:, a], count) for a in range(3)])
+    sums = [np.bincount(starts, values[:, a], count) for a in range(3)]
+    return np.column_stack(sums).astype(np.float64, copy=False)
 
 
 def _inertia(starts: np.ndarray, w: F64, seen: F64, count: int) -> F64:

@@ -97,7 +97,7 @@ def test_another_side_is_a_step_and_the_worker_makes_it(editor: Editor) -> None:
     assert lifted_of(editor).splatting == "edged surface"
     editor.shaping.say("Other side", back="continued")
     wait_for_jobs(editor)
-    assert lifted_of(editor).splatting == "solid"
+    assert lifted_of(editor).splatting == "edged solid"
 
 
 @pytest.mark.slow
