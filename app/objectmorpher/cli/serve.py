@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 import os
 import signal
@@ -50,6 +49,7 @@ def run_serve(options: argparse.Namespace) -> None:
     from ..server.cluster import Cluster, Plan
     from ..server.front import Front, Limits
     from ..server.table import table
+    from ..system.logs import show_log
     from ..worker.stages import STAGES
 
     stages = tuple(options.stages.split(",")) if options.stages else STAGES
@@ -68,7 +68,7 @@ def run_serve(options: argparse.Namespace) -> None:
         raise UsageError("Ray is not installed: `pip install 'objectmorpher[cluster]'`, or --alone")
     store = None if options.store is None else options.store << 20
     plan = Plan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
+    show_log()
     served = {name: row for name, row in table().items() if row.stage in stages}
     stop = threading.Event()
 

@@ -50,6 +50,13 @@ def start_command_log(folder: Path) -> None:
     logging.captureWarnings(True)
 
 
+def show_log() -> None:
+    """Everything goes to the terminal too, as a server's log should."""
+    terminal = logging.StreamHandler()
+    terminal.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+    logging.getLogger().addHandler(terminal)
+
+
 class _QuietFile(RotatingFileHandler):
     """A log file whose folder is made with it."""
 
