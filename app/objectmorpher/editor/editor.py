@@ -285,6 +285,8 @@ class Editor:
             self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
+        elif self.composing.offer is not None:
+            self.composing.refuse_shadow()
         else:
             if self.view.tool is ToolName.LOOK:
                 self.looking.reset()
