@@ -151,11 +151,11 @@ def test_a_disk_that_fills_up_while_a_model_comes_leaves_nothing(
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "wheels"))
     (tmp_path / "wheels").mkdir()
     write_wheel(tmp_path, WEIGHT, os.urandom(300_000))
-    for when in ("downloading", "unpacking"):
+    for stage in ("downloading", "unpacking"):
         small_disk.clear()
 
-        def fill(fraction: float, note: str, when: str = when) -> None:
-            if note.startswith(when):
+        def fill(fraction: float, note: str, stage: str = stage) -> None:
+            if note.startswith(stage):
                 small_disk.leave(100_000)
 
         with pytest.raises(ModelError, match=r"the disk is full|No space left on device") as caught:
