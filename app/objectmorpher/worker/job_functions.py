@@ -26,7 +26,8 @@ from objectmorpher_core.document.model import (
 )
 from objectmorpher_core.document.settings import Hint
 
-from ..canvas.layers import Rendered, Request, render
+from ..canvas.layer import Rendered, Request
+from ..canvas.layers import render
 from ..canvas.shape import rehearse_lift
 
 if TYPE_CHECKING:
