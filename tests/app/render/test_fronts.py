@@ -71,7 +71,7 @@ def test_the_window_shows_it_as_it_is_exported(context, monkeypatch, document, k
         exported = composite(document).pixels.astype(np.float32) / 255
         assert np.abs(window - exported).mean() <= PIXEL
         assert np.abs(window - exported)[:, 114:126].max() <= PIXEL, "the post itself"
-    without = composite(edits.let_go(document, 1)).pixels.astype(np.float32) / 255
+    without = composite(edits.stop_keeping_in_front(document, 1)).pixels.astype(np.float32) / 255
     assert np.abs(without - exported).max() > 0.2
     context.finish()
 

@@ -162,7 +162,7 @@ class Objects:
         if document is None or item is None or editor.hand.is_busy:
             return
         if item.stays_in_front:
-            editor.apply(t("Do not keep in front"), edits.let_go(document, k))
+            editor.apply(t("Do not keep in front"), edits.stop_keeping_in_front(document, k))
             return
         editor.jobs.cancel(LIFT)  # what it would bring is to be edited
         try:
@@ -176,8 +176,10 @@ class Objects:
         """What staying in front means, or that it is hardly what was meant; one click undoes it."""
         editor, document = self._editor, self._editor.committed
         assert document is not None
+        from objectmorpher_core.compose.order import doubt_about_front
+
         name, posed = document.objects[k].name, partial(self._editor.derived.posed, document)
-        if edits.doubt(document, k, posed) is None:
+        if doubt_about_front(document, k, posed) is None:
             editor.say(t("{name} covers what moves behind it", name=name))
             return
         editor.say(
