@@ -51,7 +51,7 @@ class Rendered:
 
 
 @dataclass(frozen=True, eq=False)
-class Request:
+class ExactPicture:
     """An exact picture to be rendered."""
 
     splats: PosedSplats

@@ -19,7 +19,7 @@ from objectmorpher_core.base.camera import Camera
 
 from ..editor.view import Shown, View
 from .derived import Derived
-from .layer import Box, FrameObject, Layer, Part, Rendered, Request, as_u8, in_light
+from .layer import Box, ExactPicture, FrameObject, Layer, Part, Rendered, as_u8, in_light
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
@@ -42,7 +42,7 @@ class _Work:
     source: PosedSplats  # the object as it is
     splats: PosedSplats  # what is drawn of it
     view: tuple[float, ...]
-    request: Request  # for the exact one
+    request: ExactPicture  # for the exact one
     box: Box  # canvas px
     shown: Layer
     since: float  # s, monotonic, when the splats or the view changed last
@@ -50,7 +50,7 @@ class _Work:
     lit: tuple[Layer, Lit, Layer] | None = None  # `shown`, light and grain, and `shown` in them
 
 
-Ask = Callable[[Request, Callable[[Rendered], None]], None]
+Ask = Callable[[ExactPicture, Callable[[Rendered], None]], None]
 
 
 class Layers:
@@ -105,7 +105,7 @@ class Layers:
         x0, y0, x1, y1 = layer.box
         box = (int(x0), int(y0), int(x1), int(y1))
         window = view.camera(camera, box)
-        request = Request(own.splats, own.shape.texture, window, camera, own.part)
+        request = ExactPicture(own.splats, own.shape.texture, window, camera, own.part)
         self._works[own.part] = _Work(
             own.posed, own.splats, view.place, request, box, layer, time.monotonic()
         )
@@ -175,7 +175,7 @@ def _mean_rate(before: float, seconds: float, pixels: float) -> float:
     return float(np.clip(mean, 1e-9, 1e-5))
 
 
-def render(request: Request) -> Rendered:
+def render(request: ExactPicture) -> Rendered:
     """The exact picture."""
     drawable = _prepare(request.splats, request.window, request.camera)
     return _rendered(drawable, request.texture, request.part)

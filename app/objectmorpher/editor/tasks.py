@@ -27,7 +27,7 @@ from objectmorpher_core.document.model import (
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment import Found
 
-from ..canvas.layer import Rendered, Request
+from ..canvas.layer import ExactPicture, Rendered
 from ..canvas.memo import same
 from ..canvas.shape import Shape, build_ready_shape, rehearse
 from ..system.texts import folder_of, t
@@ -372,7 +372,7 @@ class Tasks:
         if editor.preview is not None:
             editor.preview = change(editor.preview)
 
-    def render_exact(self, request: Request, accept: Callable[[Rendered], None]) -> None:
+    def render_exact(self, request: ExactPicture, accept: Callable[[Rendered], None]) -> None:
         """Asks for an exact picture of the view, which shows a draft meanwhile."""
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,
