@@ -17,7 +17,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Hint, Shadow
 
-from ...canvas.layers import Layer
+from ...canvas.layer import Layer
 from ...canvas.memo import same
 from ...system.texts import t
 from ...worker import job_functions
@@ -30,7 +30,9 @@ from ..view import ToolName
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import Patch
 
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .methods import Methods
 
 VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
@@ -62,8 +64,15 @@ class Offer:
 class Composing:
     """The plate and the joining."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self,
+        editor: EditorState,
+        methods: Methods,
+        tasks: Tasks,
+        choose_tool: Callable[[ToolName], None],
+    ) -> None:
         self._editor = editor
+        self._methods, self._tasks, self._choose_tool = methods, tasks, choose_tool
         self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
         self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
         self._stroke: Stroke | None = None  # being painted
@@ -109,15 +118,15 @@ class Composing:
     @property
     def inpainter(self) -> str:
         """The backend that is asked to fill in the background; "auto" is the best that can run."""
-        return self._editor.methods.chosen("inpaint")
+        return self._methods.chosen("inpaint")
 
     def fill_again(self) -> None:
         """A new background with another seed: a step of its own."""
-        editor, document = self._editor, self._editor.document
+        document = self._editor.document
         if document is None:
             return
         if document.plate is None:
-            editor.tasks.fill_background()
+            self._tasks.fill_background()
             return
         self._ask_plate(document.hints, document.plate.seed + 1, t("Fill in again"), _nothing)
 
@@ -149,7 +158,7 @@ class Composing:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            editor.derived.lights.hidden(document), Choice(self.inpainter, seed, hints),
+            editor.derived.hidden(document), Choice(self.inpainter, seed, hints),
             done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
         )  # fmt: skip
 
@@ -165,7 +174,7 @@ class Composing:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
-            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1), COUNT,
+            editor.derived.hidden(document), self._choice(document.plate.seed + 1), COUNT,
             done=accept, failed=editor.complain_of, kind=VARIANTS,
         )  # fmt: skip
 
@@ -323,7 +332,7 @@ class Composing:
         """From how many degrees above the ground one looks at the current object on it."""
         editor = self._editor
         assert editor.document is not None
-        return editor.derived.lights.ground(editor.document, editor.current, shadow)
+        return _seen_from(editor.document, editor.current, shadow)
 
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""
@@ -343,10 +352,10 @@ class Composing:
             return
         masks, item = _masks(document), document.objects[k]
         assert item.matte is not None
-        lights, told = editor.derived.lights, item.shadow.ground
+        told = item.shadow.ground
         is_known = told is not None or document.horizon is not None
-        ground = lights.ground(document, k, item.shadow) if is_known else None
-        covered = lights.hidden(document)
+        ground = _seen_from(document, k, item.shadow) if is_known else None
+        covered = editor.derived.hidden(document)
         cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
 
         def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
@@ -371,7 +380,7 @@ class Composing:
         if document is None or not same(masks, _masks(document)):
             return
         self._offer = replace(offer, document=document)
-        editor.choose_tool(ToolName.COMPOSE)  # which outlines it
+        self._choose_tool(ToolName.COMPOSE)  # which outlines it
         if offer.shadow is None:
             text = t("What is outlined is its reflection, and would be taken off the background")
         else:
@@ -400,8 +409,9 @@ class Composing:
     def offer(self) -> Offer | None:
         """What would be taken along, as long as the document is the one in which it was found."""
         offer, editor = self._offer, self._editor
-        is_current = offer is not None and offer.document is editor.document
-        return offer if is_current and offer.k == editor.current else None
+        if offer is None or offer.document is not editor.document or offer.k != editor.current:
+            return None
+        return offer
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""
@@ -441,3 +451,12 @@ def _nothing() -> None:
 
 def _masks(document: Document) -> tuple[Mask | None, ...]:
     return tuple(o.mask for o in document.objects)
+
+
+def _seen_from(document: Document, k: int, shadow: Shadow) -> float:
+    """From how many degrees above the ground one looks at object `k` on it."""
+    from objectmorpher_core.compose.light.lighting import ground_seen_from
+
+    lifted = document.objects[k].lifted
+    assert lifted is not None
+    return ground_seen_from(lifted, document.photo.camera, document.horizon, shadow)

@@ -12,7 +12,7 @@ from ..export_plan import FORMATS, LENGTHS, NAMES, Format, Motion, Plan, What, f
 from ..tasks import WRITE
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
 
 KNOWN = "PNG, JPG, TIF, WEBP, ORA"
 
@@ -35,7 +35,7 @@ class Draft:
 class Exporting:
     """The export dialog's state, and what may be done with it."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self.draft: Draft | None = None  # None: no dialog
         self._replacing: Path | None = None  # asked whether it may be overwritten
