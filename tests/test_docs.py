@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import ast
 import importlib.util
+import json
 import re
-import runpy
 import shlex
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from urllib.parse import unquote
 
 import pytest
@@ -25,7 +26,6 @@ PAGES = sorted([
     *DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md",
     *(ROOT / "packaging").rglob("*.md"), *(ROOT / "tests").rglob("*.md"),
 ])  # fmt: skip
-EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
 FENCE = re.compile(r"^(```+|~~~+)(\w*)[^\n]*\n(.*?)^\1\s*$", re.M | re.S)
 LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
 OUTSIDE = ("https://", "http://", "mailto:")
@@ -194,13 +194,19 @@ def test_every_file_that_is_named_exists(page):
         assert (ROOT / name).exists(), name
 
 
-@pytest.mark.parametrize("name", ["make_cli", "make_keys"])
-def test_a_reference_is_what_the_program_says(name):
-    script = DOCS / "reference" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, script)
+def _module(script: Path) -> ModuleType:
+    """What a script of the documentation defines."""
+    spec = importlib.util.spec_from_file_location(script.stem, script)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["make_cli", "make_keys"])
+def test_a_reference_is_what_the_program_says(name):
+    script = DOCS / "reference" / f"{name}.py"
+    module = _module(script)
     assert module.PAGE.read_text(encoding="utf-8") == module.page(), f"run {name_of(script)}"
 
 
@@ -230,10 +236,23 @@ def test_python_on_a_page_names_what_there_is(page):
                 assert not is_om or node.attr in om.__all__, node.attr
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=name_of)
-def test_an_example_runs(example, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path(str(example), run_name="__main__")
-    promised = re.findall(r'save\(\s*"([\w.-]+)"', text_of(example))
+def test_the_notebook_runs_and_shows_what_it_was_kept_with(tmp_path, monkeypatch):
+    """It runs in a copy of its place, beside the sample photos, and saves only what it names."""
+    runner = _module(DOCS / "examples" / "run_notebook.py")
+    (tmp_path / "assets").symlink_to(ROOT / "assets")
+    folder = tmp_path / "docs" / "examples"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    notebook = json.loads(text_of(runner.NOTEBOOK))
+    kept = [cell["outputs"] for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    shown = [found for _, found in runner.outputs(notebook)]
+
+    def kinds(found):
+        return [(o["output_type"], sorted(o.get("data", ()))) for o in found]
+
+    assert list(map(kinds, shown)) == list(map(kinds, kept)), "run docs/examples/run_notebook.py"
+    assert sum("image/jpeg" in o.get("data", ()) for found in kept for o in found) >= 3
+    code = "".join("".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == "code")
+    promised = re.findall(r'save\(\s*"([\w.-]+)"', code)
     assert promised
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(promised)
+    assert sorted(p.name for p in folder.iterdir()) == sorted(promised)

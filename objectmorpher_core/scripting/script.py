@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.files import read_input
-from ..base.quoting import shown
+from ..base.quoting import meant, shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 
 XY = tuple[float, float]
@@ -148,7 +148,7 @@ def read_scripts(path: Path) -> tuple[BatchItem, ...]:
 
 def script_text(item: BatchItem) -> str:
     """JSON of which `parse_scripts` makes this one item."""
-    told: dict[str, Any] = {"photo": item.photo, "out": item.out, **_said_by(item.script)}
+    told: dict[str, Any] = {"photo": item.photo, "out": item.out, **said_by(item.script)}
     told = {key: value for key, value in told.items() if value is not None}
     if item.others.objects:
         told["objects"] = [_told(each) for each in item.others.objects]
@@ -158,13 +158,13 @@ def script_text(item: BatchItem) -> str:
 
 
 def _told(each: FurtherObject) -> dict[str, Any]:
-    told = _said_by(each.script, each.said)
+    told = said_by(each.script, each.said)
     told |= {} if each.duplicate is None else {"duplicate": each.duplicate}
     return told | ({"stay_in_front": True} if each.stay_in_front else {})
 
 
-def _said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
-    """The options that are no defaults, and those of `said`."""
+def said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
+    """The options that differ from their defaults, and those of `said`."""
     default = asdict(EditScript())
     told = asdict(script).items()
     return {name: v for name, v in told if name in said or v != default[name]}
@@ -204,7 +204,7 @@ def script_from(options: Mapping[str, Any]) -> EditScript:
     for key, value in options.items():
         name = key.replace("-", "_")
         if name not in known:
-            raise ScriptError(f"the script's {shown(key)} is not an option")
+            raise ScriptError(f"there is no option {shown(key)}{meant(name, known)}")
         said[name] = PARSERS[name](key, value)
     return EditScript(**said)
 

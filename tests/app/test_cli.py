@@ -433,7 +433,7 @@ def test_a_failure_is_one_sentence_and_leaves_no_file(folder, capsys, case):
 SCRIPTS = {
     "not JSON": ("{", "not JSON"),
     "not an object": ("3", "not a JSON object"),
-    "unknown key": ('{"magic": 1}', "'magic' is not an option"),
+    "unknown key": ('{"magic": 1}', "no option 'magic'"),
     "wrong value": ('{"turn": [1, 2]}', "turn"),
     "empty batch": ("[]", "empty"),
     "batch without photos": ('[{"turn": [1, 2, 3]}, {"turn": [1, 2, 3]}]', "batch"),

@@ -73,7 +73,7 @@ def test_a_batch_names_photos_and_outputs():
     ("3", "not a JSON object"),
     ("[[]]", "not a JSON object"),
     ('{"photo": 3}', "'photo' is not a file name"),
-    ('{"clik": [[1, 2]]}', "'clik' is not an option"),
+    ('{"clik": [[1, 2]]}', "no option 'clik', did you mean click?"),
 ])  # fmt: skip
 def test_what_is_no_script_is_refused(text, sentence):
     with pytest.raises(ScriptError, match=sentence):

@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.base.quoting import named
+from objectmorpher_core.base.quoting import meant, named
 
 from .terminal import PROGRAM
 
 MISUSED = 2  # exit code
-LIKENESS = 0.6  # of difflib, from which on a word is taken for a misspelt one
 
 
 class Parser(argparse.ArgumentParser):
@@ -72,12 +70,6 @@ class Parser(argparse.ArgumentParser):
             if below is None or name is None:
                 return parser
             parser = below.choices[name]
-
-
-def meant(word: str, known: Iterable[str]) -> str:
-    """`, did you mean edit?`; nothing where no known word is like it."""
-    near = get_close_matches(word, list(known), n=1, cutoff=LIKENESS)
-    return f", did you mean {near[0]}?" if near else ""
 
 
 def misspelt_command(arguments: Sequence[str], commands: Sequence[str]) -> str | None:
