@@ -32,6 +32,13 @@ def counted(count: int) -> str:
     return named(f"{count:,}") if count.bit_length() < DIGITS else "too many"
 
 
+def count_range(least: int, most: int) -> str:
+    """How many there may be, as in `2`, `2 or 3`, `1 to 3`."""
+    if least == most:
+        return f"{least}"
+    return f"{least} {'or' if most == least + 1 else 'to'} {most}"
+
+
 def reason(error: BaseException) -> str:
     """What an error says, which may quote a file: on one line, and cut where it is long."""
     text = "".join(c if c.isprintable() else "?" for c in str(error))

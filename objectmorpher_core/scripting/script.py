@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.files import read_input
-from ..base.quoting import meant, shown
+from ..base.quoting import count_range, meant, shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 
 XY = tuple[float, float]
@@ -272,8 +272,7 @@ def _number(key: str, value: Any) -> float:
 def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
     def parse(key: str, value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or not least <= len(value) <= most:
-            count = f"{least}" if least == most else f"{least} or {most}"
-            raise ScriptError(f"{key}: {shown(value)} is not {count} numbers")
+            raise ScriptError(f"{key}: {shown(value)} is not {count_range(least, most)} numbers")
         numbers = tuple(_number(key, v) for v in value)
         return numbers + (0.0,) * (most - len(numbers))
 
@@ -371,7 +370,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "shape": _one_of(*KINDS), "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles,
-    "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
+    "move": _numbers(2, 3), "turn": _numbers(1, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
     "stretch_limit": _between(1.01, 10.0), "split": _flag,

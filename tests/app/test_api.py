@@ -124,7 +124,7 @@ def test_a_photo_may_be_a_path_bytes_an_array_or_an_image_of_pillow(folder):
     assert opened[4].pixels.dtype == np.uint16 and np.array_equal(opened[4].pixels, wide)
     assert opened[6].picture.icc == profile
     assert opened[8].pixels.shape == PIXELS.shape
-    assert np.array_equal(opened[9].picture.alpha, alpha)
+    assert (opened[9].picture.alpha == alpha).all()
     for photo in opened[10:]:
         assert photo.picture.is_grey and photo.pixels.shape == PIXELS.shape
     assert opened[12].pixels.dtype == np.uint16
