@@ -12,10 +12,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-try:
-    from hatchling.metadata.plugin.interface import MetadataHookInterface
-except ImportError:  # where only the function is wanted
-    MetadataHookInterface = object
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((?!https?:|#)([^)\s]+)\)")
 ADDRESS = "OBJECTMORPHER_REPOSITORY"  # environment variable
