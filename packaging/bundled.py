@@ -11,8 +11,8 @@ GPL = ("libreadline", "readline.", "libgdbm", "_gdbm", "libdb-5")
 DOCUMENTED = Path("/usr/share/doc")
 # Of SciPy what nothing in the folder imports; tests/test_imports.py does without them.
 UNUSED_SCIPY = (
-    "cluster", "datasets", "differentiate", "fftpack", "integrate", "interpolate", "io", "misc", "odr",
-    "signal", "stats",
+    "cluster", "datasets", "differentiate", "fftpack", "integrate", "interpolate", "io", "misc",
+    "odr", "signal", "stats",
 )  # fmt: skip
 # Libraries that are built with symbols which only a debugger reads: 40 MB.
 WITH_SYMBOLS = ("libllvmlite.so", "zstandard/*.so")
