@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from ..base.quoting import shown
 from ..compose.composite import straight_cutout
 from ..compose.depth_map import depth_picture
 from ..compose.layers import layers
 from ..compose.plate.plate import plate_picture
-from ..pictures.image import ENDINGS, Picture, encode_mask, encode_picture
+from ..pictures.image import ENDINGS, Picture, encode_picture
 from ..pictures.openraster import encode_openraster
 from ..pictures.video import ENDINGS as VIDEO_ENDINGS
 from ..pictures.video import encode_video
@@ -29,8 +32,30 @@ OUTPUTS = {  # what can be saved, and the endings that each may have
     "layers": (".ora",),
     "video": VIDEO_ENDINGS,
 }
+PICTURES = ("photo", "mask", "plate", "object", "depth")  # those that are one picture
 NEED_PLATE = ("plate", "layers", "video")
+U8_MIN, U8_MAX = np.uint8(0), np.uint8(255)
 USUAL_CLIP = Clip()
+
+
+def output_picture(what: str, edited: Edited) -> Picture:
+    """The picture of one of PICTURES, of the photo's size. Raises ScriptError as below."""
+    _check_possible(what, edited, PICTURES)
+    document = edited.document
+    photo = document.photo.picture
+    if what == "mask":
+        mask = document.objects[0].mask
+        if mask is None:
+            raise ScriptError("the first object has no mask")
+        return Picture(np.repeat(np.where(mask, U8_MAX, U8_MIN)[..., None], 3, 2), is_grey=True)
+    if what == "plate":
+        return Picture(plate_picture(document), is_grey=photo.is_grey, icc=photo.icc)
+    if what == "object":
+        cutout = straight_cutout(edited.composite, photo.pixels.dtype, document.photo.size)
+        return Picture(cutout[..., :3], cutout[..., 3], icc=photo.icc)
+    if what == "depth":
+        return depth_picture(document, edited.puppets)
+    return edited.picture
 
 
 def encode_output(what: str, edited: Edited, path: Path, clip: Clip = USUAL_CLIP) -> bytes:
@@ -39,37 +64,26 @@ def encode_output(what: str, edited: Edited, path: Path, clip: Clip = USUAL_CLIP
     Raises the one-sentence ValueErrors of what encodes it; ScriptError for an unknown `what`, and
     where a background is needed that was not made.
     """
-    if what not in OUTPUTS:
-        raise ScriptError(f"{what!r} cannot be saved; what can is {', '.join(OUTPUTS)}")
+    _check_possible(what, edited, tuple(OUTPUTS))
     if not path.name.lower().endswith(OUTPUTS[what]):
         raise ScriptError(f"{path}: the ending must be {' or '.join(OUTPUTS[what])}")
     document = edited.document
-    if what in NEED_PLATE and document.plate is None:
-        raise ScriptError("there is no background: nothing was moved, and none was asked for")
-    if what == "photo":
-        return encode_picture(edited.picture, path.suffix)
+    if what in PICTURES:
+        return encode_picture(output_picture(what, edited), path.suffix)
     if what == "session":
         from ..session.file import encode_session
 
         return encode_session(document)
-    if what == "mask":
-        mask = document.objects[0].mask
-        if mask is None:
-            raise ScriptError("the first object has no mask")
-        return encode_mask(mask)
-    if what == "plate":
-        plate = Picture(plate_picture(document), is_grey=document.photo.picture.is_grey,
-                        icc=document.photo.picture.icc)  # fmt: skip
-        return encode_picture(plate, path.suffix)
-    if what == "object":
-        cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
-        picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
-        return encode_picture(picture, path.suffix)
-    if what == "depth":
-        return encode_picture(depth_picture(document, edited.puppets), path.suffix)
     if what == "layers":
         return encode_openraster(layers(document)[1], edited.picture)
     if what == "video":
         return encode_video(frames(document, clip), clip.rate, path.suffix)
     item = document.objects[edited.first]
     return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
+
+
+def _check_possible(what: str, edited: Edited, known: tuple[str, ...]) -> None:
+    if what not in known:
+        raise ScriptError(f"there is no output {shown(what)}; known are {', '.join(known)}")
+    if what in NEED_PLATE and edited.document.plate is None:
+        raise ScriptError("there is no background: nothing was moved, and none was asked for")
