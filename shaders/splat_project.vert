@@ -31,6 +31,8 @@ uniform vec2 limits;        // |x / z| and |y / z|, see posed.view_limits
 
 uniform bool has_sides;     // invented pictures; else the attributes above are none
 uniform float look_aside;   // rules.Rules
+uniform float ahead;
+uniform float near;
 uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
@@ -183,7 +185,8 @@ void main() {
     p_axes = axes(vec3(fxx, sxy, fyy), fdet, cut);
     p_color = vec4(paint.rgb, 1.0 - seen);
     vec3 along_depth = motion[2] * root;
-    p_depth = vec4(at.z, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
+    float depth = at.z - (is_aside ? ahead / near * nearest : 0.0);
+    p_depth = vec4(depth, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
     p_shift = vec4(looks - photo_focal * sideways, photo, body);
     p_slope = vec4(axx, axy, ayx, ayy);
     p_edge = vec2(1.0 - matted, solidity);

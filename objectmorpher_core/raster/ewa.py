@@ -81,6 +81,7 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         shape = _shape(s, rest, base, k, screen, rules)
         _put_shape(s, k, rest[base + OPACITY * LANES + k], screen, kind, shape)
         place, j, f, a, b, _, (ixx, ixy, iyy), _ = shape
+        ahead = screen[2] / rules.near * rules.ahead
         r, u = base + k, base + k + U0 * LANES
         # normals turn with the cofactors of F; W turns them and the way to the camera alike
         k0, k1, k2 = _cross(f[1], f[2]), _cross(f[2], f[0]), _cross(f[0], f[1])
@@ -96,11 +97,13 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         ux, uy, zoom, is_aside = rest[u], rest[u + LANES], rest[r + ZOOM * LANES], 0.0
         if aside >= 0:
             q = aside + k
-            is_there = sides[q + SIDE_ZOOM * LANES] > 0.0
-            if is_there and rest[r + COSINE * LANES] < rules.look_aside * cosine:
-                upper, lower = _three(sides, q), _three(sides, q + 3 * LANES)
-                ux, uy = sides[q + SIDE_U0 * LANES], sides[q + (SIDE_U0 + 1) * LANES]
-                zoom, is_aside = sides[q + SIDE_ZOOM * LANES], 1.0
+            across, down = _three(sides, q), _three(sides, q + 3 * LANES)
+            sx, sy = sides[q + SIDE_U0 * LANES], sides[q + (SIDE_U0 + 1) * LANES]
+            own = sides[q + SIDE_ZOOM * LANES]
+            is_less = rest[r + COSINE * LANES] < rules.look_aside * cosine
+            is_aside = (1.0 if is_less else 0.0) * (1.0 if own > 0.0 else 0.0)
+            upper, lower = _chosen(is_aside, across, upper), _chosen(is_aside, down, lower)
+            (ux, uy, zoom) = _chosen(is_aside, (sx, sy, own), (ux, uy, zoom))
         c00, c01, c10, c11 = _dot(upper, a), _dot(upper, b), _dot(lower, a), _dot(lower, b)
         axx, axy = c00 * ixx + c01 * ixy, c00 * ixy + c01 * iyy
         ayx, ayy = c10 * ixx + c11 * ixy, c10 * ixy + c11 * iyy
@@ -119,6 +122,7 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         s[FACING * LANES + k] = cosine
         s[SMALLEST * LANES + k] = area / largest * j / zoom
         s[ASIDE * LANES + k] = is_aside
+        s[o + p.Z * LANES] -= is_aside * ahead
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)
@@ -257,6 +261,15 @@ def write(s, rest, base, start, count, columns, out):
 def _three(a, at):
     """Three rows of memory in which a row has LANES numbers."""
     return a[at], a[at + LANES], a[at + 2 * LANES]
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _chosen(share, a, b):
+    """`a` where `share` is 1, `b` where it is 0; without a branch, for vector instructions."""
+    rest = 1.0 - share
+    return (
+        share * a[0] + rest * b[0], share * a[1] + rest * b[1], share * a[2] + rest * b[2],
+    )  # fmt: skip
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -105,7 +105,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         centre=centre,
         conic=np.stack([conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1]], axis=1),
         extent=extent,
-        depth=means[:, 2],
+        depth=means[:, 2] - aside * RULES.ahead * splats.gap,
         slope=(covariance_z[:, None] @ inverse)[:, 0],
         shift=look - unmoved,
         shift_slope=a - ratio * np.eye(2),
