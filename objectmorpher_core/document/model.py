@@ -151,9 +151,7 @@ class Sides:
 
     def select(self, index: np.ndarray) -> Sides:
         """Of the Gaussians at `index` (integers or booleans)."""
-        return replace(
-            self, at=self.at[index], slopes=self.slopes[index], zoom=self.zoom[index]
-        )
+        return replace(self, at=self.at[index], slopes=self.slopes[index], zoom=self.zoom[index])
 
     def followed_by(self, count: int) -> Sides:
         """With `count` more Gaussians that are on none of the pictures."""

@@ -96,7 +96,7 @@ class Rules(NamedTuple):
 
     # Where an invented picture shows the surface, too, it takes the photo's place from this ratio
     # of the cosines on: of the normal with the way to the photo's camera, to that now.
-    look_aside: float = 0.45
+    look_aside: float = 0.3
     # It lies so much nearer, x the object's gap: two pictures of one surface meet along a line.
     ahead: float = 0.1
 

@@ -10,7 +10,7 @@ carries the photo (DESIGN section 3): it is as sharp, and stays the same however
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -36,7 +36,7 @@ TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
 LONGEST = 480.0  # px, longer side of the object in a picture
-SEARCH = 12_000  # px of the small picture in which patches are looked for
+SEARCH = 20_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
 EDGE = 2  # px of what is known beside a hole that are filled anew: they hold what is behind
@@ -44,6 +44,7 @@ RIM = 4  # small px of the object's edge that are no source, for what is beyond 
 STRANGE = 20_000.0  # squared levels that they cost
 FAR = 1_500.0  # squared levels that a source costs ...
 BESIDE = 3.0  # ... that is as many times as far from the hole as the hole is deep
+ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
@@ -120,10 +121,26 @@ class _Side:
     picture: _Picture
     is_wanted: Mask  # (h, w) where they are
 
+    def beside(self, front: _Picture) -> _Side:
+        """The same with what the photo shows to its right: there is the texture unforeshortened."""
+        own = self.picture
+        height, width = max(len(own.depth), len(front.depth)), front.depth.shape[1]
+        below = height - len(own.depth), height - len(front.depth)
 
-def with_sides(
-    lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
-) -> LiftedObject:
+        def joined(name: str) -> np.ndarray:
+            one, other = (
+                np.pad(field, [(0, more), (0, 0), (0, 0)][: field.ndim])
+                for field, more in zip((getattr(own, name), getattr(front, name)), below)
+            )
+            return np.concatenate([one, other], axis=1)
+
+        picture = _Picture(*(joined(f.name) for f in fields(_Picture)))
+        return replace(
+            self, picture=picture, is_wanted=np.pad(self.is_wanted, ((0, below[0]), (0, width)))
+        )
+
+
+def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
     """`lifted` with pictures of what the photo's `camera` does not see of it."""
     rest = RestSplats(replace(lifted, sides=None), camera)
     texture = object_texture(matte, None)
@@ -131,6 +148,7 @@ def with_sides(
     views = [_View.of(rest, camera, turn) for turn in TURNS]
     best = np.argmax([view.cosines for view in views], axis=0)
     is_side = lifted.is_body & (rest.cosines > FARTHEST)
+    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, texture, camera)
     sides: list[_Side] = []
     for k, view in enumerate(views):
         wanted = (best == k) & (view.cosines > FACING) & view.is_aside(rest) & is_side
@@ -140,7 +158,7 @@ def with_sides(
 
     def fill(first: int, last: int) -> None:
         for k in range(first, last):
-            filled[k] = _filled(sides[k].picture, sides[k].is_wanted, seed + k)
+            filled[k] = _filled(sides[k], front, seed + k)
 
     in_threads(fill, len(sides), parts=len(sides))
     return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
@@ -215,20 +233,22 @@ def _side_by_side(pictures: list[U8]) -> U8:
     return np.concatenate(padded, axis=1)
 
 
-def _filled(picture: _Picture, wanted: Mask, seed: int) -> U8 | None:
-    """(h, w, 3) the object with what was not known of it where it is `wanted` (h, w).
+def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
+    """(h, w, 3) the view of a side with what was not known of it where it is wanted.
 
-    None where nothing is to be filled, or nothing is known.
+    From what it shows, and from the photo's own view. None where nothing is to be filled, or
+    nothing is known.
     """
+    both = side.beside(front)
+    picture, wanted, width = both.picture, both.is_wanted, side.is_wanted.shape[1]
     unknown = picture.is_object & ~picture.is_known
     unknown = cv2.dilate(unknown.astype(np.uint8), np.ones((2 * EDGE + 1,) * 2, np.uint8)) > 0
     known = picture.is_known & ~unknown
     hole = picture.is_object & ~known & wanted
     if hole.sum() < LEAST or known.sum() < LEAST:
         return None
-    height, width = hole.shape
     scale = min(1.0, (SEARCH / hole.size) ** 0.5)
-    size = max(8, round(width * scale)), max(8, round(height * scale))
+    size = max(8, round(hole.shape[1] * scale)), max(8, round(hole.shape[0] * scale))
     around = fill_in(picture.colors, picture.is_object)
     levels = 255 * np.where(picture.is_object[..., None], picture.colors, around)
     # What nobody knows around the hole is one, too, as far as patches reach.
@@ -237,20 +257,27 @@ def _filled(picture: _Picture, wanted: Mask, seed: int) -> U8 | None:
     whole &= ~known
     small, share = shrunk(levels, (~whole).astype(np.float32), size)
     guess = smooth(small, (share >= 0.5).astype(np.float32))
-    guide = Guide(_unlikely(known, share < 0.5), find_lines(guess, share < 0.5))
+    unlikely = _unlikely(known, share < 0.5, round(width * scale))
+    guide = Guide(unlikely, find_lines(guess, share < 0.5))
     completion = complete(small, share, guide, seed, silent)
     coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
     change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
     colors = np.where(completion.hole[..., None], completion.colors + KEPT * change, small)
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
-    return with_detail(crop, whole, np.clip(colors, 0, 255).astype(np.float32), completion.sources)
+    colors = np.clip(colors, 0, 255).astype(np.float32)
+    filled = with_detail(crop, whole, colors, completion.sources)
+    return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
 
 
-def _unlikely(known: Mask, hole: Mask) -> F32:
-    """(h, w) squared levels that a source costs beside a `hole` (h, w): not known, or far away."""
+def _unlikely(known: Mask, hole: Mask, width: int) -> F32:
+    """(h, w) squared levels that a source costs beside a `hole` (h, w): not known, or far away.
+
+    What is beyond `width` is the photo's own view.
+    """
     solid = cv2.resize(known.astype(np.float32), hole.shape[::-1], interpolation=cv2.INTER_AREA)
     inner = cv2.erode((solid > 0.5).astype(np.uint8), np.ones((2 * RIM - 1,) * 2, np.uint8))
     away = cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5)
     deep = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5).max()
     far = FAR * np.clip(away / (BESIDE * deep + RIM) - 1, 0, 1)
+    far[:, width:] = ELSEWHERE
     return np.where(inner > 0, far, STRANGE).astype(np.float32)
