@@ -34,6 +34,7 @@ from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .rim import evened
+from .sides import with_sides
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -97,7 +98,9 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         is_carried = is_mirrored and hidden is None
-        return replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        progress(0.85, "Filling in its sides")
+        return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: Subject, settings: LiftSettings) -> Body:
         """The shape alone, on which `lift` spreads its Gaussians."""
