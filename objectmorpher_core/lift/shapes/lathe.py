@@ -23,7 +23,8 @@ from .solids import AROUND, revolved
 
 TRIED = 40  # places on the axis, at which the profile's ends are looked for
 PLACES = 24  # of the profile itself
-TRIM = 0.003  # x the outline's area, that the outline may lose at each end
+STRAIGHT = 0.05  # radians from one place to the next, that are noise of the outline
+TRIM = 0.002  # x the outline's area, that the outline may lose at each end
 CORNERS = 24  # of a circle, that are looked up in the outline
 SLACK = 0.5  # px that a circle may reach out of an outline, whose pixels are stairs
 HALVINGS = 12  # of an interval that holds a radius
@@ -133,10 +134,10 @@ class Lathe:
         even = np.linspace(*ends, PLACES)
         own = radii(even)
         own = np.maximum(own, 0.5 * np.interp(even, steps, found))
-        inner = np.convolve(own, [0.25, 0.5, 0.25], "same")
-        own[1:-1] = inner[1:-1]
+        for _ in range(2):
+            own[1:-1] = np.convolve(own, [0.25, 0.5, 0.25], "valid")
         slope = np.arctan2(np.diff(own), np.diff(even))
-        bend = float(np.abs(np.diff(slope)).sum())
+        bend = float(np.maximum(np.abs(np.diff(slope)) - STRAIGHT, 0.0).sum())
         return Profile(centre + even[:, None] * axis, own, axis, bend)
 
     def _ends(self, places: F64, radii: F64, ways: F64) -> tuple[float, float]:
@@ -144,19 +145,19 @@ class Lathe:
         corners = places[:, None] + radii[:, None, None] * ways
         pixels = (corners[..., :2] / corners[..., 2:] - self.start) / self.step
         polygons = np.rint(np.clip(pixels, -1e4, 1e4) * (1 << SHIFT)).astype(np.int32)
-        canvas = np.zeros(self.inside.shape, np.uint8)
-        grown = []
-        for polygon in polygons[::-1]:
-            cv2.fillConvexPoly(canvas, polygon, 1, shift=SHIFT)
-            grown.append(cv2.countNonZero(canvas))
-        left = np.array(grown[::-1], np.float64)  # of the area, without those before
-        first = _crossing(left, (1 - TRIM) * left[0])
-        canvas[:] = 0
-        grown = []
-        for polygon in polygons[int(first) :]:
-            cv2.fillConvexPoly(canvas, polygon, 1, shift=SHIFT)
-            grown.append(cv2.countNonZero(canvas))
-        back = np.array(grown[::-1], np.float64)
+        mask = (self.inside > 0).astype(np.uint8)
+
+        def left(polygons: np.ndarray) -> F64:
+            """(n,) of the area, without the first so many, or none."""
+            canvas, grown = np.zeros_like(mask), []
+            for polygon in polygons[::-1]:
+                cv2.fillConvexPoly(canvas, polygon, 1, shift=SHIFT)
+                grown.append(cv2.countNonZero(canvas & mask))
+            return np.array(grown[::-1], np.float64)
+
+        whole = left(polygons)
+        first = _crossing(whole, (1 - TRIM) * whole[0])
+        back = left(polygons[int(first) :][::-1])
         last = len(radii) - 1 - _crossing(back, (1 - TRIM) * back[0])
         if last - first < 3:
             middle = 0.5 * (first + last)

@@ -24,7 +24,7 @@ REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
 # counts most: the network's depth and normals are blurred, and rounder than what they are of.
-WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, (0.1, 0.15)
+WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, (0.1, 0.5)
 LONGEST = 2.5  # description, of which half are what they are said to be
 WIDTH = 0.25  # of descriptions, over which that changes
 LEAST = 0.3  # weight, below which an object is free

@@ -10,16 +10,17 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
-from .drawing import Mesh
+from .drawing import Mesh, drawn
 from .evidence import Evidence, Misfit
 from .lathe import Lathe, Profile
-from .refining import HOPELESS, least, refined
+from .refining import HOPELESS, least
 from .solids import AROUND, FINE, ellipsoid
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane
 STEEPEST = 1.5  # radians, likewise
-SIMPLER = 0.3  # misfit that a radian of a profile's bend outweighs
+SIMPLER = 1.0  # misfit that a radian of a profile's bend outweighs
 ALIKE = 0.998  # cosine between two axes that are tried as one
+ROUNDER = 0.5  # misfit that an ellipsoid outweighs, odd in depth by one of its steps
 KEPT = 2  # leanings that are refined
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
 CAPS = (-0.8, 0.0, 0.35, 1.0)  # height of the end that is seen, x its radius
@@ -33,7 +34,7 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
     right /= np.linalg.norm(right)
     frame = np.column_stack([right, np.cross(forward, right), forward])
     spread = frame[:, :2] @ (axes * half)
-    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.log(np.sqrt(half[0] * half[1])), 0.0, 0.0])
+    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.log(half.min()), 0.0, 0.0])
     steps = np.array([0.02, 0.02, 0.06, 0.06, 0.06, 0.3, 0.15 * half[0], 0.15 * half[1]])
 
     def build(numbers: F64, around: int = AROUND) -> Mesh:
@@ -44,18 +45,45 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
         )
         return ellipsoid(middle + away * (frame[:, 0] * x + frame[:, 1] * y), columns, around)
 
-    best, misfit = refined(build, start, steps, evidence)
-    return build(best, FINE), misfit
+    for _ in range(2):
+        start[:4] += _wider(drawn(build(start), evidence.grid).near > 0, evidence, frame, axes)
+    if evidence.misfit(build(start)).total > HOPELESS:
+        return build(start, FINE), evidence.misfit(build(start))
+
+    def cost(numbers: F64) -> float:
+        odd = (((numbers - start) / steps)[5:] ** 2).sum()  # no ball, nor an egg that lies across
+        return evidence.misfit(build(numbers)).total + ROUNDER * float(odd)
+
+    best = least(cost, start, steps)
+    return build(best, FINE), evidence.misfit(build(best))
+
+
+def _wider(met: Mask, evidence: Evidence, frame: F64, axes: F64) -> F64:
+    """(4,) how far an ellipse that is `met` (h, w) is to be moved and stretched onto the mask.
+
+    Of what is near the circle that looks the largest is not the one in the middle.
+    """
+    if not met.any():
+        return np.zeros(4)
+    own, wanted = (_spread_of(evidence.grid.tangents[mask]) for mask in (met, evidence.mask))
+    wide = [np.diag(axes.T @ spread @ axes) for spread in (wanted[1], own[1])]
+    moved = frame[:2, :2].T @ (wanted[0] - own[0])
+    return np.concatenate([moved, 0.5 * np.log(wide[0] / np.maximum(wide[1], 1e-12))])
+
+
+def _spread_of(at: F64) -> tuple[F64, F64]:
+    """Mean (2,) and covariance (2, 2) of places (n, 2)."""
+    return at.mean(0), np.cov((at - at.mean(0)).T)
 
 
 def _moments(evidence: Evidence) -> tuple[F64, F64, F64, float]:
     """Middle (3,), axes (2, 2) columns, half lengths (2,) and distance of the mask's ellipse."""
-    at = evidence.grid.tangents[evidence.mask]
-    mean = at.mean(0)
-    values, axes = np.linalg.eigh(np.cov((at - mean).T))
+    mean, spread = _spread_of(evidence.grid.tangents[evidence.mask])
+    values, axes = np.linalg.eigh(spread)
     depth = float(np.median(evidence.depth[evidence.sure])) + 0.0
-    half = 2 * np.sqrt(np.maximum(values, 1e-12)) * depth
-    middle = np.append(mean, 1.0) * (depth + 0.5 * half.min())
+    half = 2 * np.sqrt(np.maximum(values, 1e-12))
+    away = depth * (1 + 0.5 * half.min())
+    half, middle = away * half, away * np.append(mean, 1.0)
     return middle, axes, half, float(np.linalg.norm(middle))
 
 
