@@ -25,7 +25,7 @@ from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED = 1  # exit code
-FORMATS = ("png", "jpg", "tif", "webp")  # of a batch's outputs
+FORMATS = ("png", "jpg", "tif", "webp", "avif", "jxl")  # of a batch's outputs
 UNFORESEEN = "something went wrong that should not have"
 
 log = logging.getLogger(__name__)
@@ -205,13 +205,16 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
     add("--save-depth", type=Path, metavar="FILE", help="its nearness, 16 bit: white is nearest")
-    add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
+    add("--save-layers", type=Path, metavar="FILE",
+        help="layers, for paint programs: .ora or .psd")  # fmt: skip
     add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
     add("--video", metavar="KIND", default="morph",
         help="morph (photo to edit and back, the default), sway or turn")  # fmt: skip
     add("--seconds", type=float, default=4.0, metavar="S", help="its length, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
+    add("--save-mesh", type=Path, metavar="FILE.glb",
+        help="the edited object as a mesh with the photo on it")  # fmt: skip
     add("--report", type=Path, metavar="R.json", help="seconds, handles, footprint and more")
 
 
@@ -227,7 +230,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--format", choices=FORMATS, metavar="ENDING",
-        help="of those outputs: png, jpg, tif or webp; default the photo's own")  # fmt: skip
+        help="of those: png, jpg, tif, webp, avif or jxl; default the photo's own")  # fmt: skip
     add("--overwrite", action="store_true", help="also what is newer already")
     add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
     add_ray(parser)
@@ -255,9 +258,13 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 def _add_convert(parser: argparse.ArgumentParser) -> None:
     parser.description = "Reads and writes what the files' endings say."
     add = parser.add_argument
-    add("source", type=Path, metavar="IN",
-        help=".ply .compressed.ply .splat .spz, or a mesh: .glb .gltf .obj .stl .off")  # fmt: skip
-    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz")
+    add(
+        "source",
+        type=Path,
+        metavar="IN",
+        help=".ply .compressed.ply .splat .spz, a mesh (.glb .gltf .obj .stl .off), or a session",
+    )
+    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz, or .glb")
     add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
     add("--flip", action="store_true",
         help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip

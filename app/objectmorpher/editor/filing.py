@@ -13,13 +13,15 @@ from objectmorpher_core.base.progress import Progress
 from ..canvas.shape import Shapes, build_ready
 from ..system.texts import t
 from ..worker.job_error import JobError
-from .export_plan import Format
+from .export_plan import FORMATS
 from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document
 
 if TYPE_CHECKING:
     from .editor import Editor
 
-EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
+EXPORT_ENDINGS = tuple(
+    dict.fromkeys(e for formats in FORMATS.values() for f in formats for e in f.endings)
+)
 OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
@@ -172,7 +174,8 @@ class Filing:
             return folder / f"{stem}-mask.png"
         if editor.exporting.draft is not None:
             return editor.exporting.path
-        return folder / f"{stem}-edited.png"
+        ending = editor.exporting.own_format.endings[0]
+        return folder / f"{stem}-edited{ending}"
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
         """Reads the file in a thread; `then` is called when it is shown.

@@ -8,9 +8,10 @@ from pathlib import Path
 from objectmorpher_core.base.limits import FILE_BYTES as MAX_BYTES
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.pictures.formats import READABLE
 
 SESSION_ENDING = ".omorph"
-PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
+PHOTO_ENDINGS = READABLE
 OBJECT_ENDINGS = (".ply", ".splat", ".spz", ".obj", ".glb", ".gltf", ".stl", ".off")
 ZIP_MAGIC = b"PK\x03\x04"
 BLOCK = 1 << 24  # bytes read at a time
