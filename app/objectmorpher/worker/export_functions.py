@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
 
 from ..editor.export_plan import Plan
 
+if TYPE_CHECKING:
+    from objectmorpher_core.scripting.outputs import Export
+
 
 def write_export(document: Document, plan: Plan, progress: Progress) -> None:
     """Renders what the plan asks for and writes it. Raises OutputError, ImageError."""
     from objectmorpher_core.base.files import make_folder, write_all
-    from objectmorpher_core.scripting.animation import Clip
-    from objectmorpher_core.scripting.outputs import Export
 
-    progress(0.02, "drawing")
-    clip = Clip(plan.motion.name.lower(), plan.seconds, object=plan.object)
-    export = Export(
-        document, object=plan.object, bits=plan.bits, quality=plan.quality,
-        webp_quality=plan.quality, clip=clip, progress=progress,
-    )  # fmt: skip
+    export = _export(document, plan, progress)
     if not plan.is_folder:
         data = export.encode(plan.what.key, plan.path)
         progress(0.95, "writing")
@@ -37,3 +34,20 @@ def write_export(document: Document, plan: Plan, progress: Progress) -> None:
             with suppress(OSError):  # what the disk keeps, it keeps
                 plan.path.rmdir()
         raise
+
+
+def encode_export(document: Document, plan: Plan, progress: Progress) -> bytes:
+    """Return the file that `write_export` would write."""
+    return _export(document, plan, progress).encode(plan.what.key, plan.path)
+
+
+def _export(document: Document, plan: Plan, progress: Progress) -> Export:
+    from objectmorpher_core.scripting.animation import Clip
+    from objectmorpher_core.scripting.outputs import Export
+
+    progress(0.02, "drawing")
+    clip = Clip(plan.motion.name.lower(), plan.seconds, object=plan.object)
+    return Export(
+        document, object=plan.object, bits=plan.bits, quality=plan.quality,
+        webp_quality=plan.quality, clip=clip, progress=progress,
+    )  # fmt: skip

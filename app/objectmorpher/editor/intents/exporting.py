@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.pictures.formats import LOSSLESS_AT_100
 from objectmorpher_core.pictures.guests import missing_jxl
 
+from ...system import clipboard
 from ...system.texts import folder_of, t
-from ...worker.export_functions import write_export
+from ...worker.export_functions import encode_export, write_export
 from ..export_plan import (
     FORMATS,
     LENGTHS,
@@ -28,6 +29,7 @@ from ..tasks import WRITE
 if TYPE_CHECKING:
     from ..editor import Editor
 
+COPY = "copy"  # kind of jobs and chores
 KNOWN = ", ".join(f.value for f in (*FORMATS[What.PHOTO], *FORMATS[What.LAYERS][:-1]))
 
 
@@ -271,6 +273,26 @@ class Exporting:
             is_whole = format in LOSSLESS_AT_100
             quality = settings.webp_quality if is_whole else settings.quality
             self._start(Plan(what, path, quality=quality))
+
+    def copy(self, what: What) -> None:
+        """Put the edited photo, or the current object alone, into the clipboard."""
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return
+        plan = Plan(what, Path("copied.png"), editor.current, bits=8)
+        told = t("Copied the object") if what is What.CUTOUT else t("Copied the photo")
+
+        def offer(png: bytes) -> None:
+            editor.chores.start(
+                t("Copying"), lambda progress: clipboard.copy(png), kind=COPY,
+                done=lambda _: editor.say(told), failed=editor.complain_of,
+            )  # fmt: skip
+
+        editor.jobs.start(
+            t("Copying"), encode_export, document, plan, done=offer,
+            failed=lambda error: editor.complain_of(error.retried_by(lambda: self.copy(what))),
+            kind=COPY,
+        )  # fmt: skip
 
     # Inside
 
