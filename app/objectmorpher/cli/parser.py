@@ -270,6 +270,14 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
         help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
 
 
+def _add_share(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Writes one file that any browser with WebGL 2 shows, also offline."
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="an .omorph file with a lifted object")
+    add("-o", "--out", type=Path, metavar="PAGE.html", required=True, help="the page")
+    add("--object", type=int, metavar="N", help="which object, from 1; default the first")
+
+
 def _add_warm_up(parser: argparse.ArgumentParser) -> None:
     parser.description = "A minute or two after an installation, seconds afterwards."
 
@@ -370,6 +378,8 @@ SUBCOMMANDS = (
     _command("replay", "render a saved session again", _add_replay),
     _command("info", "what a session holds", _add_info),
     _command("convert", "turn splat and mesh files into each other", _add_convert),
+    Subcommand("share", "make a web page in which the object can be dragged", _add_share,
+               lazily("share", "run_share")),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
         lazily("models", "run_models"),
