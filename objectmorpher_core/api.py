@@ -329,9 +329,9 @@ class Result:
     ) -> None:
         """Writes a file, whole or not at all; an existing one is replaced.
 
-        `what`: photo, mask, plate, object, depth, layers, splats, session or video; of a video
-        `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises ValueError
-        where the file's ending cannot hold it, and OSError where it cannot be written.
+        `what`: photo, mask, plate, object, depth, layers, splats, mesh, session or video; of a
+        video `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises
+        ValueError where the file's ending cannot hold it, and OSError where it cannot be written.
         """
         target = Path(path)
         write_all({target: encode_output(what, self.edited, target, Clip(video, seconds))})
