@@ -85,7 +85,12 @@ def beside(document: Document, k: int, prompt: Prompt) -> Prompt:
 
     Another object that a positive click is on is not: what is clicked is meant.
     """
-    wanted = [(int(c.y), int(c.x)) for c in prompt.clicks if c.is_foreground]
+    width, height = document.photo.size
+    wanted = [
+        (int(c.y), int(c.x))
+        for c in prompt.clicks
+        if c.is_foreground and 0 <= c.x < width and 0 <= c.y < height  # others are refused later
+    ]
     masks = [o.mask for j, o in enumerate(document.objects) if j != k and o.mask is not None]
     masks = [mask for mask in masks if not any(mask[place] for place in wanted)]
     if not masks:

@@ -212,18 +212,26 @@ def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     run(editor, "take_shadow")
     assert COMMANDS["take_shadow"].why_not(editor) == "Its shadow is being looked for"
     wait_for_jobs(editor)
+    own = (shade > 0.3) & ~plate_cover(document)
+    offer = editor.composing.offer  # outlined, and nothing has changed
+    assert offer is not None and editor.document is document
+    assert (offer.outlined & own).sum() > 0.6 * own.sum()
+    assert editor.message is not None and editor.message.action is not None
+    editor.message.action.run()  # one click refuses
+    assert editor.document is document and editor.composing.offer is None
+    editor.composing._offer = offer
+    editor.preview = edits.set_feather(document, 3.0)
+    assert editor.composing.offer is None, "what it was found in is not what one sees"
+    editor.preview = None
+    editor.composing.accept_shadow()
     assert editor.object is not None and editor.history is not None
     assert editor.history.undo_label == "Shadow as in the photo"
     assert editor.object.shadow.strength > 0.4
     assert editor.document is not None
-    own = (shade > 0.3) & ~plate_cover(document)
     brighter = plate_picture(editor.document)[own].mean() - plate_picture(document)[own].mean()
     assert brighter > 20
-    taken = editor.composing.taken  # outlined, and refused by one click
-    assert taken is not None and (taken & own).sum() > 0.6 * own.sum()
-    assert editor.message is not None and editor.message.action is not None
-    editor.message.action.run()  # shadow and background at once
-    assert editor.document is document and editor.composing.taken is None
+    editor.undo()  # shadow and background at once
+    assert editor.document is document
 
 
 @pytest.mark.slow
@@ -243,6 +251,8 @@ def test_its_reflection_in_the_photo_goes_and_none_is_drawn(editor: Editor) -> N
     editor.start(document)
     run(editor, "take_shadow")
     wait_for_jobs(editor)
+    assert editor.document is document
+    editor.composing.accept_shadow()
     assert editor.history is not None
     assert editor.history.undo_label == "Remove old reflection"
     assert editor.object is not None and editor.object.shadow.strength == 0

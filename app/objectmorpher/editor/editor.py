@@ -70,7 +70,7 @@ class Editor(EditorState):
         self.computing = Computing(self, self.tasks)
         self.methods = Methods(self, self.computing, self.tasks)
         self.models = Models(self, self.methods, self.shaping, self.tasks)
-        self.composing = Composing(self, self.methods, self.tasks, self.undo)
+        self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
         self.refining, self.exporting = Refining(self, self.methods), Exporting(self)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
@@ -197,6 +197,8 @@ class Editor(EditorState):
             self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
+        elif self.composing.offer is not None:
+            self.composing.refuse_shadow()
         else:
             if self.view.tool is ToolName.LOOK:
                 self.looking.reset()

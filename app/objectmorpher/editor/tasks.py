@@ -145,6 +145,8 @@ class Tasks:
         Nor is what needs no reading, such as saving: the reading gives way, and is done later.
         """
         document = self._editor.committed
+        if self._editor.jobs.is_busy(READ):  # a second one would end it, and come back for ever
+            return
         if document is not None and document.photo is not self._unreadable:
             self._read(self._read_again, is_quiet=True, is_spare=True)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import cv2
@@ -24,6 +25,7 @@ from ...worker.job_error import JobError
 from ...worker.job_functions import Choice, Variant
 from ..feedback import Action
 from ..tasks import PLATE
+from ..view import ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import Patch
@@ -40,25 +42,48 @@ SMOOTHED = np.ones((9, 9), np.uint8)  # px: the ground's own grain is no outline
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """An object's shadow and reflection in the photo, which it could take along."""
+
+    document: Document  # in which they were looked for
+    k: int
+    shadow: Shadow | None  # None: there is only a reflection
+    plate: Plate  # without either
+
+    @cached_property
+    def outlined(self) -> Mask:
+        """(H, W) of the photo what would be taken off it."""
+        size = self.document.photo.size
+        if self.plate.painted is None:
+            return np.zeros(size[::-1], bool)
+        whole = crop(self.plate.painted, self.plate.box, (0, 0, *size))
+        return cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_CLOSE, SMOOTHED) > 0
+
+
 class Composing:
     """The plate and the joining."""
 
     def __init__(
-        self, editor: EditorState, methods: Methods, tasks: Tasks, undo: Callable[[], None]
+        self,
+        editor: EditorState,
+        methods: Methods,
+        tasks: Tasks,
+        choose_tool: Callable[[ToolName], None],
     ) -> None:
         self._editor = editor
-        self._methods, self._tasks, self._undo = methods, tasks, undo
+        self._methods, self._tasks, self._choose_tool = methods, tasks, choose_tool
         self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
         self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
-        self._taken: tuple[Document, Mask] | None = None  # as it was made, and what it concerns
+        self._offer: Offer | None = None  # found in the photo, not taken along yet
 
     def forget(self) -> None:
         """Another document is opened."""
         self._variants, self._ready = ((), ()), []
-        self._stroke, self._waiting, self._taken = None, [], None
+        self._stroke, self._waiting, self._offer = None, [], None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
@@ -318,7 +343,10 @@ class Composing:
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
 
     def take_shadow(self) -> None:
-        """Imitates its shadow in the photo; takes that and its reflection off the background."""
+        """Looks for its shadow and its reflection in the photo, and outlines what it finds.
+
+        Nothing changes before `accept_shadow`; `refuse_shadow`, or any other edit, ends the offer.
+        """
         editor, document, k = self._editor, self._editor.committed, self._editor.current
         if document is None or document.plate is None or not editor.is_lifted:
             return
@@ -339,7 +367,7 @@ class Composing:
             shadow, plate = answer
             if shadow is not None and is_known:
                 shadow = replace(shadow, ground=told)
-            self._ready.append(lambda: self._take_shadow(masks, k, shadow, plate))
+            self._ready.append(lambda: self._show_offer(masks, Offer(document, k, shadow, plate)))
 
         editor.jobs.start(
             t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
@@ -347,36 +375,43 @@ class Composing:
             kind=SHADOW,
         )  # fmt: skip
 
-    def _take_shadow(
-        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow | None, plate: Plate
-    ) -> None:
+    def _show_offer(self, masks: tuple[Mask | None, ...], offer: Offer) -> None:
         editor, document = self._editor, self._editor.committed
         if document is None or not same(masks, _masks(document)):
             return
-        changed = edits.set_plate(document, plate)
-        if shadow is None:
-            editor.apply(t("Remove old reflection"), changed)
-            text = t("What is outlined is taken off the background")
+        self._offer = replace(offer, document=document)
+        self._choose_tool(ToolName.COMPOSE)  # which outlines it
+        if offer.shadow is None:
+            text = t("What is outlined is its reflection, and would be taken off the background")
         else:
-            editor.apply(t("Shadow as in the photo"), edits.set_shadow(changed, k, shadow))
-            text = t("The outlined shadow goes along")
-        if editor.committed is not None and plate.painted is not None:
-            whole = crop(plate.painted, plate.box, (0, 0, *document.photo.size))
-            closed = cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_CLOSE, SMOOTHED)
-            self._taken = editor.committed, closed > 0
-        editor.say(text, Action(t("Leave it in the photo"), self._refuse))
+            text = t("What is outlined is its shadow, and would go along")
+        editor.say(text, Action(t("Leave it in the photo"), self.refuse_shadow))
 
-    def _refuse(self) -> None:
-        """What was just taken along stays in the photo after all."""
-        if self.taken is not None:
-            self._undo()
+    def accept_shadow(self) -> None:
+        """What was outlined goes along; one step for undo."""
+        offer, self._offer = self.offer, None
+        if offer is None:
+            return
+        changed = edits.set_plate(offer.document, offer.plate)
+        if offer.shadow is None:
+            self._editor.apply(t("Remove old reflection"), changed)
+        else:
+            changed = edits.set_shadow(changed, offer.k, offer.shadow)
+            self._editor.apply(t("Shadow as in the photo"), changed)
+        self._editor.message = None
+
+    def refuse_shadow(self) -> None:
+        """What was outlined stays in the photo."""
+        self._offer = None
+        self._editor.message = None
 
     @property
-    def taken(self) -> Mask | None:
-        """(H, W) of the photo what was taken along last, until anything else is done."""
-        if self._taken is None or self._taken[0] is not self._editor.document:
+    def offer(self) -> Offer | None:
+        """What would be taken along, as long as the document is the one in which it was found."""
+        offer, editor = self._offer, self._editor
+        if offer is None or offer.document is not editor.document or offer.k != editor.current:
             return None
-        return self._taken[1]
+        return offer
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""
