@@ -311,7 +311,7 @@ class _Run:
         """The next object is the one that the script means."""
         prompt = prompt_of(script)
         if mask is None and prompt.is_empty:
-            raise ScriptError("no object is chosen: use --click, --box, --subject or --mask")
+            raise ScriptError("no object is chosen: use click, box, subject or mask")
         with self._stopwatch.stage("segment"):
             if mask is not None:
                 found, backend = read_mask(mask, self.document.photo.size), "mask"
@@ -338,7 +338,7 @@ class _Run:
                 self.choose(wanted, mask, silent)
                 self._keep(k)
             except ValueError as error:
-                raise ScriptError(f"--front {number}: {error}") from error
+                raise ScriptError(f"front {number}: {error}") from error
             self.document = edits.rename(self.document, k, f"Front {number}")
 
     def doubts(self) -> tuple[str, ...]:
@@ -351,7 +351,7 @@ class _Run:
             if doubt is not None:
                 found.append(
                     f"what stays in front ({item.name}) {doubt}: if that is not what you mean, "
-                    "click nearer to its middle, or give its outline by --front-mask"
+                    "click nearer to its middle, or give its outline as a mask"
                 )
         return tuple(found)
 

@@ -12,17 +12,20 @@ from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
 
 from ..canvas.shape import Shapes, build_ready
+from ..system import clipboard
 from ..system.texts import t
 from ..worker.job_error import JobError
-from .export_plan import Format
-from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document
+from .export_plan import FORMATS
+from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document, read_photo
 
 if TYPE_CHECKING:
     from .intents.exporting import Exporting
     from .state import EditorState
     from .tasks import Tasks
 
-EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
+EXPORT_ENDINGS = tuple(
+    dict.fromkeys(e for formats in FORMATS.values() for f in formats for e in f.endings)
+)
 OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
@@ -177,27 +180,46 @@ class Filing:
             return folder / f"{stem}-mask.png"
         if self._exporting.draft is not None:
             return self._exporting.path
-        return folder / f"{stem}-edited.png"
+        ending = self._exporting.own_format.endings[0]
+        return folder / f"{stem}-edited{ending}"
+
+    def paste(self) -> None:
+        """Opens the photo in the clipboard, or the file there, after the usual question."""
+
+        def read(progress: Progress) -> tuple[Opened, Path | None]:
+            pasted = clipboard.paste()
+            if pasted.path is not None:
+                return read_document(pasted.path, self.fov, self.seed, progress), pasted.path
+            return read_photo(pasted.data, pasted.name, self.fov, self.seed), None
+
+        self.guard(lambda: self._begin(t("Pasting"), read, lambda: None))
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
-        """Reads the file in a thread; `then` is called when it is shown.
+        """Reads the file in a thread; `then` is called when it is shown."""
 
-        What is open now may be lost: that was asked. What is done to it meanwhile may not.
-        """
+        def read(progress: Progress) -> tuple[Opened, Path | None]:
+            return read_document(path, self.fov, self.seed, progress), path
+
+        self._begin(t("Opening {name}", name=path.name), read, then)
+
+    def _begin(
+        self, title: str, read: Callable[[Progress], tuple[Opened, Path | None]],
+        then: Callable[[], None],
+    ) -> None:  # fmt: skip
+        """What is open now may be lost: that was asked. What is done to it meanwhile may not."""
         editor, given_up = self._editor, self._editor.committed
-        fov, seed = self.fov, self.seed
 
-        def read(progress: Progress) -> tuple[Opened, Shapes]:
-            opened = read_document(path, fov, seed, progress)
-            return opened, build_ready(opened.document)
+        def prepared(progress: Progress) -> tuple[Opened, Path | None, Shapes]:
+            opened, path = read(progress)
+            return opened, path, build_ready(opened.document)
 
-        def show(opened: Opened, shapes: Shapes) -> None:
+        def show(opened: Opened, path: Path | None, shapes: Shapes) -> None:
             self._start(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(answer: tuple[Opened, Shapes]) -> None:
+        def accept(answer: tuple[Opened, Path | None, Shapes]) -> None:
             if editor.committed is given_up or editor.is_saved:
                 show(*answer)
             else:
@@ -207,7 +229,7 @@ class Filing:
             editor.complain_of(replace(error, trace="") if error.is_expected else error)
 
         editor.chores.start(
-            t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,
+            title, prepared, kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip
 
     def forget_recent(self, path: str) -> None:
