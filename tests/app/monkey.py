@@ -52,6 +52,7 @@ NONSENSE = (
 )  # fmt: skip
 UPWARDS = "One folder up"  # leads out of the folder where everything may be overwritten
 ASKED = "Don't save"
+KEYS_PAGE, KEYS_BACK = "Keyboard and pointer…", "Reset all"
 
 
 @dataclass
@@ -168,7 +169,28 @@ class Player:
             self.hands.xdotool("mouseup", button)
         self.hands.xdotool("keyup", "shift", "keyup", "ctrl", "keyup", "alt", "keyup", "space")
         self.resize(USUAL)
-        self.hands.catch_up()
+        self._use_the_usual_keys()
+
+    def _use_the_usual_keys(self) -> None:
+        """By the menu: the monkey may have given any key to anything."""
+        end = time.monotonic() + GONE
+        while KEYS_BACK not in self.hands.places():
+            assert time.monotonic() < end, f"{KEYS_PAGE} does not open"
+            self.hands.press("Escape")
+            for label in ("Menu: Help", KEYS_PAGE):
+                if self._appears(label):
+                    self.hands.choose(label)
+            self._appears(KEYS_BACK)
+        self.hands.choose(KEYS_BACK)
+        while KEYS_BACK in self.hands.places():
+            assert time.monotonic() < end, f"{KEYS_PAGE} does not close"
+            self.hands.press("Escape")
+
+    def _appears(self, label: str) -> bool:
+        end = time.monotonic() + 3
+        while label not in self.hands.places() and time.monotonic() < end:
+            time.sleep(0.02)
+        return label in self.hands.places()
 
     def resize(self, size: tuple[int, int]) -> None:
         self.write(f"search --name ObjectMorpher windowsize %@ {size[0]} {size[1]}")
