@@ -94,8 +94,7 @@ class Player:
             command, env=self._environment, cwd=ROOT, stderr=self._noise
         )
         self.hands = Hands(self._environment, self.process)
-        self._script = self.hands.script()
-        self._write = self._script.__enter__()
+        self._typist: subprocess.Popen[str] | None = None
         self.starts += 1
         self.size = USUAL
         self.hands.wait(lambda: bool(self.hands.title()), "starting")
@@ -104,8 +103,7 @@ class Player:
 
     def close(self) -> None:
         """Ends the program, if it has not ended, and checks what it said."""
-        with contextlib.suppress(BrokenPipeError):
-            self._script.__exit__(None, None, None)
+        self._stop_typing()
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
@@ -115,8 +113,27 @@ class Player:
         assert "Traceback" not in said, said[-2000:]
 
     def write(self, lines: str) -> None:
-        """Lines for xdotool, which does them one after the other."""
-        self._write(lines)
+        """Lines for xdotool, which does them one after the other.
+
+        It ends where a window is gone: another one does what comes later.
+        """
+        if self._typist is None or self._typist.poll() is not None:
+            self._stop_typing()
+            self._typist = subprocess.Popen(
+                ["xdotool", "-"], env=self._environment, stdin=subprocess.PIPE, text=True,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        assert self._typist.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._typist.stdin.write(lines + "\n")
+            self._typist.stdin.flush()
+
+    def _stop_typing(self) -> None:
+        if self._typist is not None:
+            self._typist.kill()
+            with contextlib.suppress(BrokenPipeError):
+                self._typist.communicate()
+            self._typist = None
 
     def answered(self) -> bool:
         """Waits until the window has seen all that was done; False where it was quit.
@@ -132,6 +149,8 @@ class Player:
             if self.process.poll() is not None:
                 assert self.process.returncode == 0, f"it ended with {self.process.returncode}"
                 return False
+            if self._typist is None or self._typist.poll() is not None:
+                self.write(f"mousemove {x} {y}")
             taken = time.monotonic() - start
             own = taken - (_waited(self.process.pid) - waited)
             if (own > STUCK and taken > STUCK) or taken > GONE:
