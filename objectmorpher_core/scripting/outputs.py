@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.pixels import crop, pixels_from_unit
 from ..base.progress import Progress, part, silent
+from ..base.quoting import shown
 from ..compose.composite import Composite, composite, straight_cutout
 from ..compose.depth_map import depth_picture
 from ..compose.layers import Layer, layers
@@ -17,7 +18,7 @@ from ..compose.plate.plate import plate_picture
 from ..deform.puppet import Puppet, puppet_of
 from ..document.model import Document, EditObject
 from ..pictures.formats import NEED_PLATE, WRITTEN, Format, endings_of, format_of
-from ..pictures.image import LOSSLESS, Picture, encode_mask, encode_picture, to_u8
+from ..pictures.image import LOSSLESS, Picture, encode_picture, to_u8
 from ..pictures.openraster import encode_openraster
 from ..pictures.psd import encode_psd
 from ..pictures.video import encode_video
@@ -27,6 +28,8 @@ from .animation import Clip, frames
 from .script import ScriptError
 
 OUTPUTS = {what: endings_of(formats) for what, formats in WRITTEN.items()}
+PICTURES = ("photo", "mask", "plate", "object", "depth")  # those that are one picture
+U8_MIN, U8_MAX = np.uint8(0), np.uint8(255)
 USUAL_CLIP = Clip()
 
 
@@ -36,13 +39,23 @@ def encode_output(what: str, edited: Edited, path: Path, clip: Clip = USUAL_CLIP
     Raises the one-sentence ValueErrors of what encodes it; ScriptError for an unknown `what`, and
     where a background is needed that was not made.
     """
-    if what not in OUTPUTS:
-        raise ScriptError(f"{what!r} cannot be saved; what can is {', '.join(OUTPUTS)}")
+    _check_possible(what, edited, tuple(OUTPUTS))
     if not path.name.lower().endswith(OUTPUTS[what]):
         raise ScriptError(f"{path}: the ending must be {' or '.join(OUTPUTS[what])}")
+    return Export(edited.document, edited, clip=clip).encode(what, path)
+
+
+def output_picture(what: str, edited: Edited) -> Picture:
+    """Return the picture of one of PICTURES, of the photo's size. Raises ScriptError as above."""
+    _check_possible(what, edited, PICTURES)
+    return Export(edited.document, edited).picture(what)
+
+
+def _check_possible(what: str, edited: Edited, known: tuple[str, ...]) -> None:
+    if what not in known:
+        raise ScriptError(f"there is no output {shown(what)}; known are {', '.join(known)}")
     if what in NEED_PLATE and edited.document.plate is None:
         raise ScriptError("there is no background: nothing was moved, and none was asked for")
-    return Export(edited.document, edited, clip=clip).encode(what, path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +77,6 @@ class Export:
             from ..session.file import encode_session
 
             return encode_session(self.document)
-        if what == "mask":
-            mask = self.document.objects[self.object or 0].mask
-            if mask is None:
-                raise ScriptError("the first object has no mask")
-            return encode_mask(mask)
         if what == "layers":
             merged, pile = self.layers(part(self.progress, 0.05, 0.7))
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
@@ -81,10 +89,12 @@ class Export:
         return self._encoded(self.picture(what), path.suffix)
 
     def picture(self, what: str) -> Picture:
-        """Return the flat picture that is asked for: photo, object, plate or depth."""
+        """Return the flat picture that is asked for, one of PICTURES."""
         draw = part(self.progress, 0.05, 0.6)
         if what == "photo":
             return self.edited.picture if self.edited else export(self.document, progress=draw)
+        if what == "mask":
+            return self._mask()
         if what == "object":
             return self._cutout(draw)
         if what == "depth":
@@ -122,6 +132,12 @@ class Export:
         merged = replace(self.document.photo.picture, pixels=result.pixels)
         deep = [replace(layer, pixels=_sampled(layer.pixels, self.bits)) for layer in pile]
         return self._with_bits(merged), deep
+
+    def _mask(self) -> Picture:
+        mask = self.document.objects[self.object or 0].mask
+        if mask is None:
+            raise ScriptError("the first object has no mask")
+        return Picture(np.repeat(np.where(mask, U8_MAX, U8_MIN)[..., None], 3, 2), is_grey=True)
 
     def _encoded(self, picture: Picture, ending: str) -> bytes:
         self.progress(0.6, "encoding")

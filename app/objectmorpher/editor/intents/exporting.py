@@ -27,7 +27,7 @@ from ..export_plan import (
 from ..tasks import WRITE
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
 
 COPY = "copy"  # kind of jobs and chores
 KNOWN = ", ".join(f.value for f in (*FORMATS[What.PHOTO], *FORMATS[What.LAYERS][:-1]))
@@ -51,7 +51,7 @@ class Draft:
 class Exporting:
     """The export dialog's state, and what may be done with it."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self.draft: Draft | None = None  # None: no dialog
         self._replacing: Path | None = None  # asked whether it may be overwritten
