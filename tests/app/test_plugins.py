@@ -76,6 +76,8 @@ def test_the_window_sends_layers_back_and_closes(
         hands.choose("Lift object")
         hands.place("Drag a point on the object")
         hands.drag(screen_xy(*CENTRE), screen_xy(CENTRE[0] + 14, CENTRE[1] - 10))
+        hands.place("Send back")
+        hands.settle()  # the background is filled in
         hands.choose("Send back")
         hands.wait(back.exists, "sending back")
     with zipfile.ZipFile(back) as archive:

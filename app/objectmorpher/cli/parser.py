@@ -270,7 +270,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--format", choices=FORMATS, metavar="ENDING",
-        help="of those outputs: png, jpg, tif, webp, avif or jxl; default as the photo")  # fmt: skip
+        help="of those outputs: png, jpg, tif, webp, avif, jxl; default as the photo")  # fmt: skip
     add("--overwrite", action="store_true", help="redo outputs that are up to date")
     add("--report", type=Path, metavar="R.json", help="the outcome and the figures of each edit")
     add_ray(parser)

@@ -92,10 +92,11 @@ class Exporting:
             return self._why_no_shape()
         has_plate = document is not None and document.plate is not None
         objects = () if document is None else document.objects
-        if what is What.DEPTH and not any(item.lifted is not None for item in objects):
+        is_lifted = any(item.lifted is not None for item in objects)
+        if what is What.DEPTH and not is_lifted:
             return t("Lift an object first")
         if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
-            return t("Lift an object first")
+            return t("The background is not ready yet" if is_lifted else "Lift an object first")
         return None
 
     def why_no_motion(self, motion: Motion) -> str | None:
