@@ -77,7 +77,7 @@ def encode_output(what: str, edited: Edited, path: Path, clip: Clip = USUAL_CLIP
     if what == "layers":
         return encode_openraster(layers(document)[1], edited.picture)
     if what == "video":
-        return encode_video(frames(document, clip), clip.rate, path.suffix)
+        return encode_video(frames(document, clip, keys=edited.keys), clip.rate, path.suffix)
     item = document.objects[edited.first]
     return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
 
