@@ -347,8 +347,8 @@ class Result:
     ) -> None:
         """Writes a file, whole or not at all; an existing one is replaced.
 
-        `what`: photo, mask, plate, object, depth, layers, splats, session or video; of a video
-        `video` says what is seen (morph, sway, turn or keys), and `seconds` how long. Raises
+        `what`: photo, mask, plate, object, depth, layers, splats, mesh, session or video; of a
+        video `video` says what is seen (morph, sway, turn or keys), and `seconds` how long. Raises
         ValueError where the file's ending cannot hold it, and OSError where it cannot be written.
         """
         target = Path(path)

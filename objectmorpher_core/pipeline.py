@@ -20,6 +20,7 @@ from .base.files import read_input
 from .base.pixels import crop, unit_pixels
 from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
+from .compose.order import doubt_about_front
 from .compose.plate.plate import build_plate
 from .deform.puppet import Puppet, puppet_of
 from .document import edits
@@ -348,7 +349,7 @@ class _Run:
         for k, item in enumerate(self.document.objects):
             doubt = None
             if item.stays_in_front:
-                doubt = edits.doubt(self.document, k, self._posed)
+                doubt = doubt_about_front(self.document, k, self._posed)
             if doubt is not None:
                 found.append(
                     f"what stays in front ({item.name}) {doubt}: if that is not what you mean, "

@@ -217,7 +217,7 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
     lifted, camera = puppet.lifted, document.photo.camera
     matte = document.objects[k].matte
     assert matte is not None
-    texture = object_texture(matte)
+    texture = object_texture(matte, lifted)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
         width, height = document.photo.size

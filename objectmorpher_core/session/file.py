@@ -344,6 +344,9 @@ def _check_lifted(item: EditObject) -> None:
     _same("u0", lifted.texture.u0.shape, (count, 2))
     _same("visibility", lifted.texture.visibility.shape, (count,))
     _same("solidity", lifted.texture.solidity.shape, (count,))
+    if (sides := lifted.sides) is not None:
+        found = sides.at.shape, sides.slopes.shape, sides.zoom.shape, sides.pixels.shape[2:]
+        _same("sides", found, ((count, 2), (count, 2, 3), (count,), (3,)))
     _same("control_points", lifted.control_points.shape, (nodes, 3))
     _same("world_from_object", lifted.world_from_object.shape, (4, 4))
     for handle in (*item.handles, *item.base.handles):

@@ -200,9 +200,9 @@ def test_the_picture_of_a_moved_object_moves_with_it():
 
 def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
     edited = _run(turn=[15, 0, 0], trust=0.0)
-    picked = edited.puppet.pick(
-        (78.0, 62.0), None, Placement(), object_texture(edited.document.objects[0].matte)
-    )
+    item = edited.document.objects[0]
+    texture = object_texture(item.matte, item.lifted)
+    picked = edited.puppet.pick((78.0, 62.0), None, Placement(), texture)
     placed = edited.puppet.picture_of(picked.rest, None, edited.document.objects[0].placement)
     assert placed[0] < 78 - 2
 

@@ -17,7 +17,7 @@ from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_pictu
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.scripting.animation import Clip
-from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, encode_output
+from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
 from objectmorpher_core.scripting.report import provenance
 from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import (
@@ -31,6 +31,7 @@ from objectmorpher_core.scripting.script import (
 )
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
+from objectmorpher_core.splat_files.meshes.textured import plain_glb
 
 from .terminal import PROGRAM, UsageError, progress_bar
 
@@ -41,6 +42,7 @@ EXTRAS = {  # further outputs of `edit` and what each holds
     "save_plate": "plate",
     "save_object": "object",
     "save_splats": "splats",
+    "save_mesh": "mesh",
     "save_depth": "depth",
     "save_layers": "layers",
     "save_video": "video",
@@ -188,12 +190,24 @@ def run_convert(options: argparse.Namespace) -> None:
     count = COUNT if options.count is None else options.count
     if not LEAST_COUNT <= count <= MOST_COUNT:
         raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")
-    check_outputs([options.source], {options.out: SPLAT_ENDINGS})
+    source, out = options.source, options.out
+    check_outputs([source], {out: (*SPLAT_ENDINGS, *OUTPUTS["mesh"])})
+    is_mesh = out.suffix.lower() in OUTPUTS["mesh"]
     with progress_bar("Converting") as progress:
-        gaussians = read(options.source, count, options.flip)
-        progress(0.7, "Writing")
-        data = encode_splats(gaussians, options.out)
-    write_all({options.out: data})
+        if source.suffix.lower() in OUTPUTS["session"]:
+            data = _object_of(source, "mesh" if is_mesh else "splats", out, progress)
+        else:
+            gaussians = read(source, count, options.flip)
+            progress(0.7, "Writing")
+            data = plain_glb(gaussians) if is_mesh else encode_splats(gaussians, out)
+    write_all({out: data})
+
+
+def _object_of(session: Path, what: str, out: Path, progress: Progress) -> bytes:
+    """The file of a session's first object in 3D, as it is posed."""
+    from objectmorpher_core.session.file import load_session
+
+    return Export(load_session(session), progress=progress).encode(what, out)
 
 
 def run_warm_up(options: argparse.Namespace) -> None:

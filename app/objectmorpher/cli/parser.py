@@ -25,7 +25,7 @@ from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED = 1  # exit code
-FORMATS = ("png", "jpg", "tif", "webp")  # of a batch's outputs
+FORMATS = ("png", "jpg", "tif", "webp", "avif", "jxl")  # of a batch's outputs
 SHELLS = ("bash", "zsh", "tcsh")  # whose completion shtab writes
 UNFORESEEN = "something went wrong that should not have"
 
@@ -238,19 +238,18 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
     add("--save-depth", type=Path, metavar="FILE", help="nearness, 16 bit: white is nearest")
-    add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
+    add("--save-layers", type=Path, metavar="FILE",
+        help="layers, for paint programs: .ora or .psd")  # fmt: skip
     add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
     add("--video", metavar="KIND", default="morph",
         help="morph (photo to edit and back, the default), sway, turn or keys")  # fmt: skip
     add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
-    add(
-        "--report",
-        type=Path,
-        metavar="R.json",
-        help="figures: seconds, handles, footprint and more",
-    )
+    add("--save-mesh", type=Path, metavar="FILE.glb",
+        help="the edited object as a mesh with the photo on it")  # fmt: skip
+    add("--report", type=Path, metavar="R.json",
+        help="figures: seconds, handles, footprint and more")  # fmt: skip
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
@@ -265,7 +264,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--format", choices=FORMATS, metavar="ENDING",
-        help="of those outputs: png, jpg, tif or webp; default as the photo")  # fmt: skip
+        help="of those outputs: png, jpg, tif, webp, avif, jxl; default as the photo")  # fmt: skip
     add("--overwrite", action="store_true", help="redo outputs that are up to date")
     add("--report", type=Path, metavar="R.json", help="the outcome and the figures of each edit")
     add_ray(parser)
@@ -305,9 +304,13 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 def _add_convert(parser: argparse.ArgumentParser) -> None:
     parser.description = "The endings of the names choose the formats."
     add = parser.add_argument
-    add("source", type=Path, metavar="IN",
-        help=".ply .compressed.ply .splat .spz, or a mesh: .glb .gltf .obj .stl .off")  # fmt: skip
-    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz")
+    add(
+        "source",
+        type=Path,
+        metavar="IN",
+        help=".ply .compressed.ply .splat .spz, a mesh (.glb .gltf .obj .stl .off), or a session",
+    )
+    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz, or .glb")
     add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
     add("--flip", action="store_true",
         help="turn it upside down, where IN ignores its format's axes")  # fmt: skip
@@ -326,6 +329,14 @@ def run_completion(options: argparse.Namespace) -> None:
     import shtab
 
     sys.stdout.write(shtab.complete(completed_files(build_parser()), options.shell))
+
+
+def _add_share(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Writes one file that any browser with WebGL 2 shows, also offline."
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="an .omorph file with a lifted object")
+    add("-o", "--out", type=Path, metavar="PAGE.html", required=True, help="the page")
+    add("--object", type=int, metavar="N", help="which object, from 1; default the first")
 
 
 def _add_warm_up(parser: argparse.ArgumentParser) -> None:
@@ -454,6 +465,8 @@ SUBCOMMANDS = (
     _command("replay", "render a saved session again", _add_replay),
     _command("info", "show what a session holds", _add_info),
     _command("convert", "convert splat and mesh files", _add_convert),
+    Subcommand("share", "make a web page in which the object can be dragged", _add_share,
+               lazily("share", "run_share")),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
         lazily("models", "run_models"),
