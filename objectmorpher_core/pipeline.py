@@ -265,6 +265,7 @@ def continue_script(
             how = Refining(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
+    notes = (*notes, *runner.guesses(document, run.puppets))
     keys = runner.key_poses(document, 0, run.puppets[0], script) if script.key else ()
     return replace(edited, notes=notes, keys=tuple(keys))
 
