@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,7 +27,7 @@ from .pictures.image import encode_mask
 from .pictures.in_memory import array_of, encode_array, encode_pil, pil_of
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
-from .scripting.animation import Clip
+from .scripting.animation import Clip, frames
 from .scripting.outputs import encode_output, output_picture
 from .scripting.report import provenance
 from .scripting.script import (
@@ -202,6 +202,14 @@ class Edit:
         """The whole object is so many times as large."""
         return self.options(scale=factor)
 
+    def key(self, **pose: Any) -> Edit:
+        """Add a key pose, through which a video of the kind keys goes after the edit's own pose.
+
+        `pose` has pin, handle, move, turn and scale as a script has them; what it does not say is
+        at rest. An edit has at most eleven of them.
+        """
+        return self.options(key=[*self.script.key, pose])
+
     def remove(self) -> Edit:
         """The object is gone, and what is behind it is seen."""
         return self.options(remove=True)
@@ -298,6 +306,16 @@ class Result:
         """
         return pil_of(output_picture(what, self.edited))
 
+    def frames(
+        self, video: str = "morph", seconds: float = 4.0, rate: float = 25.0
+    ) -> Iterator[np.ndarray]:
+        """The pictures (h, w, 3) u8 of a video, one after the other; see `save`.
+
+        Raises ValueError where nothing moves.
+        """
+        clip = Clip(video, seconds, rate)
+        return frames(self.edited.document, clip, keys=self.edited.keys)
+
     def show(self, what: str = "photo") -> None:
         """Open a picture of the result in the system's viewer.
 
@@ -330,7 +348,7 @@ class Result:
         """Writes a file, whole or not at all; an existing one is replaced.
 
         `what`: photo, mask, plate, object, depth, layers, splats, mesh, session or video; of a
-        video `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises
+        video `video` says what is seen (morph, sway, turn or keys), and `seconds` how long. Raises
         ValueError where the file's ending cannot hold it, and OSError where it cannot be written.
         """
         target = Path(path)

@@ -158,6 +158,7 @@ class Edited:
     energies: dict[int, tuple[float, ...]]  # of the solves
     stopwatch: Stopwatch
     notes: tuple[str, ...] = ()  # what one should know about the result, each a sentence
+    keys: tuple[Document, ...] = ()  # the document in its further key poses
 
     @property
     def first(self) -> int:
@@ -251,7 +252,7 @@ def continue_script(
             run.add(k, replace(wanted, script=own), mask, step)
     run.keep_fronts(script, progress)
     document, notes = runner.ordered(run.document, others), run.doubts()
-    if any(item.is_moved for item in document.objects) or needs_plate:
+    if any(item.is_moved for item in document.objects) or needs_plate or script.key:
         with stopwatch.stage("inpaint"):
             step = part(progress, 0.6, 0.85)
             behind = with_plate(document, script, frozenset(run.casting), step)
@@ -264,7 +265,9 @@ def continue_script(
             how = Refining(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
-    return replace(edited, notes=(*notes, *runner.guesses(document, run.puppets)))
+    notes = (*notes, *runner.guesses(document, run.puppets))
+    keys = runner.key_poses(document, 0, run.puppets[0], script) if script.key else ()
+    return replace(edited, notes=notes, keys=tuple(keys))
 
 
 class _Run:

@@ -134,7 +134,7 @@ def commands(page: Path) -> list[str]:
 
 def parsed(line: str) -> str:
     """What the program's parser says about a command line; empty: it takes it."""
-    words = shlex.split(line)[1:]
+    words = shlex.split(line.partition(" > ")[0])[1:]
     if any(w in ("...", "…") for w in words) or "--help" in words:
         return ""
     try:

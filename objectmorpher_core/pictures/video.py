@@ -1,7 +1,7 @@
 """Moving pictures in files: WebM and MP4 by OpenCV's encoders, GIF and animated WebP by Pillow.
 
-WebM (VP9) plays in every browser. MP4 holds MPEG-4 Part 2, which players know and browsers do not:
-an H.264 encoder of a free licence comes with no package. GIF has 256 colours.
+WebM and MP4 hold VP9, which every browser plays; an H.264 encoder of a free licence comes with no
+package. GIF has 256 colours.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..base.arrays import RGB
 from ..base.library_output import logged_output
 from .image import at_most
 
-CODECS = {".webm": "VP90", ".mp4": "mp4v"}
+CODECS = {".webm": "VP90", ".mp4": "vp09"}
 PICTURES = (".gif", ".webp")
 ENDINGS = (*CODECS, *PICTURES)
 GIF_LONGEST = 640  # px

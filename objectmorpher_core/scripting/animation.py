@@ -1,13 +1,14 @@
-"""An edit as moving pictures: how it came about, or the object turning.
+"""An edit as moving pictures: how it came about, the object turning, or its key poses in turn.
 
-Each frame is the composite of a document, as an export is. Between the photo and the edit the
-handles go their way and the object is solved anew, so that it bends as it would under the hand.
+Each frame is the composite of a document, as an export is. Between two poses the handles go their
+way and the object is solved anew, so that it bends as it would under the hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ..document.model import Document, EditObject, Handle, Placement, Pose
 from ..document.shrink import shrunk
 from ..pictures.image import to_u8
 
-MOTIONS = ("morph", "sway", "turn")
+MOTIONS = ("morph", "sway", "turn", "keys")
 SWAY = 30.0  # degrees to both sides
 HOLD = 0.15  # x the length of a morph, for which photo and edit are each shown at rest
 LONGEST = 1280  # px, longer side of a frame
@@ -32,7 +33,7 @@ TOLERANCE = 1e-3  # of a solve between two frames
 class Clip:
     """What is to be seen, and for how long."""
 
-    motion: str = "morph"  # from the photo to the edit and back; or the object sways; or turns
+    motion: str = "morph"  # photo, edit and back; the object sways; turns; through key poses
     seconds: float = 4.0
     rate: float = 25.0  # frames a second
     object: int = 0  # index of the one that sways or turns
@@ -51,27 +52,44 @@ class Clip:
         return max(round(self.seconds * self.rate), 1)
 
 
-def frames(document: Document, clip: Clip, progress: Progress = silent) -> Iterator[RGB]:
+def frames(
+    document: Document, clip: Clip, progress: Progress = silent, keys: Sequence[Document] = ()
+) -> Iterator[RGB]:
     """The clip's pictures (h, w, 3), all of one size, even in width and height.
 
-    Played again and again it has no jump. Raises ValueError where nothing moves.
+    `keys` are the document in its further key poses. Played again and again the clip has no jump.
+    Raises ValueError where nothing moves.
     """
-    small = shrunk(document, max(-(-max(document.photo.size) // clip.longest), 1))
+    times = max(-(-max(document.photo.size) // clip.longest), 1)
+    small = shrunk(document, times)
+    if clip.motion == "keys" and not keys:
+        raise ValueError("there are no key poses, and a video through them needs at least one")
     if clip.motion == "morph" and not any(item.is_moved for item in small.objects):
         raise ValueError("nothing was moved, there is nothing to be seen")
     chosen = small.objects[clip.object].lifted if clip.object < len(small.objects) else None
-    if clip.motion != "morph" and chosen is None:
+    if clip.motion in ("sway", "turn") and chosen is None:
         raise ValueError("lift an object first, then it can turn")
-    film = _Film(small)
+    film = _Film(small, tuple(shrunk(key, times) for key in keys))
     for k in range(clip.count):
         progress(k / clip.count, "drawing")
         if clip.motion == "morph":
             shown = film.morphed(share_at(k / clip.count))
+        elif clip.motion == "keys":
+            shown = film.keyed(k / clip.count)
         else:
             shown = film.turned(clip.object, _yaw_at(k / clip.count, clip.motion))
         pixels = to_u8(composite(shown, film.puppets).pixels)
         height, width = (side - side % 2 for side in pixels.shape[:2])
         yield np.ascontiguousarray(pixels[:height, :width])
+
+
+def station_at(time: float, count: int) -> tuple[int, float]:
+    """Which of `count` key poses was left at a `time` in [0, 1), and the share of the way done.
+
+    Every way starts and ends slowly; the last one leads back to the first pose.
+    """
+    station, way = divmod(time * count, 1.0)
+    return int(station) % count, float(0.5 - 0.5 * np.cos(np.pi * way))
 
 
 def share_at(time: float) -> float:
@@ -91,8 +109,9 @@ def _yaw_at(time: float, motion: str) -> float:
 class _Film:
     """A document at other moments."""
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, keys: tuple[Document, ...] = ()) -> None:
         self._document = document
+        self._stations = (document, *keys)
         camera = document.photo.camera
         self.puppets: dict[int, Puppet] = {
             k: puppet_of(item, camera)
@@ -106,8 +125,21 @@ class _Film:
         if share >= 1:
             return self._document
         objects = tuple(
-            self._on_the_way(k, item, share) if item.is_moved and item.is_visible else item
+            self._between(k, _at_rest(item), item, share)
+            if item.is_moved and item.is_visible
+            else item
             for k, item in enumerate(self._document.objects)
+        )
+        return replace(self._document, objects=objects)
+
+    def keyed(self, time: float) -> Document:
+        """The document at a `time` in [0, 1) of the way through its key poses and back."""
+        station, share = station_at(time, len(self._stations))
+        start = self._stations[station].objects
+        end = self._stations[(station + 1) % len(self._stations)].objects
+        objects = tuple(
+            self._between(k, *pair, share) if k in self.puppets else pair[0]
+            for k, pair in enumerate(zip(start, end, strict=True))
         )
         return replace(self._document, objects=objects)
 
@@ -118,44 +150,79 @@ class _Film:
         placement = replace(item.placement, turn=(old[0] + yaw, old[1], old[2]))
         return self._document.with_object(k, replace(item, placement=placement, is_visible=True))
 
-    def _on_the_way(self, k: int, item: EditObject, share: float) -> EditObject:
-        placement = _partly(item.placement, share)
-        if item.pose is None or share <= 0:
-            return replace(item, pose=None, placement=placement)
-        pose = self._solved(k, item, share) or _mixed(self.puppets[k], item.pose, share)
-        return replace(item, pose=pose, placement=placement)
+    def _between(self, k: int, start: EditObject, end: EditObject, share: float) -> EditObject:
+        """Object `k` when a `share` of the way from one of its states to another is done."""
+        placement = _blended(start.placement, end.placement, share)
+        if share <= 0 or (start.pose is None and end.pose is None):
+            return replace(end, pose=start.pose, placement=placement)
+        if share >= 1:
+            return end
+        pose = self._solved(k, start, end, share)
+        pose = pose or _mixed(self.puppets[k], start.pose, end.pose, share)
+        return replace(end, pose=pose, placement=placement)
 
-    def _solved(self, k: int, item: EditObject, share: float) -> Pose | None:
-        """The pose that the handles give; None where it is not they alone that made it."""
-        shifts = item.rig.shifts
-        if item.base.pose is not None or (not item.handles and shifts is None):
+    def _solved(self, k: int, start: EditObject, end: EditObject, share: float) -> Pose | None:
+        """The pose that the handles give; None where it is not they alone that make both."""
+        shifts = _summed(start.rig.shifts, end.rig.shifts, share)
+        has_base = start.base.pose is not None or end.base.pose is not None
+        if (
+            has_base
+            or not _alike(start.handles, end.handles)
+            or (not end.handles and shifts is None)
+        ):
             return None
         deformer = self.puppets[k].deformer
         if shifts is not None:
-            deformer = deformer.with_rig(replace(item.rig, shifts=share * shifts))
-        handles = tuple(_handle(handle, share) for handle in item.handles)
-        solved = deformer.solve(handles, item.footing, self._last.get(k), tolerance=TOLERANCE)
+            deformer = deformer.with_rig(replace(end.rig, shifts=shifts))
+        handles = tuple(
+            replace(b, target=a.target + share * (b.target - a.target),
+                    turn=_summed(a.turn, b.turn, share))
+            for a, b in zip(start.handles, end.handles, strict=True)
+        )  # fmt: skip
+        solved = deformer.solve(handles, end.footing, self._last.get(k), tolerance=TOLERANCE)
         self._last[k] = solved.pose
         return solved.pose
 
 
-def _handle(handle: Handle, share: float) -> Handle:
-    target = handle.point + share * (handle.target - handle.point)
-    turn = None if handle.turn is None else share * handle.turn
-    return replace(handle, target=target, turn=turn)
+def _at_rest(item: EditObject) -> EditObject:
+    """The object as it is in the photo, its handles where they take hold."""
+    handles = tuple(replace(handle, target=handle.point, turn=None) for handle in item.handles)
+    rig = replace(item.rig, shifts=None)
+    return replace(item, handles=handles, rig=rig, pose=None, placement=Placement())
 
 
-def _partly(placement: Placement, share: float) -> Placement:
-    x, y = placement.move
-    yaw, pitch, roll = placement.turn
-    return Placement(
-        (share * x, share * y), share * placement.depth,
-        (share * yaw, share * pitch, share * roll), placement.scale**share,
-    )  # fmt: skip
+def _alike(start: Sequence[Handle], end: Sequence[Handle]) -> bool:
+    """Whether both take hold of the same points in the same way."""
+    return len(start) == len(end) and all(
+        a.is_pin == b.is_pin and np.allclose(a.point, b.point)
+        for a, b in zip(start, end, strict=True)
+    )
 
 
-def _mixed(puppet: Puppet, pose: Pose, share: float) -> Pose:
-    """Between rest and a pose that no handle holds."""
+def _summed(start: Any, end: Any, share: float) -> Any:
+    """(1 - share) start + share end, where None is zero; None where both are."""
+    if start is None:
+        return None if end is None else share * end
+    return (1 - share) * start if end is None else start + share * (end - start)
+
+
+def _blended(start: Placement, end: Placement, share: float) -> Placement:
+    def mean(a: float, b: float) -> float:
+        return a + share * (b - a)
+
+    (x0, y0), (x1, y1) = start.move, end.move
+    yaw, pitch, roll = map(mean, start.turn, end.turn)
+    scale = start.scale ** (1 - share) * end.scale**share
+    return Placement((mean(x0, x1), mean(y0, y1)), mean(start.depth, end.depth),
+                     (yaw, pitch, roll), scale)  # fmt: skip
+
+
+def _mixed(puppet: Puppet, start: Pose | None, end: Pose | None, share: float) -> Pose:
+    """Between two poses that no handles hold, or not the same ones; None is rest."""
     rest = puppet.deformer.rest()
-    turns = [matrix_from_vector(share * vector_from_matrix(r)) for r in pose.rotations]
-    return Pose(rest.points + share * (pose.points - rest.points), np.array(turns))
+    start, end = start or rest, end or rest
+    turns = [
+        a @ matrix_from_vector(share * vector_from_matrix(a.T @ b))
+        for a, b in zip(start.rotations, end.rotations, strict=True)
+    ]
+    return Pose(start.points + share * (end.points - start.points), np.array(turns))

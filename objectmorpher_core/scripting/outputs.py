@@ -82,7 +82,8 @@ class Export:
             write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
             return write(pile, merged)
         if what == "video":
-            film = frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
+            keys = self.edited.keys if self.edited else ()
+            film = frames(self.document, self.clip, part(self.progress, 0.02, 0.95), keys)
             return encode_video(film, self.clip.rate, path.suffix)
         if what in ("splats", "mesh"):
             return self._solid(what, path)

@@ -189,6 +189,19 @@ def posed(
     return document, energies
 
 
+def key_poses(document: Document, k: int, puppet: Puppet, script: EditScript) -> list[Document]:
+    """The document with object `k` in each further key pose; what one does not say is at rest."""
+    found = []
+    for number, key in enumerate(script.key, 1):
+        rest = edits.set_placement(edits.reset_pose(document, k), k, Placement())
+        try:
+            keyed, _ = posed(rest, k, puppet, key, silent, Stopwatch())
+        except ValueError as error:
+            raise ScriptError(f"key {number}: {error}") from error
+        found.append(placed(keyed, k, key))
+    return found
+
+
 def placed(document: Document, k: int, script: EditScript) -> Document:
     """Object `k` where the script wants it, or gone."""
     document = edits.set_placement(document, k, _placement(script))

@@ -83,6 +83,7 @@ class EditScript:
     stiffness: float = 1.0
     stretch_limit: float | None = None
     split: bool = False
+    key: tuple[EditScript, ...] = ()  # further key poses of a video: options of OF_A_KEY
     shadow: str = "auto"
     fov: float | None = None
     seed: int = 0
@@ -166,8 +167,8 @@ def _told(each: FurtherObject) -> dict[str, Any]:
 def said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
     """The options that differ from their defaults, and those of `said`."""
     default = asdict(EditScript())
-    told = asdict(script).items()
-    return {name: v for name, v in told if name in said or v != default[name]}
+    told = asdict(script) | {"key": tuple(said_by(key) for key in script.key)}
+    return {name: v for name, v in told.items() if name in said or v != default[name]}
 
 
 def beside(item: BatchItem, folder: Path) -> BatchItem:
@@ -320,6 +321,23 @@ def _source(key: str, value: Any) -> FillFrom:
     return FillFrom((source[0], source[1]), (to[0], to[1]), known_radius)
 
 
+def _keys(key: str, value: Any) -> tuple[EditScript, ...]:
+    if not isinstance(value, list | tuple) or len(value) > MOST_KEYS:
+        raise ScriptError(f"{key}: {shown(value)} is not a list of at most {MOST_KEYS} poses")
+    return tuple(_key(key, pose) for pose in value)
+
+
+def _key(key: str, value: Any) -> EditScript:
+    if isinstance(value, EditScript):
+        return value
+    if not isinstance(value, dict):
+        raise ScriptError(f"{key}: {shown(value)} is not a pose")
+    for name in sorted(value.keys() - OF_A_KEY):
+        known = ", ".join(sorted(OF_A_KEY))
+        raise ScriptError(f"{key}: a pose has no {shown(name)}; it may have {known}")
+    return script_from(value)
+
+
 def _text(key: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
         raise ScriptError(f"{key}: {shown(value)} is not a name")
@@ -369,7 +387,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
     "shape": _one_of(*KINDS), "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
-    "pin": _points, "handle": _handles,
+    "pin": _points, "handle": _handles, "key": _keys,
     "move": _numbers(2, 3), "turn": _numbers(1, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
@@ -379,6 +397,8 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
 }  # fmt: skip
 
 OF_A_FILE = ("photo", "out", "objects", "order")  # keys of a script that are no options
-OF_THE_PHOTO = {"fov", "inpaint", "refine_strength", "front", "front_mask", "seed"}
+OF_THE_PHOTO = {"fov", "inpaint", "refine_strength", "front", "front_mask", "seed", "key"}
 CHOOSING = {"click", "not_click", "box", "subject", "mask", "segment"}
+OF_A_KEY = {"pin", "handle", "move", "turn", "scale"}
+MOST_KEYS = 11  # beside the pose of the edit itself
 OF_A_COPY = {"pin", "handle", "move", "turn", "scale", "shadow", "refine"}

@@ -85,6 +85,19 @@ def test_a_turn_of_one_number_is_a_yaw(folder):
     assert Path("out.png").read_bytes() == alone
 
 
+def test_key_poses_of_the_command_line_are_those_of_a_script(folder):
+    said = ["--key", "turn=-20 scale=0.9", "--key", "handle=78,45:90,45 pin=78,80", "--key", ""]
+    video = ["--video", "keys", "--seconds", "0.4", "--save-video"]
+    assert _edit("--turn", "20", *said, *video, "said.webp") == 0
+    poses = [{"turn": [-20], "scale": 0.9}, {"handle": [{"at": [78, 45], "to": [90, 45]}],
+             "pin": [[78, 80]]}, {}]  # fmt: skip
+    Path("keys.json").write_text(json.dumps({"turn": [20], "key": poses}))
+    assert _edit("--script", "keys.json", *video, "read.webp") == 0
+    assert Path("said.webp").read_bytes() == Path("read.webp").read_bytes()
+    with Image.open("said.webp") as film:
+        assert film.n_frames == 10
+
+
 def test_nothing_to_do_gives_the_photo_back(folder):
     assert _edit() == 0
     assert np.array_equal(_pixels("out.png"), PIXELS)
@@ -446,8 +459,10 @@ def test_a_failure_is_one_sentence_and_leaves_no_file(folder, capsys, case):
 SCRIPTS = {
     "not JSON": ("{", "not JSON"),
     "not an object": ("3", "not a JSON object"),
+    "a key pose with another option": ('{"key": [{"refine": "none"}]}', "a pose has no 'refine'"),
+    "a key pose beside the object": ('{"key": [{"pin": [[1, 1]]}]}', "key 1: pin 1,1 misses"),
     "unknown key": ('{"magic": 1}', "no option 'magic'"),
-    "wrong value": ('{"turn": [1, 2]}', "turn"),
+    "wrong value": ('{"turn": [1, 2, 3, 4]}', "turn"),
     "empty batch": ("[]", "empty"),
     "batch without photos": ('[{"turn": [1, 2, 3]}, {"turn": [1, 2, 3]}]', "batch"),
     "batch of one name": (

@@ -16,7 +16,9 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.shrink import shrunk
 from objectmorpher_core.pictures.video import ENDINGS, VideoError, encode_video
-from objectmorpher_core.scripting.animation import Clip, frames, share_at
+from objectmorpher_core.pipeline import run_script
+from objectmorpher_core.scripting.animation import Clip, frames, share_at, station_at
+from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
 
@@ -140,3 +142,58 @@ def test_a_pose_without_handles_comes_about_too():
     found = list(frames(document.with_object(0, bare), Clip(seconds=0.5, rate=12)))
     assert np.array_equal(found[0], document.photo.pixels)
     assert difference(found[2], found[0]) > 0
+
+
+@cache
+def keyed() -> list[np.ndarray]:
+    """A film through four poses: at rest, dragged, dragged elsewhere, and turned only."""
+    script = script_from({
+        "mask": "m.png", "gaussians": 300, "inpaint": "telea",
+        "key": [
+            {"handle": [{"at": [78, 45], "to": [90, 45]}], "pin": [[78, 80]]},
+            {"handle": [{"at": [78, 45], "to": [66, 45]}], "pin": [[78, 80]]},
+            {"turn": [25], "scale": 0.8},
+        ],
+    })  # fmt: skip
+    mask = shapes.mask("ellipse")
+    photo = shapes.png(shapes.picture(mask))
+    edited = run_script(photo, "photo.png", script, shapes.mask_png(mask))
+    assert len(edited.keys) == 3
+    clip = Clip("keys", seconds=1.6, rate=25)
+    found = list(frames(edited.document, clip, keys=edited.keys))
+    for number, key in enumerate((edited.document, *edited.keys)):
+        assert np.array_equal(found[number * 10], composite(key).pixels), "each pose is met exactly"
+    return found
+
+
+def test_a_film_goes_through_its_key_poses_and_back_without_a_jump():
+    found = keyed()
+    assert len(found) == 40
+    gaps = [difference(a, b) for a, b in zip(found, [*found[1:], found[0]], strict=True)]
+    for station in range(4):  # it starts and stops slowly
+        way = gaps[station * 10 : station * 10 + 10]
+        assert max(way[0], way[9]) < 0.7 * max(way[3:7])
+        assert max(way) < 0.6 * difference(found[station * 10], found[station * 10 + 10 - 40])
+    assert np.array_equal(found[0], shapes.picture(shapes.mask("ellipse")))
+
+
+def test_between_two_drags_of_one_handle_the_object_passes_its_rest():
+    """The handle's way is straight, from one side to the other: half-way it is where it was."""
+    found = keyed()
+    half = difference(found[15], found[0])
+    assert half < 0.35 * min(difference(found[10], found[0]), difference(found[20], found[0]))
+
+
+def test_the_way_between_key_poses_is_eased():
+    assert station_at(0.0, 4) == (0, 0.0)
+    assert station_at(0.25, 4) == (1, 0.0)
+    station, share = station_at(0.375, 4)
+    assert station == 1 and share == pytest.approx(0.5)
+    shares = [station_at(k / 200, 2)[1] for k in range(100)]
+    steps = np.diff(shares)
+    assert (steps > 0).all() and steps[0] < 0.1 * steps.max()
+
+
+def test_a_film_without_key_poses_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="no key poses"):
+        list(frames(edited(), Clip("keys")))

@@ -16,6 +16,7 @@ from objectmorpher_core.scripting.script import (
 )
 
 FULL = {
+    "key": [{"turn": [5.0, 0.0, 0.0], "pin": [[1.0, 2.0]]}, {}],
     "click": [[1, 2], [3.5, 4]], "not-click": [[5, 6]], "box": [1, 2, 30, 40], "subject": True,
     "mask": "m.png", "segment": "grabcut", "lift": "relief", "inpaint": "telea", "refine": "none",
     "splats": "s.ply", "gaussians": 500, "pin": [[7, 8]],

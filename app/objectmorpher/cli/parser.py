@@ -221,6 +221,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--turn", type=_list(1, 3), metavar="YAW[,PITCH,ROLL]",
         help="degrees; a positive yaw turns its front to the left")  # fmt: skip
     add("--scale", type=float, metavar="S", help="scale factor")
+    add("--key", action="append", type=_key, metavar="POSE",
+        help="a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'")  # fmt: skip
     add("--shadow", metavar="auto|none",
         help="auto (default): its shadow goes along, its reflection is erased")  # fmt: skip
     add(
@@ -248,7 +250,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         help="layers, for paint programs: .ora or .psd")  # fmt: skip
     add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
     add("--video", metavar="KIND", default="morph",
-        help="morph (photo to edit and back, the default), sway or turn")  # fmt: skip
+        help="morph (photo to edit and back, the default), sway, turn or keys")  # fmt: skip
     add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
@@ -408,6 +410,25 @@ def _handle(text: str) -> dict[str, Any]:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y:X2,Y2 or X,Y:X2,Y2,DZ")
     target = _list(2, 3)(to)
     return {"at": _list(2, 2)(at), "to": target[:2], "dz": target[2] if target[2:] else 0.0}
+
+
+def _key(text: str) -> dict[str, Any]:
+    """A key pose: words such as turn=20 and pin=3,4, in any order; none is the pose at rest."""
+    parsers = {"turn": _list(1, 3), "move": _list(2, 3), "scale": _list(1, 1),
+               "handle": _handle, "pin": _list(2, 2)}  # fmt: skip
+    pose: dict[str, Any] = {}
+    for word in text.split():
+        name, _, value = word.partition("=")
+        if name not in parsers:
+            raise argparse.ArgumentTypeError(
+                f"{word!r} is not one of {', '.join(parsers)}, = and a value"
+            )
+        parsed = parsers[name](value)
+        if name in ("handle", "pin"):
+            pose.setdefault(name, []).append(parsed)
+        else:
+            pose[name] = parsed[0] if name == "scale" else parsed
+    return pose
 
 
 def _fill_from(text: str) -> dict[str, Any]:
