@@ -39,6 +39,7 @@ def run(*_):
         import objectmorpher
         Krita.instance().setBatchmode(True)
         document = Krita.instance().openDocument("photo.png")
+        document.setBatchmode(True)  # no dialog asks how to write shown.png
         node = document.topLevelNodes()[0]
         objectmorpher.send(document, node, "sent.png")
         group = objectmorpher.bring_back(document, node, "back.ora")
