@@ -39,6 +39,7 @@ def run(*_):
         import objectmorpher
         Krita.instance().setBatchmode(True)
         document = Krita.instance().openDocument("photo.png")
+        document.setBatchmode(True)  # no dialog asks how to write shown.png
         node = document.topLevelNodes()[0]
         objectmorpher.send(document, node, "sent.png")
         group = objectmorpher.bring_back(document, node, "back.ora")
@@ -120,7 +121,7 @@ def test_krita_sends_a_layer_and_shows_what_comes_back(edited: Path, tmp_path: P
     environment = {**os.environ, "HOME": str(tmp_path), "PYTHONPATH": str(folder)}
     for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
         environment.pop(name, None)
-    subprocess.run(command, cwd=edited, env=environment, timeout=180, capture_output=True)
+    subprocess.run(command, cwd=edited, env=environment, timeout=600, capture_output=True)
     said = edited / "said.txt"
     if not said.exists():
         pytest.skip("Krita has no Python here (package python3-pyqt5)")

@@ -165,8 +165,8 @@ def joined(points: np.ndarray, weights: csr_array) -> csr_array:
     for part in range(parts):
         own, others = np.flatnonzero(of == part), np.flatnonzero(of != part)
         far, which = KDTree(points[others]).query(points[own])
-        for k in np.argsort(far)[:JOINTS]:
-            a, b = own[k], others[which[k]]
+        for k in np.asarray(far).argsort()[:JOINTS]:
+            a, b = own[k], others[np.asarray(which)[k]]
             table[a, b] = table[b, a] = mean
     return csr_array(table)
 

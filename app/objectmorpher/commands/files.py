@@ -13,7 +13,7 @@ COMMANDS: dict[str, Command] = {
     "send_back": Command(
         "Send back",
         "Ctrl+Enter",
-        lambda e: e.exporting.send_back(),
+        lambda e: e.exporting.send_back(e.quit),
         lambda e: no_photo(e) or e.exporting.why_not_back,
     ),
     "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -282,15 +283,17 @@ class Exporting:
             return t("No other program waits for this edit")
         return self.why_not(_what_of(self.returns))
 
-    def send_back(self) -> None:
-        """Write the edit where the other program waits for it, and close the window."""
+    def send_back(self, then: Callable[[], None]) -> None:
+        """Write the edit where the other program waits for it; `then` closes the window."""
         editor, document, path = self._editor, self._editor.committed, self.returns
         if document is None or path is None:
             return
         editor.jobs.start(
             t("Sending back"), write_export, document, Plan(_what_of(path), path),
-            done=lambda _: editor.quit(),
-            failed=lambda error: editor.complain_of(error.retried_by(self.send_back)),
+            done=lambda _: then(),
+            failed=lambda error: editor.complain_of(
+                error.retried_by(lambda: self.send_back(then))
+            ),
             kind=f"{WRITE} {path}",
         )  # fmt: skip
 
