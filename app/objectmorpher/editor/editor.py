@@ -72,7 +72,7 @@ class Editor(EditorState):
         self.models = Models(self, self.methods, self.shaping, self.tasks)
         self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
-        self.refining, self.exporting = Refining(self, self.methods), Exporting(self)
+        self.refining, self.exporting = Refining(self, self.methods), Exporting(self, self.quit)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
         self.autosave = Autosave(self)
         self.recovery = Recovery(self, self.autosave, self.filing, self.start, self.close)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,8 +52,9 @@ class Draft:
 class Exporting:
     """The export dialog's state, and what may be done with it."""
 
-    def __init__(self, editor: EditorState) -> None:
-        self._editor = editor
+    def __init__(self, editor: EditorState, quit: Callable[[], None]) -> None:
+        """`quit` closes the program."""
+        self._editor, self._quit = editor, quit
         self.draft: Draft | None = None  # None: no dialog
         self._replacing: Path | None = None  # asked whether it may be overwritten
         self.returns: Path | None = None  # where another program, which waits, wants the edit
@@ -289,7 +291,7 @@ class Exporting:
             return
         editor.jobs.start(
             t("Sending back"), write_export, document, Plan(_what_of(path), path),
-            done=lambda _: editor.quit(),
+            done=lambda _: self._quit(),
             failed=lambda error: editor.complain_of(error.retried_by(self.send_back)),
             kind=f"{WRITE} {path}",
         )  # fmt: skip
