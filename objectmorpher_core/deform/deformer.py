@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import wraps
+from threading import RLock
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -37,6 +41,20 @@ SAME = 1e-9  # x diameter, and rad: handles that are moved as one body
 LINE = 1e-6  # x the handles' spread along it: what they spread beside a line
 USUAL = Base()  # from rest, with anchors of their own
 ANCHORED_SHARE = 0.25  # of the control points, the farthest along the surface
+
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def _alone(method: Method) -> Method:
+    """Lets one thread at a time use the solver: a drag's may be prepared in another one."""
+
+    @wraps(method)
+    def wrapped(self: Deformer, *arguments: Any, **keywords: Any) -> Any:
+        with self._lock:
+            return method(self, *arguments, **keywords)
+
+    return cast(Method, wrapped)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +100,7 @@ class Deformer:
         self._frozen = Frozen.of(self.rig)
         weights = _weighed(self.graph.weights, self.rig.stiffness)
         self._solver = ArapSolver(self.points, weights, self.rig.bodies)
+        self._lock = RLock()  # see `_alone`
         self._constrained: tuple[object, ...] = ()  # what the solver is prepared for
         self._history = Anderson(self.points.size)  # what a drag's frames have learnt of it
 
@@ -119,6 +138,7 @@ class Deformer:
         farthest = own[np.argsort(-distances[own], kind="stable")[:count]]
         return frozen(np.sort(farthest[farthest != h]), np.int32)
 
+    @_alone
     def solve(
         self,
         handles: tuple[Handle, ...],
@@ -263,6 +283,7 @@ class Deformer:
         )
         return Solution(Pose(positions, rotations), minimum.energies)
 
+    @_alone
     def iterated(self, handles: tuple[Handle, ...], iterations: int, base: Base = USUAL) -> Pose:
         """The pose after so many plain iterations from rest, settled or not: for comparisons."""
         handles = self._effective(handles)
@@ -272,6 +293,7 @@ class Deformer:
         minimum = iterate(self._solver, self.rest().rotations, iterations)
         return Pose(*self._follow(minimum.positions, minimum.rotations, self.rest()))
 
+    @_alone
     def prepare(self, handles: tuple[Handle, ...], base: Base = USUAL) -> None:
         """Does now what the first solve with these handles would do: their factorisation."""
         if handles := self._effective(handles):
@@ -319,6 +341,7 @@ class Deformer:
         """How much `pose` bends and stretches the object at each control point."""
         return measure_strain(self.points, self._solver.weights, pose)
 
+    @_alone
     def influence(self, handles: tuple[Handle, ...], h: int, base: Base, pose: Pose | None) -> F64:
         """(M,) how much each control point goes along with handle `h`: 1 = as far as it does.
 

@@ -9,12 +9,18 @@ from types import FrameType
 import numpy as np
 import pytest
 
+from conftest import wait_until
 from objectmorpher.canvas.derived import Derived
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.canvas.layers import Layers
 from objectmorpher.canvas.lights import Lights
-from objectmorpher.editor.view import Shown, View
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.intents.posing import EXPECT
+from objectmorpher.editor.view import Shown, ToolName, View
+from objectmorpher.tools.pointer import Button, Pointer
+from objectmorpher.tools.pose_tool import PoseTool
+from objectmorpher_core.deform.arap import ArapSolver
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.settings import Shadow
@@ -75,3 +81,27 @@ def test_shadows_and_pictures_are_those_of_the_objects_of_the_frame(pair: Docume
     assert all(own.layer is not None for own in objects)
     assert frame.layers == tuple(own.layer for own in objects)
     assert len(frame.shades) == sum(own.lit.shade is not None for own in objects) > 0
+
+
+def test_the_first_frame_of_a_drag_finds_the_solver_ready(editor: Editor, ball: Document) -> None:
+    """It is made ready in a thread when the point is taken hold of."""
+    editor.start(ball)
+    editor.view.tool = ToolName.POSE
+    at = editor.view.canvas_from_image(np.array([90.0, 60.0]))
+    start = Pointer(float(at[0]), float(at[1]), Button.LEFT, is_down=True)
+    editor.hand.press(PoseTool().press(editor, start), Button.LEFT)
+    wait_until(editor, lambda: not editor.chores.is_busy(EXPECT))
+    asked: list[str] = []
+
+    def note(frame: FrameType, event: str, argument: object) -> None:
+        if event == "call" and frame.f_code is ArapSolver.constrain.__code__:
+            asked.append("constrain")
+
+    sys.setprofile(note)
+    try:
+        editor.hand.move(Pointer(start.x + 30, start.y, Button.LEFT, is_down=True))
+    finally:
+        sys.setprofile(None)
+    assert editor.preview is not None and editor.preview.objects[0].pose is not None
+    assert not asked
+    editor.hand.abort(editor)

@@ -43,6 +43,7 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
     chosen = _chosen(before, handle, start.shift)
     posing.select(*chosen)
     held = Held({h: posing.spot(h) for h in chosen}, {h: posing.line(h) for h in chosen})
+    posing.expect_drag(chosen)
     pointer, is_moved, depth = start, False, 0.0
     while (pointer := (yield)).is_down:
         depth -= pointer.wheel * DEPTH_STEP

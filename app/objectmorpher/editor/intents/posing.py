@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..state import EditorState
 
 
+EXPECT = "expect a drag"  # kind of what runs in a thread
 AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
 # Of a drag's frame, for the solver: a compact object lags by less than a pixel, a slender one is
 # given longer. While the pointer holds still there is more time.
@@ -190,6 +191,22 @@ class Posing:
         if editor.document is not None:
             deformer = editor.derived.deformer(editor.document, k)
             editor.preview = hold_edits.let_go(editor.document, k, deformer, handles)
+
+    def expect_drag(self, handles: tuple[int, ...]) -> None:
+        """Prepares the solver for a drag of these handles, which may begin in a moment.
+
+        In a thread: what a change of the handles takes, the first frame of the drag need not
+        wait for. A drag that begins earlier waits for the rest of it.
+        """
+        editor, k, document = self._editor, self._editor.current, self._editor.document
+        if document is None:
+            return
+        deformer = editor.derived.deformer(document, k)
+        item = hold_edits.let_go(document, k, deformer, handles).objects[k]
+        editor.chores.start(
+            "Getting ready", lambda progress: deformer.prepare(item.handles, item.footing),
+            kind=EXPECT, done=lambda _: None, failed=editor.complain_of, is_quiet=True,
+        )  # fmt: skip
 
     def drag(self, handle: int, spot: Spot) -> None:
         """Previews the handle at another place of the picture."""
