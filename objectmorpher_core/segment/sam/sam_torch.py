@@ -23,7 +23,11 @@ from .network import Asked, Masks, normalized
 
 HALF = np.full(3, 0.5, np.float32)  # SAM 3's mean and deviation
 CLASSES = {"sam": "SamModel", "sam2": "Sam2Model", "sam3": "Sam3TrackerModel"}
-WORK = {"sam": 2_500_000_000, "sam2": 950_000_000, "sam3": 2_500_000_000}  # bytes beside the weights
+WORK = {
+    "sam": 2_500_000_000,
+    "sam2": 950_000_000,
+    "sam3": 2_500_000_000,
+}  # bytes beside them
 
 
 class SamTorch:

@@ -186,7 +186,7 @@ FIRST = {
     "sam": "sam-vit-base",
     "sam-onnx": "mobile-sam",
 }  # what a family offers before one chooses
-NO_TORCH = ("sam-onnx", "lama", "migan")  # families that run without PyTorch
+NO_TORCH = ("sam-onnx", "lama", "migan", "depth-graph")  # families that run without PyTorch
 
 
 class HubModels:
