@@ -2,9 +2,11 @@
 
 Depth Anything: one input, pictures (n, 3, h, w) float32, ImageNet-normalised, sides that 14
 divides; one output that is relative inverse depth, larger for what is nearer: (n, h, w),
-(n, 1, h, w) or (h, w). MoGe-2 (Wang et al. 2025): pictures in [0, 1] and a number of tokens; `points` (n, h, w, 3)
-whose depth lacks a constant, and `mask` (n, h, w), where there are any. The constant and the
-focal length are those that make the points fall on their pixels.
+(n, 1, h, w) or (h, w).
+
+MoGe-2 (Wang et al. 2025): pictures in [0, 1] and a number of tokens; `points` (n, h, w, 3) whose
+depth lacks a constant, and `mask` (n, h, w), where there are any. The constant and the focal length
+are those that make the points fall on their pixels.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 `python hub_download.py REQUEST`, one JSON object: {"repository", "revision", "files", "sha256",
 "target", "slack", "is_plain"}. Lines of JSON on stdout: {"plan": {"revision", "files"}}, then
-{"done": files} or {"error": kind, "detail"}. A process of its own can be ended while a network hangs, reads the
-Hub's environment variables afresh, and keeps the library out of the window's process.
+{"done": files} or {"error": kind, "detail"}. A process of its own can be ended while a network
+hangs, reads the Hub's environment variables afresh, and keeps the library out of the window's.
 
 Files that another program has fetched into the Hub's shared cache are taken from there. `is_plain`
 says that commit and hashes are known and the Hub's library is absent: then Python's own does.
