@@ -1,4 +1,4 @@
-"""Writes the table of docs/models.md between its two marks: what each network takes.
+"""Writes the table of docs/model-measurements.md between its two marks: what each network takes.
 
 `python docs/estimates/make_estimates.py` needs the extra `models`, no weights and no GPU, and a
 minute. Parameters and operations are counted on networks of the published sizes; memory is what the
@@ -38,7 +38,7 @@ from objectmorpher_core.models import depth_torch
 from objectmorpher_core.models.plans import RESIDENT, Need, Network, PipelineNeed, Way
 from objectmorpher_core.segment.sam import sam_torch
 
-PAGE = Path(__file__).parents[1] / "models.md"
+PAGE = Path(__file__).parents[1] / "model-measurements.md"
 START, END = "<!-- estimates -->\n", "<!-- end of estimates -->\n"
 GPU, CPU = 80e12, 50e9  # operations a second: a GPU of 2023 at half precision; two processor cores
 SHARE = 1 / 3  # of that which a network gets; the CPU's number is what it gets

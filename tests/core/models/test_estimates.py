@@ -1,4 +1,4 @@
-"""What docs/models.md says that each network takes is what is counted, and the registry agrees."""
+"""What docs/model-measurements.md says that each network takes is counted; the registry agrees."""
 
 from __future__ import annotations
 
