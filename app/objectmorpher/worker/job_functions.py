@@ -26,7 +26,8 @@ from objectmorpher_core.document.model import (
 )
 from objectmorpher_core.document.settings import Hint
 
-from ..canvas.layers import Rendered, Request, render
+from ..canvas.layer import ExactPicture, Rendered
+from ..canvas.layers import render
 from ..canvas.shape import rehearse_lift
 
 if TYPE_CHECKING:
@@ -241,7 +242,7 @@ def write_coverage(selection: Selection, path: Path, progress: Progress) -> None
     write_all({path: encode_coverage(as_coverage(selection))})
 
 
-def render_exact(request: Request, progress: Progress) -> Rendered:
+def render_exact(request: ExactPicture, progress: Progress) -> Rendered:
     """A layer of the view."""
     return render(request)
 

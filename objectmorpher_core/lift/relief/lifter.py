@@ -34,6 +34,7 @@ from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .rim import evened
+from .sides import with_sides
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -97,7 +98,9 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         is_carried = is_mirrored and hidden is None
-        return replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        progress(0.85, "Filling in its sides")
+        return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: Subject, settings: LiftSettings) -> Body:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -119,6 +122,7 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
+                body = replace(body, doubt=seen.doubt)
                 shape = recognised(seen, settings.kind)
                 if shape is not None and not _contradicts(shape, body, settings):
                     body = completed(body, shape, camera, settings.thickness, settings.trust)
@@ -126,7 +130,7 @@ class ReliefLifter:
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
             body = flattened(body, settings.thickness)
-        if body.kind == "free":  # a shape that was recognised has its own rim
+        if body.kind in ("box", "round"):  # drawn on cells; what is free is settled already
             body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
@@ -281,6 +285,8 @@ def _assemble(
         "relief",
         middle=middle,
         kind=body.kind,
+        stands=body.standing.is_known,
+        doubt=body.doubt,
     )  # fmt: skip
 
 

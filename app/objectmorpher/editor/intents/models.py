@@ -21,7 +21,10 @@ from ..feedback import Action
 from .methods import Workers
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .methods import Methods
+    from .shaping import Shaping
 
 
 DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
@@ -48,12 +51,15 @@ NAMES = {
 class Models:
     """What the window offers about models."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self, editor: EditorState, methods: Methods, shaping: Shaping, tasks: Tasks
+    ) -> None:
         self._editor = editor
+        self._methods, self._shaping, self._tasks = methods, shaping, tasks
         self.states: tuple[State, ...] = ()  # empty until they were looked at
         self.added: tuple[Added, ...] = ()  # what users bring, likewise
-        self.hub = HubModels(editor)  # those of several files
-        self.workers = Workers(editor)  # programs of the user's
+        self.hub = HubModels(editor, self)  # those of several files
+        self.workers = Workers(editor, methods)  # programs of the user's
         self.is_open = False  # the window shows the list
         self.offers: tuple[Offer, ...] = ()  # of sets, on this machine
         self._loading = ""
@@ -171,8 +177,8 @@ class Models:
 
         def accept(own: Added) -> None:
             self.look()
-            again = Action(t("Lift it again"), lambda: editor.shaping.say(t("Depth model")))
-            can_follow = editor.is_lifted and editor.shaping.why_fixed is None
+            again = Action(t("Lift it again"), lambda: self._shaping.say(t("Depth model")))
+            can_follow = editor.is_lifted and self._shaping.why_fixed is None
             editor.say(t("{name} is ready", name=own.name), again if can_follow else None)
 
         editor.jobs.start(
@@ -191,13 +197,13 @@ class Models:
     def _take(self, found: Looked) -> None:
         self.states, self.added, self.hub.states, self.offers = found
         self.workers.look()
-        self._editor.methods.forget()
+        self._methods.forget()
 
     def use_anew(self) -> None:
         """The worker chooses its segmenter again, and reads the photo with it."""
         self._editor.jobs.start(
             "Changing the model", job_functions.forget_segmenter,
-            done=lambda _: self._editor.tasks.read_photo(), failed=lambda error: None,
+            done=lambda _: self._tasks.read_photo(), failed=lambda error: None,
             kind=FORGET, is_quiet=True,
         )  # fmt: skip
 
@@ -238,8 +244,9 @@ NO_TORCH = ("sam-onnx", "lama", "migan", "depth-graph")  # families that run wit
 class HubModels:
     """What the window offers about them, family by family."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, own: Models) -> None:
         self._editor = editor
+        self._models = own
         self.states: tuple[HubState, ...] = ()  # empty until they were looked at
         self.wanted = ""  # id of the model that a folder is being chosen for
         self._chosen: dict[str, str] = {}  # family -> id
@@ -289,7 +296,7 @@ class HubModels:
         """Gets one; the user has clicked the button, and accepted what licence needs that."""
         model = models.hub_model(id)
         accepted = model.licence if self.accepts(model) else ""
-        self._editor.models.run(id, id, lambda progress: models.get(id, progress, accepted))
+        self._models.run(id, id, lambda progress: models.get(id, progress, accepted))
 
     def use_folder(self, given: Path) -> None:
         """The folder that a chosen file is in is the model from now on."""
@@ -306,8 +313,8 @@ class HubModels:
         except models.ModelError as error:
             self._editor.complain(str(error))
         else:
-            self._editor.models.use_anew()
-        self._editor.models.look()
+            self._models.use_anew()
+        self._models.look()
 
 
 def has_torch() -> bool:
