@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -108,8 +110,9 @@ def test_a_set_that_was_stopped_goes_on(served):
 def test_files_that_another_program_has_fetched_are_used(served, monkeypatch):
     library = pytest.importorskip("huggingface_hub")
     repository = models.hub_model("sam2.1-tiny").repository
+    shared = Path(os.environ["HF_HOME"]) / "hub"
     for name in TINY_SAM2:
-        library.hf_hub_download(repository, name, endpoint=served.url)
+        library.hf_hub_download(repository, name, endpoint=served.url, cache_dir=shared)
     served.ranges.clear()
     assert (models.get("sam2.1-tiny") / "config.json").read_bytes() == TINY_SAM2["config.json"]
     assert not served.ranges and models.verify_hub("sam2.1-tiny").state == "ok"
