@@ -1,4 +1,4 @@
-"""Writes the table of docs/models.md between its two marks: what each network takes.
+"""Writes the table of docs/model-measurements.md between its two marks: what each network takes.
 
 `python docs/estimates/make_estimates.py` needs the extra `models`, no weights and no GPU, and a
 minute. Parameters and operations are counted on networks of the published sizes; memory is what the
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -32,13 +32,13 @@ from objectmorpher_core import models
 from objectmorpher_core.compose.plate import inpaint_pixelhacker
 from objectmorpher_core.compose.plate.pixelhacker import sampler
 from objectmorpher_core.compose.refine import klein, qwen
-from objectmorpher_core.compose.refine.memory import PipelineNeed, Way
+from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
 from objectmorpher_core.models import depth_torch
-from objectmorpher_core.models.device import RESIDENT, Need
+from objectmorpher_core.models.plans import RESIDENT, Need, Network, PipelineNeed, Way
 from objectmorpher_core.segment.sam import sam_torch
 
-PAGE = Path(__file__).parents[1] / "models.md"
+PAGE = Path(__file__).parents[1] / "model-measurements.md"
 START, END = "<!-- estimates -->\n", "<!-- end of estimates -->\n"
 GPU, CPU = 80e12, 50e9  # operations a second: a GPU of 2023 at half precision; two processor cores
 SHARE = 1 / 3  # of that which a network gets; the CPU's number is what it gets
@@ -145,10 +145,9 @@ def _inpainters() -> Iterator[Row]:
     work = (sampler.STEPS - 1) * step
     work += operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
     count = parameters(unet) + parameters(codec)
-    # The autoencoder counts twice: it stays in float32.
-    need = Need(count + inpaint_pixelhacker.CODEC_PARAMETERS, inpaint_pixelhacker.WORK)
-    yield Row("`pixelhacker`, a square; GPU", count, need.bytes("float16"), work)
-    yield Row("CPU", count, need.bytes("float32"), work, has_gpu=False)
+    need = inpaint_pixelhacker.need(count)
+    yield Row("`pixelhacker`, a square; float32", count, need.bytes("float32"), work)
+    yield Row("GPU, bfloat16", count, need.bytes("bfloat16"), work, has_cpu=False)
     for name in ("lama", "migan"):
         yield _of_file(name, models.hub_model(name).size)
 
@@ -162,7 +161,7 @@ def _refiners() -> Iterator[Row]:
     ))  # fmt: skip
     adapter = lora_parameters(network, LORA["qwen"])
     parts = tuple(_count(name) for name in ("qwen", "qwen-text", "qwen-vae"))
-    need = PipelineNeed(parts, qwen.QwenRefiner.work)
+    need = _need(parts, qwen.QwenRefiner)
     for steps, name in (
         (2 * qwen.STEPS, "`qwen`, a crop of 1 MP in 40 steps"),
         (4, "`qwen` with Lightning, 4 steps"),
@@ -174,23 +173,37 @@ def _refiners() -> Iterator[Row]:
         encoder_hidden_states=normal(1, 512, 7680), img_ids=normal(1, CROP, 4),
         txt_ids=normal(1, 512, 4),
     ))  # fmt: skip
-    need = PipelineNeed((_count("klein"), _count("klein-vae")), klein.KleinRefiner.work)
+    need = _need((_count("klein"), _count("klein-vae")), klein.KleinRefiner)
     yield from _pipeline("`klein`, a crop of 1 MP in 4 steps", need, klein.STEPS * step)
     text = _count("klein-text")
     yield Row("its text encoder, once, on the CPU", text, 2 * text, 0, has_gpu=False)
 
 
+def _need(parameters: tuple[int, ...], refiner: type[DiffusionRefiner]) -> PipelineNeed:
+    """What the published files of a refiner ask of memory."""
+    networks = zip(parameters, refiner.work.items(), strict=True)
+    return PipelineNeed(
+        tuple(Network(2 * count, work, name in refiner.parts) for count, (name, work) in networks)
+    )
+
+
+WAYS: dict[Way, str] = {
+    "whole": "whole", "parts": "a network at a time", "four bits": "in four bits",
+    "parts in four bits": "in four bits, a network at a time", "layers": "a layer at a time",
+    "cpu": "CPU, float32",
+}  # fmt: skip
+
+
 def _pipeline(name: str, need: PipelineNeed, work: float) -> Iterator[Row]:
-    """The tiers of a refiner. Where weights travel to the GPU, that takes the time."""
-    count = sum(need.networks)
-    yield Row(f"{name}; GPU, whole", count, need.bytes("whole"), work, has_cpu=False)
-    ways: tuple[tuple[str, Way], ...] = (
-        ("in four bits", "four bits"), ("a network at a time", "networks"),
-        ("a layer at a time", "layers"),
-    )  # fmt: skip
-    for told, way in ways:
-        yield Row(f"GPU, {told}", count, need.bytes(way), work, way == "four bits", False)
-    yield Row("CPU, float32", count, 4 * count + 2 * need.work, work, has_gpu=False)
+    """The ways of a refiner. Where weights travel to the GPU, that takes the time."""
+    count = sum(n.weights for n in need.networks) // 2
+    told = f"{name}; GPU"
+    with_quantiser = replace(need, can_shrink=True)
+    for plan in (*with_quantiser.on("cuda"), *need.on("cpu")):
+        is_cpu, has_gpu = plan.device == "cpu", plan.keeps and plan.device != "cpu"
+        row = WAYS[plan.way] if is_cpu else f"{told}, {WAYS[plan.way]}"
+        yield Row(row, count, plan.peak, work, has_gpu, is_cpu)
+        told = "GPU"
 
 
 def _of_file(name: str, size: int) -> Row:

@@ -6,8 +6,8 @@ so that its peak memory is its own: on a GPU what PyTorch took, on the CPU what 
 A flow is followed for as many steps as published on a GPU, and for one step on the CPU. There the
 processor's own seconds are told, too, about the same on a machine that has other work; those of
 the wall are left out where less than HAD of the cores could be had. The figures are kept in
-measured.json, by device, and the table of docs/models.md is written from it. A step of training
-is measured by `objectmorpher train lora --measure`.
+measured.json, by device, and the table of docs/model-measurements.md is written from it. A step of
+training is measured by `objectmorpher train lora --measure`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_research.training.composition import edit_models
 
 HERE = Path(__file__).parent
-KEPT, PAGE = HERE / "measured.json", HERE.parent / "models.md"
+KEPT, PAGE = HERE / "measured.json", HERE.parent / "model-measurements.md"
 START, END = "<!-- measured -->\n", "<!-- end of measured -->\n"
 HEAD = ("network", "how", "number", "parameters", "seconds", "of a processor", "peak memory")
 RUNS = 3  # the median of them, after one that is not counted
@@ -99,7 +99,7 @@ def main(names: list[str]) -> None:
 
 
 def write_page(kept: Mapping[str, list[dict[str, Any]]]) -> None:
-    """The tables of docs/models.md, one for each device."""
+    """The tables of docs/model-measurements.md, one for each device."""
     page = PAGE.read_text(encoding="utf-8")
     start, end = page.index(START) + len(START), page.index(END)
     PAGE.write_text(page[:start] + tables(kept) + page[end:], encoding="utf-8")

@@ -10,6 +10,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 import platformdirs
@@ -25,8 +26,23 @@ def is_frozen() -> bool:
 
 
 def extra(name: str) -> str:
-    """The command after which there is a copy with the optional packages `name`."""
-    return f"{'pipx' if is_frozen() else 'pip'} install 'objectmorpher[{name}]'"
+    """The command after which there is a copy with the optional packages `name`.
+
+    No package index has this project: a checkout is named, and of a wheel what the extra holds.
+    """
+    if name != "models" or is_frozen():
+        return f"{'pipx' if is_frozen() else 'pip'} install 'objectmorpher[{name}]'"
+    checkout = inside()
+    if (checkout / "pyproject.toml").is_file():
+        return f"pip install -e '{checkout}[{name}]'"
+    try:
+        told = requires("objectmorpher") or []
+    except PackageNotFoundError:
+        told = []
+    wanted = [
+        r.partition(";")[0].strip() for r in told if f'extra == "{name}"' in r.replace("'", '"')
+    ]
+    return " ".join(["pip install", *(f"'{each}'" for each in wanted)])
 
 
 def kernel_folder() -> Path:

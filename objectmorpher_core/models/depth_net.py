@@ -1,18 +1,25 @@
-"""A monocular depth network in one ONNX file, as exports of Depth Anything are.
+"""A monocular depth network in one ONNX file, as exports of Depth Anything and of MoGe-2 are.
 
-One input, pictures (n, 3, h, w) float32, ImageNet-normalised, sides that 14 divides; one output
-that is relative inverse depth, larger for what is nearer: (n, h, w), (n, 1, h, w) or (h, w).
+Depth Anything: one input, pictures (n, 3, h, w) float32, ImageNet-normalised, sides that 14
+divides; one output that is relative inverse depth, larger for what is nearer: (n, h, w),
+(n, 1, h, w) or (h, w).
+
+MoGe-2 (Wang et al. 2025): pictures in [0, 1] and a number of tokens; `points` (n, h, w, 3) whose
+depth lacks a constant, and `mask` (n, h, w), where there are any. The constant and the focal length
+are those that make the points fall on their pixels.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from ..base.arrays import F32, RGB
+from ..base.arrays import F32, RGB, Mask
 from .onnx_session import open_session
 from .registry import ModelError
 
@@ -20,6 +27,10 @@ SIDE = 518  # px, longer side of what the network sees: what Depth Anything was 
 PATCH = 14  # px: sides are multiples of it
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's, of RGB in [0, 1]
 DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+TOKENS = 1800  # that MoGe cuts a picture into: within what it was trained with
+SURE = 0.5  # of its mask
+LEAST_POINTS, MOST_POINTS = 16, 4096  # that tell the camera
+GOLDEN = (math.sqrt(5) - 1) / 2
 TRIAL = (70, 98)  # px, height and width of the made picture with which a file is tried
 
 
@@ -34,12 +45,14 @@ class DepthNet:
             raise ModelError(
                 f"{path.name} is not an ONNX network, all in one file, that can be opened"
             ) from error
+        names = {output.name for output in self._session.get_outputs()}
+        self._is_moge = {"points", "mask"} <= names
         self._name, self._fixed = self._checked_input(path.name)
 
     def _checked_input(self, name: str) -> tuple[str, tuple[int | None, int | None]]:
         """The input's name, and its height and width where the file says them."""
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
-        if len(inputs) != 1:
+        if len(inputs) != 1 + self._is_moge:
             raise ModelError(f"{name} has {len(inputs)} inputs, a depth network has one")
         if not outputs:
             raise ModelError(f"{name} has no output")
@@ -62,6 +75,8 @@ class DepthNet:
 
         Raises ModelError.
         """
+        if self._is_moge:
+            return self._points(rgb).inverse_depth
         width, height = self.size_for(rgb.shape[1], rgb.shape[0])
         pixels = prepared(rgb, (width, height))
         try:
@@ -76,10 +91,78 @@ class DepthNet:
             raise ModelError("the depth network's output is not finite")
         return depth
 
+    def focal(self, rgb: RGB) -> float | None:
+        """Px, in the picture (h, w, 3), that its network says; None where it says none.
+
+        Raises ModelError.
+        """
+        if not self._is_moge:
+            return None
+        seen = self._points(rgb)
+        return seen.focal * rgb.shape[1] / seen.inverse_depth.shape[1]
+
+    def _points(self, rgb: RGB) -> _Seen:
+        width, height = self.size_for(rgb.shape[1], rgb.shape[0])
+        pixels = prepared(rgb, (width, height)) * DEVIATION[:, None, None] + MEAN[:, None, None]
+        tokens = next(i for i in self._session.get_inputs() if i.name != self._name)
+        given = {self._name: pixels, tokens.name: np.array(TOKENS, np.int64)}
+        try:
+            points, mask = self._session.run(["points", "mask"], given)
+            return seen_at(np.asarray(points)[0], np.asarray(mask)[0] > SURE)
+        except Exception as error:
+            sentence = f"the depth network cannot look at {width} x {height} px"
+            raise ModelError(sentence) from error
+
     def size_for(self, width: int, height: int) -> tuple[int, int]:
         """Width and height px in which the network sees a picture of these."""
         own_width, own_height = size_in(width, height)
         return self._fixed[1] or own_width, self._fixed[0] or own_height
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What points say."""
+
+    inverse_depth: F32  # (h, w), 0 where nothing is seen
+    focal: float  # px of the picture that they are of
+
+
+def seen_at(points: F32, is_there: Mask) -> _Seen:
+    """Inverse depth and focal length of points (h, w, 3), right, down, away, of a camera's pixels.
+
+    Their depth lacks a constant, which is found with the focal length: each point, seen by a
+    camera that looks at the picture's middle, is to fall on its own pixel. Raises ValueError.
+    """
+    height, width = is_there.shape
+    rows, columns = np.nonzero(is_there & np.isfinite(points).all(2))
+    if len(rows) < LEAST_POINTS:
+        raise ValueError("hardly anything is seen")
+    every = np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(int)
+    rows, columns = rows[every], columns[every]
+    at = np.stack([columns + 0.5 - width / 2, rows + 0.5 - height / 2], 1).astype(np.float64)
+    xyz = points[rows, columns].astype(np.float64)
+    depth = xyz[:, 2]
+    least, most = -float(depth.min()), -float(depth.min()) + 20 * float(np.ptp(xyz[:, :2]))
+    spread = most - least
+
+    def off(logarithm: float) -> tuple[float, float, float]:
+        """Mean error, focal length and shift, of a distance of the nearest point."""
+        shift = least + spread * math.exp(logarithm)
+        across = xyz[:, :2] / (depth + shift)[:, None]
+        focal = float((across * at).sum() / max((across**2).sum(), 1e-12))
+        return float(np.abs(focal * across - at).mean()), focal, shift
+
+    tried = np.linspace(math.log(1e-4), 0.0, 60)
+    best = int(np.argmin([off(t)[0] for t in tried]))
+    low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
+    for _ in range(40):  # golden sections
+        a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        low, high = (low, b) if off(a)[0] < off(b)[0] else (a, high)
+    _, focal, shift = off((low + high) / 2)
+    if focal <= 0:
+        raise ValueError("the points are behind the camera")
+    away = np.where(is_there, points[..., 2] + shift, np.inf)
+    return _Seen((1 / np.maximum(away, 1e-6)).astype(np.float32), focal)
 
 
 def size_in(width: int, height: int) -> tuple[int, int]:

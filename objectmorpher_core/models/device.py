@@ -44,6 +44,14 @@ def devices() -> tuple[Device, ...]:
     return tuple(d for d in found if d == wanted) if wanted else tuple(found)
 
 
+def total_memory() -> int:
+    """Bytes of main memory; what is free where nobody can tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (ValueError, OSError, AttributeError):
+        return _free_main_memory() or 0
+
+
 def free_memory(device: Device) -> int | None:
     """Bytes that this process can have there, or None where nobody can tell.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -36,6 +37,7 @@ from .weight_folder import (
     pickled_pixelhacker,
 )
 
+log = logging.getLogger(__name__)
 EXTRA = installation.extra("models")
 PARTIAL = ".partial-"
 
@@ -113,7 +115,7 @@ def get(id: str, progress: Progress = silent, accepted: str = "") -> Path:
         raise ModelError(f"{id} is brought by you: {told}")
     check_licence(model, accepted)
     check_online(id)
-    if importlib.util.find_spec("huggingface_hub") is None:
+    if not is_plain(model) and importlib.util.find_spec("huggingface_hub") is None:
         raise ModelError(f"{id} cannot be downloaded without huggingface_hub: {EXTRA}")
     try:
         _download(model, progress)
@@ -122,6 +124,11 @@ def get(id: str, progress: Progress = silent, accepted: str = "") -> Path:
         raise ModelError(f"{id} cannot be written to {folder()}: {reason}") from error
     progress(1.0, f"{id} is ready")
     return folder() / id
+
+
+def is_plain(model: HubModel) -> bool:
+    """Whether commit and hash of each file are known, so that it can be had without the library."""
+    return bool(model.revision) and set(model.files) == set(model.sha256)
 
 
 def use_folder(id: str, at: Path) -> HubState:
@@ -251,6 +258,7 @@ def _download(model: HubModel, progress: Progress) -> None:
     request = {
         "repository": model.repository, "revision": revision, "files": list(model.files),
         "sha256": known | dict(model.sha256), "target": str(partial),
+        "is_plain": is_plain(model) and importlib.util.find_spec("huggingface_hub") is None,
         "slack": SLACK + (model.size if has_pickles(model) else 0),  # each is written once more
     }  # fmt: skip
     answer, revision = _run(model, request, progress)
@@ -314,6 +322,8 @@ def _run(
         told = _lines(said)
     finally:
         said.unlink(missing_ok=True)
+    for pattern in told.get("absent", ()):
+        log.warning("%s has no file %s", model.repository, shown(pattern))
     if "done" not in told:
         raise ModelError(_sentence(model, told.get("error", "other"), told.get("detail", "")))
     return told["done"], told["plan"]["revision"]

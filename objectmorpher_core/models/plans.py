@@ -129,6 +129,7 @@ class PipelineNeed:
     networks: tuple[Network, ...]
     is_shrunk: bool = False  # whether its files are quantised already
     is_slow_on_cpu: bool = True
+    can_shrink: bool | None = None  # whether four bits can be made; None: as this machine can
 
     def on(self, where: Device) -> tuple[Plan, ...]:
         """See `Needs`."""
@@ -156,7 +157,8 @@ class PipelineNeed:
         yield Plan("cuda", "bfloat16", "parts", most, host=weights)
         if self.is_shrunk:
             return
-        if has_quantiser() and any(n.can_shrink for n in self.networks):
+        can_shrink = has_quantiser() if self.can_shrink is None else self.can_shrink
+        if can_shrink and any(n.can_shrink for n in self.networks):
             yield from self._shrunk(work)
         # Pinned: none of it can be swapped out.
         yield Plan("cuda", "bfloat16", "layers", LAYERS + work, host=weights)

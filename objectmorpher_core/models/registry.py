@@ -82,6 +82,16 @@ class HubModel:
         return self.licence_kind == "permissive"
 
 
+@dataclass(frozen=True)
+class ModelSet:
+    """Models that are got together."""
+
+    id: str
+    models: tuple[str, ...]  # ids, those first on which others depend
+    purpose: str
+    instead: Mapping[str, str] = field(default_factory=dict)  # id -> id where it does not fit
+
+
 @cache
 def _registry() -> dict[str, Any]:
     text = files("objectmorpher_core.models").joinpath("registry.toml").read_text(encoding="utf-8")
@@ -113,6 +123,14 @@ def hub_models() -> tuple[HubModel, ...]:
     return tuple(
         HubModel(**{**entry, "files": tuple(entry.get("files", ()))})
         for entry in _registry()["model"]
+    )
+
+
+@cache
+def model_sets() -> tuple[ModelSet, ...]:
+    """All known sets, the smallest first."""
+    return tuple(
+        ModelSet(**{**entry, "models": tuple(entry["models"])}) for entry in _registry()["set"]
     )
 
 

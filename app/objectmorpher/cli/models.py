@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from objectmorpher_core import lift, models
+from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import Added, HubModel, HubState, State, TrunkState
 
@@ -71,6 +71,9 @@ def _remove(id: str) -> None:
 def _get(options: argparse.Namespace) -> None:
     """One; or all single files that editing uses. What else there is is got one by one."""
     id = options.id
+    if id in {known.id for known in models.model_sets()}:
+        _get_set(id, options)
+        return
     if id in _trunks():
         trunk = models.trunk(id)
         raise UsageError(
@@ -97,11 +100,30 @@ def _get(options: argparse.Namespace) -> None:
         _write(f"{weight.id}: {at}")
 
 
+def _get_set(id: str, options: argparse.Namespace) -> None:
+    """All of a set: first what each would do here, then one question."""
+    found = next(o for o in model_sets.offers() if o.set.id == id)
+    for step in found.steps:
+        how = step.plan.told if step.plan else step.why_not or "beside the others"
+        _write(f"{step.model.id:<{WIDE}}{_size(step.model.size):>10}  {step.model.licence}, {how}")
+    told = f"{id}: {_size(found.missing)} to download, licences {', '.join(found.licences)}"
+    if found.missing:
+        _consent(told, id, options.is_agreed)
+    with progress_bar(f"Getting {id}") as progress:
+        model_sets.get_set(found, progress, options.accept_licence or "")
+    _write(f"{id}: {models.folder()}")
+
+
 def _ask(model: HubModel, is_agreed: bool) -> None:
     """The user's consent to a download. Raises UsageError without it."""
     told = f"{model.id}: {_size(model.size)} from {model.home}, licence {model.licence}"
     if models.has_pickles(model):
         told += "; it comes as pickles, of which nothing but the numbers is read"
+    _consent(told, model.id, is_agreed)
+
+
+def _consent(told: str, id: str, is_agreed: bool) -> None:
+    """The user's word on what is told. Raises UsageError without it."""
     if is_agreed:
         sys.stderr.write(f"{told}\n")
         return
@@ -110,7 +132,7 @@ def _ask(model: HubModel, is_agreed: bool) -> None:
     sys.stderr.write(f"{told}. Download it? [y/N] ")
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise UsageError(f"{model.id} was not downloaded")
+        raise UsageError(f"{id} was not downloaded")
 
 
 def _look(action: str, id: str | None) -> None:

@@ -21,6 +21,7 @@ from .depth_prior import Seen
 
 Look = Callable[[Pixels, Mask], Seen | None]
 """Of a photo (H, W, 3), where a mask (H, W) of it is."""
+GRAPHS = "depth-graph"  # family of the networks that need no PyTorch
 DEPTH_ANYTHING = "depth-anything-v2-small"
 PACKAGES = ("torch", "transformers", "safetensors")
 MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
@@ -53,10 +54,14 @@ class There:
 
 
 def installed() -> There | None:
-    """The network that is looked with: the user's file, else Depth Anything by PyTorch."""
+    """The network that is looked with: the user's file, else one of ours, by PyTorch the last."""
     own = models.added("depth")
     if own.state == "ok":
         return There(own.sha256, own.path, True)
+    for model in models.installed(GRAPHS)[:1]:
+        (file,) = (f for f in models.files(model.id) if f.suffix == ".onnx")
+        facts = file.stat()
+        return There(f"{file}:{facts.st_size}:{facts.st_mtime_ns}", file, True)
     at = models.place(DEPTH_ANYTHING)
     if at is None or any(find_spec(name) is None for name in PACKAGES):
         return None

@@ -27,7 +27,7 @@ WORK = {
     "sam": 2_500_000_000,
     "sam2": 950_000_000,
     "sam3": 2_500_000_000,
-}  # bytes beside the weights
+}  # bytes beside them
 
 
 class SamTorch:

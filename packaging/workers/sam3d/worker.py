@@ -1,5 +1,8 @@
 """SAM 3D Objects: Gaussians with their pose. Set SAM3D_ROOT to a clone of the repository.
 
+Only Gaussians are decoded, and the pose is not optimised afterwards: meshes and layouts are where
+a GPU of 24 GB runs out, and the editor improves the pose itself.
+
 Its pose takes row vectors to PyTorch3D's camera (x left, y up, z away): X = s p R(q) + t.
 """
 
@@ -19,7 +22,7 @@ LEFT_UP = np.diag([-1.0, -1.0, 1.0])  # PyTorch3D's camera to x right, y down
 
 
 def work(job: Job) -> None:
-    """Runs the published `Inference` on the photo and the mask."""
+    """Runs the pipeline of the published `Inference` on the photo and the mask."""
     root = Path(os.environ.get("SAM3D_ROOT", "."))
     sys.path.insert(0, str(root / "notebook"))
     from inference import Inference
@@ -28,7 +31,13 @@ def work(job: Job) -> None:
     config = os.environ.get("SAM3D_CONFIG", str(root / "checkpoints" / "hf" / "pipeline.yaml"))
     inference = Inference(config, compile=False)
     say(0.3, "Making the object")
-    out = inference(job.rgba[..., :3].copy(), job.mask, seed=job.seed)
+    cut = np.dstack([job.rgba[..., :3], np.where(job.mask, 255, 0).astype(np.uint8)])
+    # `Inference` itself decodes meshes, too, and has no argument for it.
+    out = inference._pipeline.run(
+        cut, None, job.seed, stage1_only=False, with_mesh_postprocess=False,
+        with_texture_baking=False, with_layout_postprocess=False, use_vertex_color=True,
+        stage1_inference_steps=None, pointmap=None, decode_formats=["gaussian"],
+    )  # fmt: skip
     say(0.95, "Writing it")
     # In its own axes, z up: the pose is told of those.
     out["gs"].save_ply(str(job.folder / "object.ply"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,9 @@ import pytest
 from conftest import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents import models as hub_models
-from objectmorpher.gui.dialogs.models_dialog import GAINS, NAMES, SIZES, STAGES
+from objectmorpher.gui.dialogs.models_dialog import GAINS, NAMES, SETS, SIZES, STAGES
 from objectmorpher_core import models
+from objectmorpher_core.base.progress import Progress
 from tests.core.models.local_hub import TINY_SAM2, TOKEN, Hub, offering, own_cache
 
 FREE, GATED = models.hub_model("sam2.1-tiny"), models.hub_model("sam3")
@@ -105,3 +107,20 @@ def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     hub.remove(FREE.id)
     settle(choosing)
     assert json.loads((folder / "config.json").read_bytes()) == {"model_type": "sam2"}
+
+
+def test_a_set_is_told_for_this_machine_and_downloads_queue(choosing: Editor, server: Hub) -> None:
+    offers = {offer.set.id: offer for offer in choosing.models.offers}
+    assert set(offers) == set(SETS) and offers["clicks"].missing > 0
+    began: list[str] = []
+
+    def fetch(name: str, progress: Progress) -> Path:
+        began.append(name)
+        return Path(name)
+
+    for name in ("one", "two", "three"):
+        choosing.models.run(name, name, partial(fetch, name))
+    assert choosing.models.downloading == "one" and choosing.models.is_waiting("two")
+    choosing.models.forget_waiting("two")
+    settle(choosing)
+    assert began == ["one", "three"] and choosing.models.downloading is None

@@ -1,4 +1,4 @@
-"""Faults of downloads that other tests leave out; the tests that docs/models.md names are there."""
+"""Faults of downloads that other tests leave out; the tests that the docs name are there."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
 
 
 def test_every_fault_of_the_page_names_tests_that_are_there() -> None:
-    page = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "model-measurements.md").read_text(encoding="utf-8")
     lines = page[page.index(TABLE) :].splitlines()
     rows = [line.split(" | ") for line in lines if line.startswith("| ")][1:]
     assert len(rows) > 20 and all(len(row) == 3 for row in rows)

@@ -433,7 +433,7 @@ def test_without_pytorch_one_sentence_says_how_to_get_it(own_cache, monkeypatch,
     models.use_folder("sam2", tiny_sams.write("sam2", own_cache / "sam2"))
     monkeypatch.setitem(sys.modules, name, None)  # as where it is not installed
     reason = segment.load("sam2").missing()
-    assert reason == "SAM 2 is not here: `pip install 'objectmorpher[models]'`"
+    assert reason == f"SAM 2 is not here: `{models.EXTRA}`"
     assert segment.load("auto").name == "grabcut"
 
 

@@ -8,9 +8,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from objectmorpher_core import models
+from objectmorpher_core import model_sets, models
 from objectmorpher_core.base.installation import is_frozen
 from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.model_sets import Offer
 from objectmorpher_core.models import Added, HubModel, HubState, State, Weight, shipped
 
 from ...system.texts import t
@@ -60,7 +61,9 @@ class Models:
         self.hub = HubModels(editor, self)  # those of several files
         self.workers = Workers(editor, methods)  # programs of the user's
         self.is_open = False  # the window shows the list
+        self.offers: tuple[Offer, ...] = ()  # of sets, on this machine
         self._loading = ""
+        self._waiting: dict[str, Callable[[], None]] = {}  # id -> how it is begun
 
     def look(self) -> None:
         """Reads anew what is there; a damaged file counts as none."""
@@ -91,8 +94,11 @@ class Models:
         self.run(id, names_of(id).name, lambda progress: models.fetch(id, progress))
 
     def run(self, id: str, name: str, fetch: Callable[[Progress], Path]) -> None:
-        """Downloads model `id`, called `name`; the worker uses it once it is there."""
+        """Downloads model `id`, called `name`, once the one before is there; the worker uses it."""
         editor = self._editor
+        if self.downloading is not None:
+            self._waiting[id] = lambda: self.run(id, name, fetch)
+            return
         self._loading = id
         editor.message = None
 
@@ -100,16 +106,48 @@ class Models:
             self.look()
             self.use_anew()
             editor.say(t("{name} is ready", name=name))
+            self._next()
 
         def complain(error: JobError) -> None:
             # Whatever it was: networks come back, disks are cleared, indexes are mended.
             again = Action(t("Retry"), lambda: self.run(id, name, fetch))
             editor.complain(error.sentence, action=again)
+            self._next()
+
+        def stop() -> None:
+            self.look()
+            self._next()
 
         editor.chores.start(
             t("Downloading {name}", name=name), fetch, kind=DOWNLOAD,
-            done=accept, failed=complain, cancelled=self.look,
+            done=accept, failed=complain, cancelled=stop,
         )  # fmt: skip
+
+    def _next(self) -> None:
+        """What waits longest is begun."""
+        if self._waiting and self.downloading is None:
+            self._waiting.pop(next(iter(self._waiting)))()
+
+    def is_waiting(self, id: str) -> bool:
+        """Whether it is begun when others are there."""
+        return id in self._waiting
+
+    def forget_waiting(self, id: str) -> None:
+        """It is not begun after all."""
+        self._waiting.pop(id, None)
+
+    def download_set(self, offer: Offer) -> None:
+        """Gets all that is missing of a set; the user has clicked the button that says so."""
+
+        def fetch(progress: Progress) -> Path:
+            model_sets.get_set(offer, progress)
+            return models.folder()
+
+        self.run(offer.set.id, offer.set.id, fetch)
+
+    def why_not_set(self, offer: Offer) -> str | None:
+        """Why it cannot be downloaded."""
+        return next((why for s in offer.steps if (why := self.hub.why_not(s.model))), None)
 
     def cancel(self) -> None:
         """Stops the download; nothing of it stays."""
@@ -157,7 +195,7 @@ class Models:
         self.look()
 
     def _take(self, found: Looked) -> None:
-        self.states, self.added, self.hub.states = found
+        self.states, self.added, self.hub.states, self.offers = found
         self.workers.look()
         self._methods.forget()
 
@@ -170,13 +208,21 @@ class Models:
         )  # fmt: skip
 
 
-Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...]]
+Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...], tuple[Offer, ...]]
 
 
 def _looked() -> Looked:
     several = tuple(models.look_hub(model.id) for model in models.hub_models())
     single = tuple(state for state in models.verify() if state.weight.category == "edit")
-    return single, tuple(models.added(kind.id) for kind in models.KINDS), several
+    return single, tuple(models.added(kind.id) for kind in models.KINDS), several, _offers()
+
+
+def _offers() -> tuple[Offer, ...]:
+    """None where the environment asks for a device that is not there."""
+    try:
+        return model_sets.offers()
+    except models.ModelError:
+        return ()
 
 
 def names_of(id: str) -> Names:
@@ -192,7 +238,7 @@ FIRST = {
     "sam": "sam-vit-base",
     "sam-onnx": "mobile-sam",
 }  # what a family offers before one chooses
-NO_TORCH = ("sam-onnx", "lama", "migan")  # families that run without PyTorch
+NO_TORCH = ("sam-onnx", "lama", "migan", "depth-graph")  # families that run without PyTorch
 
 
 class HubModels:
@@ -244,7 +290,7 @@ class HubModels:
             return t("Needs PyTorch: {command}", command=models.EXTRA)
         if not self.accepts(model):
             return t("Accept its licence first")
-        return t("Another model is on its way") if self._models.downloading else None
+        return None
 
     def download(self, id: str) -> None:
         """Gets one; the user has clicked the button, and accepted what licence needs that."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from objectmorpher_core.model_sets import Offer
 from objectmorpher_core.models import Added, HubState, State
 
 from ...editor.editor import Editor
@@ -57,6 +58,8 @@ def _draw_rows(editor: Editor) -> None:
     across = imgui.get_content_region_avail().x + theme.pt(PADDING)  # the scroll bar is in there
     imgui.set_next_window_size_constraints(ImVec2(across, 0), ImVec2(across, max(room, 1)))
     imgui.begin_child("##rows", ImVec2(across, 0), imgui.ChildFlags_.auto_resize_y)
+    for offer in editor.models.offers:
+        _draw_set(editor, offer)
     for state in editor.models.states:
         _draw_model(editor, state)
     for own in editor.models.added:
@@ -66,6 +69,81 @@ def _draw_rows(editor: Editor) -> None:
     if not editor.models.states:
         note(t("Looking at what is there…"))
     imgui.end_child()
+
+
+SETS = {
+    "clicks": ("Clicks", "A click selects nearly anything"),
+    "light": ("Light", "Selecting, lifting, background and refining, for a GPU of 8 GB or more"),
+    "paper": ("Paper", "What the paper uses, as far as the GPU holds it"),
+}
+
+
+def _draw_set(editor: Editor, offer: Offer) -> None:
+    """A set of models: whether it fits, what it takes, and the button that gets all of it."""
+    name, gain = SETS[offer.set.id]
+    rule()
+    imgui.push_id(f"set {offer.set.id}")
+    with bold_text():
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(t(name))
+    imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
+    if offer.missing or _is_coming(editor, offer.set.id):
+        why = editor.models.why_not_set(offer)
+        if _download_button(editor, offer.set.id, why):
+            editor.models.download_set(offer)
+    else:
+        _draw_installed()
+    imgui.push_text_wrap_pos(imgui.get_window_width() - theme.pt(20 + BUTTON + 16))
+    imgui.text_unformatted(t(gain))
+    note(_fit_of(offer))
+    imgui.pop_text_wrap_pos()
+    size, licences = f"{offer.size / 1e9:.1f} GB", ", ".join(offer.licences)
+    note(t("{size} on disk · licence {licence}", size=size, licence=licences))
+    imgui.pop_id()
+
+
+def _fit_of(offer: Offer) -> str:
+    """Whether it runs here, and about how long an edit then takes."""
+    gpu = f"{offer.card.gpu / 2**30:.0f} GB"
+    if not offer.card.gpu:
+        return t("No GPU was found: most of it would take minutes or hours")
+    if not offer.fits:
+        told = next(step.why_not for step in offer.steps if step.why_not)
+        return f"{sentence(told)}."
+    seconds = offer.seconds
+    if seconds is None or seconds < 1:
+        return t("Fits your {size}", size=gpu)
+    return t("Fits your {size} · about {seconds} s an edit, computed", size=gpu,
+             seconds=f"{seconds:.0f}")  # fmt: skip
+
+
+def _is_coming(editor: Editor, id: str) -> bool:
+    return editor.models.downloading == id or editor.models.is_waiting(id)
+
+
+def _download_button(editor: Editor, id: str, why_not: str | None) -> bool:
+    """Cancel with how far it is, the place in the queue, or the button: whether it was clicked."""
+    models = editor.models
+    if models.downloading == id:
+        chore = editor.chores.shown
+        share = chore.fraction if chore is not None and chore.kind == DOWNLOAD else 0.0
+        if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
+            models.cancel()
+        return False
+    if models.is_waiting(id):
+        if button(t("Waiting, cancel"), width=BUTTON):
+            models.forget_waiting(id)
+        return False
+    return button(t("Download"), Kind.PLAIN, why_not, width=BUTTON)
+
+
+def _draw_installed() -> None:
+    across = imgui.calc_text_size(f"{Icon.CHECK}{t('Installed')}").x + theme.pt(6)
+    imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20) - across)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec("accent"), Icon.CHECK)
+    imgui.same_line(0, theme.pt(6))
+    imgui.text_colored(theme.vec("secondary"), t("Installed"))
 
 
 def _draw_model(editor: Editor, state: State) -> None:
@@ -117,23 +195,11 @@ def _draw_added(editor: Editor, own: Added) -> None:
 
 def _draw_state(editor: Editor, state: State) -> None:
     """Installed, on its way with Cancel, or the button that gets it."""
-    models, id = editor.models, state.weight.id
-    if models.downloading == id:
-        chore = editor.chores.shown
-        share = chore.fraction if chore is not None and chore.kind == DOWNLOAD else 0.0
-        if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
-            models.cancel()
-    elif state.state == "ok":
-        across = imgui.calc_text_size(f"{Icon.CHECK}{t('Installed')}").x + theme.pt(6)
-        imgui.set_cursor_pos_x(imgui.get_window_width() - theme.pt(20) - across)
-        imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec("accent"), Icon.CHECK)
-        imgui.same_line(0, theme.pt(6))
-        imgui.text_colored(theme.vec("secondary"), t("Installed"))
-    else:
-        busy = t("Another model is on its way") if models.downloading else None
-        if button(t("Download"), Kind.PLAIN, busy, width=BUTTON):
-            models.download(id)
+    id = state.weight.id
+    if state.state == "ok" and not _is_coming(editor, id):
+        _draw_installed()
+    elif _download_button(editor, id, None):
+        editor.models.download(id)
 
 
 def draw_offer(editor: Editor) -> None:
@@ -166,7 +232,8 @@ NAMES = {
     "sam2": "SAM 2.1", "sam3": "SAM 3", "sam": "SAM", "sam-onnx": "Small SAMs (ONNX)",
     "pixelhacker": "PixelHacker", "lama": "LaMa", "migan": "MI-GAN",
     "trellis": "TRELLIS", "cupid": "CUPID", "dinov2-with-registers": "DINOv2 with registers",
-    "depth-anything": "Depth Anything V2", "qwen-image-edit": "Qwen-Image-Edit",
+    "depth-anything": "Depth Anything V2, by PyTorch", "depth-graph": "Depth, without a GPU",
+    "qwen-image-edit": "Qwen-Image-Edit",
     "qwen-image-edit-2511-lightning": "Lightning for Qwen-Image-Edit-2511",
     "qwen-image-edit-2509-lightning": "Lightning for Qwen-Image-Edit-2509",
     "qwen-refine-lora": "Your LoRA on Qwen-Image-Edit",
@@ -185,6 +252,7 @@ GAINS = {
     "cupid": "The same with the photo's camera; also needs TRELLIS",
     "dinov2-with-registers": "What TRELLIS and CUPID see a picture with",
     "depth-anything": "A lifted object is as deep as it looks, not as its outline says",
+    "depth-graph": "A lifted object is as deep as it looks, without PyTorch or a GPU",
     "qwen-image-edit": "Makes the edit look photographed, for a very large GPU: the paper's",
     "qwen-image-edit-2511-lightning": "The same in 4 steps instead of 40",
     "qwen-image-edit-2509-lightning": "The same in 4 or 8 steps instead of 40",
@@ -197,6 +265,7 @@ SIZES = {
     "sam2.1-tiny": "Tiny", "sam2.1-small": "Small", "sam2.1-base-plus": "Base",
     "sam2.1-large": "Large",
     "sam-vit-base": "Base", "sam-vit-large": "Large", "sam-vit-huge": "Huge",
+    "moge-2-vits": "MoGe-2", "depth-anything-v2-small-onnx": "Depth Anything V2",
     "mobile-sam": "MobileSAM", "efficient-sam": "EfficientSAM",
     "qwen-image-edit-2509": "2509", "qwen-image-edit-2511": "2511",
     "qwen-image-edit-2509-lightning-4": "4 steps", "qwen-image-edit-2509-lightning-8": "8 steps",
@@ -280,19 +349,16 @@ def _draw_facts(editor: Editor, shown: HubState) -> None:
 
 def _draw_button(editor: Editor, shown: HubState) -> None:
     """Remove, Cancel with how far it is, Download, or the folder's choice."""
-    models, hub, id = editor.models, editor.models.hub, shown.model.id
-    if models.downloading == id:
-        chore = editor.chores.shown
-        share = chore.fraction if chore is not None and chore.kind == DOWNLOAD else 0.0
-        if button(t("Cancel, {share} %", share=f"{100 * share:.0f}"), width=BUTTON):
-            models.cancel()
+    hub, id = editor.models.hub, shown.model.id
+    if _is_coming(editor, id):
+        _download_button(editor, id, None)
     elif shown.state == "ok" or shown.is_own:
         if button(t("Remove"), width=BUTTON):
             hub.remove(id)
     elif not shown.model.repository:
         if button(t("Use a folder…"), width=BUTTON):
             hub.wanted, editor.filing.wanted = id, Dialog.MODEL_FOLDER
-    elif button(t("Download"), Kind.PLAIN, hub.why_not(shown.model), width=BUTTON):
+    elif _download_button(editor, id, hub.why_not(shown.model)):
         hub.download(id)
 
 

@@ -54,7 +54,7 @@ def test_every_worker_has_a_file_that_is_read_and_an_environment(name, monkeypat
     worker = read_worker(name)
     assert worker.licence and worker.timeout >= 60
     files = {at.name for at in (WORKERS / name).iterdir()}
-    assert name == "card" or files & {"pixi.toml", "environment.yml"}
+    assert name == "card" or files & {"pixi.toml", "environment.yml", "make_environment.sh"}
     if "pixi.toml" in files:
         tomllib.loads((WORKERS / name / "pixi.toml").read_text(encoding="utf-8"))
 

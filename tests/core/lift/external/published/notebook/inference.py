@@ -18,10 +18,30 @@ class Splats:
 class Inference:
     def __init__(self, config_file, compile=False):
         assert config_file.endswith("pipeline.yaml")
+        self._pipeline = Pipeline()
 
-    def __call__(self, image, mask, seed=None, pointmap=None):
-        assert image.dtype == np.uint8 and image.shape == (*mask.shape, 3) and mask.dtype == bool
-        height, width = mask.shape
+
+class Pipeline:
+    def run(
+        self,
+        image,
+        mask=None,
+        seed=None,
+        stage1_only=False,
+        with_mesh_postprocess=True,
+        with_texture_baking=True,
+        with_layout_postprocess=True,
+        use_vertex_color=False,
+        stage1_inference_steps=None,
+        pointmap=None,
+        decode_formats=None,
+    ):
+        assert image.dtype == np.uint8 and image.shape[2] == 4 and mask is None
+        assert set(np.unique(image[..., 3])) == {0, 255}
+        # What takes the memory, and nobody asks for.
+        assert decode_formats == ["gaussian"]
+        assert not (with_mesh_postprocess or with_texture_baking or with_layout_postprocess)
+        height, width = image.shape[:2]
         half = torch.tensor(0.5).sqrt()
         rows, columns = np.mgrid[0 : height // 2, 0 : width // 2]
         z = 4.0 + 0 * rows
