@@ -44,9 +44,9 @@ depth a thing turns is not in the photo.
 What is seen is then explained by a few plain shapes, each fitted to outline, depth and normals: a
 flat sheet, a box, an ellipsoid, a ring and a surface of revolution, whose profile is read off the
 outline, about the axis with which it is simplest. Each is drawn as the camera would see it and
-compared; it rights how the whole leans, also what sticks out of it; the one that describes the object in the fewest words takes the place of the
-network's surface as far as it explains it, and gives the far side that no photo shows. Where none
-does, the shape stays free. `--shape`, or Kind in the Shape panel, overrules that.
+compared; the one that describes the object in the fewest words takes the place of the network's
+surface as far as it explains it, rights how the whole leans, and gives the far side that no photo
+shows. Where none does, the shape stays free. `--shape`, or Kind in the Shape panel, overrules that.
 
 Seven of the solids are meshes of the package pybullet (zlib licence), which are fetched and not
 kept here; the figure, the mug and the box are made by `solids.py`. The thresholds in

@@ -17,6 +17,7 @@ import numpy as np
 from ..compose.composite import Composite
 from ..deform.puppet import Puppet
 from ..document.model import Document, EditObject, Placement
+from ..raster.trust import trust_in
 
 VERSION = 1
 STAGES = (
@@ -137,7 +138,12 @@ def _of_object(
             "from": _px(at), "to": _px(to), "reached": _px(reached),
             "error_px": round(float(np.linalg.norm(reached - to)), 4),
         })  # fmt: skip
+    trust = trust_in(puppet.posed(item.pose, item.placement))
     return {
+        "trust": {
+            "sign": trust.sign, "risk": round(trust.risk, 4),
+            "invented": round(trust.invented, 4), "astray": round(trust.astray, 4),
+        },
         "object": {
             "mask_area_px": int(item.mask.sum()),
             "gaussians": len(lifted.body),
@@ -151,6 +157,21 @@ def _of_object(
             "start": energies[0], "end": energies[-1], "iterations": max(len(energies) - 1, 0),
         },
     }  # fmt: skip
+
+
+def provenance(result: Composite) -> str:
+    """How much of the photo an edit changed, and where those pixels come from; no full stop."""
+    if not result.changed:
+        return "nothing changed"
+    shares = result.shares
+    parts = (
+        (shares.from_photo, "the photo's own"),
+        (shares.from_lifter, "the unseen side"),
+        (shares.from_inpainter, "filled-in background"),
+        (shares.from_refiner, "refined"),
+    )
+    named = ", ".join(f"{share:.0%} {name}" for share, name in parts if share >= 0.005)
+    return f"{result.changed / result.pixels[..., 0].size:.0%} of the photo changed ({named})"
 
 
 def peak_memory_mb() -> float:

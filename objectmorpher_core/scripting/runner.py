@@ -37,6 +37,7 @@ from ..document.model import (
 )
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
+from ..raster.trust import SIGNS, trust_in
 from .report import Stopwatch
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
 
@@ -64,7 +65,7 @@ def _refuse_missing(script: EditScript) -> None:
     if script.refine not in ("auto", *known):
         raise ScriptError(f"there is no refiner {script.refine!r}; known are {', '.join(known)}")
     if script.refine in refine.BACKENDS and (reason := refine.missing(script.refine)) is not None:
-        raise ScriptError(f"--refine {script.refine}: {reason}")
+        raise ScriptError(f"refine {script.refine}: {reason}")
 
 
 def refiner_of(script: EditScript, others: Others = ALONE) -> str | None:
@@ -194,6 +195,21 @@ def placed(document: Document, k: int, script: EditScript) -> Document:
     return edits.set_visible(document, k, False) if script.remove else document
 
 
+def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
+    """What is more guessed than known of the edit, each a sentence."""
+    found = []
+    for k, puppet in puppets.items():
+        item = document.objects[k]
+        if item.is_moved and item.is_visible:
+            trust = trust_in(puppet.posed(item.pose, item.placement))
+            if trust.sign == SIGNS[-1]:
+                found.append(
+                    f"{item.name} is turned so far that it is guesswork: the photo does not show"
+                    f" {trust.invented:.0%} of what is seen of it now"
+                )
+    return tuple(found)
+
+
 def _placement(script: EditScript) -> Placement:
     move, turn = script.move or (0.0, 0.0, 0.0), script.turn or (0.0, 0.0, 0.0)
     scale = 1.0 if script.scale is None else script.scale
@@ -204,7 +220,7 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
     lifted, camera = puppet.lifted, document.photo.camera
     matte = document.objects[k].matte
     assert matte is not None
-    texture = object_texture(matte)
+    texture = object_texture(matte, lifted)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
         width, height = document.photo.size
@@ -218,12 +234,12 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
         return point
 
     for xy in script.pin:
-        document = edits.add_handle(document, k, pick(xy, "--pin").rest, is_pin=True)
+        document = edits.add_handle(document, k, pick(xy, "pin").rest, is_pin=True)
     for handle in script.handle:
-        point = pick(handle.at, "--handle")
+        point = pick(handle.at, "handle")
         depth = point.depth + handle.dz * lifted.diameter * lifted.scale
         if depth <= 0:
-            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
+            raise ScriptError(f"handle: a depth of {handle.dz:g} is behind the camera")
         target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
         document = edits.add_handle(document, k, point.rest, target)
     return document
@@ -303,7 +319,7 @@ def with_plate(
 
 def _notes(item: EditObject, old: OldTraces, has_gone: bool) -> list[str]:
     """What becomes of an object's traces in the photo, and how to refuse."""
-    refuse = "--shadow none leaves the ground as it is in the photo"
+    refuse = "shadow none leaves the ground as it is in the photo"
     notes = []
     if old.shadow is not None:
         goes = "goes along with it" if item.is_visible else "is removed with it"

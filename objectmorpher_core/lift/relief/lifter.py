@@ -33,6 +33,7 @@ from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
+from .sides import with_sides
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -96,7 +97,9 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         is_carried = is_mirrored and hidden is None
-        return replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        progress(0.85, "Filling in its sides")
+        return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: Subject, settings: LiftSettings) -> Body:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -118,6 +121,7 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
+                body = replace(body, doubt=seen.doubt)
                 shape = recognised(seen, settings.kind)
                 if shape is not None and not _contradicts(shape, body, settings):
                     body = completed(body, shape, camera, settings.thickness, settings.trust)
@@ -278,6 +282,8 @@ def _assemble(
         "relief",
         middle=middle,
         kind=body.kind,
+        stands=body.standing.is_known,
+        doubt=body.doubt,
     )  # fmt: skip
 
 

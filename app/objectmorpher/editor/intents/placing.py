@@ -15,6 +15,7 @@ from objectmorpher_core.document.placement import (
     Hold,
     centre_of,
     ground_under,
+    turned,
     with_centre,
 )
 
@@ -22,14 +23,16 @@ from ...canvas.derived import ObjectFrame
 from ...system.texts import t
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .posing import Posing
 
 
 class Placing:
     """The current object's placement."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
+        self._posing = posing
 
     @property
     def placement(self) -> Placement | None:
@@ -64,7 +67,7 @@ class Placing:
             centre = centre_of(placement, lifted, camera)
             contact = ground.lowest(centre + self._offsets(placement))
             return Hold(placement, lifted, camera, contact, ground)
-        seen = None if canvas_xy is None else editor.posing.surface_at(canvas_xy)
+        seen = None if canvas_xy is None else self._posing.surface_at(canvas_xy)
         point = self.centre() if seen is None else seen.world
         return Hold(placement, lifted, camera, np.asarray(point, np.float64))
 
@@ -136,6 +139,23 @@ class Placing:
             return placement
         standing = ground.stood(centre, self._offsets(placement))
         return with_centre(placement, standing, thing.lifted, camera)
+
+    def turned(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
+        """`start` with another turn, about the object's foot or the middle of its outline."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        lifted, camera = thing.lifted, document.photo.camera
+        own = self._editor.derived.body_points(document, self._editor.current)
+        points = lifted.world_points(own)
+        try:
+            down = ground_under(points, camera, self.horizon).normal
+        except GroundError:
+            down = np.array([0.0, 1.0, 0.0])
+        try:
+            changed = turned(start, turn, points, lifted, camera, down)
+        except ValueError:  # behind the camera, as `move_to` will say
+            changed = replace(start, turn=turn)
+        return self.stood(changed)
 
     def _offsets(self, placement: Placement) -> np.ndarray:
         """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""
