@@ -207,13 +207,13 @@ HELD_OUT: dict[str, tuple[Maker, View]] = {
               _lathed([0.3, 0.45, 0.52], 0.06)), (20, 28, 0),
     ),
     "lamp": (
-        _made("lamp", 26, _lathed([0.3, 0.28], 0.08), capsule((0, 0, 0), (0, -0.7, 0), 0.04),
+        _made("lamp", 26, _lathed([0.3, 0.28], 0.08), _lathed([0.04, 0.04], 0.7),
               _lathed([0.36, 0.2], 0.4, 0.6)), (0, 12, 0),
     ),
     "domino": (_mesh("domino/domino.obj", "domino", Z_UP, "domino/domino.jpg"), (40, 20, 0)),
     "cone": (_mesh("racecar/meshes/cone.obj", "cone", Z_UP, seed=28), (30, 15, 0)),
     "hand": (_mesh("franka_panda/meshes/collision/hand.obj", "hand", Z_UP, seed=29), (35, 15, 0)),
-    "goblet": (_mesh("objects/mug.obj", "goblet", Z_UP, seed=30), (25, 15, 0)),
+    "beaker": (_mesh("objects/mug.obj", "beaker", Z_UP, seed=30), (25, 15, 0)),
 }  # fmt: skip
 MADE = ("figure", "mug", "box")  # here: nothing is fetched for them
 

@@ -33,7 +33,6 @@ from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
-from .rim import evened
 from .sides import with_sides
 from .silhouette import Silhouette
 from .spreading import Surface, spread
@@ -130,8 +129,6 @@ class ReliefLifter:
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
             body = flattened(body, settings.thickness)
-        if body.kind in ("box", "round"):  # drawn on cells; what is free is settled already
-            body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
             body = self._followed(body, subject, settings, hidden)

@@ -1,9 +1,9 @@
 """What an object is: explicit shapes fitted to what a photo shows of it, and chosen among.
 
-Analysis by synthesis: a flat sheet, a box, and a round thing (a surface of revolution or an
-ellipsoid) are each drawn as the camera would see them, and their numbers found for which outline,
-depth and normals are nearest to the photo's and the shape network's. The one that explains most
-gives the object's front and back as far as it explains them; the rest stays free.
+Analysis by synthesis: a flat sheet, a box, and a round thing (a surface of revolution, a ring
+or an ellipsoid) are each drawn as the camera would see them, and their numbers found for which
+outline, depth and normals are nearest to the photo's and the shape network's. The one that explains
+most gives the object's front and back as far as it explains them; the rest stays free.
 """
 
 from __future__ import annotations

@@ -113,11 +113,11 @@ class Lathe:
         return self._fitted(centre, steps, axis)
 
     def _fitted(self, centre: F64, steps: F64, axis: F64) -> Profile | None:
-        u = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        u = np.asarray(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]), np.float64)
         u /= np.linalg.norm(u)
         v = np.cross(axis, u)
         turn = 2 * np.pi * np.arange(CORNERS) / CORNERS
-        ways = np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v
+        ways = np.asarray(np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v, np.float64)
         most = self.depth * (self.high - self.low)
 
         def radii(steps: F64) -> F64:
@@ -131,7 +131,7 @@ class Lathe:
         steps, found = steps[held[0] : held[-1] + 1], found[held[0] : held[-1] + 1]
         first, last = self._ends(centre + steps[:, None] * axis, found, ways)
         ends = np.interp([first, last], range(len(steps)), steps)
-        even = np.linspace(*ends, PLACES)
+        even = np.linspace(ends[0], ends[1], PLACES)
         own = radii(even)
         own = np.maximum(own, 0.5 * np.interp(even, steps, found))
         for _ in range(2):
@@ -180,7 +180,7 @@ def _signed(mask: Mask) -> F64:
         for side in (mask, ~mask)
     )
     away = np.where(mask, inside - 0.5, 0.5 - outside)
-    return np.asarray(cv2.GaussianBlur(away.astype(np.float64), (0, 0), 0.7))
+    return np.asarray(cv2.GaussianBlur(away.astype(np.float64), (0, 0), 0.7), np.float64)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

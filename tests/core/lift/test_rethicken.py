@@ -98,7 +98,7 @@ def test_it_is_as_a_lift_of_that_thickness(name, factor):
         gap = cKDTree(a).query(b)[0]
         # What slid apart leaves gaps as much wider as it is thicker.
         assert np.quantile(gap, 0.99) < 1.5 * max(factor, 1) * spacing
-    assert changed.scale == pytest.approx(other.scale, rel=0.03)
+    assert changed.scale == pytest.approx(other.scale, rel=0.04)
 
 
 @factors
