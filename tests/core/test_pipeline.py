@@ -254,9 +254,9 @@ def test_empty_and_full_masks_are_refused(inside, error):
 
 
 @pytest.mark.parametrize(("options", "sentence"), [
-    ({"handle": [{"at": [5, 5], "to": [9, 9]}]}, "--handle 5,5 misses the object"),
-    ({"handle": [{"at": [500, 5], "to": [9, 9]}]}, "--handle 500,5 is outside the photo of 160"),
-    ({"pin": [[5, 5]]}, "--pin 5,5 misses the object"),
+    ({"handle": [{"at": [5, 5], "to": [9, 9]}]}, "handle 5,5 misses the object"),
+    ({"handle": [{"at": [500, 5], "to": [9, 9]}]}, "handle 500,5 is outside the photo of 160"),
+    ({"pin": [[5, 5]]}, "pin 5,5 misses the object"),
     ({"handle": [{"at": [78, 62], "to": [9, 9], "dz": -50}]}, "behind the camera"),
     ({"splats": "x.pdf"}, "x.pdf has none of the endings"),
     ({"refine": "dream"}, "no refiner 'dream'"),

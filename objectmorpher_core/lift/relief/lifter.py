@@ -130,7 +130,7 @@ class ReliefLifter:
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
             body = flattened(body, settings.thickness)
-        if body.kind == "free":  # a shape that was recognised has its own rim
+        if body.kind in ("box", "round"):  # drawn on cells; what is free is settled already
             body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")
