@@ -111,8 +111,8 @@ not show, and four times how far the rest is expected to be off; half of it for 
 as a plain shape. Its numbers were chosen on box, mug, duck and ring: there it ranks 1 - IoU of
 twenty turns with a Spearman coefficient of 0.82, and PSNR with 0.74. On ball, brick, bunny,
 figure, robot and teddy, on which nothing was chosen, it is 0.62 and 0.62 of thirty turns; SSIM it
-ranks with 0.35 only. Below 0.25 the sign is *fine*, from 0.5 on *guesswork*. What one part of an object hides
-of another counts as invented although it may stay hidden.
+ranks with 0.35 only. Below 0.25 the sign is *fine*, from 0.5 on *guesswork*. What one
+part of an object hides of another counts as invented although it may stay hidden.
 
 `python docs/lifting/sheet.py` turns sixteen photos and measures them.
 """

@@ -185,7 +185,8 @@ def _carried(
         left += pixels.shape[1] + GAP
     if not pictures:
         return lifted
-    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, at, slopes, zoom))
+    where = (field.astype(np.float32) for field in (at, slopes, zoom))
+    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, *where))
 
 
 def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
