@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from outlines import outline_of
-from pictures import CLICKS, SAMPLES, _sized, _turned, _write
+from pictures import CLICKS, SAMPLES, _sized, _write
 from skimage import data
 from sklearn.datasets import load_sample_image
 from smear import smear_of
@@ -29,6 +29,7 @@ FOLDER = Path(__file__).resolve().parent
 TURNS = [(a, 0.0, 0.0) for a in (-35.0, -25.0, -15.0, 15.0, 25.0, 35.0)]
 TURNS += [(0.0, a, 0.0) for a in (-20.0, 20.0)]
 LONGEST = 700  # px, of a photo: larger ones are made smaller
+GREY = 0.72  # of what is behind a turned object
 WIDTH = 170  # px, of a picture on the sheet
 SUBJECT = EditScript(subject=True)
 BOXES = {
@@ -86,13 +87,14 @@ def lifted(name: str) -> Document:
     return edits.set_lifted(document, 0, *lift_mask(photo.pixels, photo.camera, mask))
 
 
-def rows_of(name: str, document: Document) -> list[Row]:
+def measured(name: str, document: Document) -> tuple[list[Row], list[np.ndarray]]:
+    """What is measured of each turn, and its picture (h, w, 3) u8 on grey."""
     item, camera = document.objects[0], document.photo.camera
     assert item.lifted is not None and item.matte is not None, "it was lifted"
     texture = object_texture(item.matte, item.lifted)
     puppet = Puppet(item.lifted, DeformSettings(), camera)
     rest = puppet.draw(None, Placement(), texture, camera)
-    still, rows = outline_of(rest.alpha), []
+    still, rows, pictures = outline_of(rest.alpha), [], []
     for turn in TURNS:
         place = Placement(turn=turn)
         picture, trust = (
@@ -105,7 +107,9 @@ def rows_of(name: str, document: Document) -> list[Row]:
         rows.append(
             Row(name, turn, wobble, torn, smear.streaks, smear.flat, trust.invented, trust.sign)
         )
-    return rows
+        shown = picture.color + (1 - picture.alpha[..., None]) * GREY
+        pictures.append(np.rint(255 * shown.clip(0, 1)).astype(np.uint8))
+    return rows, pictures
 
 
 def main(names: list[str]) -> None:
@@ -113,9 +117,9 @@ def main(names: list[str]) -> None:
     sheet = []
     for name in names or [*CLICKS, "bowl", *BOXES]:
         document = lifted(name)
-        for row in rows_of(name, document):
-            print(row, flush=True)
-        sheet.append([document.photo.pixels, *(_turned(document, turn) for turn in TURNS)])
+        rows, pictures = measured(name, document)
+        print("\n".join(map(str, rows)), flush=True)
+        sheet.append([document.photo.pixels, *pictures])
     labels = [f"yaw {a:+.0f}" if a else f"pitch {b:+.0f}" for a, b, _ in TURNS]
     path = FOLDER / "turned.jpg" if not names else Path.cwd() / f"turned-{'-'.join(names)}.jpg"
     _write(path, ["the photo", *labels], sheet, WIDTH)

@@ -19,6 +19,7 @@ MASK = shapes.mask("ellipse")
 KEYS = {
     "version": None,
     "photo": {"width", "height"},
+    "trust": {"sign", "risk", "invented", "astray"},
     "object": {"mask_area_px", "gaussians", "edge_gaussians", "control_points", "links",
                "components"},
     "handles": None,

@@ -35,8 +35,8 @@ AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about a
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
-LONGEST = 480.0  # px, longer side of the object in a picture
-SEARCH = 20_000  # px of the small picture in which patches are looked for
+LONGEST = 400.0  # px, longer side of the object in a picture
+SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
 EDGE = 2  # px of what is known beside a hole that are filled anew: they hold what is behind
@@ -185,7 +185,8 @@ def _carried(
         left += pixels.shape[1] + GAP
     if not pictures:
         return lifted
-    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, at, slopes, zoom))
+    where = (field.astype(np.float32) for field in (at, slopes, zoom))
+    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, *where))
 
 
 def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
