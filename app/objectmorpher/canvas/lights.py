@@ -168,8 +168,8 @@ class Lights:
             if (shade := self.of(document, k).shade) is not None:
                 corner = (shade.left, shade.top)
                 _mark(touched, shade.alpha > 0, corner, shade.pitch, (view, cell))
-        plate = document.plate
-        if plate is not None and plate.painted is not None and _is_edited(document):
+        plate = self._derived.plate(document) if _is_edited(document) else None
+        if plate is not None and plate.painted is not None:
             small, pitch = self._painted(lambda: _shrunk(plate.painted), plate.painted)
             _mark(touched, small, (plate.left, plate.top), pitch, (view, cell))
         return touched

@@ -37,6 +37,7 @@ from .intents.computing import Computing
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
 from .intents.landing import Landing
+from .intents.leaving_out import LeavingOut
 from .intents.looking import Looking
 from .intents.masking import Masking
 from .intents.methods import Methods
@@ -70,6 +71,7 @@ class Editor:
         self.filing = Filing(self)
         self.selection, self.objects = Selection(self), Objects(self)
         self.masking, self.shaping = Masking(self), Shaping(self)
+        self.leaving_out = LeavingOut(self)
         self.posing, self.placing = Posing(self), Placing(self)
         self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
         self.exporting, self.models = Exporting(self), Models(self)

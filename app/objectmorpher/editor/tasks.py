@@ -328,6 +328,7 @@ class Tasks:
 
     def _add_plate(self, plate: Plate) -> None:
         self._amend(lambda document: edits.set_plate(document, plate))
+        self._editor.leaving_out.offer()
 
     def _amend(self, change: Callable[[Document], Document]) -> None:
         """A computed addition to the current step, not a step of its own."""

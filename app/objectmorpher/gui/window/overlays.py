@@ -16,7 +16,7 @@ from ..overlay.legend import Legend
 from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
-from ..overlay.select import draw_mask, draw_selection
+from ..overlay.select import draw_left_out, draw_mask, draw_selection
 from .landmarks import mark_on_canvas
 from .layout import Rect
 
@@ -43,6 +43,7 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
             draw_control_points(canvas)
         if editor.is_lifted or view.tool in OF_THE_PHOTO:
             DRAWN[view.tool](canvas)
+        draw_left_out(canvas)
         Legend(editor, rect).draw()
     is_split = view.split is not None and editor.looking.orbit is None
     if editor.looking.badge or is_split:
