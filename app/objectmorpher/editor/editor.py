@@ -312,6 +312,7 @@ class Editor:
         is_changed = self.chores.poll() or is_changed
         self.tasks.rehearse()
         is_changed = self.tasks.ensure_fronts() or is_changed
+        is_changed = self.tasks.ensure_sample() or is_changed
         is_changed = self.refits.ensure() or is_changed
         is_changed = self.tasks.ensure_plate() or is_changed
         is_changed = self.composing.deliver() or is_changed

@@ -85,13 +85,18 @@ class Filing:
 
         self.guard(lambda: self._open(chosen, then))
 
-    def open_sample(self, path: Path) -> None:
-        """Opens a photo that came with the program: it is nobody's file to go back to."""
+    def open_sample(self, path: Path, thing: tuple[float, float] | None = None) -> None:
+        """Opens a photo that came with the program: it is nobody's file to go back to.
 
-        def forget_file() -> None:
+        The `thing` at that place, image px, is selected and lifted: it can be dragged at once.
+        """
+
+        def start() -> None:
             self._editor.source = None
+            if thing is not None:
+                self._editor.tasks.lift_thing(*thing)
 
-        self.guard(lambda: self._open(path, forget_file))
+        self.guard(lambda: self._open(path, start))
 
     def _remember(self, path: Path) -> None:
         self._editor.settings = self._editor.settings.with_recent(path)

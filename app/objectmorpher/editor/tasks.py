@@ -80,11 +80,14 @@ class Tasks:
         # What stays in front, as it was asked for last: its mask, and the answer
         self._front: tuple[Mask | None, Matte | None] | None = None
         self._unreadable: Photo | None = None  # reading it has ended the worker
+        self._sample: Photo | None = None  # that was opened, until its thing is lifted
+        self._is_sample_asked = False
         editor.jobs.restarted = self._read_again
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self._plate = self._no_plate = self._front = None
+        self.question = self._plate = self._no_plate = self._front = self._sample = None
+        self._is_sample_asked = False
 
     def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
@@ -144,6 +147,26 @@ class Tasks:
 
     def _drop_question(self) -> None:
         self.question = None
+
+    def lift_thing(self, x: float, y: float) -> None:
+        """Selects what a sample shows at image px (x, y), and lifts it as soon as that is known."""
+        document = self._editor.committed
+        self._sample, self._is_sample_asked = document.photo if document else None, True
+        self._editor.selection.add_click(x, y, is_foreground=True)
+
+    def ensure_sample(self) -> bool:
+        """Lifts a sample's thing when it is selected; each frame. Not where the artist goes on."""
+        editor, document = self._editor, self._editor.committed
+        if not self._is_sample_asked or self.question or editor.jobs.is_busy(SELECT):
+            return False
+        self._is_sample_asked = False
+        is_untouched = document is not None and len(document.objects) == 1
+        is_untouched = is_untouched and editor.view.tool is ToolName.SELECT
+        if editor.mask is None or editor.is_lifted or not is_untouched:
+            self._sample = None
+            return False
+        self.lift()
+        return True
 
     def lift(self, shape: LiftSettings | None = None, label: str = "") -> None:
         """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
@@ -223,6 +246,9 @@ class Tasks:
         editor = self._editor
         editor.posing.select(None)
         editor.apply(t("Lift object"), changed)
+        if changed.photo is self._sample and editor.history is not None:
+            editor.history.mark_saved(changed)  # the artist has done nothing yet
+            self._sample = None
         editor.view.tool = ToolName.POSE
         name = changed.objects[k].name
         editor.say(t("{name} is in 3D now · Drag any point of it", name=name))

@@ -37,7 +37,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
     "Window": ("panel", "history", "models", "preferences"),
-    "Help": ("shortcuts", "about"),
+    "Help": ("palette", "help", "shortcuts", "-", "about"),
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import ToolName
 from ..overlay.canvas import Canvas
+from ..overlay.card import draw_card
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
 from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
@@ -49,3 +50,4 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     if editor.looking.badge or is_split:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()
+    draw_card(editor, rect)
