@@ -291,7 +291,7 @@ def with_ghosts(
 
 # What of it may be a part of the object, to be added to its selection.
 
-LEAST_PART = 0.6  # x hole margin, squared: a smaller piece is hardly worth a question
+LEAST_PART = 1.5  # x hole margin, squared: a smaller piece is hardly worth a question
 SHADE = 0.25  # of a darkening, by how much it may differ between the channels of a shadow
 BLACK = 0.02  # of sRGB's range, added before ratios are taken
 
