@@ -214,6 +214,12 @@ fuzz-options: .make/test
 fuzz-sessions: .make/test
 	@$(PYTHON) -m tests.fuzz.hostile $(ARGS)
 
+# Lets a monkey play with the window: EVENTS says how often it does something.
+.PHONY: monkey
+monkey: .make/test
+	@$(COMPILE)
+	PYTHONPATH=. $(PYTHON) tests/app/monkey.py --events $(or $(EVENTS),20000) $(ARGS)
+
 # Lets every system call go wrong with which something is written; ARGS=--power cuts the power.
 .PHONY: faults
 faults: .make/test

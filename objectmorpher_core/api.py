@@ -7,6 +7,7 @@ the bytes that `objectmorpher edit` gives for the same options.
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,16 +16,20 @@ from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
+from PIL import Image, ImageShow
 
 from .base.arrays import Mask, Pixels
 from .base.files import read_input, write_all
-from .base.progress import Progress, silent
+from .base.progress import Bar, Progress, as_progress
+from .base.quoting import named, shown
 from .document.model import Document
 from .pictures.image import encode_mask
+from .pictures.in_memory import array_of, encode_array, encode_pil, pil_of
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
 from .scripting.animation import Clip
-from .scripting.outputs import encode_output
+from .scripting.outputs import encode_output, output_picture
+from .scripting.report import provenance
 from .scripting.script import (
     ALONE,
     CHOOSING,
@@ -33,6 +38,7 @@ from .scripting.script import (
     ScriptError,
     beside,
     parse_scripts,
+    said_by,
     script_from,
 )
 
@@ -40,6 +46,7 @@ __all__ = ["Edit", "Result", "Shape", "open", "read_scripts", "replay"]
 
 File = str | os.PathLike[str]
 IN_MEMORY = "photo"  # name of a photo that is no file
+PREVIEW = 1024  # px, longer side of the picture that a notebook shows
 OF_THE_SHAPE = {
     "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "shape",
     "trust", "no_depth", "hidden",
@@ -63,13 +70,17 @@ class Shape(TypedDict, total=False):
     flip: bool
 
 
-def open(photo: File | bytes, fov: float | None = None, seed: int = 0) -> Edit:
-    """An edit of a photo that does nothing yet.
+def open(
+    photo: File | bytes | Image.Image | np.ndarray, fov: float | None = None, seed: int = 0
+) -> Edit:
+    """Open a photo for an edit that does nothing yet.
 
-    `photo` is a file or the bytes of one; `fov` is the camera's horizontal field of view in
-    degrees, which is otherwise read from EXIF, else 50. Raises ValueError for what is no picture.
+    `photo` is a path, the bytes of a picture file, a Pillow image, or an array of RGB: (H, W, 3),
+    also (H, W) or with alpha (H, W, 4), of uint8 or uint16. `fov` is the camera's horizontal field
+    of view in degrees, which is otherwise read from EXIF, else 50. Raises ValueError for what is no
+    picture, and OSError for a file that cannot be read.
     """
-    data, name = (photo, IN_MEMORY) if isinstance(photo, bytes) else _read(photo)
+    data, name = _photo_file(photo)
     told = {} if fov is None else {"fov": fov}
     script = script_from({"seed": seed, **told})
     return Edit(open_photo(data, name, script.fov, script.seed), script)
@@ -98,15 +109,15 @@ def read_scripts(script: File, photo: File | None = None) -> tuple[Edit, ...]:
     return tuple(edits)
 
 
-def replay(session: File | bytes, progress: Progress = silent) -> Result:
+def replay(session: File | bytes, progress: Progress | Bar | None = None) -> Result:
     """The edit of a session (.omorph), from the window or the command line, carried out again."""
     from .session.file import decode_session
 
     data = session if isinstance(session, bytes) else _read(session)[0]
-    return Result(replay_document(decode_session(data), progress))
+    return Result(replay_document(decode_session(data), as_progress(progress)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Edit:
     """A photo and what is to be done to it. Every method gives a new edit; this one stays.
 
@@ -158,15 +169,16 @@ class Edit:
 
     # ---- its shape, its pose and its place ---------------------------------------------------
 
-    def lift(self, progress: Progress = silent, **shape: Unpack[Shape]) -> Edit:
-        """The edit with its object chosen and lifted to 3D now, so that it is done only once.
+    def lift(self, progress: Progress | Bar | None = None, **shape: Unpack[Shape]) -> Edit:
+        """Choose the object and lift it to 3D now, so that it is done only once.
 
-        Without it `render` does so, each time. What is told later about which object is meant, or
-        about its shape, undoes it.
+        Without it `render` does so, each time. What is said later about which object is meant, or
+        about its shape, undoes it. `progress` is as in `render`.
         """
         edit = self._with(shape)._unlifted
-        edit = self._with(shape)._unlifted
-        lifted = lift_first(edit.document, edit.script, edit.own_mask, progress)
+        told = as_progress(progress)
+        lifted = lift_first(edit.document, edit.script, edit.own_mask, told)
+        told(1.0, "Lifted")
         return replace(edit, document=lifted)
 
     def pin(self, x: float, y: float) -> Edit:
@@ -211,12 +223,25 @@ class Edit:
         """
         return self._with(options)
 
-    def render(self, progress: Progress = silent) -> Result:
-        """Carries the edit out. `progress(fraction, text)` is called on the way."""
+    def render(self, progress: Progress | Bar | None = None) -> Result:
+        """Carry the edit out.
+
+        `progress` is a function of a fraction in [0, 1] and a text, which may raise `Cancelled` to
+        stop the work; or a bar such as `tqdm()`.
+        """
+        told = as_progress(progress)
         done = continue_script(
-            self.document, self.script, self.own_mask, progress, self.needs_plate, self.others
+            self.document, self.script, self.own_mask, told, self.needs_plate, self.others
         )
         return Result(done)
+
+    def __repr__(self) -> str:
+        width, height = self.document.photo.size
+        said = [f"{name}={_brief(value)}" for name, value in said_by(self.script).items()]
+        said += ["mask"] if self.own_mask is not None else []
+        said += ["lifted"] if self.document.objects else []
+        about = "; ".join([f"{width} x {height} px", *([", ".join(said)] if said else [])])
+        return f"<Edit of {named(self.document.photo.name)}: {about}>"
 
     def _with(self, options: Mapping[str, Any]) -> Edit:
         said = {name.replace("-", "_") for name in options}
@@ -238,9 +263,9 @@ class Edit:
         return replace(self, document=open_photo(photo.source, photo.name, script.fov, script.seed))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """An edit that was carried out."""
+    """An edit that was carried out. A notebook shows it as its picture, at most PREVIEW px long."""
 
     edited: Edited
 
@@ -254,6 +279,45 @@ class Result:
         """What `--report` writes: seconds, handles, footprint and more, in plain values."""
         return self.edited.report()
 
+    def to_numpy(self, what: str = "photo") -> np.ndarray:
+        """A picture of the result as an array of its own.
+
+        photo and plate: (H, W, 3) RGB, or (H, W, 4) where the photo has alpha; object: (H, W, 4),
+        straight alpha; u8 or u16 as the photo's. mask: (H, W) bool. depth: (H, W) u16, the nearest
+        is 65535. Raises ValueError for another `what`, and for a plate that was not made.
+        """
+        pixels = array_of(output_picture(what, self.edited))
+        if what == "mask":
+            return pixels[..., 0] > 0
+        return pixels[..., 0] if what == "depth" else pixels
+
+    def to_pil(self, what: str = "photo") -> Image.Image:
+        """A picture of the result as Pillow's image, with the photo's profile and EXIF.
+
+        `what` is as in `to_numpy`. Pillow holds colours of 8 bits: those of 16 are rounded.
+        """
+        return pil_of(output_picture(what, self.edited))
+
+    def show(self, what: str = "photo") -> None:
+        """Open a picture of the result in the system's viewer.
+
+        `what` is as in `to_numpy`. Raises RuntimeError where there is no viewer.
+        """
+        if not ImageShow.show(self.to_pil(what), what):
+            raise RuntimeError("no program that shows pictures was found; save the result instead")
+
+    def _repr_png_(self) -> bytes:
+        image = self.to_pil()
+        image.thumbnail((PREVIEW, PREVIEW))
+        out = io.BytesIO()
+        image.save(out, "PNG")
+        return out.getvalue()
+
+    def __repr__(self) -> str:
+        photo = self.edited.document.photo
+        size = f"{photo.size[0]} x {photo.size[1]} px"
+        return f"<Result of {named(photo.name)}: {size}; {provenance(self.edited.composite)}>"
+
     def encode(
         self, ending: str = ".png", what: str = "photo", video: str = "morph", seconds: float = 4.0
     ) -> bytes:
@@ -265,12 +329,36 @@ class Result:
     ) -> None:
         """Writes a file, whole or not at all; an existing one is replaced.
 
-        `what`: photo, mask, plate, object, depth, layers, splats, session or video; of a video
-        `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises ValueError
-        where the file's ending cannot hold it, and OSError where it cannot be written.
+        `what`: photo, mask, plate, object, depth, layers, splats, mesh, session or video; of a
+        video `video` says what is seen (morph, sway or turn), and `seconds` how long. Raises
+        ValueError where the file's ending cannot hold it, and OSError where it cannot be written.
         """
         target = Path(path)
         write_all({target: encode_output(what, self.edited, target, Clip(video, seconds))})
+
+
+def _brief(value: Any) -> str:
+    """A value of a script in one short piece: whole numbers without their point."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k}: {_brief(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return named("(" + ", ".join(map(_brief, value)) + ")")
+    return f"{value:g}" if isinstance(value, float) else shown(value)
+
+
+def _photo_file(photo: File | bytes | Image.Image | np.ndarray) -> tuple[bytes, str]:
+    """The bytes of a picture file, and its name. Raises TypeError for what is none of these."""
+    if isinstance(photo, bytes | bytearray | memoryview):
+        return bytes(photo), IN_MEMORY
+    if isinstance(photo, np.ndarray):
+        return encode_array(photo), IN_MEMORY
+    if isinstance(photo, Image.Image):
+        return encode_pil(photo), IN_MEMORY
+    if isinstance(photo, str | os.PathLike):
+        return _read(photo)
+    raise TypeError(
+        f"a photo is a path, bytes, a Pillow image or an array, not {type(photo).__name__}"
+    )
 
 
 def _read(file: File) -> tuple[bytes, str]:

@@ -20,6 +20,7 @@ from .base.files import read_input
 from .base.pixels import crop, unit_pixels
 from .base.progress import Progress, part, silent
 from .compose.composite import OPAQUE, Composite, composite
+from .compose.order import doubt_about_front
 from .compose.plate.plate import build_plate
 from .deform.puppet import Puppet, puppet_of
 from .document import edits
@@ -310,7 +311,7 @@ class _Run:
         """The next object is the one that the script means."""
         prompt = prompt_of(script)
         if mask is None and prompt.is_empty:
-            raise ScriptError("no object is chosen: use --click, --box, --subject or --mask")
+            raise ScriptError("no object is chosen: use click, box, subject or mask")
         with self._stopwatch.stage("segment"):
             if mask is not None:
                 found, backend = read_mask(mask, self.document.photo.size), "mask"
@@ -337,7 +338,7 @@ class _Run:
                 self.choose(wanted, mask, silent)
                 self._keep(k)
             except ValueError as error:
-                raise ScriptError(f"--front {number}: {error}") from error
+                raise ScriptError(f"front {number}: {error}") from error
             self.document = edits.rename(self.document, k, f"Front {number}")
 
     def doubts(self) -> tuple[str, ...]:
@@ -346,11 +347,11 @@ class _Run:
         for k, item in enumerate(self.document.objects):
             doubt = None
             if item.stays_in_front:
-                doubt = edits.doubt(self.document, k, self._posed)
+                doubt = doubt_about_front(self.document, k, self._posed)
             if doubt is not None:
                 found.append(
                     f"what stays in front ({item.name}) {doubt}: if that is not what you mean, "
-                    "click nearer to its middle, or give its outline by --front-mask"
+                    "click nearer to its middle, or give its outline as a mask"
                 )
         return tuple(found)
 

@@ -86,7 +86,7 @@ def _show_seldom(document: Document, thing: EditObject, puppet: Puppet) -> None:
     assert thing.mask is not None and thing.matte is not None
     make_plate(deep, thing.mask)
     lift_mask(deep, document.photo.camera, thing.mask)
-    texture, camera = object_texture(thing.matte), document.photo.camera
+    texture, camera = object_texture(thing.matte, thing.lifted), document.photo.camera
     lifted = puppet.lifted
     nowhere = replace(lifted.texture, visibility=np.zeros(len(lifted.gaussians), np.float32))
     plain = replace(lifted, splatting="classic", texture=nowhere)
@@ -102,7 +102,7 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
 
     assert thing.pose is not None and thing.matte is not None
     puppet.deformer.strain(thing.pose)
-    texture, camera = object_texture(thing.matte), puppet.camera
+    texture, camera = object_texture(thing.matte, thing.lifted), puppet.camera
     for settings in (
         DeformSettings("laplacian", "euclidean", is_splitting=True, stretch_limit=1.5),
         DeformSettings(is_faithful=True),

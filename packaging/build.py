@@ -58,6 +58,7 @@ def build_folder(out: Path) -> Path:
         inside, quiet=1, force=True, stripdir=str(inside), workers=1,
         invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH,
     )  # fmt: skip
+    bundled.strip_symbols(inside)
     bundled.check(folder)
     if sys.platform == "linux":
         bundled.write_system_texts(folder, inside / "third-party")

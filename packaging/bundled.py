@@ -9,6 +9,13 @@ from pathlib import Path
 # Under the GPL; Python can do without each.
 GPL = ("libreadline", "readline.", "libgdbm", "_gdbm", "libdb-5")
 DOCUMENTED = Path("/usr/share/doc")
+# Of SciPy what nothing in the folder imports; tests/test_imports.py does without them.
+UNUSED_SCIPY = (
+    "cluster", "datasets", "differentiate", "fftpack", "integrate", "interpolate", "io", "misc",
+    "odr", "signal", "stats",
+)  # fmt: skip
+# Libraries that are built with symbols which only a debugger reads: 40 MB.
+WITH_SYMBOLS = ("libllvmlite.so", "zstandard/*.so")
 
 
 def check(folder: Path) -> None:
@@ -16,6 +23,14 @@ def check(folder: Path) -> None:
     found = [p.name for p in folder.rglob("*") if p.name.startswith(GPL)]
     if found:
         raise SystemExit(f"under the GPL, and may not be shipped: {', '.join(found)}")
+
+
+def strip_symbols(inside: Path) -> None:
+    """Take the symbols out of WITH_SYMBOLS, where this system has binutils."""
+    if shutil.which("strip") is None:
+        return
+    for library in sorted(p for name in WITH_SYMBOLS for p in inside.rglob(name)):
+        subprocess.run(["strip", "--strip-unneeded", str(library)], check=True)
 
 
 def write_system_texts(folder: Path, target: Path) -> None:

@@ -25,7 +25,8 @@ from packaging.utils import canonicalize_name
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 PAGE = PROJECT.parent / "docs" / "licences.md"
-EXTRAS = ("models", "cluster", "research")  # that people install; the others are for our own tests
+# Those that people install; the others are for our own tests.
+EXTRAS = ("models", "formats", "cluster", "research")
 OWN = ("objectmorpher", "objectmorpher-research")
 START, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 TEXT = re.compile(r"(^|/)(LICEN[CS]E|COPYING|COPYRIGHT|NOTICE|AUTHORS)[^/]*$", re.I)

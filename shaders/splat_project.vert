@@ -12,6 +12,9 @@ in vec4 size;    // standard deviations, object units; cosine of the normal at r
 in vec4 normal;  // object frame; visibility
 in vec3 look;    // u0 minus where the mean is seen at rest, photo px; solidity
 in vec4 paint;   // colour; zoom, px per world unit at rest
+in vec3 side0;   // px per unit of the object at rest, of an invented picture: across,
+in vec3 side1;   // and down
+in vec3 aside;   // `look` there; its zoom, 0: there is none
 
 #include "MOTION"
 
@@ -26,6 +29,10 @@ uniform vec3 view;          // focal, cx, cy of the view, px
 uniform float photo_focal;  // px
 uniform vec2 limits;        // |x / z| and |y / z|, see posed.view_limits
 
+uniform bool has_sides;     // invented pictures; else the attributes above are none
+uniform float look_aside;   // rules.Rules
+uniform float ahead;
+uniform float near;
 uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
@@ -127,6 +134,15 @@ void main() {
     vec3 d0 = nearer * rest_rows[0] - turned.x * rest_rows[2] - (change[0] - side.x * change[2]) / at.z;
     vec3 d1 = nearer * rest_rows[1] - turned.y * rest_rows[2] - (change[1] - side.y * change[2]) / at.z;
     vec3 h0 = photo_focal * d0 * root, h1 = photo_focal * d1 * root;
+    float cosine = facing(f, at), turn = cosine - size.w;
+    bool is_aside = has_sides && aside.z > 0.0 && size.w < look_aside * cosine;
+    vec2 looks = look.xy;
+    if (is_aside) {
+        h0 = side0 * root - ratio * g0;
+        h1 = side1 * root - ratio * g1;
+        looks = aside.xy;
+        zoom = aside.z;
+    }
     float own = ratio * extra / det;
     float axx = dot(h0, k0) - own * (syy + extra), axy = dot(h0, k1) + own * sxy;
     float ayx = dot(h1, k0) + own * sxy, ayy = dot(h1, k1) - own * (sxx + extra);
@@ -140,7 +156,6 @@ void main() {
 
     // the rules that decide weights and shares
     float solidity = is_layered ? look.z : 1.0;  // no brim where no photo is carried
-    float cosine = facing(f, at), turn = cosine - size.w;
     if (is_edged && seen == 0.0) cosine = min(cosine, turn);
     float fdet = area + low_pass * (sxx + syy) + low_pass * low_pass;
     float fxx = sxx + low_pass, fyy = syy + low_pass;
@@ -153,7 +168,9 @@ void main() {
     weight *= solidity * front + (1.0 - solidity) * brim;
     float matted = ramp(stretch, matte_end, matte_start);
     matted *= is_edged ? seen : ramp(turn, turned_end, turned_start);
-    if (has_colors) {
+    if (is_aside) {
+        matted = seen = 0.0;
+    } else if (has_colors) {
         photo *= seen;
         seen = 1.0;
     }
@@ -168,8 +185,9 @@ void main() {
     p_axes = axes(vec3(fxx, sxy, fyy), fdet, cut);
     p_color = vec4(paint.rgb, 1.0 - seen);
     vec3 along_depth = motion[2] * root;
-    p_depth = vec4(at.z, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
-    p_shift = vec4(look.xy - photo_focal * sideways, photo, body);
+    float depth = at.z - (is_aside ? ahead / near * nearest : 0.0);
+    p_depth = vec4(depth, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
+    p_shift = vec4(looks - photo_focal * sideways, photo, body);
     p_slope = vec4(axx, axy, ayx, ayy);
     p_edge = vec2(1.0 - matted, solidity);
     if (!is_there || any(isnan(p_centre)) || any(isinf(p_centre)) || any(isnan(p_axes)))

@@ -318,7 +318,7 @@ class Scene:
         soft = cv2.GaussianBlur(outline, (0, 0), 0.7)
         own = (-whole[2], -whole[0], soft.shape[1] - whole[2], soft.shape[0] - whole[0])
         matte = replace(self.matte, alpha=crop(soft, own, (x0, y0, x1, y1)))
-        return replace(self, matte=matte, texture=object_texture(matte))
+        return replace(self, matte=matte, texture=object_texture(matte, self.lifted))
 
     def document(self) -> Document:
         """The document in which the object is lifted, at rest, before a plain grey plate."""
@@ -341,7 +341,7 @@ def lifted_scene(pixels: RGB, inside: Mask, count: int, seed: int = 0) -> Scene:
     matte, lifted = lift_mask(
         pixels, view, inside, "relief", LiftSettings(count, trust=0), seed=seed
     )
-    texture = object_texture(matte)
+    texture = object_texture(matte, lifted)
     puppet = Puppet(lifted, DeformSettings(), view)
     return Scene(pixels, inside, view, matte, lifted, texture, puppet)
 

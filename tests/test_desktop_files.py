@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import configparser
+import hashlib
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -66,3 +69,43 @@ def test_the_installers_of_other_systems_name_sessions_too() -> None:
     for name in ("objectmorpher.spec", "windows/objectmorpher.wxs"):
         text = (ROOT / "packaging" / name).read_text("utf-8")
         assert re.search(re.escape(SESSION_ENDING.lstrip(".")) + r"\b", text), name
+
+
+def test_the_manifests_of_winget_and_homebrew_hold_the_hashes_of_what_was_built(tmp_path) -> None:
+    names = ("ObjectMorpher-9-x64.msi", "ObjectMorpher-9-arm64.dmg", "ObjectMorpher-9-x86_64.dmg")
+    hashes = {}
+    for number, name in enumerate(names):
+        (tmp_path / name).write_bytes(bytes([number]) * 1000)
+        hashes[name] = hashlib.sha256(bytes([number]) * 1000).hexdigest()
+    command = [sys.executable, ROOT / "packaging" / "store_files.py", tmp_path, "--address"]
+    subprocess.run([*command, "https://example.org/us/it/"], check=True)
+    manifests = {}
+    for path in tmp_path.glob("*.yaml"):
+        lines = path.read_text("utf-8").splitlines()
+        values = dict(re.findall(r"^[ -]*([A-Z]\w+): (.+)$", "\n".join(lines), re.M))
+        assert values["PackageVersion"] == __version__ and values["ManifestVersion"]
+        manifests[values["ManifestType"]] = values
+    assert set(manifests) == {"version", "installer", "defaultLocale"}
+    installer = manifests["installer"]
+    assert installer["InstallerSha256"] == hashes[names[0]].upper()
+    release = f"https://example.org/us/it/releases/download/v{__version__}/"
+    assert installer["InstallerUrl"] == release + names[0]
+    cask = (tmp_path / "objectmorpher.rb").read_text("utf-8")
+    assert f'arm: "{hashes[names[1]]}"' in cask and f'intel: "{hashes[names[2]]}"' in cask
+    assert 'arch arm: "arm64", intel: "x86_64"' in cask
+    assert len(re.findall(r"\bdo$", cask, re.M)) == len(re.findall(r"^end$", cask, re.M)) == 1
+
+
+def test_the_workflows_run_what_there_is_on_three_systems() -> None:
+    """Files and targets that they name exist; each package is run before it is kept."""
+    folder = ROOT / ".github" / "workflows"
+    text = {path.stem: path.read_text("utf-8") for path in folder.glob("*.yml")}
+    assert set(text) == {"test", "packages"}
+    for name in re.findall(r"\b(?:packaging|assets)[/\\][\w./\\-]+\w", "".join(text.values())):
+        assert (ROOT / name.replace("\\", "/")).exists(), name
+    assert (ROOT / ".ci" / "run").exists() and ".ci/run" in text["test"]
+    for system in ("ubuntu-", "windows-", "macos-"):
+        assert system in text["test"] and system in text["packages"]
+    assert text["packages"].count("objectmorpher edit") == 2  # the recipes of the others do so, too
+    for recipe in ("windows/build.ps1", "macos/build.sh"):
+        assert " edit assets" in (ROOT / "packaging" / recipe).read_text("utf-8").replace("\\", "/")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import compileall
+import importlib.util
 import os
 import subprocess
 import sys
@@ -12,6 +13,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+
+from tests.tree import PYTHONPATH
 
 ROOT = Path(__file__).parents[1]
 CORE, APP = ROOT / "objectmorpher_core", ROOT / "app" / "objectmorpher"
@@ -34,6 +37,10 @@ LATER = {  # than the window's first frame
 
 WINDOW_IMPORT = "import objectmorpher.cli.parser, objectmorpher.gui.window.window"
 RUNS = 7
+sys.path.append(str(ROOT / "packaging"))
+
+import bundled  # noqa: E402
+
 MOST_RATIO = 7.0  # it is about 4.5; scipy alone would add 2, torch 20
 
 
@@ -79,7 +86,7 @@ def broken(found: dict[Path, Iterable[str]]) -> list[str]:
 
 
 def test_no_import_at_load_goes_in_a_circle():
-    """Not even through several files; what functions import, or types, is another matter."""
+    """Not even through several files."""
     ahead = {_module(path): imports(path, is_at_import=True) for path in sources(CORE, APP)}
     ahead = {  # a module's own package is loaded before it in any case
         module: {n for n in names & ahead.keys() if not f"{module}.".startswith(f"{n}.")}
@@ -88,6 +95,41 @@ def test_no_import_at_load_goes_in_a_circle():
     while free := {module for module, names in ahead.items() if not names}:
         ahead = {m: names - free for m, names in ahead.items() if m not in free}
     assert not sorted(ahead)
+
+
+def test_at_most_two_files_know_each_other_in_a_circle():
+    """Types and what functions import included: what is larger cannot be read file by file."""
+    known = {_module(path): imports(path) for path in sources(CORE, APP)}
+    known = {
+        module: {n for n in names & known.keys() if not f"{module}.".startswith(f"{n}.")}
+        for module, names in known.items()
+    }
+    assert not [circle for circle in _circles(known) if len(circle) > 2]
+
+
+def _circles(ahead: dict[str, set[str]]) -> list[set[str]]:
+    """Groups of modules that all reach each other (strongly connected components, Tarjan 1972)."""
+    order: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    stack, circles = [], []
+
+    def visit(module: str) -> None:
+        order[module] = lowest[module] = len(order)
+        stack.append(module)
+        for other in ahead[module]:
+            if other not in order:
+                visit(other)
+            if other in stack:
+                lowest[module] = min(lowest[module], lowest[other])
+        if lowest[module] == order[module]:
+            place = stack.index(module)
+            circles.append(set(stack[place:]))
+            del stack[place:]
+
+    for module in ahead:
+        if module not in order:
+            visit(module)
+    return circles
 
 
 def _module(path: Path) -> str:
@@ -191,3 +233,43 @@ def _seconds(code: str) -> float:
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
     end = os.times()
     return (end.children_user - start.children_user) + (end.children_system - start.children_system)
+
+
+WITHOUT = """
+import importlib, sys
+from pathlib import Path
+left_out, folder, *wanted = sys.argv[1:]
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name in left_out.split(","):
+            raise ImportError(f"{name} is not packaged")
+
+sys.meta_path.insert(0, Blocker())
+for name in wanted:
+    importlib.import_module(name)
+import trimesh
+from objectmorpher_core.splat_files import read
+for ending in (".glb", ".obj", ".stl"):
+    path = Path(folder) / ("ball" + ending)
+    trimesh.creation.icosphere(1).export(path)
+    assert len(read(path, 200)) > 100
+"""
+
+
+def test_the_parts_of_scipy_that_packages_leave_out_are_not_imported(tmp_path):
+    """Neither by us, nor by what we use of SciPy, nor where trimesh reads a mesh."""
+    left_out = ",".join(f"scipy.{part}" for part in bundled.UNUSED_SCIPY)
+    used = {n for path in sources(CORE, APP) for n in imports(path) if n.startswith("scipy.")}
+    used = {n for n in used if importlib.util.find_spec(n.rpartition(".")[0]) is not None}
+    modules = {n if _is_module(n) else n.rpartition(".")[0] for n in used}
+    assert len(modules) >= 5
+    command = [sys.executable, "-c", WITHOUT, left_out, tmp_path, *sorted(modules)]
+    subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": PYTHONPATH})
+
+
+def _is_module(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False

@@ -53,6 +53,19 @@ def test_the_page_names_all_that_is_needed_to_run() -> None:
     assert names - {"package"} == {package.name.lower() for package in licences.run_time()}
 
 
+def test_every_font_and_photo_that_is_bundled_is_listed() -> None:
+    page = licences.PAGE.read_text("utf-8")
+    fonts = page[page.index("## Fonts and sample photos") :].lower()
+    told = (ROOT / "assets" / "licences.txt").read_text("utf-8")
+    named = {"chelsea": "cat", "coffee": "coffee cup"}
+    for photo in (ROOT / "assets" / "samples").iterdir():
+        assert f"samples/{photo.name}" in told
+        assert re.search(rf"^\|[^|]*\b{named.get(photo.stem, photo.stem)}\b", fonts, re.M), photo
+    for font in (ROOT / "assets" / "fonts").glob("*.[ot]tf"):
+        assert f"fonts/{font.name}" in told
+        assert re.match(r"[A-Z][a-z]+", font.stem)[0].lower() in fonts, font  # type: ignore[index]
+
+
 def test_no_text_of_theirs_is_the_gpl_but_for_gccs_libraries() -> None:
     for one in map(licences.licence_of, licences.run_time()):
         for text in one.texts:

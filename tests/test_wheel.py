@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "packaging"))
+
+import index_page  # noqa: E402
 
 READ_RESOURCES = """
 import sys
@@ -101,3 +105,26 @@ def test_an_edit(installed, tmp_path):
         "-o", "out.png", cwd=tmp_path,
     )  # fmt: skip
     assert (tmp_path / "out.png").stat().st_size > 10_000
+
+
+def test_the_page_of_a_package_index_has_no_link_that_leads_nowhere():
+    text = (ROOT / "README.md").read_text("utf-8")
+    relative = re.compile(r"\]\((?!https?://|#)")
+    assert relative.search(text)
+    bare = index_page.index_page(text, None, "0.1.0")
+    assert not relative.search(bare) and "![" not in bare and "https://arxiv.org" in bare
+    linked = index_page.index_page(text, "https://example.org/us/it/", "0.1.0")
+    assert not relative.search(linked)
+    assert "](https://example.org/us/it/raw/v0.1.0/docs/drag.webp)" in linked
+    assert "](https://example.org/us/it/blob/v0.1.0/docs/install.md)" in linked
+    assert linked.count("](") == text.count("](")
+
+
+@pytest.mark.slow
+def test_that_page_is_the_wheels(installed, tmp_path):
+    said = run(
+        installed / "python", "-c",
+        "from importlib.metadata import metadata; print(metadata('objectmorpher').get_payload())",
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert said.startswith("# ObjectMorpher\n") and "](docs/" not in said

@@ -56,7 +56,7 @@ def _under(name: str, meshes: Path, lamp: Lamp) -> list[Turned]:
     photo = _over(view.color, view.alpha)
     pixels = np.rint(photo * 255).astype(np.uint8)
     matte, lifted = lift_mask(pixels, CAMERA, view.alpha > 0.5, settings=SETTINGS)
-    puppet, texture = Puppet(lifted, DeformSettings(), CAMERA), object_texture(matte)
+    puppet, texture = Puppet(lifted, DeformSettings(), CAMERA), object_texture(matte, lifted)
     light = estimate_light(lifted, matte)
     cases = []
     for turn, (yaw, pitch) in TURNS.items():

@@ -131,7 +131,7 @@ def _texture(edit: om.Edit) -> None:
     assert item.matte is not None
     camera, box = document.photo.camera, (205, 130, 345, 270)
     splats = puppet_of(item, camera).posed(item.pose, item.placement)
-    texture = object_texture(item.matte)
+    texture = object_texture(item.matte, item.lifted)
     plain = splats.painted(splats.rest.lifted.gaussians.colors.astype(np.float64))
     sheet = [
         ("the photo", _cut(document.photo.pixels, box)),

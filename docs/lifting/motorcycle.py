@@ -119,7 +119,8 @@ def _relief_shot(
     moved = np.eye(4)
     moved[0, 3] = -baseline
     right = replace(camera, cx=camera.cx + OFFSET)
-    picture = tiles.render(replace(splats, placement=moved), object_texture(matte), right, camera)
+    texture = object_texture(matte, lifted)
+    picture = tiles.render(replace(splats, placement=moved), texture, right, camera)
     return np.asarray(picture.color, np.float64), float(np.sqrt((error[is_known] ** 2).mean()))
 
 

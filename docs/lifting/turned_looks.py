@@ -44,7 +44,7 @@ class Look:
 def looks(scene: Scene) -> dict[str, Look]:
     """Of the product's own lift, by the name of the turn."""
     matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=SEEN)
-    puppet, texture = Puppet(lifted, DeformSettings(), CAMERA), object_texture(matte)
+    puppet, texture = Puppet(lifted, DeformSettings(), CAMERA), object_texture(matte, lifted)
 
     def drawn(place: Placement) -> Picture3D:
         return puppet.draw(None, place, texture, CAMERA)

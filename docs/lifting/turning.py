@@ -199,12 +199,12 @@ def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
     _, inflated = lift_mask(scene.pixels, CAMERA, scene.mask, settings=INFLATED)
     lifts = {"network": learned, "relief": lifted, "inflation": inflated, "depth": deep}
     puppets = {way: Puppet(own, DeformSettings(), CAMERA) for way, own in lifts.items()}
-    texture = object_texture(matte)
+    textures = {way: object_texture(matte, own) for way, own in lifts.items()}
     found = {}
     for key, truth in scene.edited.items():
         edit = EDITS[key]
         drawers: dict[str, Draw] = {
-            way: lambda shift, p=puppet, e=edit: _drawn(p, texture, e, shift)
+            way: lambda shift, p=puppet, t=textures[way], e=edit: _drawn(p, t, e, shift)
             for way, puppet in puppets.items()
         }
         if not edit.bend:

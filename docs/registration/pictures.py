@@ -33,7 +33,7 @@ def draw_sheet(path: Path, scene: truth.Scene, registration: Registration) -> No
     panels = [scene.pixels, outlined]
     matte = build_matte(scene.pixels, scene.mask, 24)
     lifted = lift_imported(solids.gaussians(scene.solid), best, matte)
-    puppet, texture = Puppet(lifted, DeformSettings(), best.camera), object_texture(matte)
+    puppet, texture = Puppet(lifted, DeformSettings(), best.camera), object_texture(matte, lifted)
     for turn in TURNS:
         drawn = puppet.draw(None, Placement(turn=(turn, 0.0, 0.0)), texture, best.camera)
         shown = drawn.color + (1 - drawn.alpha[..., None]) * GREY

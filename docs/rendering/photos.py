@@ -78,7 +78,7 @@ def compare(subject: Subject, path: Path) -> list[Row]:
         matte, lifted = lift_mask(
             pixels, subject.camera, subject.mask, "relief", LiftSettings(count)
         )
-        texture = object_texture(matte)
+        texture = object_texture(matte, lifted)
         puppet = Puppet(lifted, DeformSettings(), subject.camera)
         rest, turned = puppet.posed(None, Placement()), puppet.posed(None, TURN)
         where = inside(tiles.render(rest, texture, subject.camera, subject.camera).alpha, MARGIN)

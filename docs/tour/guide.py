@@ -96,13 +96,13 @@ class Guide(Hands):
         pixels = self.settle()
         word = re.sub(r"[^a-z]+", "-", title.lower()).strip("-")
         name = f"{self._story}-{len(self.captions) + 1:02d}-{word}.jpg"
-        picture = _with_pointer(pixels, self.pointer(), pixels.shape[1] / 1440)
+        picture = with_pointer(pixels, self.pointer(), pixels.shape[1] / 1440)
         picture.save(self._out / name, quality=QUALITY, optimize=True)
         self.captions.append(Caption(name, title, text))
         print(f"  {name}", flush=True)
 
 
-def _with_pointer(pixels: np.ndarray, at: tuple[int, int], scale: float) -> Image.Image:
+def with_pointer(pixels: np.ndarray, at: tuple[int, int], scale: float) -> Image.Image:
     """A screen's picture lacks the pointer: an arrow, white with a dark line around it."""
     picture = Image.fromarray(pixels).convert("RGB")
     side = round(32 * scale)

@@ -1,8 +1,8 @@
 """Makes docs/tour and the pictures of the README anew: `make tour`.
 
 Whole edits by a real pointer in the real window, on displays of their own (Xvfb and xdotool),
-with a picture of every step. `python docs/tour/make_tour.py [dark] [light] [large] [views]` makes
-some of them. It waits for what the window shows and not for a time, so it may run on a busy
+with a picture of every step. `python docs/tour/make_tour.py [dark] [light] [large] [views] [clip]`
+makes some of them. It waits for what the window shows and not for a time, so it may run on a busy
 machine.
 """
 
@@ -20,6 +20,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "app")]
 
+import clip  # noqa: E402
 import platformdirs  # noqa: E402
 import stories  # noqa: E402
 import views  # noqa: E402
@@ -41,19 +42,40 @@ def home() -> Iterator[Path]:
         yield folder
 
 
-def tell(story: stories.Story) -> None:
-    """One edit, and a picture of each of its steps."""
-    width, height = (round(side * story.scale) for side in SIZE)
+@contextmanager
+def stage(width: int, height: int) -> Iterator[tuple[dict[str, str], Path]]:
+    """A display of so many px, and a home: the environment of a window, and the home's folder."""
     with home() as folder, x_display(width, height) as display:
         if display is None:
             raise SystemExit("no free X display was found")
         settings = f'dialogs = "built-in"\nexport_folder = "{folder / PICTURES}"\n'
         settings += 'motion = "reduced"\n'
-        environment = window_environment(display, folder, settings) | {
-            "HOME": str(folder),
-            "XDG_DATA_HOME": str(platformdirs.user_data_path()),  # the models are there
-            "XDG_CACHE_HOME": str(platformdirs.user_cache_path()),
-        }
+        yield (
+            window_environment(display, folder, settings)
+            | {
+                "HOME": str(folder),
+                "XDG_DATA_HOME": str(platformdirs.user_data_path()),  # the models are there
+                "XDG_CACHE_HOME": str(platformdirs.user_cache_path()),
+            },
+            folder,
+        )
+
+
+def record() -> None:
+    """The README's clip of a drag."""
+    size = ",".join(map(str, clip.SIZE))
+    with stage(*clip.SIZE) as (environment, folder):
+        photo = folder / PICTURES / "astronaut.jpg"
+        with opened(environment, photo, "--theme", "dark", "--size", size):
+            camera = clip.Camera(environment, folder / PICTURES)
+            clip.film(camera)
+    camera.save(ROOT / "docs" / "drag.webp")
+
+
+def tell(story: stories.Story) -> None:
+    """One edit, and a picture of each of its steps."""
+    width, height = (round(side * story.scale) for side in SIZE)
+    with stage(width, height) as (environment, folder):
         options = ("--theme", story.theme, "--scale", str(story.scale))
         with opened(environment, None, *options):
             guide = Guide(environment, HERE, story.name, story.photo_size, folder / PICTURES)
@@ -66,12 +88,14 @@ def tell(story: stories.Story) -> None:
 
 
 def main() -> None:
-    wanted = sys.argv[1:] or [*stories.STORIES, "views"]
+    wanted = sys.argv[1:] or [*stories.STORIES, "views", "clip"]
     os.chdir(ROOT)
     for name in wanted:
         print(name)
         if name == "views":
             views.make(ROOT / "docs")
+        elif name == "clip":
+            record()
         else:
             tell(stories.STORIES[name])
     write_page(HERE)

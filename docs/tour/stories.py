@@ -96,9 +96,9 @@ def _tilt_head(guide: Guide) -> None:
     guide.point(EMPTY)
     guide.shoot("History", "Every step; a click goes back to it.")
     guide.choose("Export photo…")
-    guide.area("Export astronaut-edited.png")
+    guide.area("Export astronaut-edited.jpg")
     guide.shoot("Export", "What, how and where to. The button names the file that it will write.")
-    export(guide, "astronaut-edited.png", "The status line says what was written.")
+    export(guide, "astronaut-edited.jpg", "The status line says what was written.")
 
 
 def _turn_cup(guide: Guide) -> None:
@@ -159,10 +159,8 @@ def _turn_cup(guide: Guide) -> None:
     guide.point(EMPTY)
     guide.shoot("History", "What was done, the newest step at the end.")
     guide.choose("Export photo…")
-    guide.area("Export coffee-edited.png")
-    guide.choose("JPEG")
     guide.area("Export coffee-edited.jpg")
-    guide.shoot("Export", "A JPEG has a quality instead of a depth.")
+    guide.shoot("Export", "A JPEG stays a JPEG, which has a quality instead of a depth.")
     export(guide, "coffee-edited.jpg", "Done.")
 
 
@@ -216,9 +214,9 @@ def _bend_rocket(guide: Guide) -> None:
     guide.shoot("Keys", "F1: every key and gesture. A click on a key changes it.")
     guide.press("Escape")
     guide.choose("Export photo…")
-    guide.area("Export rocket-edited.png")
+    guide.area("Export rocket-edited.jpg")
     guide.shoot("Export", "What, how and where to.")
-    export(guide, "rocket-edited.png", "The status line says what was written.", ABOVE)
+    export(guide, "rocket-edited.jpg", "The status line says what was written.", ABOVE)
 
 
 def pin(guide: Guide, *places: tuple[float, float]) -> None:

@@ -1,9 +1,8 @@
-"""The pictures of the README: docs/window.jpg and docs/views.jpg."""
+"""The picture of all views, docs/views.jpg."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -11,14 +10,11 @@ from pathlib import Path
 
 from hands import ROOT, x_display
 
-WINDOW = "dark-*-rotation-ring.jpg"  # the step of the tour that the README shows
 EDIT = "docs/gallery/astronaut-handles.json"  # what every view shows
 
 
 def make(docs: Path) -> None:
-    """The window from the tour's pictures, the views from the gallery's edit."""
-    (window,) = (docs / "tour").glob(WINDOW)
-    shutil.copyfile(window, docs / "window.jpg")
+    """Write it, of an edit of the gallery."""
     with tempfile.TemporaryDirectory() as folder, x_display(1440, 900) as display:
         assert display is not None, "no free X display was found"
         environment = os.environ | {

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any
 
 LONGEST = 60  # characters
 DIGITS = 10_000  # binary ones, beyond which Python does not write a number
 REASON = 200  # characters of a sentence that quotes what a file says
+LIKENESS = 0.6  # of difflib, from which on a word is taken for a misspelt one
 
 
 def shown(value: Any) -> str:
@@ -29,7 +32,20 @@ def counted(count: int) -> str:
     return named(f"{count:,}") if count.bit_length() < DIGITS else "too many"
 
 
+def count_range(least: int, most: int) -> str:
+    """How many there may be, as in `2`, `2 or 3`, `1 to 3`."""
+    if least == most:
+        return f"{least}"
+    return f"{least} {'or' if most == least + 1 else 'to'} {most}"
+
+
 def reason(error: BaseException) -> str:
     """What an error says, which may quote a file: on one line, and cut where it is long."""
     text = "".join(c if c.isprintable() else "?" for c in str(error))
     return text if len(text) <= REASON else f"{text[: REASON - 3]}..."
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """`, did you mean edit?`; nothing where no known word is like it."""
+    near = get_close_matches(word, list(known), n=1, cutoff=LIKENESS)
+    return f", did you mean {near[0]}?" if near else ""

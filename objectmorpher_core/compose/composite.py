@@ -171,7 +171,9 @@ class _Drawing:
             for k, thing in enumerate(things)
             if thing.item.is_moved and thing.item.is_visible and thing.splats is not None
         }
-        self._textures = {k: object_texture(things[k].matte) for k in self._drawables}
+        self._textures = {
+            k: object_texture(things[k].matte, things[k].item.lifted) for k in self._drawables
+        }
         self.box = self._region(camera)
 
     def _region(self, camera: Camera) -> Box:

@@ -36,7 +36,7 @@ def depth_map(
         box = None if whole is None else overlap(whole, (0, 0, camera.width, camera.height))
         if box is None:
             continue
-        picture = tiles.draw(drawable, object_texture(item.matte), box)
+        picture = tiles.draw(drawable, object_texture(item.matte, item.lifted), box)
         depth = np.where(picture.alpha > SOLID, picture.depth, np.float32(np.inf))
         part = nearest[box[1] : box[3], box[0] : box[2]]
         np.minimum(part, depth, out=part)

@@ -8,10 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..base.arrays import Mask
+from ..base.camera import Camera
 from ..document.model import Document, EditObject, Matte
 from ..raster.posed import PosedSplats
 from .plate.plate import hole_margin
 
+MOSTLY = 0.5  # of a moved object: what hides more of it is hardly what was meant to
+FRAMED = 3  # sides of the photo: what touches so many is its background
+ALONG = 0.1  # of a side's length, from which it is touched
 EDGE = 4.0  # x the spacing of the Gaussians, how far an object reaches around their means
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 px of the photo
 Posed = Callable[[int], PosedSplats]
@@ -43,6 +48,34 @@ def stack(document: Document, posed: Posed) -> Stack:
 def stands_in_front(item: EditObject) -> bool:
     """Whether it covers what is edited, as it does in the photo."""
     return item.stays_in_front and item.matte is not None and item.is_visible and not item.is_moved
+
+
+def doubt_about_front(document: Document, k: int, posed: Posed) -> str | None:
+    """Return a doubt about object `k` as something in front, in words that follow its name.
+
+    It hides most of what was moved, or touches three sides of the photo: both happen where a click
+    has taken the background. `posed` gives a moved object's Gaussians where the edit has put them.
+    """
+    mask = document.objects[k].mask
+    if mask is None:
+        return None
+    for number, item in enumerate(document.objects):
+        if item.is_moved and item.is_visible:
+            share = _hidden(mask, posed(number), document.photo.camera)
+            if share > MOSTLY:
+                return f"hides {share:.0%} of {item.name}"
+    edges = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
+    touched = sum(float(edge.mean()) > ALONG for edge in edges)
+    return f"touches {touched} sides of the photo" if touched >= FRAMED else None
+
+
+def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
+    """Return the share of an object's Gaussians within the photo that lie behind `mask` (H, W)."""
+    height, width = mask.shape
+    means = splats.means[splats.means[:, 2] > 0]
+    x, y = np.floor(camera.project(means)).astype(np.int64).T
+    is_seen = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return float(mask[y[is_seen], x[is_seen]].mean()) if is_seen.any() else 0.0
 
 
 def back_to_front(

@@ -128,11 +128,12 @@ class Puppet:
         """The object of these pieces at rest; each looks where it is in the photo."""
         lifted, parents = self.lifted, split.parents
         texture = lifted.texture
-        pieces = self.camera.project(lifted.world_points(split.gaussians.means))
-        whole = self.camera.project(lifted.world_points(lifted.gaussians.means))
-        u0 = texture.u0[parents] + (pieces - whole[parents])
+        pieces = lifted.world_points(split.gaussians.means)
+        whole = lifted.world_points(lifted.gaussians.means)[parents]
+        u0 = texture.u0[parents] + (self.camera.project(pieces) - self.camera.project(whole))
+        sides = None if lifted.sides is None else lifted.sides.select(parents).moved(pieces - whole)
         own = PhotoTexture(u0, texture.visibility[parents], texture.solidity[parents])
-        return replace(lifted, gaussians=split.gaussians, texture=own)
+        return replace(lifted, gaussians=split.gaussians, texture=own, sides=sides)
 
     def posed_gaussians(self, pose: Pose | None, placement: Placement) -> Gaussians:
         """The object's solid Gaussians after the edit, in the photo camera's frame (y down)."""

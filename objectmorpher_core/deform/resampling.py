@@ -125,6 +125,7 @@ def thinned(lifted: LiftedObject, count: int) -> tuple[LiftedObject, I32] | None
     )  # fmt: skip
     wide = replace(
         lifted, gaussians=replace(gaussians, scales=scales), texture=own,
+        sides=None if lifted.sides is None else lifted.sides.select(chosen),
         spacing=gain * lifted.spacing,
     )  # fmt: skip
     return wide, chosen

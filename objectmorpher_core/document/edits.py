@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,9 +37,6 @@ from .settings import (
     Refined,
     Shadow,
 )
-
-if TYPE_CHECKING:
-    from ..raster.posed import PosedSplats
 
 SAME_THING = 0.15  # IoU of two masks, below which they are of two things
 SAME_PLACE = 1e-6  # object units: two targets closer than this are one
@@ -90,7 +85,12 @@ def beside(document: Document, k: int, prompt: Prompt) -> Prompt:
 
     Another object that a positive click is on is not: what is clicked is meant.
     """
-    wanted = [(int(c.y), int(c.x)) for c in prompt.clicks if c.is_foreground]
+    width, height = document.photo.size
+    wanted = [
+        (int(c.y), int(c.x))
+        for c in prompt.clicks
+        if c.is_foreground and 0 <= c.x < width and 0 <= c.y < height  # others are refused later
+    ]
     masks = [o.mask for j, o in enumerate(document.objects) if j != k and o.mask is not None]
     masks = [mask for mask in masks if not any(mask[place] for place in wanted)]
     if not masks:
@@ -482,13 +482,9 @@ def set_feather(document: Document, feather: float) -> Document:
 
 # Changes of what stays in front of the edited objects, as it stands in the photo.
 
-MOSTLY = 0.5  # of a moved object: what hides more of it is hardly what was meant to
-FRAMED = 3  # sides of the photo: what touches so many is its background
-ALONG = 0.1  # of a side's length, from which it is touched
-
 
 def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Document:
-    """Object `k` is not edited: it covers what is, by its `matte`, as it stands in the photo.
+    """Keep object `k` unedited in front of what is edited, by its `matte`, as it is in the photo.
 
     The matte may come later. Raises EditError where nothing is selected, or it was moved.
     """
@@ -501,38 +497,10 @@ def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Doc
     return document.with_object(k, kept)
 
 
-def let_go(document: Document, k: int) -> Document:
-    """Object `k` does not stay in front any more."""
+def stop_keeping_in_front(document: Document, k: int) -> Document:
+    """Let object `k` be edited again instead of staying in front."""
     item = replace(document.objects[k], stays_in_front=False)
     return document.with_object(k, item if item.lifted else replace(item, matte=None))
-
-
-def doubt(document: Document, k: int, posed: Callable[[int], PosedSplats]) -> str | None:
-    """What is odd about object `k` as something in front, in words that follow its name.
-
-    It hides most of what was moved, or touches three sides of the photo: both happen where a click
-    has taken the background. `posed` gives a moved object's Gaussians where the edit has put them.
-    """
-    mask = document.objects[k].mask
-    if mask is None:
-        return None
-    for number, item in enumerate(document.objects):
-        if item.is_moved and item.is_visible:
-            share = _hidden(mask, posed(number), document.photo.camera)
-            if share > MOSTLY:
-                return f"hides {share:.0%} of {item.name}"
-    edges = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
-    touched = sum(float(edge.mean()) > ALONG for edge in edges)
-    return f"touches {touched} sides of the photo" if touched >= FRAMED else None
-
-
-def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
-    """The share of an object's Gaussians within the photo that lie behind `mask` (H, W)."""
-    height, width = mask.shape
-    means = splats.means[splats.means[:, 2] > 0]
-    x, y = np.floor(camera.project(means)).astype(np.int64).T
-    is_seen = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    return float(mask[y[is_seen], x[is_seen]].mean()) if is_seen.any() else 0.0
 
 
 # What is changed about the refinement of an edit, as pure functions Document -> Document.

@@ -129,6 +129,50 @@ class PhotoTexture:
             object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
 
 
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Invented pictures of the sides that a photo does not show, and where each Gaussian looks.
+
+    A Gaussian takes what it shows from there once it faces the camera so much more than it faced
+    the photo's that the photo would be stretched over it (`raster.rules`).
+    """
+
+    pixels: U8  # (h, w, 3) sRGB
+    left: int  # px of the photo, where the corner of the pixels lies in the object's texture
+    top: int
+    at: F32  # (N, 2) px of the photo: what each Gaussian's mean shows
+    slopes: F32  # (N, 2, 3) px per world unit at rest
+    zoom: F32  # (N,) px per world unit of the picture; 0: the Gaussian is on none
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen(self.pixels, np.uint8))
+        for name in ("at", "slopes", "zoom"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float32))
+
+    def select(self, index: np.ndarray) -> Sides:
+        """Of the Gaussians at `index` (integers or booleans)."""
+        return replace(self, at=self.at[index], slopes=self.slopes[index], zoom=self.zoom[index])
+
+    def followed_by(self, count: int) -> Sides:
+        """With `count` more Gaussians that are on none of the pictures."""
+        parts = (self.at, self.slopes, self.zoom)
+        at, slopes, zoom = (
+            np.concatenate([part, np.zeros((count, *part.shape[1:]), np.float32)]) for part in parts
+        )
+        return replace(self, at=at, slopes=slopes, zoom=zoom)
+
+    def moved(self, offsets: np.ndarray, linear: np.ndarray | None = None) -> Sides:
+        """Of Gaussians that lie `offsets` (N, 3) world units aside, on the same surface.
+
+        `linear` (N, 3, 3): the surface itself was deformed so about each of them.
+        """
+        at, slopes = self.at, self.slopes.astype(np.float64)
+        if linear is not None:
+            slopes = slopes @ np.linalg.inv(linear)
+        at = at + np.einsum("nij,nj->ni", slopes, offsets)
+        return replace(self, at=at, slopes=slopes)
+
+
 GAUSSIANS = 16_000  # default count; the detail is in the photo, they only follow the shape
 BACKS = ("auto", "mirrored", "continued")  # what the side looks like that the photo does not show
 KINDS = ("auto", "free", "round", "flat", "box", "tube")  # of shapes; see lift.shapes
@@ -190,6 +234,7 @@ class LiftedObject:
     # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
     middle: F32 | None = None
     kind: str = ""  # of KINDS, what it was recognised as; empty: nobody looked
+    sides: Sides | None = None  # invented; None: what the photo does not show has plain colours
 
     def __post_init__(self) -> None:
         if self.middle is not None:

@@ -56,6 +56,7 @@ def refitted_shape(
     )
     lifted = replace(
         old, gaussians=gaussians, texture=texture,
+        sides=None if old.sides is None else old.sides.select(stays).followed_by(int(comes.sum())),
         middle=np.concatenate([old.middle[stays], middle]),
     )  # fmt: skip
     return with_control_points(lifted, old.control_points)

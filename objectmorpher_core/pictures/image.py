@@ -1,7 +1,7 @@
 """Pictures in and out of files: upright, RGB, bit depth, alpha, profile and EXIF kept.
 
-The pixels of a file that is read and written again as PNG, TIFF or WebP are the same, byte for
-byte; only 16-bit pixels that go into JPEG or WebP, which have 8, are rounded.
+The pixels of a file that is read and written again as PNG, TIFF, WebP or JPEG XL are the same,
+byte for byte; only 16-bit pixels that go into a format of 8 bits (`formats.py`) are rounded.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from PIL import Image, ImageCms
 from ..base.arrays import RGB, U8, Mask, Pixels, frozen
 from ..base.library_output import logged_output
 from ..base.limits import PICTURE_PIXELS as MAX_PIXELS
-from . import exif, png, tiff
+from . import exif, guests, png, tiff
+from .formats import FLAT, READABLE, endings_of
 
 FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "BMP", "GIF")  # plain pixels, no programs
-ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")  # that can be written
-READ_ENDINGS = (*ENDINGS, ".bmp")  # of what counts as a picture in a folder of pictures
+ENDINGS = endings_of(FLAT)  # that can be written
+READ_ENDINGS = READABLE  # of what counts as a picture in a folder of pictures
 MASK_THRESHOLD = 127  # of 255; above it a mask's pixel belongs to the object
 WEBP_MAX_SIDE = 16383  # px
 JPEG_MAX_SIDE = 65535  # px
+AVIF_MAX_SIDE = 65535  # px
+AVIF_SPEED = 8  # of 10; 6 takes three times as long for 3 % less
 REASON = 200  # characters of what a decoder says
 LOSSLESS = 100  # quality of WebP that keeps every pixel
 
@@ -64,6 +67,8 @@ def read_picture(data: bytes, most: int = MAX_PIXELS) -> Picture:
 
 
 def _read(data: bytes, most: int) -> Picture:
+    if (kind := guests.kind_of(data)) is not None:
+        return _read_guest(kind, data, most)
     try:
         image = Image.open(io.BytesIO(data), formats=FORMATS)
     except Image.DecompressionBombError:
@@ -71,7 +76,7 @@ def _read(data: bytes, most: int) -> Picture:
     except Exception:  # Pillow raises whatever a broken file makes it stumble over
         image = None  # perhaps a TIFF that only tifffile knows
     if image is None and data[:4] not in tiff.MARKS:
-        raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP)")
+        raise ImageError("the file is not an image that can be read (PNG, JPEG, TIFF, WebP, AVIF)")
     if image is not None and image.width * image.height > most:
         allowed = f"{most // 10**6} megapixels" if most >= 10**6 else f"{most:,} px"
         raise ImageError(f"the image is {image.width} x {image.height} px, more than {allowed}")
@@ -90,6 +95,17 @@ def _read(data: bytes, most: int) -> Picture:
         raise ImageError("the image cannot be read: it is damaged or ends early") from error
 
 
+def _read_guest(kind: str, data: bytes, most: int) -> Picture:
+    """The picture of a file that another package decodes."""
+    try:
+        found = guests.read(kind, data, most)
+    except guests.GuestError as error:
+        raise ImageError(str(error)) from error
+    except MemoryError as error:
+        raise ImageError("the image cannot be read: there is not enough memory for it") from error
+    return _picture(found.samples, found.exif, found.icc, turn=1)
+
+
 def _read_16_bit(data: bytes, image: Image.Image | None, most: int) -> Picture | None:
     """The picture of a file with 16 bits a channel; None where it has fewer."""
     if data.startswith(png.SIGNATURE):
@@ -103,7 +119,7 @@ def _read_16_bit(data: bytes, image: Image.Image | None, most: int) -> Picture |
         samples, turn = found
     else:
         return None
-    return _picture(samples, image, turn)
+    return _picture(samples, *_about(image), turn)
 
 
 def _read_8_bit(image: Image.Image | None) -> Picture:
@@ -114,13 +130,13 @@ def _read_8_bit(image: Image.Image | None) -> Picture:
         raise ImageError("only images of 8 or 16 whole-number bits a channel can be read")
     turn = 1 if image.format == "TIFF" else None  # Pillow turns TIFF files itself
     if image.mode in ("CMYK", "LAB"):
-        picture = _picture(np.asarray(_through_profile(image)), image, turn)
+        picture = _picture(np.asarray(_through_profile(image)), *_about(image), turn)
         return replace(picture, icc=None)
     has_alpha = image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info
     is_grey = image.mode in ("1", "L", "LA", "La")
     mode = ("LA" if has_alpha else "L") if is_grey else ("RGBA" if has_alpha else "RGB")
     samples = np.asarray(image.convert(mode))
-    return _picture(samples.reshape(*samples.shape[:2], -1), image, turn)
+    return _picture(samples.reshape(*samples.shape[:2], -1), *_about(image), turn)
 
 
 def _through_profile(image: Image.Image) -> Image.Image:
@@ -140,15 +156,12 @@ def _through_profile(image: Image.Image) -> Image.Image:
 
 
 def _picture(
-    samples: np.ndarray,
-    image: Image.Image | None,
-    turn: int | None,
+    samples: np.ndarray, block: bytes | None, icc: bytes | None, turn: int | None
 ) -> Picture:
     """Upright Picture of stored samples (H, W, 1..4): grey, grey + alpha, RGB or RGBA.
 
-    `turn` is the EXIF orientation, None to take it from the metadata of `image`.
+    `turn` is the EXIF orientation, None to take it from the EXIF `block`.
     """
-    block = None if image is None else _exif_block(image)
     if turn is None:
         turn = exif.orientation(block) if block else 1
     samples = _upright(samples, turn)
@@ -157,10 +170,17 @@ def _picture(
         pixels=samples[..., :3] if channels > 2 else np.repeat(samples[..., :1], 3, axis=2),
         alpha=samples[..., -1] if channels in (2, 4) else None,
         is_grey=channels < 3,
-        icc=image.info.get("icc_profile") or None if image is not None else None,
+        icc=icc,
         exif=exif.upright(block) if block else None,
         focal_35mm=exif.focal_35mm(block) if block else None,
     )
+
+
+def _about(image: Image.Image | None) -> tuple[bytes | None, bytes | None]:
+    """EXIF block and colour profile of an opened file."""
+    if image is None:
+        return None, None
+    return _exif_block(image), image.info.get("icc_profile") or None
 
 
 def _exif_block(image: Image.Image) -> bytes | None:
@@ -187,10 +207,10 @@ def encode_picture(
 ) -> bytes:
     """The bytes of an image file of the kind that `ending` (".png", "jpg") names.
 
-    PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for JPEG and WebP. `quality` is
-    JPEG's; WebP is lossless unless `webp_quality` is below 100. Grey stays grey (not in WebP,
-    which has none). Raises ImageError for an unknown ending, and where the format cannot hold
-    the picture.
+    PNG and TIFF keep the bit depth; 16 bits are rounded to 8 for the others. `quality` is that of
+    JPEG and AVIF; WebP and JPEG XL are lossless unless `webp_quality` is below 100. Grey stays
+    grey (not in WebP and AVIF, which have none). Raises ImageError for an unknown ending, and
+    where the format cannot hold the picture.
     """
     ending = "." + ending.lower().removeprefix(".")
     if ending not in ENDINGS:
@@ -200,6 +220,10 @@ def encode_picture(
             return _encode_jpeg(picture, quality)
         if ending == ".webp":
             return _encode_webp(picture, webp_quality)
+        if ending == ".avif":
+            return _encode_avif(picture, quality)
+        if ending == ".jxl":
+            return _encode_jxl(picture, webp_quality)
         codec = png if ending == ".png" else tiff
         samples = _Channels(picture)
         return codec.encode(samples, _profile_for(picture, samples.shape[2]), picture.exif)
@@ -256,16 +280,41 @@ def _encode_webp(picture: Picture, quality: int) -> bytes:
     height, width = picture.pixels.shape[:2]
     if max(width, height) > WEBP_MAX_SIDE:
         raise ImageError(f"WebP cannot hold {width} x {height} px; choose .png or .tif")
-    pixels = to_u8(picture.pixels)
-    if picture.alpha is not None:
-        pixels = np.dstack([pixels, to_u8(picture.alpha)])
     out = io.BytesIO()
     how = {"lossless": True} if quality >= LOSSLESS else {"quality": quality}
-    Image.fromarray(pixels).save(
+    Image.fromarray(_colours_and_alpha(picture)).save(
         out, "WEBP", **how, exact=True,  # exact: colours under transparency stay
         icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
     )  # fmt: skip
     return out.getvalue()
+
+
+def _encode_avif(picture: Picture, quality: int) -> bytes:
+    height, width = picture.pixels.shape[:2]
+    if max(width, height) > AVIF_MAX_SIDE:
+        raise ImageError(f"AVIF cannot hold {width} x {height} px; choose .png or .tif")
+    out = io.BytesIO()
+    Image.fromarray(_colours_and_alpha(picture)).save(
+        out, "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED,
+        icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
+    )  # fmt: skip
+    return out.getvalue()
+
+
+def _encode_jxl(picture: Picture, quality: int) -> bytes:
+    has_pair = picture.is_grey and picture.alpha is not None  # which the library does not take
+    samples = _colours_and_alpha(picture) if has_pair else to_u8(_Channels(picture)[:])
+    icc = _profile_for(picture, samples.shape[2])
+    try:
+        return guests.encode_jxl(samples, icc, picture.exif, quality)
+    except (guests.GuestError, RuntimeError) as error:
+        raise ImageError(str(error)) from error
+
+
+def _colours_and_alpha(picture: Picture) -> RGB:
+    """(H, W, 3 or 4) u8."""
+    pixels = to_u8(picture.pixels)
+    return pixels if picture.alpha is None else np.dstack([pixels, to_u8(picture.alpha)])
 
 
 def _profile_for(picture: Picture, channels: int) -> bytes | None:

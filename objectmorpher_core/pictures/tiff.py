@@ -148,6 +148,14 @@ def described(image: Image.Image) -> bytes | None:
     return b"II*\0" + struct.pack("<I", 8) + block if len(fields) else None
 
 
+def described_raw(data: bytes) -> bytes | None:
+    """EXIF block of what a RAW file that is built like a TIFF says; None for all others."""
+    if data[:4] not in MARKS[:2]:
+        return None
+    fields = _described_by(data)
+    return b"II*\0" + struct.pack("<I", 8) + fields.tobytes(8) if len(fields) else None
+
+
 def _described_by(exif: bytes | None) -> ImageFileDirectory_v2:
     """A directory with what an EXIF block says, which is nothing where it cannot be read."""
     if exif:

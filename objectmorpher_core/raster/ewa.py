@@ -23,6 +23,8 @@ from .posed import (
     NORMAL,
     OPACITY,
     PICTURE,
+    SIDE_U0,
+    SIDE_ZOOM,
     SOLIDITY,
     U0,
     VISIBILITY,
@@ -35,7 +37,8 @@ OUT = skinning.ROWS  # then the columns of the results,
 VOLUME = OUT + p.SPAN  # |det F|,
 FACING = VOLUME + 1  # cosine of the normal,
 SMALLEST = VOLUME + 2  # and the smaller magnification
-ROWS = VOLUME + 3
+ASIDE = VOLUME + 3  # whether it looks into an invented picture
+ROWS = VOLUME + 4
 ENDLESS = 1e30
 
 
@@ -68,25 +71,18 @@ def project_plain(s, rest, base, screen, rules, kind):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
-def project_textured(s, rest, base, screen, rules, kind):
-    """The same, and what they show of the photo."""
+def project_textured(s, rest, base, sides, aside, screen, rules, kind):
+    """The same, and what they show of the photo, or of an invented picture.
+
+    Of those, what begins at `aside` of `sides` is of the same Gaussians; -1: there are none.
+    """
     w, _, _, _, _, _, (ratio, photo_cx, photo_cy) = screen
     for k in range(LANES):
         shape = _shape(s, rest, base, k, screen, rules)
         _put_shape(s, k, rest[base + OPACITY * LANES + k], screen, kind, shape)
         place, j, f, a, b, _, (ixx, ixy, iyy), _ = shape
-        r = base + k
-        # A = J0 Sigma (J1 F)^T (...)^-1
-        upper = _three(rest, r + PICTURE * LANES)
-        lower = _three(rest, r + (PICTURE + 3) * LANES)
-        c00, c01, c10, c11 = _dot(upper, a), _dot(upper, b), _dot(lower, a), _dot(lower, b)
-        axx, axy = c00 * ixx + c01 * ixy, c00 * ixy + c01 * iyy
-        ayx, ayy = c10 * ixx + c11 * ixy, c10 * ixy + c11 * iyy
-        # its singular values
-        total = axx * axx + axy * axy + ayx * ayx + ayy * ayy
-        area = abs(axx * ayy - axy * ayx)
-        spread = math.sqrt(max(total * total - 4 * area * area, 0.0))
-        largest = math.sqrt(max(0.5 * (total + spread), 1e-30))
+        ahead = screen[2] / rules.near * rules.ahead
+        r, u = base + k, base + k + U0 * LANES
         # normals turn with the cofactors of F; W turns them and the way to the camera alike
         k0, k1, k2 = _cross(f[1], f[2]), _cross(f[2], f[0]), _cross(f[0], f[1])
         determinant = _dot(f[0], k0)
@@ -95,16 +91,38 @@ def project_textured(s, rest, base, screen, rules, kind):
         n = _dot(k0, n), _dot(k1, n), _dot(k2, n)
         v = _times(place, w)
         cosine = -sign * _dot(n, v) / max(math.sqrt(_dot(n, n) * _dot(v, v)), 1e-30)
+        # A = J0 Sigma (J1 F)^T (...)^-1
+        upper = _three(rest, r + PICTURE * LANES)
+        lower = _three(rest, r + (PICTURE + 3) * LANES)
+        ux, uy, zoom, is_aside = rest[u], rest[u + LANES], rest[r + ZOOM * LANES], 0.0
+        if aside >= 0:
+            q = aside + k
+            across, down = _three(sides, q), _three(sides, q + 3 * LANES)
+            sx, sy = sides[q + SIDE_U0 * LANES], sides[q + (SIDE_U0 + 1) * LANES]
+            own = sides[q + SIDE_ZOOM * LANES]
+            is_less = rest[r + COSINE * LANES] < rules.look_aside * cosine
+            is_aside = (1.0 if is_less else 0.0) * (1.0 if own > 0.0 else 0.0)
+            upper, lower = _chosen(is_aside, across, upper), _chosen(is_aside, down, lower)
+            (ux, uy, zoom) = _chosen(is_aside, (sx, sy, own), (ux, uy, zoom))
+        c00, c01, c10, c11 = _dot(upper, a), _dot(upper, b), _dot(lower, a), _dot(lower, b)
+        axx, axy = c00 * ixx + c01 * ixy, c00 * ixy + c01 * iyy
+        ayx, ayy = c10 * ixx + c11 * ixy, c10 * ixy + c11 * iyy
+        # its singular values
+        total = axx * axx + axy * axy + ayx * ayx + ayy * ayy
+        area = abs(axx * ayy - axy * ayx)
+        spread = math.sqrt(max(total * total - 4 * area * area, 0.0))
+        largest = math.sqrt(max(0.5 * (total + spread), 1e-30))
         o = OUT * LANES + k
-        u = r + U0 * LANES
-        s[o + p.SX * LANES] = rest[u] - (j * place[0] * ratio + photo_cx)
-        s[o + p.SY * LANES] = rest[u + LANES] - (j * place[1] * ratio + photo_cy)
+        s[o + p.SX * LANES] = ux - (j * place[0] * ratio + photo_cx)
+        s[o + p.SY * LANES] = uy - (j * place[1] * ratio + photo_cy)
         s[o + p.AXX * LANES], s[o + p.AXY * LANES] = axx - ratio, axy
         s[o + p.AYX * LANES], s[o + p.AYY * LANES] = ayx, ayy - ratio
         s[o + p.MAGNIFIED * LANES] = largest
         s[VOLUME * LANES + k] = abs(determinant)
         s[FACING * LANES + k] = cosine
-        s[SMALLEST * LANES + k] = area / largest * j / rest[r + ZOOM * LANES]
+        s[SMALLEST * LANES + k] = area / largest * j / zoom
+        s[ASIDE * LANES + k] = is_aside
+        s[o + p.Z * LANES] -= is_aside * ahead
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)
@@ -182,7 +200,9 @@ def weigh_textured(s, rest, base, scale, rules, kind):
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
         matted *= seen if kind.is_edged else ramp(turned, rules.turned_end, rules.turned_start)
-        if kind.has_colors:
+        if s[ASIDE * LANES + k] > 0.0:
+            matted = seen = 0.0
+        elif kind.has_colors:
             photo *= seen
             seen = 1.0
         body = (1.0 - photo) * solidity
@@ -241,6 +261,15 @@ def write(s, rest, base, start, count, columns, out):
 def _three(a, at):
     """Three rows of memory in which a row has LANES numbers."""
     return a[at], a[at + LANES], a[at + 2 * LANES]
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _chosen(share, a, b):
+    """`a` where `share` is 1, `b` where it is 0; without a branch, for vector instructions."""
+    rest = 1.0 - share
+    return (
+        share * a[0] + rest * b[0], share * a[1] + rest * b[1], share * a[2] + rest * b[2],
+    )  # fmt: skip
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

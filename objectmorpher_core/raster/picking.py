@@ -98,7 +98,8 @@ def _probe(drawable: Drawable, texture: TextureLevels, at: F64, near: I32) -> Hi
     q = rows[:, QXX] * (dx + rows[:, TILT] * dy) ** 2 + rows[:, RYY] * dy**2
     apart = np.abs(rows[:, Z] + rows[:, ZX] * dx + rows[:, ZY] * dy - depth)
     weights = rows[:, WEIGHT] * np.exp(-0.5 * q)
-    weights *= (q < rows[:, CUT]) & (apart <= drawable.splats.gap)
+    # Another picture of the surface, or another surface, may lie within the gap: it counts less.
+    weights *= (q < rows[:, CUT]) * np.maximum(1 - (apart / drawable.splats.gap) ** 2, 0) ** 2
     best = np.argsort(-weights, kind="stable")[:NEAR]
     return Hit(at, depth, near[best[weights[best] > 0]])
 

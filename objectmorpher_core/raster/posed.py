@@ -26,6 +26,10 @@ U0 = NORMAL + 3
 VISIBILITY, SOLIDITY, OPACITY, ZOOM, COSINE = range(U0 + 2, U0 + 7)
 COLOUR = COSINE + 1
 REST_ROWS = COLOUR + 3
+# Rows of a block of where they look in invented pictures, see `RestSplats.side_blocks`.
+SIDE_U0 = 6  # after the covariance of the picture with the rest object
+SIDE_ZOOM = SIDE_U0 + 2
+SIDE_ROWS = SIDE_ZOOM + 1
 
 ENDLESS = 1e12  # px per world unit, of a photo that cannot be carried along
 BEYOND = 1.3  # x half the photo: Jacobians are taken no farther out (Kerbl et al. 2023)
@@ -42,6 +46,7 @@ class RestSplats:
         self.means = frozen(lifted.gaussians.means, np.float64)  # (N, 3) object frame
         world = lifted.world_points(self.means)
         self.zoom = frozen(camera.focal / world[:, 2])  # (N,) px per world unit
+        self.sides = lifted.sides
         self.spacing = lifted.spacing * lifted.scale  # world units
         self.spacing_px = self.spacing * float(np.median(self.zoom))
         self._jacobians = projection_jacobians(world, camera.focal)
@@ -67,7 +72,7 @@ class RestSplats:
         other.lifted = replace(self.lifted, gaussians=gaussians)
         # The photo's part ends where the motion stretches it too much: here everywhere.
         other.zoom = frozen(np.full(len(self), ENDLESS))
-        other.is_textured = False
+        other.is_textured, other.sides = False, None
         blocks = self.blocks.copy()
         table = np.zeros((blocks.shape[0] * LANES, 4))
         table[: len(self)] = np.column_stack([gaussians.colors, gaussians.opacities])
@@ -104,6 +109,12 @@ class RestSplats:
         return frozen(self._jacobians @ self.covariances)
 
     @cached_property
+    def side_pictures(self) -> F64:
+        """(N, 2, 3) the same of the invented picture that each may look into."""
+        assert self.sides is not None, "there are some"
+        return frozen(self.sides.slopes.astype(np.float64) @ self.covariances)
+
+    @cached_property
     def normals(self) -> F64:
         """(N, 3) outward, world, unit."""
         normals = self.lifted.gaussians.normals.astype(np.float64)
@@ -127,6 +138,16 @@ class RestSplats:
         return frozen(-(self.normals * world).sum(1) / np.linalg.norm(world, axis=1))
 
     @cached_property
+    def side_blocks(self) -> F32:
+        """(blocks, SIDE_ROWS, LANES) where they look in invented pictures; empty without any."""
+        if self.sides is None:
+            return frozen(np.zeros((0, SIDE_ROWS, LANES), np.float32))
+        pictures = self.sides.slopes.astype(np.float64) @ self.world_from_object[:3, :3]
+        pictures = pictures @ self.lifted.gaussians.covariances()
+        rows = [pictures[:, 0], pictures[:, 1], self.sides.at, self.sides.zoom[:, None]]
+        return _in_blocks(np.hstack(rows))
+
+    @cached_property
     def blocks(self) -> F32:
         """(blocks, REST_ROWS, LANES): 64 Gaussians side by side, in the object's frame.
 
@@ -142,10 +163,15 @@ class RestSplats:
             texture.visibility[:, None], texture.solidity[:, None], gaussians.opacities[:, None],
             self.zoom[:, None], self.cosines[:, None], gaussians.colors,
         ]  # fmt: skip
-        count = -(-len(self) // LANES)
-        table = np.zeros((count * LANES, REST_ROWS), np.float32)
-        table[: len(self)] = np.hstack(rows)
-        return frozen(table.reshape(count, LANES, REST_ROWS).transpose(0, 2, 1))
+        return _in_blocks(np.hstack(rows))
+
+
+def _in_blocks(rows: np.ndarray) -> F32:
+    """(blocks, R, LANES) of rows (N, R), the rest of the last block 0."""
+    count = -(-len(rows) // LANES)
+    table = np.zeros((count * LANES, rows.shape[1]), np.float32)
+    table[: len(rows)] = rows
+    return frozen(table.reshape(count, LANES, -1).transpose(0, 2, 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from ..base.threads import FAST, in_threads
 from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
 from . import ewa
-from .posed import REST_ROWS, PosedSplats, view_limits
+from .posed import REST_ROWS, SIDE_ROWS, PosedSplats, view_limits
 from .rules import FRONT, PLAIN_SPAN, RULES, SPAN, SX, Z
 
 
@@ -41,7 +41,7 @@ def project(
         ]
     )  # fmt: skip
     inputs: tuple[Any, ...] = (
-        *_motion(splats), rest.blocks.reshape(-1), frozen(frame), RULES, rest.splatting,
+        *_motion(splats), rest.blocks.reshape(-1), rest.side_blocks.reshape(-1), frozen(frame), RULES, rest.splatting,
         splats.is_layered, out, _NO_DEPTHS if depths is None else depths,
     )  # fmt: skip
     in_threads(lambda first, last: _project(first, last, *inputs), len(rest.blocks), 2)
@@ -70,7 +70,7 @@ def _motion(splats: PosedSplats) -> tuple[Any, ...]:
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _project(
     first, last, x, control_points, shares, nodes, centre, points, linear,
-    rest, frame, rules, kind, is_textured, out, depths,
+    rest, sides, frame, rules, kind, is_textured, out, depths,
 ):  # fmt: skip
     """Fills the rows of `out` that belong to the blocks first..last."""
     s = np.ones(ewa.ROWS * LANES)
@@ -99,7 +99,8 @@ def _project(
                     for b in range(3):
                         s[(LINEAR + 3 * a + b) * LANES + k] = linear[start + k, a, b]
         if is_textured:
-            ewa.project_textured(s, rest, base, screen, rules, kind)
+            at = block * SIDE_ROWS * LANES if len(sides) > 0 else -1
+            ewa.project_textured(s, rest, base, sides, at, screen, rules, kind)
             ewa.weigh_textured(s, rest, base, frame[12], rules, kind)
             ewa.limit(s, kind)
             ewa.limit_front(s, rules, kind)

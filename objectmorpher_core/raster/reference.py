@@ -53,7 +53,17 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     screen = jacobian @ world @ jacobian.transpose(0, 2, 1)
     ridge = RULES.ridge * np.trace(screen, axis1=1, axis2=2) + 1e-12
     inverse = np.linalg.inv(screen + ridge[:, None, None] * np.eye(2))
-    a = rest.pictures[index] @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
+    seen = texture.visibility[index].astype(np.float64)
+    cosine = _cosines(rest.normals[index], motion, means)
+    pictures, look, zoomed = rest.pictures[index], texture.u0[index], rest.zoom[index]
+    aside = np.zeros(len(index), bool)
+    if rest.sides is not None:  # where an invented picture shows the surface better
+        zoom = rest.sides.zoom[index]
+        aside = (zoom > 0) & (rest.cosines[index] < RULES.look_aside * cosine)
+        pictures = np.where(aside[:, None, None], rest.side_pictures[index], pictures)
+        look = np.where(aside[:, None], rest.sides.at[index], look)
+        zoomed = np.where(aside, zoom, zoomed)
+    a = pictures @ motion.transpose(0, 2, 1) @ jacobian.transpose(0, 2, 1) @ inverse
     filtered = screen + kind.filter * np.eye(2)
     conic = np.linalg.inv(filtered).astype(np.float64)
     # Where the filter spreads a small Gaussian over more pixels, it must not gain weight by that.
@@ -61,11 +71,9 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     compensation = larger if kind.is_compensated else np.ones(len(index))
     singular = np.linalg.svd(a, compute_uv=False).astype(np.float64)
     volume = np.cbrt(np.abs(np.linalg.det(motion)))
-    zoom = camera.focal / means[:, 2] / rest.zoom[index]
+    zoom = camera.focal / means[:, 2] / zoomed
     stretch = singular[:, 1] * zoom * volume
     carried = smoothstep(stretch, RULES.streak_end, RULES.streak_start)
-    seen = texture.visibility[index].astype(np.float64)
-    cosine = _cosines(rest.normals[index], motion, means)
     turned = cosine - rest.cosines[index]
     if kind.is_edged:
         cosine = np.where(seen == 0, np.minimum(cosine, turned), cosine)
@@ -82,9 +90,10 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
     facing = solidity * front + (1 - solidity) * brim
     matted = smoothstep(stretch, RULES.matte_end, RULES.matte_start)
     matted *= seen if kind.is_edged else smoothstep(turned, RULES.turned_end, RULES.turned_start)
-    photo = seen * carried if kind.has_colors else carried
+    matted *= ~aside
+    photo = np.where(aside, carried, seen * carried) if kind.has_colors else carried
     body = (1 - photo) * solidity
-    seen = np.ones(len(index)) if kind.has_colors else seen
+    seen = ~aside * (np.ones(len(index)) if kind.has_colors else seen)
     weight = gaussians.opacities[index] * facing * compensation
     centre = camera.project(means)
     ratio = photo_camera.focal / camera.focal  # photo px per view px
@@ -96,9 +105,9 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         centre=centre,
         conic=np.stack([conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1]], axis=1),
         extent=extent,
-        depth=means[:, 2],
+        depth=means[:, 2] - aside * RULES.ahead * splats.gap,
         slope=(covariance_z[:, None] @ inverse)[:, 0],
-        shift=texture.u0[index] - unmoved,
+        shift=look - unmoved,
         shift_slope=a - ratio * np.eye(2),
         magnified=singular[:, 0],
         weight=weight,

@@ -94,6 +94,12 @@ class Rules(NamedTuple):
     turned_start: float = 0.08  # of the cosine, more than at rest
     turned_end: float = 0.25
 
+    # Where an invented picture shows the surface, too, it takes the photo's place from this ratio
+    # of the cosines on: of the normal with the way to the photo's camera, to that now.
+    look_aside: float = 0.3
+    # It lies so much nearer, x the object's gap: two pictures of one surface meet along a line.
+    ahead: float = 0.1
+
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.
     streak_start: float = 0.40

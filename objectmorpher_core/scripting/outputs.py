@@ -1,35 +1,35 @@
-"""What can be saved of an edit that was carried out, as the bytes of a file."""
+"""The exporter of window, command line and library: what can be saved of an edit, as bytes."""
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..compose.composite import straight_cutout
+import numpy as np
+
+from ..base.pixels import crop, pixels_from_unit
+from ..base.progress import Progress, part, silent
+from ..base.quoting import shown
+from ..compose.composite import Composite, composite, straight_cutout
 from ..compose.depth_map import depth_picture
-from ..compose.layers import layers
+from ..compose.layers import Layer, layers
 from ..compose.plate.plate import plate_picture
-from ..pictures.image import ENDINGS, Picture, encode_mask, encode_picture
+from ..deform.puppet import Puppet, puppet_of
+from ..document.model import Document, EditObject
+from ..pictures.formats import NEED_PLATE, WRITTEN, Format, endings_of, format_of
+from ..pictures.image import LOSSLESS, Picture, encode_picture, to_u8
 from ..pictures.openraster import encode_openraster
-from ..pictures.video import ENDINGS as VIDEO_ENDINGS
+from ..pictures.psd import encode_psd
 from ..pictures.video import encode_video
-from ..pipeline import Edited
-from ..splat_files import SPLAT_ENDINGS
+from ..pipeline import Edited, export
 from ..splat_files import encode as encode_splats
 from .animation import Clip, frames
 from .script import ScriptError
 
-OUTPUTS = {  # what can be saved, and the endings that each may have
-    "photo": ENDINGS,
-    "session": (".omorph",),
-    "mask": (".png",),
-    "plate": ENDINGS,
-    "object": (".png", ".tif", ".tiff", ".webp"),
-    "splats": SPLAT_ENDINGS,
-    "depth": (".png", ".tif", ".tiff"),
-    "layers": (".ora",),
-    "video": VIDEO_ENDINGS,
-}
-NEED_PLATE = ("plate", "layers", "video")
+OUTPUTS = {what: endings_of(formats) for what, formats in WRITTEN.items()}
+PICTURES = ("photo", "mask", "plate", "object", "depth")  # those that are one picture
+U8_MIN, U8_MAX = np.uint8(0), np.uint8(255)
 USUAL_CLIP = Clip()
 
 
@@ -39,37 +39,174 @@ def encode_output(what: str, edited: Edited, path: Path, clip: Clip = USUAL_CLIP
     Raises the one-sentence ValueErrors of what encodes it; ScriptError for an unknown `what`, and
     where a background is needed that was not made.
     """
-    if what not in OUTPUTS:
-        raise ScriptError(f"{what!r} cannot be saved; what can is {', '.join(OUTPUTS)}")
+    _check_possible(what, edited, tuple(OUTPUTS))
     if not path.name.lower().endswith(OUTPUTS[what]):
         raise ScriptError(f"{path}: the ending must be {' or '.join(OUTPUTS[what])}")
-    document = edited.document
-    if what in NEED_PLATE and document.plate is None:
-        raise ScriptError("there is no background: nothing was moved, and none was asked for")
-    if what == "photo":
-        return encode_picture(edited.picture, path.suffix)
-    if what == "session":
-        from ..session.file import encode_session
+    return Export(edited.document, edited, clip=clip).encode(what, path)
 
-        return encode_session(document)
-    if what == "mask":
-        mask = document.objects[0].mask
+
+def output_picture(what: str, edited: Edited) -> Picture:
+    """Return the picture of one of PICTURES, of the photo's size. Raises ScriptError as above."""
+    _check_possible(what, edited, PICTURES)
+    return Export(edited.document, edited).picture(what)
+
+
+def _check_possible(what: str, edited: Edited, known: tuple[str, ...]) -> None:
+    if what not in known:
+        raise ScriptError(f"there is no output {shown(what)}; known are {', '.join(known)}")
+    if what in NEED_PLATE and edited.document.plate is None:
+        raise ScriptError("there is no background: nothing was moved, and none was asked for")
+
+
+@dataclass(frozen=True, eq=False)
+class Export:
+    """A document, how it is to be saved, and what of it was computed already."""
+
+    document: Document
+    edited: Edited | None = None  # None: all is computed from the document
+    object: int | None = None  # index of the one that is meant; None: the first, or all of them
+    bits: int = 0  # 8 or 16 a channel; 0: the photo's own
+    quality: int = 95  # of JPEG and AVIF
+    webp_quality: int = LOSSLESS  # of WebP and JPEG XL
+    clip: Clip = USUAL_CLIP
+    progress: Progress = silent
+
+    def encode(self, what: str, path: Path) -> bytes:
+        """Return the file that holds `what`, in the format that the name of `path` says."""
+        if what == "session":
+            from ..session.file import encode_session
+
+            return encode_session(self.document)
+        if what == "layers":
+            merged, pile = self.layers(part(self.progress, 0.05, 0.7))
+            write = encode_psd if format_of(path.name) is Format.PSD else encode_openraster
+            return write(pile, merged)
+        if what == "video":
+            film = frames(self.document, self.clip, part(self.progress, 0.02, 0.95))
+            return encode_video(film, self.clip.rate, path.suffix)
+        if what in ("splats", "mesh"):
+            return self._solid(what, path)
+        return self._encoded(self.picture(what), path.suffix)
+
+    def picture(self, what: str) -> Picture:
+        """Return the flat picture that is asked for, one of PICTURES."""
+        draw = part(self.progress, 0.05, 0.6)
+        if what == "photo":
+            return self.edited.picture if self.edited else export(self.document, progress=draw)
+        if what == "mask":
+            return self._mask()
+        if what == "object":
+            return self._cutout(draw)
+        if what == "depth":
+            return depth_picture(self.document, self.edited and self.edited.puppets, draw)
+        photo = self.document.photo
+        pixels = photo.pixels if self.document.plate is None else plate_picture(self.document)
+        return replace(photo.picture, pixels=pixels)
+
+    def files(self, folder: Path) -> dict[Path, bytes]:
+        """Return the layers as PNG files as large as the photo, and all together.
+
+        They are numbered from below.
+        """
+        merged, pile = self.layers(part(self.progress, 0.05, 0.7))
+        pile = [layer for layer in pile if layer.is_shown]
+        height, width = merged.pixels.shape[:2]
+        stem = Path(self.document.photo.name).stem
+        outputs = {}
+        for k, layer in enumerate(pile):
+            self.progress(0.7 + 0.25 * k / len(pile), "encoding")
+            samples = layer.pixels
+            alpha = None
+            if samples.shape[2] == 4:
+                samples = crop(samples, layer.box, (0, 0, width, height))
+                alpha = samples[..., 3]
+            name = re.sub(r"[^\w-]+", "-", layer.name).strip("-").lower() or "object"
+            data = encode_picture(Picture(samples[..., :3], alpha, icc=merged.icc), ".png")
+            outputs[folder / f"{stem}-{k}-{name}.png"] = data
+        outputs[folder / f"{stem}-{len(pile)}-composite.png"] = encode_picture(merged, ".png")
+        return outputs
+
+    def layers(self, progress: Progress) -> tuple[Picture, list[Layer]]:
+        """Return the edited photo and its layers from below, with the bits that are wanted."""
+        result, pile = layers(self.document, progress)
+        merged = replace(self.document.photo.picture, pixels=result.pixels)
+        deep = [replace(layer, pixels=_sampled(layer.pixels, self.bits)) for layer in pile]
+        return self._with_bits(merged), deep
+
+    def _mask(self) -> Picture:
+        mask = self.document.objects[self.object or 0].mask
         if mask is None:
             raise ScriptError("the first object has no mask")
-        return encode_mask(mask)
-    if what == "plate":
-        plate = Picture(plate_picture(document), is_grey=document.photo.picture.is_grey,
-                        icc=document.photo.picture.icc)  # fmt: skip
-        return encode_picture(plate, path.suffix)
-    if what == "object":
-        cutout = straight_cutout(edited.composite, document.photo.pixels.dtype, document.photo.size)
-        picture = Picture(cutout[..., :3], cutout[..., 3], icc=document.photo.picture.icc)
-        return encode_picture(picture, path.suffix)
-    if what == "depth":
-        return encode_picture(depth_picture(document, edited.puppets), path.suffix)
-    if what == "layers":
-        return encode_openraster(layers(document)[1], edited.picture)
-    if what == "video":
-        return encode_video(frames(document, clip), clip.rate, path.suffix)
-    item = document.objects[edited.first]
-    return encode_splats(edited.puppet.posed_gaussians(item.pose, item.placement), path)
+        return Picture(np.repeat(np.where(mask, U8_MAX, U8_MIN)[..., None], 3, 2), is_grey=True)
+
+    def _encoded(self, picture: Picture, ending: str) -> bytes:
+        self.progress(0.6, "encoding")
+        return encode_picture(self._with_bits(picture), ending, self.quality, self.webp_quality)
+
+    def _with_bits(self, picture: Picture) -> Picture:
+        alpha = None if picture.alpha is None else _sampled(picture.alpha, self.bits)
+        return replace(picture, pixels=_sampled(picture.pixels, self.bits), alpha=alpha)
+
+    def _cutout(self, progress: Progress) -> Picture:
+        """One object, or all that were edited, where they are now; straight colour and alpha."""
+        photo = self.document.photo
+        if self.edited is not None and self.object is None:
+            samples = self._drawn(self.edited.composite)
+        else:
+            thing = self.document.objects[self.object or 0]
+            if thing.is_moved:
+                objects = (replace(thing, is_visible=True),)
+                alone = replace(self.document, objects=objects, plate=None, refined=None)
+                samples = self._drawn(composite(alone, progress=progress))
+            else:
+                samples = unmoved_cutout(self.document, thing)
+        return Picture(samples[..., :3], samples[..., 3], icc=photo.picture.icc)
+
+    def _drawn(self, result: Composite) -> np.ndarray:
+        return straight_cutout(result, self.document.photo.pixels.dtype, self.document.photo.size)
+
+    def _solid(self, what: str, path: Path) -> bytes:
+        """The posed object in 3D, as Gaussians or as a mesh."""
+        index, puppet = self._posed_object()
+        thing = self.document.objects[index]
+        if what == "splats" and format_of(path.name) is not Format.GLB:
+            return encode_splats(puppet.posed_gaussians(thing.pose, thing.placement), path)
+        from ..splat_files.meshes.textured import textured_glb
+
+        self.progress(0.2, "drawing")
+        return textured_glb(thing, puppet)
+
+    def _posed_object(self) -> tuple[int, Puppet]:
+        if self.edited is not None and self.object is None:
+            return self.edited.first, self.edited.puppet
+        lifted = [k for k, item in enumerate(self.document.objects) if item.lifted is not None]
+        index = lifted[0] if self.object is None and lifted else self.object
+        if index is None or index not in lifted:
+            raise ScriptError("the object has no shape yet")
+        return index, puppet_of(self.document.objects[index], self.document.photo.camera)
+
+
+def unmoved_cutout(document: Document, thing: EditObject) -> np.ndarray:
+    """(H, W, 4) an object as it is in the photo: by its matte, else by its mask."""
+    pixels = document.photo.pixels
+    height, width = pixels.shape[:2]
+    if thing.matte is None:
+        assert thing.mask is not None, "it is asked for first"
+        alpha = thing.mask * np.array(np.iinfo(pixels.dtype).max, pixels.dtype)
+        return np.dstack([pixels, alpha])
+    matte = thing.matte
+    box = (max(matte.left, 0), max(matte.top, 0), min(matte.box[2], width),
+           min(matte.box[3], height))  # fmt: skip
+    soft = np.dstack([crop(matte.foreground, matte.box, box), crop(matte.alpha, matte.box, box)])
+    soft[soft[..., 3] <= 0] = 0
+    samples = np.zeros((height, width, 4), pixels.dtype)
+    samples[box[1] : box[3], box[0] : box[2]] = pixels_from_unit(soft, pixels.dtype)
+    return samples
+
+
+def _sampled(samples: np.ndarray, bits: int) -> np.ndarray:
+    """Samples of any shape with so many bits; 0 leaves them."""
+    if bits == 8:
+        return to_u8(samples)
+    is_narrow = bits == 16 and samples.dtype == np.uint8
+    return samples.astype(np.uint16) * np.uint16(257) if is_narrow else samples  # 255 -> 65535

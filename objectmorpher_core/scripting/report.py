@@ -153,6 +153,21 @@ def _of_object(
     }  # fmt: skip
 
 
+def provenance(result: Composite) -> str:
+    """How much of the photo an edit changed, and where those pixels come from; no full stop."""
+    if not result.changed:
+        return "nothing changed"
+    shares = result.shares
+    parts = (
+        (shares.from_photo, "the photo's own"),
+        (shares.from_lifter, "the unseen side"),
+        (shares.from_inpainter, "filled-in background"),
+        (shares.from_refiner, "refined"),
+    )
+    named = ", ".join(f"{share:.0%} {name}" for share, name in parts if share >= 0.005)
+    return f"{result.changed / result.pixels[..., 0].size:.0%} of the photo changed ({named})"
+
+
 def peak_memory_mb() -> float:
     """Largest resident memory of this process so far, MB; 0 where the system does not tell."""
     with contextlib.suppress(OSError):  # Linux; getrusage would count who started us, too

@@ -64,7 +64,7 @@ def _refuse_missing(script: EditScript) -> None:
     if script.refine not in ("auto", *known):
         raise ScriptError(f"there is no refiner {script.refine!r}; known are {', '.join(known)}")
     if script.refine in refine.BACKENDS and (reason := refine.missing(script.refine)) is not None:
-        raise ScriptError(f"--refine {script.refine}: {reason}")
+        raise ScriptError(f"refine {script.refine}: {reason}")
 
 
 def refiner_of(script: EditScript, others: Others = ALONE) -> str | None:
@@ -204,7 +204,7 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
     lifted, camera = puppet.lifted, document.photo.camera
     matte = document.objects[k].matte
     assert matte is not None
-    texture = object_texture(matte)
+    texture = object_texture(matte, lifted)
 
     def pick(xy: tuple[float, float], option: str) -> Any:
         width, height = document.photo.size
@@ -218,12 +218,12 @@ def _with_handles(document: Document, k: int, puppet: Puppet, script: EditScript
         return point
 
     for xy in script.pin:
-        document = edits.add_handle(document, k, pick(xy, "--pin").rest, is_pin=True)
+        document = edits.add_handle(document, k, pick(xy, "pin").rest, is_pin=True)
     for handle in script.handle:
-        point = pick(handle.at, "--handle")
+        point = pick(handle.at, "handle")
         depth = point.depth + handle.dz * lifted.diameter * lifted.scale
         if depth <= 0:
-            raise ScriptError(f"--handle: a depth of {handle.dz:g} is behind the camera")
+            raise ScriptError(f"handle: a depth of {handle.dz:g} is behind the camera")
         target = lifted.object_points(camera.unproject(np.array(handle.to), depth))
         document = edits.add_handle(document, k, point.rest, target)
     return document
@@ -303,7 +303,7 @@ def with_plate(
 
 def _notes(item: EditObject, old: OldTraces, has_gone: bool) -> list[str]:
     """What becomes of an object's traces in the photo, and how to refuse."""
-    refuse = "--shadow none leaves the ground as it is in the photo"
+    refuse = "shadow none leaves the ground as it is in the photo"
     notes = []
     if old.shadow is not None:
         goes = "goes along with it" if item.is_visible else "is removed with it"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.files import read_input
-from ..base.quoting import shown
+from ..base.quoting import count_range, meant, shown
 from ..document.model import BACKS, KINDS, LEAST_THICKNESS, MOST_THICKNESS
 
 XY = tuple[float, float]
@@ -148,7 +148,7 @@ def read_scripts(path: Path) -> tuple[BatchItem, ...]:
 
 def script_text(item: BatchItem) -> str:
     """JSON of which `parse_scripts` makes this one item."""
-    told: dict[str, Any] = {"photo": item.photo, "out": item.out, **_said_by(item.script)}
+    told: dict[str, Any] = {"photo": item.photo, "out": item.out, **said_by(item.script)}
     told = {key: value for key, value in told.items() if value is not None}
     if item.others.objects:
         told["objects"] = [_told(each) for each in item.others.objects]
@@ -158,13 +158,13 @@ def script_text(item: BatchItem) -> str:
 
 
 def _told(each: FurtherObject) -> dict[str, Any]:
-    told = _said_by(each.script, each.said)
+    told = said_by(each.script, each.said)
     told |= {} if each.duplicate is None else {"duplicate": each.duplicate}
     return told | ({"stay_in_front": True} if each.stay_in_front else {})
 
 
-def _said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
-    """The options that are no defaults, and those of `said`."""
+def said_by(script: EditScript, said: frozenset[str] = frozenset()) -> dict[str, Any]:
+    """The options that differ from their defaults, and those of `said`."""
     default = asdict(EditScript())
     told = asdict(script).items()
     return {name: v for name, v in told if name in said or v != default[name]}
@@ -204,7 +204,7 @@ def script_from(options: Mapping[str, Any]) -> EditScript:
     for key, value in options.items():
         name = key.replace("-", "_")
         if name not in known:
-            raise ScriptError(f"the script's {shown(key)} is not an option")
+            raise ScriptError(f"there is no option {shown(key)}{meant(name, known)}")
         said[name] = PARSERS[name](key, value)
     return EditScript(**said)
 
@@ -272,8 +272,7 @@ def _number(key: str, value: Any) -> float:
 def _numbers(least: int, most: int) -> Callable[[str, Any], tuple[float, ...]]:
     def parse(key: str, value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or not least <= len(value) <= most:
-            count = f"{least}" if least == most else f"{least} or {most}"
-            raise ScriptError(f"{key}: {shown(value)} is not {count} numbers")
+            raise ScriptError(f"{key}: {shown(value)} is not {count_range(least, most)} numbers")
         numbers = tuple(_number(key, v) for v in value)
         return numbers + (0.0,) * (most - len(numbers))
 
@@ -371,7 +370,7 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "shape": _one_of(*KINDS), "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles,
-    "move": _numbers(2, 3), "turn": _numbers(3, 3), "scale": _number,
+    "move": _numbers(2, 3), "turn": _numbers(1, 3), "scale": _number,
     "deform": _one_of("arap", "laplacian"), "links": _one_of("geodesic", "euclidean"),
     "faithful": _flag, "nodes": _whole(4, 4096), "stiffness": _between(0.25, 4.0),
     "stretch_limit": _between(1.01, 10.0), "split": _flag,

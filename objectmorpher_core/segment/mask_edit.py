@@ -138,7 +138,9 @@ def feather(selection: Selection, px: float) -> U8:
 
     What is selected stays the same: the half line stays on the edge.
     """
-    from .matting.matte import signed_distance  # its module needs numba; the window starts without
+    from .matting.soft_edge import (
+        signed_distance,  # its module needs numba; the window starts without
+    )
 
     mask = is_selected(selection)
     coverage = np.zeros(mask.shape, np.uint8)

@@ -41,6 +41,7 @@ VERSION = 1
 FORMAT = "objectmorpher session"
 DOCUMENT, ARRAYS = "document.json", "arrays.npz"
 MAX_HORIZON = 100  # x the photo's height, how far outside it the horizon may be
+MOST_INVENTED = 2_000_000  # px of invented pictures: a small photo has fewer
 
 
 def save_session(document: Document, path: Path) -> None:
@@ -259,6 +260,7 @@ def _photo(tree: object, members: Mapping[str, bytes], reader: Reader) -> Photo:
         picture = read_picture(source, reader.most)
     except ImageError as error:
         raise SessionError(f"the session's photo cannot be read: {error}") from error
+    reader.most = max(reader.most, MOST_INVENTED)
     return Photo(picture, camera, source, reader.value(str, tree.get("name"), "photo.name"))
 
 
@@ -344,6 +346,9 @@ def _check_lifted(item: EditObject) -> None:
     _same("u0", lifted.texture.u0.shape, (count, 2))
     _same("visibility", lifted.texture.visibility.shape, (count,))
     _same("solidity", lifted.texture.solidity.shape, (count,))
+    if (sides := lifted.sides) is not None:
+        found = sides.at.shape, sides.slopes.shape, sides.zoom.shape, sides.pixels.shape[2:]
+        _same("sides", found, ((count, 2), (count, 2, 3), (count,), (3,)))
     _same("control_points", lifted.control_points.shape, (nodes, 3))
     _same("world_from_object", lifted.world_from_object.shape, (4, 4))
     for handle in (*item.handles, *item.base.handles):

@@ -43,5 +43,5 @@ STEPS = (
     Step("Lift object", "Click this button", _choose("Lift object")),
     Step("Drag a point on the object", "Drag the rocket by its upper end to the right", _bend),
     Step("Export photo…", "Click this button", _choose("Export photo…")),
-    Step("Export rocket-edited.png", "Click this button", _choose("Export rocket-edited.png")),
+    Step("Export rocket-edited.jpg", "Click this button", _choose("Export rocket-edited.jpg")),
 )

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from objectmorpher.editor.editor import Editor
-from objectmorpher.tools.pointer import Button, Pointer, Tool
+from objectmorpher.tools.pointer import Button, Pointer
+from objectmorpher.tools.registry import Tool
 
 Place = np.ndarray | Sequence[float]
 

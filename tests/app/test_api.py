@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tqdm
+from PIL import Image, ImageCms, ImageShow
 
 import objectmorpher_core as om
 from objectmorpher import __version__
@@ -101,6 +105,99 @@ def test_a_script_file_is_the_command_lines(folder):
     assert edit.render().encode() == Path("cli.png").read_bytes()
 
 
+def test_a_photo_may_be_a_path_bytes_an_array_or_an_image_of_pillow(folder):
+    wide = PIXELS.astype(np.uint16) * 257
+    alpha = np.where(MASK, 255, 60).astype(np.uint8)
+    image = Image.open(folder / "photo.png")
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    turned = image.transpose(Image.Transpose.ROTATE_90)  # as a camera on its side stores it
+    turned.info["icc_profile"] = profile
+    turned.getexif()[0x0112] = 6
+    photos = (
+        "photo.png", folder / "photo.png", shapes.png(PIXELS), PIXELS, wide, image, turned,
+        image.convert("P"), image.convert("CMYK"), np.dstack([PIXELS, alpha]), PIXELS[..., 1],
+        image.convert("L"), Image.fromarray(wide[..., 1]),
+    )  # fmt: skip
+    opened = [om.open(photo).document.photo for photo in photos]
+    for photo in opened[:4] + opened[5:7] + opened[9:10]:
+        assert np.array_equal(photo.pixels, PIXELS)
+    assert opened[4].pixels.dtype == np.uint16 and np.array_equal(opened[4].pixels, wide)
+    assert opened[6].picture.icc == profile
+    assert opened[8].pixels.shape == PIXELS.shape
+    assert (opened[9].picture.alpha == alpha).all()
+    for photo in opened[10:]:
+        assert photo.picture.is_grey and photo.pixels.shape == PIXELS.shape
+    assert opened[12].pixels.dtype == np.uint16
+    result = om.open(photos[9]).mask(MASK).options(**QUICK).turn(20).render()
+    assert np.array_equal(result.to_numpy()[..., 3], alpha), "alpha is kept as it is"
+    assert result.to_pil().mode == "RGBA"
+    om.replay(result.encode(".omorph", "session"))  # what was opened can be kept
+
+
+def test_a_result_is_an_array_an_image_and_a_picture_in_a_notebook(folder):
+    result = _edit().turn(20).plate("telea").render()
+    pixels = result.to_numpy()
+    assert np.array_equal(pixels, result.pixels) and pixels.flags.writeable
+    pixels[:] = 0
+    assert result.pixels.any()
+    assert np.array_equal(np.asarray(result.to_pil()), result.pixels)
+    preview = read_picture(result._repr_png_()).pixels
+    assert np.array_equal(preview, result.pixels), "it is small enough to be shown whole"
+    assert np.array_equal(result.to_numpy("mask"), MASK)
+    for what, ending in (("plate", ".png"), ("object", ".png"), ("depth", ".png")):
+        saved = Image.open(io.BytesIO(result.encode(ending, what)))
+        assert np.array_equal(np.asarray(saved), result.to_numpy(what)), what
+        assert np.array_equal(np.asarray(result.to_pil(what)), result.to_numpy(what)), what
+
+
+def test_a_result_is_shown_by_the_systems_viewer(folder, monkeypatch):
+    monkeypatch.setattr(ImageShow, "_viewers", [])
+    result = _edit().turn(20).render()
+    with pytest.raises(RuntimeError, match="save the result"):
+        result.show()
+    seen = []
+
+    class Viewer(ImageShow.Viewer):
+        format = "PNG"  # as those of every system
+
+        def show_file(self, path, **options):
+            seen.append(np.asarray(Image.open(path)))
+            return 1
+
+    ImageShow.register(Viewer())
+    result.show("object")
+    assert np.array_equal(seen[0], result.to_numpy("object"))
+
+
+def test_progress_is_a_function_or_a_bar(folder):
+    lifting: list[tuple[float, str]] = []
+    rendering: list[tuple[float, str]] = []
+    lifted = _edit().lift(lambda *step: lifting.append(step))
+    lifted.turn(20).render(lambda *step: rendering.append(step))
+    for told in (lifting, rendering):
+        assert told[-1][0] == 1 and len(told) > 2
+        assert all(0 <= fraction <= 1 and note for fraction, note in told)
+    for total in (None, 1.0, 7):
+        with tqdm.tqdm(total=total, file=io.StringIO()) as bar:
+            lifted.turn(20).render(bar)
+            assert bar.n == bar.total and rendering[-1][1] in bar.desc
+
+
+def test_an_edit_and_a_result_are_one_line(folder):
+    edit = _edit().lift().turn(20).drag(TOP, (86, 45))
+    assert repr(edit) == (
+        "<Edit of photo.png: 160 x 120 px; inpaint='telea', gaussians=300, "
+        "handle=({at: (78, 45), to: (86, 45), dz: 0}), turn=(20, 0, 0), mask, lifted>"
+    )
+    result = repr(edit.render())
+    assert re.fullmatch(
+        r"<Result of photo.png: 160 x 120 px; \d+% of the photo changed \(.*own.*\)>", result
+    )
+    assert repr(_edit().render()).endswith("nothing changed>")
+    long = om.open(PIXELS).options(click=[(n, n) for n in range(100)])
+    assert len(repr(long)) < 200
+
+
 def test_an_edit_stays_as_it_was(folder):
     edit = _edit()
     before = edit.script, edit.document
@@ -153,6 +250,13 @@ WRONG = {
     "an output": lambda: _edit().render().save("out.png", "everything"),
     "no background": lambda: _edit().render().save("out.png", "plate"),
     "no such folder": lambda: _edit().render().save("nowhere/out.png"),
+    "an array of fractions": lambda: om.open(PIXELS / 255),
+    "an array of two axes more": lambda: om.open(PIXELS[None, None]),
+    "an empty array": lambda: om.open(PIXELS[:0]),
+    "an image of numbers": lambda: om.open(Image.fromarray(PIXELS[..., 0]).convert("F")),
+    "an output in memory": lambda: _edit().render().to_pil("layers"),
+    "no background in memory": lambda: _edit().render().to_numpy("plate"),
+    "a pin beside it": lambda: _edit().turn(9).pin(1, 1).render(),
     "a script": lambda: om.read_scripts("photo.png"),
     "a session": lambda: om.replay("photo.png"),
 }
@@ -165,8 +269,16 @@ def test_a_failure_is_one_sentence_and_writes_nothing(folder, name):
         WRONG[name]()
     told = str(caught.value)
     assert told and "\n" not in told and "Errno" not in told and "codec" not in told
+    assert "--" not in told, "that is the command line's"
     assert len(told) < 200
     assert sorted(folder.iterdir()) == before
+
+
+def test_what_is_no_photo_at_all_is_a_type_error():
+    with pytest.raises(TypeError, match="not NoneType"):
+        om.open(None)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="did you mean thickness"):
+        om.open(PIXELS).options(thicknes=2)
 
 
 def test_importing_it_imports_nothing_else():

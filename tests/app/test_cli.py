@@ -72,7 +72,17 @@ def test_an_edit_writes_the_photo_and_nothing_else(folder, capsys):
     assert _edit(*TURN) == 0
     assert set(_files()) == before | {"out.png"}
     assert _pixels("out.png").shape == PIXELS.shape
-    assert capsys.readouterr().err == ""
+    said = capsys.readouterr()
+    assert said.err == ""
+    line = r"wrote out\.png in \d+\.\d s: \d+% of the photo changed \(.*%.*\)\n"
+    assert re.fullmatch(line, said.out)
+
+
+def test_a_turn_of_one_number_is_a_yaw(folder):
+    assert _edit("--turn", "20") == 0
+    alone = Path("out.png").read_bytes()
+    assert _edit("--turn", "20,0,0") == 0
+    assert Path("out.png").read_bytes() == alone
 
 
 def test_nothing_to_do_gives_the_photo_back(folder):
@@ -322,7 +332,10 @@ def test_replaying_a_session_gives_the_same_bytes(folder, capsys):
     assert info["objects"][0]["handles"] == 1
     assert info["objects"][0]["turn"] == [20, 0, 0]
     assert cli.main(["info", "s.omorph"]) == 0
-    assert "photo.png" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "photo: name photo.png, width 160, height 120, bits 8\n" in said
+    assert re.search(r"^- Object 1: .*\bmoved: yes\b.*\bturn: 20 0 0\b", said, re.M)
+    assert not re.search(r"True|False|None|[][{}_]", said)
 
 
 def test_a_session_of_an_object_cut_by_the_frame_gives_the_same_bytes(folder):
@@ -433,7 +446,7 @@ def test_a_failure_is_one_sentence_and_leaves_no_file(folder, capsys, case):
 SCRIPTS = {
     "not JSON": ("{", "not JSON"),
     "not an object": ("3", "not a JSON object"),
-    "unknown key": ('{"magic": 1}', "'magic' is not an option"),
+    "unknown key": ('{"magic": 1}', "no option 'magic'"),
     "wrong value": ('{"turn": [1, 2]}', "turn"),
     "empty batch": ("[]", "empty"),
     "batch without photos": ('[{"turn": [1, 2, 3]}, {"turn": [1, 2, 3]}]', "batch"),

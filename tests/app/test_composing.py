@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from conftest import wait_for_jobs, wait_until
+from objectmorpher.canvas.frame import build_frame
+from objectmorpher.canvas.layer import FrameObject
 from objectmorpher.canvas.layers import FRAME
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.compose_tool import ComposeTool
 from objectmorpher_core.compose.plate.plate import plate_cover, plate_picture
+from objectmorpher_core.compose.shadow.shadow import Shade
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.document.settings import (
@@ -165,15 +168,22 @@ def test_shadow_and_light_are_for_what_has_moved(editor: Editor, ball: Document)
     assert editor.object.shadow == Shadow() and editor.object.harmony == 0
 
 
+def shade_of(editor: Editor, document: Document) -> Shade | None:
+    """The shadow of the document's object as a frame has it."""
+    (own,) = build_frame(document, editor.view, editor.cache, renderer="gl").objects
+    assert isinstance(own, FrameObject)
+    return own.lit.shade
+
+
 def test_a_dragged_shadow_is_coarse_until_the_pointer_rests(editor: Editor, ball: Document) -> None:
-    lights = editor.derived.lights
+    cache = editor.cache
     document = edits.set_placement(ball, 0, Placement(move=(20.0, 5.0)))
     document = edits.set_shadow(document, 0, Shadow(strength=0.6))
-    sketched = lights.of(document, 0).shade
-    assert lights.is_waiting and editor.derived.layers.is_waiting
-    wait_until(editor, lambda: lights.of(document, 0).shade is not sketched)
-    assert not lights.is_waiting
-    exact = lights.of(document, 0).shade
+    sketched = shade_of(editor, document)
+    assert cache.lights.is_waiting and cache.is_waiting
+    wait_until(editor, lambda: shade_of(editor, document) is not sketched)
+    assert not cache.lights.is_waiting
+    exact = shade_of(editor, document)
     assert exact is not None and sketched is not None
     assert exact.pitch < sketched.pitch
     for a, b in zip(exact.bounds, sketched.bounds, strict=True):
@@ -202,18 +212,26 @@ def test_the_shadow_in_the_photo_is_taken_along(editor: Editor) -> None:
     run(editor, "take_shadow")
     assert COMMANDS["take_shadow"].why_not(editor) == "Its shadow is being looked for"
     wait_for_jobs(editor)
+    own = (shade > 0.3) & ~plate_cover(document)
+    offer = editor.composing.offer  # outlined, and nothing has changed
+    assert offer is not None and editor.document is document
+    assert (offer.outlined & own).sum() > 0.6 * own.sum()
+    assert editor.message is not None and editor.message.action is not None
+    editor.message.action.run()  # one click refuses
+    assert editor.document is document and editor.composing.offer is None
+    editor.composing._offer = offer
+    editor.preview = edits.set_feather(document, 3.0)
+    assert editor.composing.offer is None, "what it was found in is not what one sees"
+    editor.preview = None
+    editor.composing.accept_shadow()
     assert editor.object is not None and editor.history is not None
     assert editor.history.undo_label == "Shadow as in the photo"
     assert editor.object.shadow.strength > 0.4
     assert editor.document is not None
-    own = (shade > 0.3) & ~plate_cover(document)
     brighter = plate_picture(editor.document)[own].mean() - plate_picture(document)[own].mean()
     assert brighter > 20
-    taken = editor.composing.taken  # outlined, and refused by one click
-    assert taken is not None and (taken & own).sum() > 0.6 * own.sum()
-    assert editor.message is not None and editor.message.action is not None
-    editor.message.action.run()  # shadow and background at once
-    assert editor.document is document and editor.composing.taken is None
+    editor.undo()  # shadow and background at once
+    assert editor.document is document
 
 
 @pytest.mark.slow
@@ -233,6 +251,8 @@ def test_its_reflection_in_the_photo_goes_and_none_is_drawn(editor: Editor) -> N
     editor.start(document)
     run(editor, "take_shadow")
     wait_for_jobs(editor)
+    assert editor.document is document
+    editor.composing.accept_shadow()
     assert editor.history is not None
     assert editor.history.undo_label == "Remove old reflection"
     assert editor.object is not None and editor.object.shadow.strength == 0
@@ -274,12 +294,12 @@ def test_harmonise_offers_both_lights_and_grain_and_one_step_takes_all(
 def test_the_canvas_shows_the_light_that_stays(editor: Editor, ball: Document) -> None:
     turned = edits.set_placement(ball, 0, Placement(turn=(35.0, 0.0, 0.0)))
     editor.start(turned)
-    editor.derived.layers.frame_time = np.inf  # one frame, exact
-    plain = editor.derived.layers.draw(turned, editor.view)[0]
+    editor.cache.frame_time = np.inf  # one frame, exact
+    plain = build_frame(turned, editor.view, editor.cache).layers[0]
     lit = edits.set_relight(turned, 0, 1.0)
-    relit = editor.derived.layers.draw(lit, editor.view)[0]
-    again = editor.derived.layers.draw(lit, editor.view)[0]
-    editor.derived.layers.frame_time = FRAME
+    relit = build_frame(lit, editor.view, editor.cache).layers[0]
+    again = build_frame(lit, editor.view, editor.cache).layers[0]
+    editor.cache.frame_time = FRAME
     assert again is relit  # made once
     assert np.array_equal(plain.pixels[..., 3], relit.pixels[..., 3])
     assert np.abs(plain.pixels.astype(int) - relit.pixels).max() > 4

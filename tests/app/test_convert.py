@@ -69,7 +69,7 @@ def test_what_is_refused_writes_nothing(folder, capsys):
     refused(["broken.spz", "out.ply"], "broken.spz: the .spz file", capsys)
     refused(["none.ply", "out.ply"], "none.ply does not exist", capsys)
     refused(["cat.ply", "cat.ply"], "is an input", capsys)
-    refused(["cat.ply", "out.glb"], "the ending must be", capsys)
+    refused(["cat.ply", "out.obj"], "the ending must be", capsys)
     refused(["photo.png", "out.ply"], "photo.png has none of the endings", capsys)
     refused(["cat.ply", "no/out.ply"], "does not exist", capsys)
     refused(["cone.stl", "out.ply", "--count", "3"], "--count", capsys)

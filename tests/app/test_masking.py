@@ -19,7 +19,8 @@ from objectmorpher.editor.tasks import Combine, Question
 from objectmorpher.editor.view import Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.mask_tool import MaskTool
-from objectmorpher.tools.pointer import Button, Tool
+from objectmorpher.tools.pointer import Button
+from objectmorpher.tools.registry import Tool
 from objectmorpher.tools.select_tool import SelectTool
 from objectmorpher_core import segment
 from objectmorpher_core.base.brush import Brush

@@ -107,7 +107,7 @@ def test_a_first_use_of_the_window_asks_nobody(
 ) -> None:
     settings = Path(window_environment["OBJECTMORPHER_SETTINGS"])
     settings.write_text(f'{settings.read_text()}export_folder = "{tmp_path}"\n')
-    exported, out = tmp_path / "rocket-edited.png", tmp_path / "tried.jsonl"
+    exported, out = tmp_path / "rocket-edited.jpg", tmp_path / "tried.jsonl"
     with opened(window_environment, None, by=network.watcher(out)) as hands:
         for step in first_use.STEPS:
             hands.place(step.said)

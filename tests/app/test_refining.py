@@ -96,7 +96,7 @@ def test_its_strength_is_live_and_one_step(moved, monkeypatch):
     asked = Asked(moved, monkeypatch)
     moved.refining.run()
     asked.answer()
-    full, layers = moved.document, moved.derived.refined.layers
+    full, layers = moved.document, moved.cache.refined.layers
     for strength in (0.8, 0.5):
         moved.refining.preview_strength(strength)
         (layer,) = layers(moved.document, moved.view)

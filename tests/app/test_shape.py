@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from conftest import open_file, wait_for_jobs
-from objectmorpher.canvas.derived import MOST_SHAPES, Derived
+from objectmorpher.canvas.derived import MOST_SHAPES
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.shape import Shape, build_shape, rehearse
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import View
@@ -56,10 +57,11 @@ def test_what_many_objects_need_is_remembered_of_all_of_them(ball: Document) -> 
     )
     document, shape = replace(ball, objects=many), build_shape(ball.photo.camera, thing)
     made = [(one, Shape(shape.puppet, shape.texture)) for one in many]
-    derived, view = Derived(), View()
+    cache, view = Cache(), View()
+    derived = cache.derived
     derived.adopt(made)
     for _ in range(2):
-        derived.layers.draw(document, view)
+        build_frame(document, view, cache)
         assert all(derived.shape(ball.photo, one) is own for one, own in made)
 
 

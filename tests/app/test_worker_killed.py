@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import job_functions
 from conftest import wait_for_jobs, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
@@ -176,6 +177,25 @@ def test_what_is_asked_for_next_does_not_wait_for_the_photo(
     wait_until(editor, lambda: not editor.jobs.is_busy(f"{WRITE} {path}"))
     assert editor.message is None or not editor.message.details, editor.message
     assert editor.jobs.is_busy(READ), "it is read afterwards"
+    wait_for_jobs(editor)
+
+
+def test_a_reading_that_did_not_stop_is_begun_again_only_once(
+    editor: Editor, ball: Document
+) -> None:
+    """Two readings would end each other, without end where each takes longer than one waits."""
+    editor.start(ball)
+    wait_for_jobs(editor)
+    editor.jobs.start(
+        "Reading the photo", job_functions.hang, 60.0, done=print, failed=print,
+        cancelled=editor.tasks._read_again, kind=READ, is_spare=True,
+    )  # fmt: skip
+    hanging = editor.jobs.current
+    editor.jobs.cancel(READ)
+    wait_until(editor, lambda: editor.jobs.current is not hanging)
+    reading = editor.jobs.current
+    assert reading is not None and reading.kind == READ
+    assert reading.stop_asked is None and READ not in editor.jobs._waiting
     wait_for_jobs(editor)
 
 

@@ -43,6 +43,11 @@ def test_other_objects_are_background_but_the_one_that_is_clicked(document):
     on_it, own = Prompt((Click(x, y),)), Prompt((Click(far_x, far_y),))
     assert edits.beside(document, 1, on_it) is on_it
     assert edits.beside(document, 0, own) is own
+    width, height = document.photo.size
+    for at in ((0, height), (width, 0), (-1, y)):  # on nothing: to be refused with the prompt
+        outside = edits.beside(document, 1, Prompt((Click(*at),)))
+        assert isinstance(outside, BesidePrompt)
+        np.testing.assert_array_equal(outside.taken, mask)
 
 
 def test_a_handle_turns_and_softens(document):

@@ -200,9 +200,9 @@ def test_the_picture_of_a_moved_object_moves_with_it():
 
 def test_a_positive_yaw_takes_what_faces_the_camera_to_the_left():
     edited = _run(turn=[15, 0, 0], trust=0.0)
-    picked = edited.puppet.pick(
-        (78.0, 62.0), None, Placement(), object_texture(edited.document.objects[0].matte)
-    )
+    item = edited.document.objects[0]
+    texture = object_texture(item.matte, item.lifted)
+    picked = edited.puppet.pick((78.0, 62.0), None, Placement(), texture)
     placed = edited.puppet.picture_of(picked.rest, None, edited.document.objects[0].placement)
     assert placed[0] < 78 - 2
 
@@ -254,9 +254,9 @@ def test_empty_and_full_masks_are_refused(inside, error):
 
 
 @pytest.mark.parametrize(("options", "sentence"), [
-    ({"handle": [{"at": [5, 5], "to": [9, 9]}]}, "--handle 5,5 misses the object"),
-    ({"handle": [{"at": [500, 5], "to": [9, 9]}]}, "--handle 500,5 is outside the photo of 160"),
-    ({"pin": [[5, 5]]}, "--pin 5,5 misses the object"),
+    ({"handle": [{"at": [5, 5], "to": [9, 9]}]}, "handle 5,5 misses the object"),
+    ({"handle": [{"at": [500, 5], "to": [9, 9]}]}, "handle 500,5 is outside the photo of 160"),
+    ({"pin": [[5, 5]]}, "pin 5,5 misses the object"),
     ({"handle": [{"at": [78, 62], "to": [9, 9], "dz": -50}]}, "behind the camera"),
     ({"splats": "x.pdf"}, "x.pdf has none of the endings"),
     ({"refine": "dream"}, "no refiner 'dream'"),

@@ -73,7 +73,7 @@ def test_a_batch_names_photos_and_outputs():
     ("3", "not a JSON object"),
     ("[[]]", "not a JSON object"),
     ('{"photo": 3}', "'photo' is not a file name"),
-    ('{"clik": [[1, 2]]}', "'clik' is not an option"),
+    ('{"clik": [[1, 2]]}', "no option 'clik', did you mean click?"),
 ])  # fmt: skip
 def test_what_is_no_script_is_refused(text, sentence):
     with pytest.raises(ScriptError, match=sentence):
@@ -85,7 +85,7 @@ def test_what_is_no_script_is_refused(text, sentence):
     ("mask", ""), ("mask", 3), ("segment", None), ("gaussians", 99), ("gaussians", 1e5),
     ("gaussians", True), ("handle", [[1, 2]]), ("handle", [{"at": [1, 2]}]),
     ("handle", [{"at": [1, 2], "to": [1, 2], "dx": 1}]), ("move", [1]), ("move", [1, 2, 3, 4]),
-    ("turn", [1, 2]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
+    ("turn", [1, 2, 3, 4]), ("turn", [1, 2, "3"]), ("scale", "2"), ("scale", float("inf")),
     ("scale", float("nan")), ("deform", "jelly"), ("links", None), ("faithful", "yes"),
     ("nodes", 3), ("nodes", 5000), ("nodes", 1.5), ("stiffness", 9),
     ("fill-from", [[1, 2]]), ("fill-from", [{"source": [1, 2]}]),

@@ -174,7 +174,7 @@ def test_the_keys_of_one_object_are_those_of_the_first():
 BAD = {
     "a further object that is none": ({"objects": [3]}, "object 2: it is not a JSON object"),
     "objects that are no list": ({"objects": {}}, "the script's 'objects' are not a list"),
-    "an unknown key": ({"objects": [{"colour": 3}]}, "object 2: the script's 'colour' is not"),
+    "an unknown key": ({"objects": [{"colour": 3}]}, "object 2: there is no option 'colour'"),
     "a wrong value": ({"objects": [{"duplicate": 1}, {"scale": "x"}]}, "object 3: scale: 'x'"),
     "a copy of a later one": ({"objects": [{"duplicate": 2}]}, "object 2: duplicate: 2 is not"),
     "a copy chosen anew": (
@@ -201,7 +201,7 @@ def test_what_makes_no_sense_is_one_sentence_with_its_number(case):
 FAILING = {
     "nothing chosen": ([{"move": [1, 2]}], "object 2: no object is chosen"),
     "a handle beside it": (
-        [{"duplicate": 1, "handle": [{"at": [2, 2], "to": [3, 3]}]}], "object 2: --handle 2,2",
+        [{"duplicate": 1, "handle": [{"at": [2, 2], "to": [3, 3]}]}], "object 2: handle 2,2",
     ),
     "no such lifter": ([{"lift": "magic", "click": [[1, 1]]}], "object 2: there is no lifter"),
     "behind the camera": ([{"duplicate": 1, "move": [0, 0, -99]}], "object 2: a depth of -99"),
@@ -221,7 +221,7 @@ def test_a_click_says_what_stays_in_front():
     item = edited.document.objects[1]
     assert item.name == "Front 1" and item.stays_in_front and item.mask is not None
     assert (item.mask & RIGHT).sum() > 0.7 * (item.mask | RIGHT).sum()
-    with pytest.raises(ScriptError, match="--front 1: "):
+    with pytest.raises(ScriptError, match="front 1: "):
         _run(_item(front=[[-5, 2]], segment="grabcut"))
 
 

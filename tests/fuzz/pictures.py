@@ -19,6 +19,7 @@ from objectmorpher_core.pictures.image import (
     read_picture,
 )
 from objectmorpher_core.pipeline import open_photo
+from tests.raw_photos import dng
 
 from .checks import Reader, check_picture, refusing
 from .damage import EXIF
@@ -59,7 +60,8 @@ def seeds() -> list[bytes]:
             _lab(photo).save(out, kind)
         )
         found.append(out.getvalue())
-    return found + _deep_tiffs()
+    phone = (Path(__file__).parents[1] / "core" / "files" / "cat-10-bit.heic").read_bytes()
+    return [*found, *_deep_tiffs(), phone, dng(noise(24, 36, 3) / 255)]
 
 
 def _lab(photo: Image.Image) -> Image.Image:

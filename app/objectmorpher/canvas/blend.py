@@ -7,6 +7,7 @@ not where they were, on a grid, with the same margin around them.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import cv2
@@ -17,11 +18,11 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
 
 from ..editor.view import View
+from .layer import PosedObject
 
 if TYPE_CHECKING:
+    from objectmorpher_core.compose.light.lighting import Lit
     from objectmorpher_core.raster.posed import PosedSplats
-
-    from .derived import Derived
 
 CELL = 4  # canvas px, of the grid
 TOLERANCE = 0.25  # canvas px: a Gaussian that moved less is where it was
@@ -31,30 +32,32 @@ NOWHERE = np.empty((0, 3))
 REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one counts
 
 
-def build_blend(derived: Derived, document: Document, view: View) -> F32:
-    """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo."""
+def build_blend(
+    document: Document, moved: Iterable[tuple[PosedObject, Lit]], view: View, touched: F32
+) -> F32:
+    """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo.
+
+    `moved` are the document's moved objects, also hidden ones; `touched`: see `Lights.touched`.
+    """
     from objectmorpher_core.compose import composite
     from objectmorpher_core.compose.light.defocus import reach_of
     from objectmorpher_core.compose.order import leaves_a_hole
     from objectmorpher_core.compose.plate.plate import hole_margin
 
-    height, width = -(-view.height // CELL), -(-view.width // CELL)
-    distance = np.full((height, width), FAR, np.float32)  # photo px to what moved
-    for k, thing in enumerate(document.objects):
-        if thing.lifted is None or not thing.is_moved:
-            continue
-        splats = derived.draft(document, k)
-        world = splats.means if thing.is_visible else NOWHERE
+    distance = np.full(touched.shape, FAR, np.float32)  # photo px to what moved
+    for own, lit in moved:
+        splats, item = own.draft, own.item
+        world = splats.means if item.is_visible else NOWHERE
         # What moved leaves a hole, unless a copy of it is still there.
-        has_left = leaves_a_hole(document.objects, k)
-        reach = REACH * splats.rest.spacing_px * max(thing.placement.scale, 1.0)
-        reach += reach_of(derived.lights.of(document, k).blur)
-        own = _distance(splats, world, document.photo.camera, view, has_left)
-        distance = np.minimum(distance, own - reach)
+        has_left = leaves_a_hole(document.objects, own.k)
+        reach = REACH * splats.rest.spacing_px * max(item.placement.scale, 1.0)
+        reach += reach_of(lit.blur)
+        apart = _distance(splats, world, document.photo.camera, view, has_left)
+        distance = np.minimum(distance, apart - reach)
     margin = document.feather * hole_margin(*document.photo.size)
     ramp = (1 - composite.FEATHER_START) * margin
     blend = np.clip((margin - distance) / ramp, 0, 1).astype(np.float32)
-    return np.maximum(blend, derived.lights.touched(document, view, CELL))
+    return np.maximum(blend, touched)
 
 
 def _distance(splats: PosedSplats, world: F64, camera: Camera, view: View, has_left: bool) -> F32:

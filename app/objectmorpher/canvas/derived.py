@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64, I32, Mask, Sparse
+from objectmorpher_core.base.camera import Camera
+from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import (
     DeformSettings,
@@ -25,14 +27,8 @@ from objectmorpher_core.document.model import (
 )
 
 from ..editor.view import View
-from .blend import build_blend
-from .fronts import Fronts, RefinedView
-from .layers import Layers
-from .lights import Lights
 from .memo import Memo
-from .painter import Painter
 from .shape import Shape, Shapes, build_shape
-from .surface_facts import SurfaceFacts
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -76,23 +72,18 @@ class ObjectFrame:
 
 
 class Derived:
-    """Solver, posed Gaussians and rendered layers of the document's objects."""
+    """Solver, posed Gaussians and places of the document's objects."""
 
     def __init__(self) -> None:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
         self._drafts: dict[int, Memo] = {}
-        self.layers, self.fronts = Layers(self), Fronts()
-        self.refined = RefinedView()
-        self.painter = Painter(self)
-        self.facts = SurfaceFacts(self)
-        self.lights = Lights(self)
         self._latest: tuple[LiftedObject | None, DeformSettings, Shape] | None = None
-        self._blend: tuple[Document, tuple[float, ...], F32] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
-        self._carriers, self._ghosts = Memo(), Memo()
+        self._carriers, self._invented, self._hidden = Memo(), Memo(), Memo()
+        self._ghosts = Memo()
         self._ghost_shares: tuple[float, ...] = ()
 
     def share(self, mask: Mask) -> float:
@@ -137,6 +128,20 @@ class Derived:
         parts = tuple(part for o in document.objects for part in (o.matte, o.mask, o.lifted))
         return self._ghosts(lambda: find_ghosts(document, near), document.plate, *parts)
 
+    def invented_background(self, document: Document) -> Mask | None:
+        """(H, W) where the plate is invented; None while there is no plate."""
+        plate = self.plate(document)
+        if plate is None:
+            return None
+        width, height = document.photo.size
+        return self._invented(lambda: crop(plate.hole, plate.box, (0, 0, width, height)), plate)
+
+    def hidden(self, document: Document) -> Mask:
+        """(H, W) what the objects hide."""
+        from objectmorpher_core.compose.plate.plate import plate_cover
+
+        return self._hidden(lambda: plate_cover(document), *(o.matte for o in document.objects))
+
     def contours(self, mask: Mask) -> tuple[F32, ...]:
         """A mask's outlines, each (N, 2) image px."""
         return self._contours(lambda: _outlines(mask), mask)
@@ -171,7 +176,6 @@ class Derived:
     def make_room(self, objects: int) -> None:
         """Remembers what so many objects need in each frame."""
         self._shapes.make_room(objects + SPARE_SHAPES)
-        self.fronts.make_room(objects)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""
@@ -204,11 +208,10 @@ class Derived:
         is_solid = splats.rest.lifted.texture.solidity > 0.5
         return splats.skinned.points[is_solid if is_solid.any() else slice(None)]
 
-    def drawable(self, document: Document, k: int, view: View) -> Drawable:
-        """Object `k`'s Gaussians on the canvas."""
+    def drawable_of(self, k: int, splats: PosedSplats, camera: Camera, view: View) -> Drawable:
+        """Object `k`'s Gaussians `splats` on the canvas; `camera` is the photo's."""
         from objectmorpher_core.raster import tiles
 
-        splats, camera = self.posed(document, k), document.photo.camera
         key = view.place
         kept = self._drawables.get(k)
         if kept is None or kept[0] is not splats or kept[1] != key:
@@ -221,13 +224,6 @@ class Derived:
         self._posed = {k: kept for k, kept in self._posed.items() if k in lifted}
         self._drafts = {k: kept for k, kept in self._drafts.items() if k in lifted}
         self._drawables = {k: kept for k, kept in self._drawables.items() if k in lifted}
-
-    def blend(self, document: Document, view: View) -> F32:
-        """Where the canvas shows the edit: (h, w) on a grid, 1 the edit, 0 the photo."""
-        key = (*view.place, *self.lights.state(document))
-        if self._blend is None or self._blend[0] is not document or self._blend[1] != key:
-            self._blend = (document, key, build_blend(self, document, view))
-        return self._blend[2]
 
     def solved(self, document: Document, k: int, start: Pose | None, **effort: float) -> Document:
         """The document with object `k` in the pose that its handles ask for.
@@ -342,7 +338,7 @@ class Derived:
         thing = document.objects[k]
         shape = self.shape(document.photo, thing)
         at, reach = (float(xy[0]), float(xy[1])), PICK_REACH * view.scale
-        drawable = self.drawable(document, k, view)
+        drawable = self.drawable_of(k, self.posed(document, k), document.photo.camera, view)
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip

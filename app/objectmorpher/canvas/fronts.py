@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from objectmorpher_core.base.arrays import U8
 from objectmorpher_core.document.model import Document, EditObject, Matte
 from objectmorpher_core.document.settings import Refined
 
 from ..editor.view import View
-from .layers import Layer
+from .layer import Layer, as_u8
 from .memo import Memo
 
 if TYPE_CHECKING:
@@ -81,11 +80,7 @@ def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | N
     level = np.ascontiguousarray(levels.levels[times])
     shown = cv2.warpAffine(level, matrix, (x1 - x0, y1 - y0), flags=way | cv2.WARP_INVERSE_MAP)
     box = (float(x0), float(y0), float(x1), float(y1))
-    return Layer(box, _as_u8(shown * np.float32(strength)))
-
-
-def _as_u8(premultiplied: np.ndarray) -> U8:
-    return (premultiplied * 255 + 0.5).clip(0, 255).astype(np.uint8)
+    return Layer(box, as_u8(shown * np.float32(strength)))
 
 
 # The document's refinement on the canvas: over the edit, as `compose/composite.py` mixes it.

@@ -12,7 +12,7 @@ from objectmorpher_core.base.arrays import F32
 from .memo import Memo
 
 if TYPE_CHECKING:
-    from ..editor.editor import Editor
+    from ..editor.state import EditorState
 
 CELLS = 160.0  # along the longer side of the grid on which the outline is followed
 GAP = 2.0  # cells between points that are of one silhouette
@@ -20,7 +20,7 @@ GAP = 2.0  # cells between points that are of one silhouette
 _outlines = Memo(1)
 
 
-def ghost(editor: Editor) -> tuple[F32, ...]:
+def ghost(editor: EditorState) -> tuple[F32, ...]:
     """Outlines, (N, 2) image px each, of the current object where it was; none if it is there."""
     before, now, k = editor.committed, editor.preview, editor.current
     if before is None or now is None or k >= len(before.objects):

@@ -7,7 +7,7 @@ pointer rests, it is the one that is exported.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,17 +15,14 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.model import Document, Placement, Plate
 
 from ..editor.view import View
-from .layers import Layer
+from .layer import Layer, PosedObject
 from .memo import Memo, same
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lighting, Lit
-    from objectmorpher_core.document.settings import Shadow
-
-    from .derived import Derived
 
 STILL = 0.12  # s without a change, after which the shadow is the exact one
 SMALL = 1024  # px, longer side of the picture of what was repaired
@@ -49,69 +46,65 @@ Ask = Callable[[int, Callable[[], "Lit"], Callable[["Lit"], None]], None]
 class Lights:
     """Light and shadow of each moved object."""
 
-    def __init__(self, derived: Derived) -> None:
-        self._derived = derived
+    def __init__(self) -> None:
         self._kept: dict[int, _Kept] = {}
-        self._lightings, self._painted = Memo(), Memo()
-        self._hidden, self._rests = Memo(), Memo()
+        self._lightings, self._painted, self._rests = Memo(), Memo(), Memo()
         self.ask: Ask | None = None  # computes an object's elsewhere and calls back
-
-    @property
-    def _is_hurried(self) -> bool:
-        """Whether a frame has only so much time."""
-        return bool(np.isfinite(self._derived.layers.frame_time))
 
     @property
     def is_waiting(self) -> bool:
         """Whether an exact shadow is still to be asked for."""
         return any(kept.is_sketch and not kept.is_asked for kept in self._kept.values())
 
-    def of(self, document: Document, k: int) -> Lit:
-        """Object `k`'s light and shadow as the window shows them now."""
+    def forget(self, moved: Collection[int]) -> None:
+        """Drops what is kept of objects other than these."""
+        self._kept = {k: kept for k, kept in self._kept.items() if k in moved}
+
+    def of(self, document: Document, own: PosedObject, is_hurried: bool) -> Lit:
+        """Light and shadow of an object as the window shows them now.
+
+        `is_hurried`: a frame has only so much time, and what is new is a sketch for now.
+        """
         from objectmorpher_core.compose.light.lighting import NOTHING
 
-        item = document.objects[k]
+        k, item = own.k, own.item
         shares = (item.harmony, item.relight, item.grain, item.defocus)
         has_any = item.shadow.strength or any(shares)
         if not item.is_moved or not item.is_visible or not has_any:
             self._kept.pop(k, None)
             return NOTHING
-        splats, now = self._derived.posed(document, k), time.monotonic()
-        sources = (splats, item.shadow, *shares, document.plate, document.horizon)
-        kept = self._kept.get(k)
+        sources = (own.posed, item.shadow, *shares, document.plate, document.horizon)
+        kept, now = self._kept.get(k), time.monotonic()
         if kept is None or not same(kept.sources, sources):
-            lit = self._work(document, k, self._is_hurried)()
-            kept = self._kept[k] = _Kept(sources, lit, now, self._is_hurried)
+            lit = self._work(document, own, is_hurried)()
+            self._kept[k] = _Kept(sources, lit, now, is_hurried)
         elif kept.is_sketch and not kept.is_asked and now - kept.since >= STILL:
-            self._make_exact(document, k, kept)
+            self._make_exact(document, own, kept)
         return self._kept[k].lit
 
-    def _make_exact(self, document: Document, k: int, kept: _Kept) -> None:
-        """Replaces what is kept of object `k`, now or when it is answered."""
-        kept.is_asked = True
+    def _make_exact(self, document: Document, own: PosedObject, kept: _Kept) -> None:
+        """Replaces what is kept of an object, now or when it is answered."""
+        k, kept.is_asked = own.k, True
 
         def accept(lit: Lit) -> None:
             if self._kept.get(k) is kept:
                 self._kept[k] = _Kept(kept.sources, lit, time.monotonic(), False)
 
-        work = self._work(document, k, is_sketch=False)
+        work = self._work(document, own, is_sketch=False)
         if self.ask is None:
             accept(work())
         else:
             self.ask(k, work, accept)
 
-    def _work(self, document: Document, k: int, is_sketch: bool) -> Callable[[], Lit]:
-        """What computes object `k`'s light and shadow, in any thread."""
-        item, derived = document.objects[k], self._derived
-        shape, lighting = derived.shape(document.photo, item), self._lighting(document)
-        puppet = shape.puppet
+    def _work(self, document: Document, own: PosedObject, is_sketch: bool) -> Callable[[], Lit]:
+        """What computes light and shadow of an object, in any thread."""
+        item, puppet, texture = own.item, own.shape.puppet, own.shape.texture
+        lighting = self._lighting(document)
         is_coarse = is_sketch and puppet.has_draft
-        splats = (derived.draft if is_coarse else derived.posed)(document, k)
+        splats = own.draft if is_coarse else own.posed
         posed = puppet.draft if is_coarse else puppet.posed
         rest = self._rests(lambda: posed(None, Placement()), puppet, is_coarse)
-        return lambda: lighting.of(
-            item, splats, lambda: rest, document.horizon, shape.texture, is_sketch
-        )
+        return lambda: lighting.of(item, splats, lambda: rest, document.horizon, texture, is_sketch)
 
     def _lighting(self, document: Document) -> Lighting:
         from objectmorpher_core.compose.light.lighting import Lighting
@@ -120,63 +113,41 @@ class Lights:
 
     # The picture
 
-    def state(self, document: Document) -> tuple[float, ...]:
-        """Changes where a shadow or a blur does."""
-        looks = [self.of(document, k) for k in range(len(document.objects))]
-        return (*(id(look.shade) for look in looks), *(look.blur for look in looks))
-
-    def layers(self, document: Document, view: View) -> tuple[Layer, ...]:
-        """The shadows on the canvas."""
+    def layers(self, looks: Mapping[int, Lit], view: View) -> tuple[Layer, ...]:
+        """The shadows on the canvas, of objects in these lights."""
         found = []
-        self._kept = {k: kept for k, kept in self._kept.items() if k < len(document.objects)}
-        for k in range(len(document.objects)):
-            shade = self.of(document, k).shade
-            if shade is None:
+        for k, look in looks.items():
+            if look.shade is None:
                 continue
             kept = self._kept[k]
-            x0, y0, x1, y1 = shade.bounds
+            x0, y0, x1, y1 = look.shade.bounds
             low = view.canvas_from_image(np.array([x0, y0]))
             high = view.canvas_from_image(np.array([x1, y1]))
             box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
             if kept.shade is None or kept.shade.box != box:
+                shade = look.shade
                 rgba = kept.shade.rgba if kept.shade else _inked(shade.alpha, shade.colour)
                 kept.shade = Layer(box, rgba, is_coarse=True)
             found.append(kept.shade)
         return tuple(found)
 
-    def ground(self, document: Document, k: int, shadow: Shadow) -> float:
-        """From how many degrees above the ground one looks at object `k` on it."""
-        from objectmorpher_core.compose.light.lighting import ground_seen_from
-
-        lifted = document.objects[k].lifted
-        assert lifted is not None
-        return ground_seen_from(lifted, document.photo.camera, document.horizon, shadow)
-
-    def hidden(self, document: Document) -> Mask:
-        """(H, W) what the objects hide."""
-        from objectmorpher_core.compose.plate.plate import plate_cover
-
-        return self._hidden(lambda: plate_cover(document), *(o.matte for o in document.objects))
-
     # Where it is shown
 
-    def touched(self, document: Document, view: View, cell: int) -> F32:
-        """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are."""
+    def touched(self, plate: Plate | None, looks: Iterable[Lit], view: View, cell: int) -> F32:
+        """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are.
+
+        `plate` is the one that the edit shows; None where nothing has moved.
+        """
         shape = (-(-view.height // cell), -(-view.width // cell))
         touched = np.zeros(shape, np.float32)
-        for k in range(len(document.objects)):
-            if (shade := self.of(document, k).shade) is not None:
+        for look in looks:
+            if (shade := look.shade) is not None:
                 corner = (shade.left, shade.top)
                 _mark(touched, shade.alpha > 0, corner, shade.pitch, (view, cell))
-        plate = self._derived.plate(document) if _is_edited(document) else None
         if plate is not None and plate.painted is not None:
             small, pitch = self._painted(lambda: _shrunk(plate.painted), plate.painted)
             _mark(touched, small, (plate.left, plate.top), pitch, (view, cell))
         return touched
-
-
-def _is_edited(document: Document) -> bool:
-    return any(o.is_moved for o in document.objects)
 
 
 def _inked(alpha: F32, colour: tuple[float, float, float]) -> np.ndarray:

@@ -83,7 +83,7 @@ def build_shape(camera: Camera, thing: EditObject) -> Shape:
     from objectmorpher_core.deform.puppet import puppet_of
 
     assert thing.matte is not None
-    return Shape(puppet_of(thing, camera), object_texture(thing.matte))
+    return Shape(puppet_of(thing, camera), object_texture(thing.matte, thing.lifted))
 
 
 def build_ready_shape(camera: Camera, thing: EditObject) -> Shape:

@@ -9,13 +9,12 @@ import numpy as np
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.document.model import Document
 
+from .derived import Derived
 from .memo import Memo
 from .shape import Surface
 
 if TYPE_CHECKING:
     from objectmorpher_core.deform.symmetry import MirrorPlane
-
-    from .derived import Derived
 
 AROUND = 12  # Gaussians whose normals make a handle's
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.base.quoting import named
+from objectmorpher_core.base.quoting import meant, named
 
 from .terminal import PROGRAM
 
 MISUSED = 2  # exit code
-LIKENESS = 0.6  # of difflib, from which on a word is taken for a misspelt one
+HEADING, OPTION, PLAIN = "\033[1m", "\033[36m", "\033[0m"  # ANSI
 
 
 class Parser(argparse.ArgumentParser):
@@ -25,6 +25,14 @@ class Parser(argparse.ArgumentParser):
         told = re.sub(r"\S+", lambda word: named(word[0]), self._helpful(message))
         sys.stderr.write(f"{PROGRAM}: {told}\n")
         raise SystemExit(MISUSED)
+
+    def print_help(self, file: Any = None) -> None:
+        """Write the help, in colour where it goes to a terminal that has any."""
+        stream, text = file or sys.stdout, self.format_help()
+        is_argparses_own = sys.version_info >= (3, 14)
+        if not is_argparses_own and has_colour(stream):
+            text = coloured(text)
+        stream.write(text)
 
     def _helpful(self, message: str) -> str:
         """argparse's message with what would have been right."""
@@ -74,10 +82,29 @@ class Parser(argparse.ArgumentParser):
             parser = below.choices[name]
 
 
-def meant(word: str, known: Iterable[str]) -> str:
-    """`, did you mean edit?`; nothing where no known word is like it."""
-    near = get_close_matches(word, list(known), n=1, cutoff=LIKENESS)
-    return f", did you mean {near[0]}?" if near else ""
+def has_colour(stream: Any) -> bool:
+    """Whether a stream is a terminal that shows colour, and nobody has asked for none."""
+    is_wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return is_wanted and stream.isatty()
+
+
+def coloured(text: str) -> str:
+    """A help text with its headings and options marked for a terminal."""
+    text = re.sub(r"^\S.*:$", rf"{HEADING}\g<0>{PLAIN}", text, flags=re.M)
+    return re.sub(r"(?<![\w-])--?[a-z][a-z-]*", rf"{OPTION}\g<0>{PLAIN}", text)
+
+
+def completed_files(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """`parser` with its files, and those of the commands below it, marked for shtab."""
+    import shtab
+
+    for action in parser._actions:
+        if action.type is Path or str(action.metavar).endswith(("FILE", "M.png")):
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                completed_files(below)
+    return parser
 
 
 def misspelt_command(arguments: Sequence[str], commands: Sequence[str]) -> str | None:

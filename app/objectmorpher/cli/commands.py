@@ -17,7 +17,8 @@ from objectmorpher_core.pictures.image import ENDINGS, encode_mask, encode_pictu
 from objectmorpher_core.pipeline import Edited, open_photo, replay, run_script
 from objectmorpher_core.pipeline import select as select_object
 from objectmorpher_core.scripting.animation import Clip
-from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, encode_output
+from objectmorpher_core.scripting.outputs import NEED_PLATE, OUTPUTS, Export, encode_output
+from objectmorpher_core.scripting.report import provenance
 from objectmorpher_core.scripting.runner import refuse_missing
 from objectmorpher_core.scripting.script import (
     BatchItem,
@@ -30,6 +31,7 @@ from objectmorpher_core.scripting.script import (
 )
 from objectmorpher_core.splat_files import COUNT, SPLAT_ENDINGS, read
 from objectmorpher_core.splat_files import encode as encode_splats
+from objectmorpher_core.splat_files.meshes.textured import plain_glb
 
 from .terminal import PROGRAM, UsageError, progress_bar
 
@@ -40,6 +42,7 @@ EXTRAS = {  # further outputs of `edit` and what each holds
     "save_plate": "plate",
     "save_object": "object",
     "save_splats": "splats",
+    "save_mesh": "mesh",
     "save_depth": "depth",
     "save_layers": "layers",
     "save_video": "video",
@@ -55,6 +58,7 @@ def run_edit(options: argparse.Namespace) -> None:
     named = [name for s in scripts for name in files_of(s)]
     inputs = [Path(name) for name in (*(i.photo for i in items), *named, options.script) if name]
     outputs: dict[Path, bytes] = {}
+    lines: list[str] = []
     clip = Clip(options.video, options.seconds)
     for item in items:
         out = Path(item.out or "")
@@ -65,8 +69,11 @@ def run_edit(options: argparse.Namespace) -> None:
         if len({path.resolve() for path in everything}) < len(everything):
             raise UsageError("two outputs have the same name")
         refuse_missing(item.script, item.others)
-        outputs |= _edit_one(item, extras, clip)
+        written, line = _edit_one(item, extras, clip)
+        outputs |= written
+        lines.append(line)
     write_all(outputs)
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
 
 
 def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
@@ -77,7 +84,10 @@ def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) ->
     return run_script(data, photo.name, script, mask, progress, needs_plate, item.others)
 
 
-def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path, bytes]:
+def _edit_one(
+    item: BatchItem, extras: dict[str, Path], clip: Clip
+) -> tuple[dict[Path, bytes], str]:
+    """The files of an edit, and the line that is printed once they are written."""
     out = Path(item.out or "")
     with progress_bar("Opening") as progress:
         edited = edited_by(item, progress, any(EXTRAS[name] in NEED_PLATE for name in extras))
@@ -90,7 +100,9 @@ def _edit_one(item: BatchItem, extras: dict[str, Path], clip: Clip) -> dict[Path
             outputs[extras["report"]] = json_bytes(edited.report())
     for note in edited.notes:
         sys.stderr.write(f"{PROGRAM}: {out}: {note}\n")
-    return outputs
+    names = ", ".join(map(str, outputs))
+    seconds = edited.stopwatch.read()["total"]
+    return outputs, f"wrote {names} in {seconds:.1f} s: {provenance(edited.composite)}"
 
 
 def _endings(what: str) -> tuple[str, ...]:
@@ -136,9 +148,10 @@ def run_info(options: argparse.Namespace) -> None:
         return
     for key, value in info.items():
         if key != "objects":
-            sys.stdout.write(f"{key}: {_line(value)}\n")
+            sys.stdout.write(f"{_label(key)}: {_line(value)}\n")
     for item in info["objects"]:
-        sys.stdout.write("- " + ", ".join(f"{k}: {_line(v)}" for k, v in item.items()) + "\n")
+        told = ", ".join(f"{_label(k)}: {_line(v)}" for k, v in item.items() if k != "name")
+        sys.stdout.write(f"- {item['name']}: {told}\n")
 
 
 def describe(document: Document) -> dict[str, Any]:
@@ -177,12 +190,24 @@ def run_convert(options: argparse.Namespace) -> None:
     count = COUNT if options.count is None else options.count
     if not LEAST_COUNT <= count <= MOST_COUNT:
         raise UsageError(f"--count must be from {LEAST_COUNT} to {MOST_COUNT:,}, not {count:,}")
-    check_outputs([options.source], {options.out: SPLAT_ENDINGS})
+    source, out = options.source, options.out
+    check_outputs([source], {out: (*SPLAT_ENDINGS, *OUTPUTS["mesh"])})
+    is_mesh = out.suffix.lower() in OUTPUTS["mesh"]
     with progress_bar("Converting") as progress:
-        gaussians = read(options.source, count, options.flip)
-        progress(0.7, "Writing")
-        data = encode_splats(gaussians, options.out)
-    write_all({options.out: data})
+        if source.suffix.lower() in OUTPUTS["session"]:
+            data = _object_of(source, "mesh" if is_mesh else "splats", out, progress)
+        else:
+            gaussians = read(source, count, options.flip)
+            progress(0.7, "Writing")
+            data = plain_glb(gaussians) if is_mesh else encode_splats(gaussians, out)
+    write_all({out: data})
+
+
+def _object_of(session: Path, what: str, out: Path, progress: Progress) -> bytes:
+    """The file of a session's first object in 3D, as it is posed."""
+    from objectmorpher_core.session.file import load_session
+
+    return Export(load_session(session), progress=progress).encode(what, out)
 
 
 def run_warm_up(options: argparse.Namespace) -> None:
@@ -252,7 +277,17 @@ def json_bytes(value: Any) -> bytes:
     return (json.dumps(value, indent=2) + "\n").encode()
 
 
+def _label(key: str) -> str:
+    """The key of a figure in words."""
+    return key.removeprefix("is_").removeprefix("has_").replace("_", " ")
+
+
 def _line(value: Any) -> str:
+    """A figure in words: yes and no, numbers with spaces between them."""
     if isinstance(value, dict):
-        return " ".join(f"{k} {_line(v)}" for k, v in value.items())
-    return str(value)
+        return ", ".join(f"{_label(k)} {_line(v)}" for k, v in value.items()) or "none"
+    if isinstance(value, list):
+        return " ".join(map(_line, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

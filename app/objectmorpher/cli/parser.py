@@ -14,10 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from objectmorpher_core.base.quoting import reason
+from objectmorpher_core.base.quoting import count_range, reason
 
 from .. import __version__
-from .command_parser import MISUSED, Parser, misspelt_command
+from .command_parser import MISUSED, Parser, completed_files, misspelt_command
 from .options import RENDERERS, WindowOptions
 from .ray import add_ray
 from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
@@ -25,7 +25,8 @@ from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
 FAILED = 1  # exit code
-FORMATS = ("png", "jpg", "tif", "webp")  # of a batch's outputs
+FORMATS = ("png", "jpg", "tif", "webp", "avif", "jxl")  # of a batch's outputs
+SHELLS = ("bash", "zsh", "tcsh")  # whose completion shtab writes
 UNFORESEEN = "something went wrong that should not have"
 
 log = logging.getLogger(__name__)
@@ -87,11 +88,11 @@ def window_parser() -> argparse.ArgumentParser:
     add("file", nargs="?", type=Path, metavar="FILE", help="a photo or a session")
     add("--sample", dest="is_sample", action="store_true", help="open a sample photo")
     add("--renderer", choices=RENDERERS, default="auto", help="gl draws on the GPU, tiles does not")
-    add("--theme", choices=("dark", "light"), help="this once; else as in the preferences")
+    add("--theme", choices=("dark", "light"), help="for this run; default as in the preferences")
     add("--scale", type=float, metavar="S", help="pixels per point")
     add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
-    add("--seed", type=int, default=0, help="of all that is random")
+    add("--seed", type=int, default=0, help="of everything random")
     add("--frames", type=int, metavar="N", help="close after N frames")
     add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
     add("--frame-log", type=Path, metavar="F.json", help="when each frame was shown")
@@ -123,21 +124,25 @@ def _add_choosing(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("choosing the object (px of the upright photo)")
     add = group.add_argument
     add("--click", action="append", type=_list(2, 2), metavar="X,Y", help="on the object")
-    add("--not-click", action="append", type=_list(2, 2), metavar="X,Y", help="beside it")
+    add("--not-click", action="append", type=_list(2, 2), metavar="X,Y", help="not on the object")
     add("--box", type=_list(4, 4), metavar="X0,Y0,X1,Y1", help="around it")
     add("--subject", action="store_true", default=None, help="the photo's main subject")
-    add("--mask", metavar="M.png", help="a mask picture; it wins over everything else")
+    add("--mask", metavar="M.png", help="a mask picture; overrides all of these")
     add(
         "--segment",
         metavar="NAME",
         help="backend: auto, dino, grabcut, subject, sam2, sam, sam3, sam-onnx, or one model's id",
     )
-    add("--seed", type=int, metavar="N", help="default 0; two runs give identical bytes")
+    add("--seed", type=int, metavar="N", help="default 0; the same seed gives the same bytes")
 
 
 def _add_edit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "photo", type=Path, nargs="?", metavar="PHOTO", help="else the script names it"
+        "photo",
+        type=Path,
+        nargs="?",
+        metavar="PHOTO",
+        help="a picture file; a script may name it instead",
     )
     parser.add_argument("-o", "--out", type=Path, metavar="OUT", help="the edited photo")
     _add_choosing(parser)
@@ -145,54 +150,80 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--inpaint", metavar="NAME", help="auto, pixelhacker, lama, migan, patchmatch or telea")
     add("--lift", metavar="NAME", help="auto, relief, trellis, cupid, or a worker")
     add("--fill-from", action="append", type=_fill_from, metavar="X,Y:X2,Y2[,R]",
-        help="the background R px around X2,Y2 is filled in from around X,Y")  # fmt: skip
+        help="fill the background within R px of X2,Y2 from around X,Y")  # fmt: skip
     add("--refine", metavar="NAME",
         help="none (also auto), harmonise (light, grain, focus), qwen or klein")  # fmt: skip
-    add("--refine-strength", type=float, metavar="S", help="how much of a network's, 0 to 1")
+    add(
+        "--refine-strength",
+        type=float,
+        metavar="S",
+        help="how much of a network's change to keep, 0 to 1",
+    )
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add = parser.add_argument_group("the object's shape").add_argument
-    add("--gaussians", type=int, metavar="N", help="how many to lift the object to")
-    add("--thickness", type=float, metavar="S", help="times what its outline says, default 1")
-    add("--back", metavar="KIND", help="auto, mirrored or continued: the side that is not seen")
+    add(
+        "--gaussians",
+        type=int,
+        metavar="N",
+        help="how many Gaussians the object gets, default 16000",
+    )
+    add(
+        "--thickness",
+        type=float,
+        metavar="S",
+        help="a factor on what its outline suggests, default 1",
+    )
+    add("--back", metavar="KIND", help="the unseen side: auto, mirrored or continued")
     add("--symmetry", metavar="auto|yes|no", help="whether it looks the same left and right")
     add("--floating", action="store_true", default=None,
-        help="it does not stand on the ground: its outline's foot tells nothing")  # fmt: skip
-    add("--shape", metavar="KIND", help="what it is: auto, free, round, flat, box or tube")
+        help="it does not stand on the ground: ignore where its foot is")  # fmt: skip
+    add("--shape", metavar="KIND", help="its kind: auto, free, round, flat, box or tube")
     add(
         "--trust",
         type=float,
         metavar="T",
-        help="in the shape network, 0 to 1; 0: its outline alone tells its shape; default 1",
+        help="weight of the shape network, 0 (the outline alone) to 1 (default)",
     )
     add("--no-depth", action="store_true", default=None,
-        help="not as a depth model sees it, though one is installed")  # fmt: skip
-    add("--hidden", metavar="M.png", help="a mask of what of it is hidden behind something")
+        help="ignore the depth model even where one is installed")  # fmt: skip
+    add("--hidden", metavar="M.png", help="a mask of its parts that are hidden behind something")
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
-    add("--flip", action="store_true", default=None, help="that file stands on its head")
+    add("--flip", action="store_true", default=None, help="turn that file upside down")
     add = parser.add_argument_group("deforming").add_argument
     add("--pin", action="append", type=_list(2, 2), metavar="X,Y", help="a point that stays")
     add("--handle", action="append", type=_handle, metavar="X,Y:X2,Y2[,DZ]",
-        help="drag the surface point seen at X,Y to X2,Y2, DZ diameters away")  # fmt: skip
+        help="drag the surface point at X,Y to X2,Y2, and DZ object diameters away")  # fmt: skip
     add("--deform", metavar="MODE", help="arap (default) or laplacian")
     add("--links", metavar="KIND", help="geodesic (default) or euclidean")
-    add("--faithful", action="store_true", default=None, help="the paper as printed")
+    add(
+        "--faithful",
+        action="store_true",
+        default=None,
+        help="the method exactly as printed in the paper",
+    )
     add("--nodes", type=int, metavar="N", help="control points, 4 to 4096, default 512")
     add("--stiffness", type=float, metavar="S",
         help="reach of the links between control points, 0.25 to 4, default 1")  # fmt: skip
     add("--stretch-limit", type=float, metavar="S",
-        help="handles stop where a part would be S times as long as it was")  # fmt: skip
+        help="stop handles before a part becomes S times as long")  # fmt: skip
     add("--split", action="store_true", default=None,
-        help="Gaussians that are stretched far become several")  # fmt: skip
+        help="split Gaussians that are stretched far")  # fmt: skip
     add = parser.add_argument_group("placing the whole object, after the handles").add_argument
     add("--move", type=_list(2, 3), metavar="DX,DY[,DZ]", help="px, px, diameters")
-    add("--turn", type=_list(3, 3), metavar="YAW,PITCH,ROLL", help="degrees")
-    add("--scale", type=float, metavar="S", help="times as large")
+    add("--turn", type=_list(1, 3), metavar="YAW[,PITCH,ROLL]",
+        help="degrees; a positive yaw turns its front to the left")  # fmt: skip
+    add("--scale", type=float, metavar="S", help="scale factor")
     add("--shadow", metavar="auto|none",
-        help="default auto: its own goes with it, its reflection goes, where found")  # fmt: skip
-    add("--remove", action="store_true", default=None, help="it is gone, what is behind it shows")
+        help="auto (default): its shadow goes along, its reflection is erased")  # fmt: skip
+    add(
+        "--remove",
+        action="store_true",
+        default=None,
+        help="take the object away and show what is behind it",
+    )
     add("--front", action="append", type=_list(2, 2), metavar="X,Y",
-        help="on a thing that stays in front of what is edited")  # fmt: skip
-    add("--front-mask", metavar="M.png", help="a mask of such a thing")
+        help="on something that stays in front of the object")  # fmt: skip
+    add("--front-mask", metavar="M.png", help="a mask of something that stays in front")
     add = parser.add_argument_group("scripts and further outputs").add_argument
     add(
         "--script",
@@ -200,43 +231,54 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
         metavar="EDIT.json",
         help="the same options from a file, and further objects (docs/formats.md)",
     )
-    add("--session", type=Path, metavar="S.omorph", help="for the editor, and for replay")
-    add("--save-mask", type=Path, metavar="FILE", help="what was selected")
+    add("--session", type=Path, metavar="S.omorph", help="a session for the editor and for replay")
+    add("--save-mask", type=Path, metavar="FILE", help="the selection")
     add("--save-plate", type=Path, metavar="FILE", help="the photo without the object")
     add("--save-object", type=Path, metavar="FILE", help="the edited object, straight alpha")
-    add("--save-depth", type=Path, metavar="FILE", help="its nearness, 16 bit: white is nearest")
-    add("--save-layers", type=Path, metavar="FILE.ora", help="layers, for GIMP and Krita")
+    add("--save-depth", type=Path, metavar="FILE", help="nearness, 16 bit: white is nearest")
+    add("--save-layers", type=Path, metavar="FILE",
+        help="layers, for paint programs: .ora or .psd")  # fmt: skip
     add("--save-video", type=Path, metavar="FILE", help="as .webm, .mp4, .gif or .webp")
     add("--video", metavar="KIND", default="morph",
         help="morph (photo to edit and back, the default), sway or turn")  # fmt: skip
-    add("--seconds", type=float, default=4.0, metavar="S", help="its length, default 4")
+    add("--seconds", type=float, default=4.0, metavar="S", help="length of the video, default 4")
     add("--save-splats", type=Path, metavar="FILE",
         help="the edited object as .ply, .compressed.ply, .splat or .spz")  # fmt: skip
-    add("--report", type=Path, metavar="R.json", help="seconds, handles, footprint and more")
+    add("--save-mesh", type=Path, metavar="FILE.glb",
+        help="the edited object as a mesh with the photo on it")  # fmt: skip
+    add("--report", type=Path, metavar="R.json",
+        help="figures: seconds, handles, footprint and more")  # fmt: skip
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Runs scripts one after the other, a line for each. A failure does not stop the others; "
-        "an output that is newer than all it is made from is left as it is."
+        "Runs scripts one after the other and prints a line for each. A failure does not stop the "
+        "others, and outputs that are up to date are kept."
     )
     add = parser.add_argument
     add("scripts", type=Path, nargs="+", metavar="SCRIPT", help="edit scripts, or folders of them")
     add("-o", "--out", type=Path, metavar="FOLDER",
-        help="of outputs that a script does not name; it is made where there is none")  # fmt: skip
+        help="for outputs that no script names; created if missing")  # fmt: skip
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--format", choices=FORMATS, metavar="ENDING",
-        help="of those outputs: png, jpg, tif or webp; default the photo's own")  # fmt: skip
-    add("--overwrite", action="store_true", help="also what is newer already")
-    add("--report", type=Path, metavar="R.json", help="what became of each, with its figures")
+        help="of those outputs: png, jpg, tif, webp, avif or jxl; default as the photo")  # fmt: skip
+    add("--overwrite", action="store_true", help="redo outputs that are up to date")
+    add("--report", type=Path, metavar="R.json", help="the outcome and the figures of each edit")
     add_ray(parser)
 
 
 def _add_select(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("photo", type=Path, metavar="PHOTO", help="a picture file")
-    add("-o", "--out", type=Path, metavar="MASK.png", required=True, help="white is the object")
+    add(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="MASK.png",
+        required=True,
+        help="white where the object is",
+    )
     _add_choosing(parser)
 
 
@@ -244,7 +286,12 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("session", type=Path, metavar="SESSION", help="an .omorph file")
     add("-o", "--out", type=Path, metavar="OUT", required=True, help="the edited photo")
-    add("--report", type=Path, metavar="R.json", help="the figures of it")
+    add(
+        "--report",
+        type=Path,
+        metavar="R.json",
+        help="figures: seconds, handles, footprint and more",
+    )
 
 
 def _add_info(parser: argparse.ArgumentParser) -> None:
@@ -253,38 +300,72 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Reads and writes what the files' endings say."
+    parser.description = "The endings of the names choose the formats."
     add = parser.add_argument
-    add("source", type=Path, metavar="IN",
-        help=".ply .compressed.ply .splat .spz, or a mesh: .glb .gltf .obj .stl .off")  # fmt: skip
-    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz")
+    add(
+        "source",
+        type=Path,
+        metavar="IN",
+        help=".ply .compressed.ply .splat .spz, a mesh (.glb .gltf .obj .stl .off), or a session",
+    )
+    add("out", type=Path, metavar="OUT", help=".ply .compressed.ply .splat .spz, or .glb")
     add("--count", type=int, metavar="N", help="Gaussians on a mesh, default 20000")
     add("--flip", action="store_true",
-        help="turn it upside down: IN does not keep to its format's axes")  # fmt: skip
+        help="turn it upside down, where IN ignores its format's axes")  # fmt: skip
+
+
+def _add_completion(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Prints a completion script. For bash: objectmorpher completion bash >"
+        " ~/.local/share/bash-completion/completions/objectmorpher"
+    )
+    parser.add_argument("shell", choices=SHELLS, help="the shell that it is for")
+
+
+def run_completion(options: argparse.Namespace) -> None:
+    """`objectmorpher completion`"""
+    import shtab
+
+    sys.stdout.write(shtab.complete(completed_files(build_parser()), options.shell))
+
+
+def _add_share(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Writes one file that any browser with WebGL 2 shows, also offline."
+    add = parser.add_argument
+    add("session", type=Path, metavar="SESSION", help="an .omorph file with a lifted object")
+    add("-o", "--out", type=Path, metavar="PAGE.html", required=True, help="the page")
+    add("--object", type=int, metavar="N", help="which object, from 1; default the first")
 
 
 def _add_warm_up(parser: argparse.ArgumentParser) -> None:
-    parser.description = "A minute or two after an installation, seconds afterwards."
+    parser.description = "Takes a minute or two after an installation, and seconds afterwards."
 
 
 def _add_models(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Learned weights: fetched ones, and those that you bring."
+    parser.description = "Manages learned weights: those to be fetched and your own."
     actions = ("list", "get", "path", "verify", "add", "remove")
-    parser.add_argument("action", choices=actions, help="path: where it is; add: one of yours")
-    parser.add_argument("id", nargs="?", help="one of the list; default all of them")
+    parser.add_argument(
+        "action", choices=actions, help="path: print where it is; add: add one of your own"
+    )
+    parser.add_argument("id", nargs="?", help="a name of the list; default all")
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE",
-        help="to add: add depth FILE, or add sam2 FOLDER, which is used where it is")  # fmt: skip
+        help="for add: add depth FILE, or add sam2 FOLDER, which stays where it is")  # fmt: skip
     add = parser.add_argument_group("downloads").add_argument
-    add("--yes", dest="is_agreed", action="store_true", help="its size and licence are all right")
-    add("--accept-licence", metavar="NAME", help="for those with a star in the list")
+    add(
+        "--yes",
+        dest="is_agreed",
+        action="store_true",
+        help="accept size and licence without being asked",
+    )
+    add("--accept-licence", metavar="NAME", help="needed for models with a star in the list")
     add("--convert", dest="is_converted", action="store_true",
-        help="to add pixelhacker: take the numbers out of its pickles")  # fmt: skip
+        help="for add pixelhacker: extract the weights from its pickle files")  # fmt: skip
     add("--offline", dest="is_offline", action="store_true",
         help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
 
 
 def _add_doctor(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Tells which backend each stage would use on this machine, and why."
+    parser.description = "Reports which backend each stage would use on this machine, and why."
     parser.add_argument("--json", dest="is_json", action="store_true", help="as one JSON object")
 
 
@@ -306,7 +387,7 @@ def _list(least: int, most: int) -> Callable[[str], tuple[float, ...]]:
         except ValueError:
             numbers = ()
         if not least <= len(numbers) <= most:
-            count = f"{least}" if least == most else f"{least} or {most}"
+            count = count_range(least, most)
             raise argparse.ArgumentTypeError(f"{text!r} is not {count} numbers with commas")
         return numbers
 
@@ -356,24 +437,29 @@ def _on_photo(
 SUBCOMMANDS = (
     _on_photo("edit", "edit a photo without a window", _add_edit),
     Subcommand(
-        "batch", "run many edit scripts, whatever becomes of each", _add_batch,
+        "batch", "run many edit scripts", _add_batch,
         lazily("batch", "run_batch"),
     ),
     _on_photo("select", "write the mask of the chosen object", _add_select),
     _command("replay", "render a saved session again", _add_replay),
-    _command("info", "what a session holds", _add_info),
-    _command("convert", "turn splat and mesh files into each other", _add_convert),
+    _command("info", "show what a session holds", _add_info),
+    _command("convert", "convert splat and mesh files", _add_convert),
+    Subcommand("share", "make a web page in which the object can be dragged", _add_share,
+               lazily("share", "run_share")),
     Subcommand(
         "models", "list, get and check learned weights", _add_models,
         lazily("models", "run_models"),
     ),
     Subcommand(
-        "doctor", "what runs here, and what would help", _add_doctor,
+        "doctor", "show what runs on this machine, and what would help", _add_doctor,
         lazily("doctor", "run_doctor"),
     ),
-    _command("warm-up", "compile the kernels now, not when needed", _add_warm_up),
+    _command("warm-up", "compile the kernels in advance", _add_warm_up),
     Subcommand(
-        "serve", "compute for the windows of other computers", lazily("serve", "add_serve"),
+        "completion", "print a completion script for your shell", _add_completion, run_completion
+    ),
+    Subcommand(
+        "serve", "run the long jobs for other computers", lazily("serve", "add_serve"),
         lazily("serve", "run_serve"),
     ),
 )  # fmt: skip

@@ -21,26 +21,26 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
     from ..server.address import PORT
 
     parser.description = (
-        "Selects, lifts, fills in and refines for the windows of other computers (docs/serve.md)."
-        " Whoever asks needs the token: from --token-file, or OBJECTMORPHER_TOKEN, else it is made"
-        " anew and printed."
+        "Selects, lifts, inpaints and refines for the windows of other computers (docs/serve.md)."
+        " Clients need the token, which is read from --token-file or OBJECTMORPHER_TOKEN, or else"
+        " created and printed."
     )
     add = parser.add_argument_group("who may ask").add_argument
     add("--host", default="127.0.0.1", metavar="H", help="default: this computer only")
     add("--port", type=int, default=PORT, metavar="P", help=f"default {PORT}; 0: any free one")
-    add("--token-file", type=Path, metavar="FILE", help="the token; made there if there is none")
-    add("--max-body", type=int, default=512, metavar="MB", help="of a request, default 512")
+    add("--token-file", type=Path, metavar="FILE", help="holds the token; created if missing")
+    add("--max-body", type=int, default=512, metavar="MB", help="largest request, default 512")
     add = parser.add_argument_group("who computes").add_argument
     add("--alone", action="store_true",
-        help="this process, one job after the other: without Ray")  # fmt: skip
-    add("--ray", metavar="ADDRESS", help="of a running Ray cluster; default: one is started here")
+        help="in this process, one job at a time, without Ray")  # fmt: skip
+    add("--ray", metavar="ADDRESS", help="of a running Ray cluster; default: start one here")
     add("--stages", metavar="A,B", help="of segment, lift, inpaint and refine; default all of them")
     add("--replicas", metavar="MIN[,MAX]", default="1",
-        help="processes per backend, as many as the queue needs; default 1")  # fmt: skip
+        help="processes per backend, growing with the queue; default 1")  # fmt: skip
     add("--cpus", type=float, default=1.0, metavar="N", help="per process, default 1")
     add("--gpus", type=float, metavar="N",
-        help="per process; default: the backends share one, where there are any")  # fmt: skip
-    add("--store", type=int, metavar="MB", help="of memory for Ray's objects; default Ray's own")
+        help="per process; default: all backends share one, if there is one")  # fmt: skip
+    add("--store", type=int, metavar="MB", help="memory for Ray's objects; default Ray's own")
 
 
 def run_serve(options: argparse.Namespace) -> None:

@@ -59,7 +59,7 @@ def take_next_step(editor: Editor) -> None:
         return
     if name is not None:
         run(editor, name)
-    elif editor.is_click_awaited and editor.hover.place is not None:
+    elif editor.tasks.is_click_awaited and editor.hover.place is not None:
         editor.selection.add_click(*editor.hover.place, is_foreground=True)
 
 

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from ..editor.editor import Editor
+from ..editor.export_plan import What
 from ..editor.view import ToolName
 from ..tools import navigate
-from .command import Command, Reason, never, no_lift, no_photo, no_redo, no_undo
+from .command import (
+    Command,
+    Reason,
+    never,
+    no_lift,
+    no_photo,
+    no_redo,
+    no_selection,
+    no_undo,
+)  # fmt: skip
 
 
 def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
@@ -18,6 +28,11 @@ def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:
 COMMANDS: dict[str, Command] = {
     "undo": Command("Undo", "Ctrl+Z", lambda e: e.undo(), no_undo),
     "redo": Command("Redo", "Ctrl+Shift+Z", lambda e: e.redo(), no_redo, other_keys=("Ctrl+Y",)),
+    "copy": Command("Copy photo", "Ctrl+C", lambda e: e.exporting.copy(What.PHOTO)),
+    "copy_object": Command(
+        "Copy object", "Ctrl+Shift+C", lambda e: e.exporting.copy(What.CUTOUT), no_selection
+    ),
+    "paste": Command("Paste photo", "Ctrl+V", lambda e: e.filing.paste(), never),
     "select": _tool(ToolName.SELECT, "1", no_photo),
     "mask": _tool(ToolName.MASK, "2", no_photo),
     "pose": _tool(ToolName.POSE, "3", no_lift),

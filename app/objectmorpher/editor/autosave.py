@@ -29,7 +29,7 @@ from ..system.file_lock import FileLock
 from ..system.texts import t
 
 if TYPE_CHECKING:
-    from .editor import Editor
+    from .state import EditorState
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +73,7 @@ class Held:
 class Autosave:
     """Looks each frame whether there is something new, and has it written."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self._asked: Document | None = None  # last one given to the thread
         self._asked_at = -INTERVAL  # s, monotonic
@@ -86,8 +86,8 @@ class Autosave:
         self._given = self._done = 0  # orders; the one counted here, the other in the thread
         self._thread: threading.Thread | None = None
 
-    def poll(self) -> None:
-        """Once a frame, on the main thread."""
+    def poll(self) -> bool:
+        """Once a frame, on the main thread. Whether anything changed: a complaint, at most."""
         editor, document = self._editor, self._editor.committed
         if self._problem is not None:
             self._tell(self._problem)
@@ -95,13 +95,14 @@ class Autosave:
             if self._is_kept:
                 self._asked, self._is_kept = None, False
                 self._order(None)
-            return
+            return False
         now = time.monotonic()
         is_early = now - self._asked_at < INTERVAL
         if document is self._asked or self._given > self._done or is_early:
-            return
+            return False
         self._asked, self._asked_at, self._is_kept = document, now, True
         self._order((document, self._about(document)))
+        return False
 
     @property
     def is_up_to_date(self) -> bool:

@@ -11,6 +11,7 @@ more closely while the pointer goes on resting: what that costs the click need n
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -26,10 +27,10 @@ from ..worker import job_functions
 from ..worker.job_error import JobError
 from ..worker.job_functions import Choice
 from ..worker.jobs import RELUCTANCE
-from .tasks import SELECT, Question
+from .tasks import SELECT, Question, Tasks
 
 if TYPE_CHECKING:
-    from .editor import Editor
+    from .state import EditorState
 
 
 CANDIDATE = "candidate"  # kind of job
@@ -37,6 +38,13 @@ CLOSER = "closer candidate"  # kind of job, of one that is shown
 REST = 0.06  # s that the pointer rests before the worker is asked
 SAME_PLACE = 2.0  # points: a hand moves so much when it presses
 TOO_SLOW = 2.5  # s; after such an answer the photo is not asked about again
+
+Answered = Callable[[Question, Found, Prompt], None]
+Improved = Callable[[Question, Selection | None, Found], None]
+
+
+def _ignore(*answer: object) -> None:
+    """Nobody wants it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +77,10 @@ class Candidate:
 class Candidates:
     """The one under the pointer."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, tasks: Tasks) -> None:
         self._editor = editor
+        self._tasks = tasks
+        self.answered: Answered = _ignore  # takes the answer to a question, and what was asked
         self.shown: Candidate | None = None
         self._place: tuple[float, float] | None = None  # image px, where the pointer is
         self._since = 0.0  # s, monotonic, when it came there
@@ -83,12 +93,12 @@ class Candidates:
         """Whether the worker will be asked within a moment."""
         return self._next_prompt() is not None and self._is_free()
 
-    def poll(self, now: float) -> None:
-        """Asks when the pointer rests; once a frame. `now`: s, monotonic."""
-        place = self._editor.hover.place
+    def poll(self) -> bool:
+        """Asks when the pointer rests; once a frame."""
+        place, now = self._editor.hover.place, time.monotonic()
         if not self._is_wished():
             self.shown = self._place = self._asked = None
-            return
+            return False
         assert place is not None
         if place != self._place:
             self._place, self._since = place, now
@@ -99,6 +109,7 @@ class Candidates:
         prompt = self._next_prompt()
         if prompt is not None and now - self._since >= REST and self._is_free():
             self._ask(prompt, now)
+        return False
 
     def take(self, question: Question) -> bool:
         """Whether the question is answered already, or will be by what runs: then nobody asks."""
@@ -109,12 +120,12 @@ class Candidates:
             editor.jobs.cancel(CANDIDATE)
             self.shown = self._asked = None
             # A closer look goes on: the step's own then finds that it was taken.
-            editor.selection.take(question, shown.found, shown.prompt)
+            self.answered(question, shown.found, shown.prompt)
             return True
         asked = self._asked is not None and self._is_same(self._asked, question.prompt)
         if not asked or not editor.jobs.promote(CANDIDATE, SELECT):
             return False
-        self._wanted = editor.tasks.question = question
+        self._wanted = self._tasks.question = question
         return True
 
     def _is_free(self) -> bool:
@@ -127,7 +138,7 @@ class Candidates:
         """Whether the user may want to know what a click here would select."""
         editor = self._editor
         return (
-            (editor.is_click_awaited or editor.is_correction_awaited)
+            (self._tasks.is_click_awaited or self._tasks.is_correction_awaited)
             and editor.document is not None
             and editor.document.photo is not self._slow
             and editor.hover.place is not None
@@ -143,7 +154,7 @@ class Candidates:
             prompt = Prompt((Click(*self._place),), level=editor.view.selecting.level)
         else:  # a click where the mask is right says nothing new
             is_selected = bool(mask[int(self._place[1]), int(self._place[0])])
-            before = editor.selection.prompt
+            before = self._tasks.prompt
             click = Click(*self._place, is_foreground=not is_selected)
             prompt = replace(before, clicks=(*before.clicks, click))
         return None if prompt == self._asked else prompt
@@ -176,7 +187,7 @@ class Candidates:
                 if wanted is not None:
                     editor.complain(answer)
             elif wanted is not None:
-                editor.selection.take(wanted, answer, prompt)
+                self.answered(wanted, answer, prompt)
             elif self._is_wished() and editor.mask is before:
                 self.shown = Candidate(photo, prompt, answer, before)
                 self._look_closer(self.shown)
@@ -217,7 +228,7 @@ class Candidates:
     def _pop_wanted(self) -> Question | None:
         wanted, self._wanted = self._wanted, None
         if wanted is not None:
-            self._editor.tasks.question = None
+            self._tasks.question = None
         return wanted
 
 
@@ -241,8 +252,10 @@ class _Glance:
 class CloserLook:
     """The one that is owed, if any."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, tasks: Tasks) -> None:
         self._editor = editor
+        self._tasks = tasks
+        self.improved: Improved = _ignore  # takes a better answer, and what was selected before
         self._owed: _Glance | None = None
 
     def begin(self, question: Question, base: Selection | None, asked: Prompt) -> None:
@@ -261,7 +274,7 @@ class CloserLook:
             self._owed = None
         elif owed.found is not None and not editor.hand.is_busy and editor.preview is None:
             self._owed = None
-            editor.selection.improve(owed.question, owed.base, owed.found)
+            self.improved(owed.question, owed.base, owed.found)
             return True
         elif owed.found is None and editor.jobs.is_idle:  # it had to give way
             self._ask(owed)
@@ -270,7 +283,7 @@ class CloserLook:
     def _is_wanted(self, owed: _Glance) -> bool:
         """Whether the step is still the last word about what is selected."""
         editor, history = self._editor, self._editor.history
-        if history is None or history.cursor != owed.cursor or editor.tasks.question is not None:
+        if history is None or history.cursor != owed.cursor or self._tasks.question is not None:
             return False
         return editor.current == owed.question.k and editor.mask is owed.mask
 
@@ -295,7 +308,7 @@ class CloserLook:
         )  # fmt: skip
 
 
-def choice_of(editor: Editor) -> Choice:
+def choice_of(editor: EditorState) -> Choice:
     """Which segmenter is asked."""
     seed = editor.document.seed if editor.document is not None else 0
     return Choice(editor.settings.backends.segment, seed)

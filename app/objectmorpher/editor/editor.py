@@ -1,36 +1,27 @@
-"""The editor without a window: its state, and the steps from one document to the next.
+"""The editor without a window: its parts, put together, and the steps that concern several.
 
-State: the history of documents and the preview of the stroke in progress; what is derived from
-them; the view; the jobs in flight; what the user points at. What a user may intend with them are
-the methods of its parts (`editing/`): selection, objects, posing, placing, composing. Panels,
-menu, shortcuts, tools and tests call the same ones. No GL, no ImGui, no window in here.
+What a user may intend are the methods of its parts (`intents/`): selection, objects, posing,
+placing, composing. Panels, menu, shortcuts, tools and tests call the same ones. No GL, no ImGui,
+no window in here.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
+from objectmorpher_core.document.model import Document
 
-from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document.model import Document, EditObject
-
-from ..canvas.derived import Derived
+from ..canvas.frame import Cache
 from ..canvas.shape import Shapes
 from ..system.freed_memory import give_back
-from ..system.texts import sentence, t
-from ..tools.pointer import Hand, Pointer
-from ..worker.job_error import JobError
-from ..worker.job_functions import WARM
-from ..worker.jobs import RELUCTANCE, Jobs
-from ..worker.threads import Chores
+from ..system.texts import t
+from ..worker.jobs import RELUCTANCE
 from .autosave import Autosave
 from .candidate import Candidates, CloserLook
-from .feedback import Action, Hover, Message
-from .filing import OPEN, Filing
+from .feedback import Hover
+from .filing import OPEN, Dialog, Filing
 from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
@@ -47,133 +38,74 @@ from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import Refining
 from .intents.rigging import Rigging
+from .intents.sample import Sample
 from .intents.selection import Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
 from .refits import Refits
 from .settings import Settings
+from .state import EditorState
 from .tasks import SELECT, Tasks
-from .view import USUAL_LEVEL, SelectMode, Shown, ToolName, View
+from .view import USUAL_LEVEL, Shown, ToolName
 
 
-class Editor:
+class Editor(EditorState):
     """Everything that the window shows and changes."""
 
     def __init__(self, settings: Settings, wake: Callable[[], None] = lambda: None) -> None:
         """`wake` is called from another thread when `poll` has something to do."""
-        self.settings = settings
-        self.view = View()
-        self.hand = Hand()
-        self.jobs = Jobs(WARM, wake)
-        self.chores = Chores(wake)
-        self.autosave, self.recovery = Autosave(self), Recovery(self)
-        self.tasks, self.refits = Tasks(self), Refits(self)
-        self.filing = Filing(self)
-        self.selection, self.objects = Selection(self), Objects(self)
-        self.masking, self.shaping = Masking(self), Shaping(self)
+        super().__init__(settings, wake)
+        self.posing, self.rigging = Posing(self), Rigging(self)
+        self.handle_numbers = HandleNumbers(self, self.posing)
+        self.placing, self.objects = Placing(self, self.posing), Objects(self, self.posing)
+        self.landing = Landing(self, self.objects)
+        self.looking = Looking(self, self.landing)
+        self.tasks = Tasks(self, self.posing)
+        self.refits = Refits(self, self.posing, self.tasks)
+        self.masking = Masking(self, self.landing, self.posing)
+        self.candidates = Candidates(self, self.tasks)
+        self.closer_look = CloserLook(self, self.tasks)
+        self.selection = Selection(
+            self, self.tasks, self.masking, self.candidates, self.closer_look
+        )
+        self.shaping = Shaping(self, self.posing, self.tasks)
+        self.computing = Computing(self, self.tasks)
+        self.methods = Methods(self, self.computing, self.tasks)
+        self.models = Models(self, self.methods, self.shaping, self.tasks)
+        self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
+        self.hinting = Hinting(self, self.composing)
+        self.refining, self.exporting = Refining(self, self.methods), Exporting(self)
+        self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
         self.leaving_out = LeavingOut(self)
-        self.posing, self.placing = Posing(self), Placing(self)
-        self.handle_numbers, self.rigging = HandleNumbers(self), Rigging(self)
-        self.exporting, self.models = Exporting(self), Models(self)
-        self.composing, self.looking = Composing(self), Looking(self)
-        self.methods, self.computing = Methods(self), Computing(self)
-        self.hinting, self.refining = Hinting(self), Refining(self)
-        self.landing = Landing(self)
-        self.candidates = Candidates(self)
-        self.closer_look = CloserLook(self)
-        self.derived = self._nothing_derived()
-        self.history: History | None = None
-        self.preview: Document | None = None  # of the stroke in progress
-        self.path: Path | None = None  # the session's file
-        self.source: Path | None = None  # the photo's file
-        self.current = 0  # index of the object that the tools change
-        self.hover = Hover()
-        self.pointer: Pointer | None = None  # where it is now, on the canvas
-        self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
-        self.message: Message | None = None
-        self.is_over = False  # the window closes
+        self.sample = Sample(self, self.filing, self.selection, self.tasks)
+        self.autosave = Autosave(self)
+        self.recovery = Recovery(self, self.autosave, self.filing, self.start, self.close)
+        self._pollers = self._in_order()
+        self._ask_elsewhere()
 
-    # What there is
+    def _uses(self) -> dict[Dialog, Callable[[Path], None]]:
+        """What is done with the files that were chosen, but for documents and exports."""
+        return {
+            Dialog.MASK_OPEN: self.masking.open_file,
+            Dialog.MASK_SAVE: self.masking.write_file,
+            Dialog.SHAPE_OPEN: self.shaping.open_file,
+            Dialog.MODEL_OPEN: self.models.add,
+            Dialog.MODEL_FOLDER: self.models.hub.use_folder,
+        }
 
-    @property
-    def document(self) -> Document | None:
-        if self.preview is not None:
-            return self.preview
-        return self.committed
-
-    @property
-    def committed(self) -> Document | None:
-        """The document without the stroke in progress."""
-        return self.history.document if self.history else None
-
-    @property
-    def object(self) -> EditObject | None:
-        """The object that the tools change, if it exists already."""
-        document = self.document
-        if document is None or self.current >= len(document.objects):
-            return None
-        return document.objects[self.current]
-
-    @property
-    def mask(self) -> Mask | None:
-        return self.object.mask if self.object else None
-
-    @property
-    def is_lifted(self) -> bool:
-        return self.object is not None and self.object.lifted is not None
-
-    @property
-    def is_click_awaited(self) -> bool:
-        """Whether a click would begin a selection."""
+    def _in_order(self) -> tuple[Callable[[], bool], ...]:
+        """What is called once a frame; each says whether it has changed anything."""
+        tasks = self.tasks
         return (
-            self.document is not None
-            and self.view.tool is ToolName.SELECT
-            and self.view.selecting.mode is SelectMode.CLICK
-            and self.mask is None
-            and self.tasks.question is None
-        )
+            self.jobs.poll, self.chores.poll, tasks.rehearse, tasks.ensure_fronts,
+            self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.refining.deliver,
+            self.autosave.poll, self.candidates.poll, self.closer_look.poll, self.sample.poll,
+            self.leaving_out.poll,
+        )  # fmt: skip
 
-    @property
-    def is_correction_awaited(self) -> bool:
-        """Whether a click would correct what clicks, a box or the subject have selected."""
-        return (
-            self.document is not None
-            and self.preview is None
-            and self.view.tool is ToolName.SELECT
-            and self.view.selecting.mode is SelectMode.CLICK
-            and self.object is not None
-            and self.object.mask is not None
-            and not self.object.prompt.is_empty
-            and self.tasks.question is None
-        )
-
-    @property
-    def photo_size(self) -> tuple[int, int] | None:
-        return self.document.photo.size if self.document else None
-
-    @property
-    def is_saved(self) -> bool:
-        return self.history is None or self.history.is_saved
-
-    def is_on_photo(self, canvas_xy: np.ndarray) -> bool:
-        if self.photo_size is None:
-            return False
-        xy = self.view.image_from_canvas(canvas_xy)
-        return bool((xy >= 0).all() and (xy < self.photo_size).all())
-
-    # Saying things
-
-    def say(self, text: str, action: Action | None = None) -> None:
-        self.message = Message(text, action=action)
-
-    def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
-        """An error: one sentence, its first letter a capital."""
-        self.message = Message(sentence(text), is_error=True, details=details, action=action)
-
-    def complain_of(self, error: JobError) -> None:
-        """A job that failed; where another try may help there is a button for it."""
-        retry = Action(t("Retry"), error.retry) if error.retry else None
-        self.complain(error.sentence, error.trace, retry)
+    def _ask_elsewhere(self) -> None:
+        """What takes longer than a frame is computed beside it."""
+        self.cache.layers.ask, self.cache.lights.ask = self.tasks.render_exact, self.tasks.light
 
     # Steps
 
@@ -201,13 +133,9 @@ class Editor:
         self._forget_derived()
 
     def _forget_derived(self) -> None:
-        self.derived = self._nothing_derived()
+        self.cache = Cache()
+        self._ask_elsewhere()
         give_back()
-
-    def _nothing_derived(self) -> Derived:
-        derived = Derived()
-        derived.layers.ask, derived.lights.ask = self.tasks.render_exact, self.tasks.light
-        return derived
 
     def close_document(self) -> None:
         self.hand.abort(self)
@@ -221,26 +149,13 @@ class Editor:
         self.hinting.forget()
         self.refining.forget()
         self.posing.forget()
-        self.history = self.preview = self.path = self.source = None
         self.posing.select(None)
-        self.hover, self.message = Hover(), None
+        self.forget_document()
 
     def quit(self) -> None:
         """Closes the program; nothing is asked here."""
         self.close_document()
         self.is_over = True
-
-    def apply(self, label: str, document: Document) -> None:
-        """`document` is the next step."""
-        assert self.history is not None
-        self.preview = None
-        self.history.apply(label, document)
-
-    def commit(self, label: str) -> None:
-        """The preview becomes a step; without a label it is dropped."""
-        preview, self.preview = self.preview, None
-        if preview is not None and label:
-            self.apply(label, preview)
 
     def undo(self) -> None:
         if self.hand.abort(self) or self.history is None:
@@ -287,6 +202,8 @@ class Editor:
             self.objects.carried = None
         elif self.tasks.question is not None:
             self.jobs.cancel(SELECT)
+        elif self.composing.offer is not None:
+            self.composing.refuse_shadow()
         else:
             if self.view.tool is ToolName.LOOK:
                 self.looking.reset()
@@ -307,20 +224,8 @@ class Editor:
     # Time
 
     def poll(self) -> bool:
-        """Takes in what the worker sent; once a frame. Whether anything changed."""
-        is_changed = self.jobs.poll()
-        is_changed = self.chores.poll() or is_changed
-        self.tasks.rehearse()
-        is_changed = self.tasks.ensure_fronts() or is_changed
-        is_changed = self.tasks.ensure_sample() or is_changed
-        is_changed = self.refits.ensure() or is_changed
-        is_changed = self.tasks.ensure_plate() or is_changed
-        is_changed = self.composing.deliver() or is_changed
-        is_changed = self.refining.deliver() or is_changed
-        self.autosave.poll()
-        self.candidates.poll(time.monotonic())
-        is_changed = self.closer_look.poll() or is_changed
-        return is_changed
+        """Takes in what was computed elsewhere; once a frame. Whether anything changed."""
+        return any([poll() for poll in self._pollers])
 
     def shut_down(self) -> None:
         self.chores.close()

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-LOSSLESS = 100  # quality of WebP at which every pixel is kept
+from objectmorpher_core.pictures.formats import WRITTEN, Format, format_of
+
+LOSSLESS = 100  # quality of LOSSLESS_AT_100 at which every pixel is kept
 
 
 class What(Enum):
@@ -19,6 +21,18 @@ class What(Enum):
     BACKGROUND = "Background"
     LAYERS = "Layers"
     VIDEO = "Video"
+    SOLID = "3D object"
+
+    @property
+    def key(self) -> str:
+        """Its name in the table of what can be saved, `objectmorpher_core.pictures.formats`."""
+        return _KEYS[self]
+
+
+_KEYS = {
+    What.PHOTO: "photo", What.CUTOUT: "object", What.MASK: "mask", What.DEPTH: "depth",
+    What.BACKGROUND: "plate", What.LAYERS: "layers", What.VIDEO: "video", What.SOLID: "splats",
+}  # fmt: skip
 
 
 class Motion(Enum):
@@ -29,52 +43,9 @@ class Motion(Enum):
     TURN = "Turn around"
 
 
-class Format(Enum):
-    """Kinds of image files."""
-
-    PNG = "PNG"
-    JPEG = "JPEG"
-    TIFF = "TIFF"
-    WEBP = "WebP"
-    OPENRASTER = "OpenRaster"
-    WEBM = "WebM"
-    MP4 = "MP4"
-    GIF = "GIF"
-
-    @property
-    def endings(self) -> tuple[str, ...]:
-        """The usual one first."""
-        return _ENDINGS[self]
-
-    @property
-    def has_16_bits(self) -> bool:
-        return self in (Format.PNG, Format.TIFF, Format.OPENRASTER)
-
-    @property
-    def has_quality(self) -> bool:
-        return self in (Format.JPEG, Format.WEBP)
-
-
-_ENDINGS = {
-    Format.PNG: (".png",),
-    Format.JPEG: (".jpg", ".jpeg"),
-    Format.TIFF: (".tif", ".tiff"),
-    Format.WEBP: (".webp",),
-    Format.OPENRASTER: (".ora",),
-    Format.WEBM: (".webm",),
-    Format.MP4: (".mp4",),
-    Format.GIF: (".gif",),
-}
-_FLAT = (Format.PNG, Format.JPEG, Format.TIFF, Format.WEBP)
-_TRANSPARENT = (Format.PNG, Format.TIFF, Format.WEBP)
-FORMATS = {
-    What.PHOTO: _FLAT,
-    What.CUTOUT: _TRANSPARENT,
-    What.MASK: (Format.PNG,),
-    What.DEPTH: (Format.PNG, Format.TIFF),
-    What.BACKGROUND: _FLAT,
-    What.LAYERS: (Format.OPENRASTER, Format.PNG),
-    What.VIDEO: (Format.WEBM, Format.MP4, Format.GIF, Format.WEBP),
+FORMATS = {what: WRITTEN[what.key] for what in What} | {
+    What.LAYERS: (*WRITTEN["layers"], Format.PNG),  # in a folder
+    What.SOLID: (*WRITTEN["mesh"], *WRITTEN["splats"]),
 }
 NAMES = {  # what follows the photo's name
     What.PHOTO: "edited",
@@ -84,13 +55,9 @@ NAMES = {  # what follows the photo's name
     What.BACKGROUND: "background",
     What.LAYERS: "layers",
     What.VIDEO: "video",
+    What.SOLID: "object",
 }
 LENGTHS = (1.0, 12.0)  # s, of a video
-
-
-def format_of(ending: str) -> Format | None:
-    """The format that an ending (".JPG") names."""
-    return next((f for f in Format if ending.lower() in f.endings), None)
 
 
 @dataclass(frozen=True)
@@ -101,15 +68,15 @@ class Plan:
     path: Path  # the file; of layers as PNG the folder
     object: int = 0  # index of the one whose cut-out or mask it is
     bits: int = 0  # 8 or 16 a channel; 0: the photo's own
-    quality: int = 95  # of JPEG, and of WebP where LOSSLESS is just that
+    quality: int = 95  # of the format; 100 is lossless where it has that
     motion: Motion = Motion.MORPH
     seconds: float = 4.0
 
     @property
     def is_folder(self) -> bool:
-        return is_folder(self.what, format_of(self.path.suffix))
+        return is_folder(self.what, format_of(self.path.name))
 
 
 def is_folder(what: What, format: Format | None) -> bool:
     """Whether it is written as several files in a folder: layers that are not in one file."""
-    return what is What.LAYERS and format is not Format.OPENRASTER
+    return what is What.LAYERS and format not in WRITTEN["layers"]

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core.base.progress import Progress
+from objectmorpher_core.document.model import Document
 
 from ..canvas.shape import Shapes, build_ready
+from ..system import clipboard
 from ..system.texts import t
 from ..worker.job_error import JobError
-from .export_plan import Format
-from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document
+from .export_plan import FORMATS
+from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document, read_photo
 
 if TYPE_CHECKING:
-    from .editor import Editor
+    from .intents.exporting import Exporting
+    from .state import EditorState
+    from .tasks import Tasks
 
-EXPORT_ENDINGS = tuple(ending for format in Format for ending in format.endings)
+EXPORT_ENDINGS = tuple(
+    dict.fromkeys(e for formats in FORMATS.values() for f in formats for e in f.endings)
+)
 OPEN = "open"  # kind of chores
 NAMED = 3  # files named in a message
 
@@ -42,13 +48,21 @@ class Dialog(Enum):
         return self not in (Dialog.SAVE, Dialog.EXPORT, Dialog.MASK_SAVE)
 
 
+Uses = Mapping[Dialog, Callable[[Path], None]]
+Start = Callable[[Document, Shapes], None]
+
+
 class Filing:
     """Which file is which, and what waits for an answer about them."""
 
-    def __init__(self, editor: Editor, fov: float | None = None, seed: int = 0) -> None:
-        """`fov` (degrees) and `seed` are for photos that are opened."""
+    def __init__(
+        self, editor: EditorState, tasks: Tasks, exporting: Exporting, uses: Uses, start: Start
+    ) -> None:
+        """`uses`: what is done with the files of other dialogs; `start` shows a document."""
         self._editor = editor
-        self._fov, self._seed = fov, seed
+        self._tasks, self._exporting, self._uses, self._start = tasks, exporting, uses, start
+        self.fov: float | None = None  # degrees, of photos that are opened
+        self.seed = 0  # likewise
         self.wanted: Dialog | None = None  # the window shows it
         self.question: Callable[[], None] | None = None  # goes on when the changes may be lost
         self._after_save: Callable[[], None] | None = None
@@ -70,7 +84,7 @@ class Filing:
         if not paths:
             return
         if self._editor.mask is not None and is_object(paths[0]):
-            self._editor.shaping.open_file(paths[0])
+            self._uses[Dialog.SHAPE_OPEN](paths[0])
             return
         kinds = (*PHOTO_ENDINGS, SESSION_ENDING)
         usable = [p for p in paths if p.suffix.lower() in kinds and not p.is_dir()]
@@ -85,16 +99,12 @@ class Filing:
 
         self.guard(lambda: self._open(chosen, then))
 
-    def open_sample(self, path: Path, thing: tuple[float, float] | None = None) -> None:
-        """Opens a photo that came with the program: it is nobody's file to go back to.
-
-        The `thing` at that place, image px, is selected and lifted: it can be dragged at once.
-        """
+    def open_sample(self, path: Path, then: Callable[[], None] = lambda: None) -> None:
+        """Opens a photo that came with the program: it is nobody's file to go back to."""
 
         def start() -> None:
             self._editor.source = None
-            if thing is not None:
-                self._editor.tasks.lift_thing(*thing)
+            then()
 
         self.guard(lambda: self._open(path, start))
 
@@ -127,20 +137,14 @@ class Filing:
             self.open(path)
         elif dialog is Dialog.SAVE:
             self.save_as(path if path.suffix else path.with_suffix(SESSION_ENDING))
-        elif dialog is Dialog.MASK_OPEN:
-            self._editor.masking.open_file(path)
-        elif dialog is Dialog.SHAPE_OPEN:
-            self._editor.shaping.open_file(path)
-        elif dialog is Dialog.MODEL_OPEN:
-            self._editor.models.add(path)
-        elif dialog is Dialog.MODEL_FOLDER:
-            self._editor.models.hub.use_folder(path)
         elif dialog is Dialog.MASK_SAVE:
-            self._editor.masking.write_file(path if path.suffix else path.with_suffix(".png"))
-        elif self._editor.exporting.draft is not None:
-            self._editor.exporting.set_path(path)
+            self._uses[dialog](path if path.suffix else path.with_suffix(".png"))
+        elif dialog in self._uses:
+            self._uses[dialog](path)
+        elif self._exporting.draft is not None:
+            self._exporting.set_path(path)
         else:
-            self._editor.exporting.export_to(path)
+            self._exporting.export_to(path)
 
     def cancel_dialog(self) -> None:
         """The user closed a dialog without choosing."""
@@ -160,7 +164,7 @@ class Filing:
             self._editor.complain(sentence)
             return
         then, self._after_save = self._after_save, None
-        self._editor.tasks.save(path, then)
+        self._tasks.save(path, then)
 
     def suggestion(self, dialog: Dialog) -> Path:
         """The file name a dialog begins with."""
@@ -175,29 +179,48 @@ class Filing:
             return editor.path or folder / f"{stem}{SESSION_ENDING}"
         if dialog is Dialog.MASK_SAVE:
             return folder / f"{stem}-mask.png"
-        if editor.exporting.draft is not None:
-            return editor.exporting.path
-        return folder / f"{stem}-edited.png"
+        if self._exporting.draft is not None:
+            return self._exporting.path
+        ending = self._exporting.own_format.endings[0]
+        return folder / f"{stem}-edited{ending}"
+
+    def paste(self) -> None:
+        """Opens the photo in the clipboard, or the file there, after the usual question."""
+
+        def read(progress: Progress) -> tuple[Opened, Path | None]:
+            pasted = clipboard.paste()
+            if pasted.path is not None:
+                return read_document(pasted.path, self.fov, self.seed, progress), pasted.path
+            return read_photo(pasted.data, pasted.name, self.fov, self.seed), None
+
+        self.guard(lambda: self._begin(t("Pasting"), read, lambda: None))
 
     def _open(self, path: Path, then: Callable[[], None]) -> None:
-        """Reads the file in a thread; `then` is called when it is shown.
+        """Reads the file in a thread; `then` is called when it is shown."""
 
-        What is open now may be lost: that was asked. What is done to it meanwhile may not.
-        """
+        def read(progress: Progress) -> tuple[Opened, Path | None]:
+            return read_document(path, self.fov, self.seed, progress), path
+
+        self._begin(t("Opening {name}", name=path.name), read, then)
+
+    def _begin(
+        self, title: str, read: Callable[[Progress], tuple[Opened, Path | None]],
+        then: Callable[[], None],
+    ) -> None:  # fmt: skip
+        """What is open now may be lost: that was asked. What is done to it meanwhile may not."""
         editor, given_up = self._editor, self._editor.committed
-        fov, seed = self._fov, self._seed
 
-        def read(progress: Progress) -> tuple[Opened, Shapes]:
-            opened = read_document(path, fov, seed, progress)
-            return opened, build_ready(opened.document)
+        def prepared(progress: Progress) -> tuple[Opened, Path | None, Shapes]:
+            opened, path = read(progress)
+            return opened, path, build_ready(opened.document)
 
-        def show(opened: Opened, shapes: Shapes) -> None:
-            editor.start(opened.document, shapes)
+        def show(opened: Opened, path: Path | None, shapes: Shapes) -> None:
+            self._start(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(answer: tuple[Opened, Shapes]) -> None:
+        def accept(answer: tuple[Opened, Path | None, Shapes]) -> None:
             if editor.committed is given_up or editor.is_saved:
                 show(*answer)
             else:
@@ -207,7 +230,7 @@ class Filing:
             editor.complain_of(replace(error, trace="") if error.is_expected else error)
 
         editor.chores.start(
-            t("Opening {name}", name=path.name), read, kind=OPEN, done=accept, failed=fail,
+            title, prepared, kind=OPEN, done=accept, failed=fail,
         )  # fmt: skip
 
     def forget_recent(self, path: str) -> None:

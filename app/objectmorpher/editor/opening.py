@@ -8,9 +8,10 @@ from pathlib import Path
 from objectmorpher_core.base.limits import FILE_BYTES as MAX_BYTES
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
+from objectmorpher_core.pictures.formats import READABLE
 
 SESSION_ENDING = ".omorph"
-PHOTO_ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp")
+PHOTO_ENDINGS = READABLE
 OBJECT_ENDINGS = (".ply", ".splat", ".spz", ".obj", ".glb", ".gltf", ".stl", ".off")
 ZIP_MAGIC = b"PK\x03\x04"
 BLOCK = 1 << 24  # bytes read at a time
@@ -51,9 +52,9 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
                 return Opened(read_session(file), is_session=True)
         data = _read(path, progress)
         progress(0.35, "")
-        from objectmorpher_core.pipeline import open_photo
-
-        return Opened(open_photo(data, path.name, fov=fov, seed=seed), is_session=False)
+        return read_photo(data, path.name, fov, seed)
+    except OpeningError:
+        raise
     except OSError as error:
         reason = error.strerror or str(error)
         raise OpeningError(f"{path.name} cannot be opened: {reason}") from error
@@ -61,6 +62,18 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
         raise OpeningError(f"{path.name} does not fit into the memory") from error
     except ValueError as error:
         raise OpeningError(f"{path.name} cannot be opened: {error}") from error
+
+
+def read_photo(data: bytes, name: str, fov: float | None, seed: int) -> Opened:
+    """A new document of a photo, the bytes of its file. Raises OpeningError."""
+    from objectmorpher_core.pipeline import open_photo
+
+    try:
+        return Opened(open_photo(data, name, fov=fov, seed=seed), is_session=False)
+    except MemoryError as error:
+        raise OpeningError(f"{name} does not fit into the memory") from error
+    except ValueError as error:
+        raise OpeningError(f"{name} cannot be opened: {error}") from error
 
 
 def _check(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import shutil
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -23,7 +24,9 @@ from .autosave import LOCK, Held, recovery_root
 from .feedback import Action
 
 if TYPE_CHECKING:
-    from .editor import Editor
+    from .autosave import Autosave
+    from .filing import Filing, Start
+    from .state import EditorState
 
 log = logging.getLogger(__name__)
 
@@ -47,8 +50,17 @@ class Left:
 class Recovery:
     """What there is to recover."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self,
+        editor: EditorState,
+        autosave: Autosave,
+        filing: Filing,
+        start: Start,
+        close: Callable[[], None],
+    ) -> None:
         self._editor = editor
+        self._autosave, self._filing = autosave, filing
+        self._start, self._close = start, close
         self.left: tuple[Left, ...] = ()  # newest first
         self._is_unseen = False
 
@@ -83,11 +95,11 @@ class Recovery:
         else:
             text = t("Unsaved work of {count} earlier sessions is still here",
                      count=len(self.left))  # fmt: skip
-            editor.say(text, Action(t("Show"), lambda: editor.filing.guard(editor.close)))
+            editor.say(text, Action(t("Show"), lambda: self._filing.guard(self._close)))
 
     def recover(self, left: Left) -> None:
         """Opens it, unsaved as it was; its folder is this editor's from then on."""
-        self._editor.filing.guard(lambda: self._recover(left))
+        self._filing.guard(lambda: self._recover(left))
 
     def discard(self, left: Left) -> None:
         """Deletes it for good."""
@@ -112,11 +124,11 @@ class Recovery:
         def accept(answer: tuple[Document, Shapes]) -> None:
             document, shapes = answer
             self._forget(left)
-            editor.start(document, shapes)
+            self._start(document, shapes)
             editor.path, editor.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()
-            editor.autosave.adopt(Held(Journal(left.folder), lock))
+            self._autosave.adopt(Held(Journal(left.folder), lock))
             editor.say(t("Recovered {name} as it was at {time}", name=left.name,
                          time=when(left.edited)))  # fmt: skip
 

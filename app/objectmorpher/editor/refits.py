@@ -20,7 +20,9 @@ from ..worker.job_error import JobError
 if TYPE_CHECKING:
     from objectmorpher_core.lift.refitting import Refitted
 
-    from .editor import Editor
+    from .intents.posing import Posing
+    from .state import EditorState
+    from .tasks import Tasks
 
 REFIT = "refit"  # kind of job
 
@@ -44,8 +46,9 @@ class Wanted:
 class Refits:
     """What is asked of the worker, one object at a time, and its answer."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
         self._editor = editor
+        self._posing, self._tasks = posing, tasks
         self._asked: Wanted | None = None  # or failed for, or cancelled
         self._answer: Refitted | None = None  # that is not shown yet
 
@@ -120,15 +123,15 @@ class Refits:
             assert editor.history is not None and editor.committed is not None
             lost = len(editor.committed.objects[k].handles) - len(changed.objects[k].handles)
             editor.history.amend(changed)
-            editor.posing.forget_lost()
+            self._posing.forget_lost()
             if lost:
                 editor.say(_farewell(lost))
 
         title = t("Fitting {name} to its new outline", name=_name(editor, k))
-        editor.tasks.make_ready(k, change, title, show)
+        self._tasks.make_ready(k, change, title, show)
 
 
-def _name(editor: Editor, k: int) -> str:
+def _name(editor: EditorState, k: int) -> str:
     document = editor.committed
     return document.objects[k].name if document and k < len(document.objects) else ""
 

@@ -43,7 +43,7 @@ class Settings:
     quality: int = 95  # of JPEG exports
     webp_quality: int = 100  # of WebP exports; 100 is lossless
     export_what: str = "Photo"  # the last export's, see `export_plan.py`
-    export_format: str = "PNG"
+    export_format: str = ""  # empty: the photo's own
     export_bits: int = 0  # 8 or 16; 0: the photo's own
     export_motion: str = "Photo to edit"
     export_seconds: float = 4.0

@@ -27,7 +27,7 @@ from objectmorpher_core.document.model import (
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment import Found
 
-from ..canvas.layers import Rendered, Request
+from ..canvas.layer import ExactPicture, Rendered
 from ..canvas.memo import same
 from ..canvas.shape import Shape, build_ready_shape, rehearse
 from ..system.texts import folder_of, t
@@ -35,12 +35,13 @@ from ..worker import job_functions
 from ..worker.job_error import JobError
 from ..worker.job_functions import Choice, Cut
 from .feedback import Action
-from .view import ToolName
+from .view import SelectMode, ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
 
-    from .editor import Editor
+    from .intents.posing import Posing
+    from .state import EditorState
 
 REHEARSE, READY = "rehearse", "ready"  # kinds of what runs in a thread
 READ, SELECT, LIFT, PLATE, WRITE = "read", "segment", "lift", "plate", "write"  # kinds of jobs
@@ -72,22 +73,52 @@ class Question:
 class Tasks:
     """Segmenting, lifting, inpainting, writing."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
+        self._posing = posing
         self.question: Question | None = None  # asked, not answered yet
         self._plate: tuple[Wanted, Plate] | None = None  # of what was wanted
         self._no_plate: Wanted | None = None  # asked or failed for
         # What stays in front, as it was asked for last: its mask, and the answer
         self._front: tuple[Mask | None, Matte | None] | None = None
         self._unreadable: Photo | None = None  # reading it has ended the worker
-        self._sample: Photo | None = None  # that was opened, until its thing is lifted
-        self._is_sample_asked = False
         editor.jobs.restarted = self._read_again
 
     def forget(self) -> None:
         """Another document is opened."""
-        self.question = self._plate = self._no_plate = self._front = self._sample = None
-        self._is_sample_asked = False
+        self.question = self._plate = self._no_plate = self._front = None
+
+    @property
+    def pending(self) -> Prompt | None:
+        """What is being segmented now; shown at once, in the document when the mask is there."""
+        question = self.question
+        return question.prompt if question and question.k == self._editor.current else None
+
+    @property
+    def prompt(self) -> Prompt:
+        """What the user said about the current object, asked or answered."""
+        if self.pending is not None:
+            return self.pending
+        thing = self._editor.object
+        return thing.prompt if thing else Prompt()
+
+    @property
+    def is_click_awaited(self) -> bool:
+        """Whether a click would begin a selection."""
+        return self._is_clicking and self._editor.mask is None
+
+    @property
+    def is_correction_awaited(self) -> bool:
+        """Whether a click would correct what clicks, a box or the subject have selected."""
+        item = self._editor.object
+        is_told = item is not None and item.mask is not None and not item.prompt.is_empty
+        return self._is_clicking and self._editor.preview is None and is_told
+
+    @property
+    def _is_clicking(self) -> bool:
+        editor, view = self._editor, self._editor.view
+        is_select = view.tool is ToolName.SELECT and view.selecting.mode is SelectMode.CLICK
+        return editor.document is not None and is_select and self.question is None
 
     def read_photo(self, is_quiet: bool = False) -> None:
         """Lets the worker look at a photo that was opened, before the first click."""
@@ -114,11 +145,13 @@ class Tasks:
         Nor is what needs no reading, such as saving: the reading gives way, and is done later.
         """
         document = self._editor.committed
+        if self._editor.jobs.is_busy(READ):  # a second one would end it, and come back for ever
+            return
         if document is not None and document.photo is not self._unreadable:
             self._read(self._read_again, is_quiet=True, is_spare=True)
 
-    def segment(self, question: Question) -> None:
-        """Asks for the mask of a prompt; what was said before it is in it."""
+    def segment(self, question: Question, take: Callable[[Question, Found], None]) -> None:
+        """Asks for the mask of a prompt, to be taken; what was said before it is in it."""
         editor, document = self._editor, self._editor.document
         if document is None:
             return
@@ -131,42 +164,22 @@ class Tasks:
             self.question = None
             current = editor.document
             if current is not None and current.photo is photo and not editor.hand.is_busy:
-                editor.selection.take(question, found)
+                take(question, found)
+
+        def fail(error: JobError) -> None:
+            self._drop_question()
+            editor.complain_of(error.retried_by(lambda: self.segment(question, take)))
 
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels,
             edits.beside(document, question.k, question.prompt),
             Choice(editor.settings.backends.segment, document.seed),
-            done=accept, failed=lambda error: self._fail_segment(error, question),
+            done=accept, failed=fail,
             cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
 
-    def _fail_segment(self, error: JobError, question: Question) -> None:
-        self._drop_question()
-        self._editor.complain_of(error.retried_by(lambda: self.segment(question)))
-
     def _drop_question(self) -> None:
         self.question = None
-
-    def lift_thing(self, x: float, y: float) -> None:
-        """Selects what a sample shows at image px (x, y), and lifts it as soon as that is known."""
-        document = self._editor.committed
-        self._sample, self._is_sample_asked = document.photo if document else None, True
-        self._editor.selection.add_click(x, y, is_foreground=True)
-
-    def ensure_sample(self) -> bool:
-        """Lifts a sample's thing when it is selected; each frame. Not where the artist goes on."""
-        editor, document = self._editor, self._editor.committed
-        if not self._is_sample_asked or self.question or editor.jobs.is_busy(SELECT):
-            return False
-        self._is_sample_asked = False
-        is_untouched = document is not None and len(document.objects) == 1
-        is_untouched = is_untouched and editor.view.tool is ToolName.SELECT
-        if editor.mask is None or editor.is_lifted or not is_untouched:
-            self._sample = None
-            return False
-        self.lift()
-        return True
 
     def lift(self, shape: LiftSettings | None = None, label: str = "") -> None:
         """Asks for the current object in 3D; with another `shape`, which is a step of its own."""
@@ -192,7 +205,7 @@ class Tasks:
             if shape is None:
                 self._take_lift(document, k)
             elif not editor.hand.is_busy:
-                editor.posing.select(None)
+                self._posing.select(None)
                 editor.apply(label, editor.derived.solved(document, k, None))
 
         title = t("Lifting the object")
@@ -244,31 +257,29 @@ class Tasks:
 
     def _take_lift(self, changed: Document, k: int) -> None:
         editor = self._editor
-        editor.posing.select(None)
+        self._posing.select(None)
         editor.apply(t("Lift object"), changed)
-        if changed.photo is self._sample and editor.history is not None:
-            editor.history.mark_saved(changed)  # the artist has done nothing yet
-            self._sample = None
         editor.view.tool = ToolName.POSE
         name = changed.objects[k].name
         editor.say(t("{name} is in 3D now · Drag any point of it", name=name))
 
-    def rehearse(self) -> None:
+    def rehearse(self) -> bool:
         """Sees to it that the current object can be dragged at once; each frame."""
         editor, document = self._editor, self._editor.committed
         if document is None or editor.current >= len(document.objects):
-            return
+            return False
         camera, thing = document.photo.camera, document.objects[editor.current]
         if thing.lifted is None or editor.chores.is_busy(REHEARSE):
-            return
+            return False
         shape = editor.derived.shape(document.photo, thing)
         if shape.is_rehearsed:
-            return
+            return False
         shape.is_rehearsed = True
         editor.chores.start(
             "Getting ready", lambda progress: rehearse(shape, camera, thing.placement),
             kind=REHEARSE, done=lambda _: None, failed=editor.complain_of, is_quiet=True,
         )  # fmt: skip
+        return False
 
     def ensure_fronts(self) -> bool:
         """Sees to it that what stays in front is cut out; each frame."""
@@ -354,7 +365,6 @@ class Tasks:
 
     def _add_plate(self, plate: Plate) -> None:
         self._amend(lambda document: edits.set_plate(document, plate))
-        self._editor.leaving_out.offer()
 
     def _amend(self, change: Callable[[Document], Document]) -> None:
         """A computed addition to the current step, not a step of its own."""
@@ -364,7 +374,7 @@ class Tasks:
         if editor.preview is not None:
             editor.preview = change(editor.preview)
 
-    def render_exact(self, request: Request, accept: Callable[[Rendered], None]) -> None:
+    def render_exact(self, request: ExactPicture, accept: Callable[[Rendered], None]) -> None:
         """Asks for an exact picture of the view, which shows a draft meanwhile."""
         self._editor.jobs.start(
             "Drawing", job_functions.render_exact, request,

@@ -17,7 +17,7 @@ from objectmorpher_core.base.kernel_files import numba
 from objectmorpher_core.base.threads import EXACT, in_threads
 
 from ..canvas.blend import CELL
-from ..canvas.layers import Layer
+from ..canvas.layer import Layer
 
 Bounds = tuple[float, float, float, float]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from ..canvas.layers import Layer
+from ..canvas.layer import Layer
 from ..editor.view import View
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject

@@ -31,6 +31,7 @@ LAYERED: Columns = (
 
 GEOMETRY = (("place", "4f"), ("quat", "4f"), ("size", "4f"), ("normal", "4f"), ("look", "3f"))
 PAINT = (("paint", "4f"),)
+SIDES = (("side0", "3f"), ("side1", "3f"), ("aside", "3f"))
 NODES = (("control_points", "4i"),)
 SHARES = tuple((f"share{c}", "4f") for c in range(4))
 GIVEN = (("shift_at", "3f"), ("grown0", "3f"), ("grown1", "3f"), ("grown2", "3f"))
@@ -93,9 +94,11 @@ class ProjectPass:
         uploads, buffer = self._uploads, self._context.buffer
         geometry = uploads("geometry", rest.means, lambda: buffer(_table_geometry(rest, photo)))
         paint = uploads("paint", rest, lambda: buffer(_table_paint(rest)))
+        sides = uploads("sides", rest.means, lambda: buffer(_table_sides(rest, photo)))
         return [
             buffer_layout(program, geometry, GEOMETRY),
             buffer_layout(program, paint, PAINT),
+            buffer_layout(program, sides, SIDES),
         ]
 
     def _bound(self, program: moderngl.Program, binding: Binding) -> list[Any]:
@@ -125,7 +128,7 @@ def _uniforms(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Unif
         **kind._asdict(), "low_pass": kind.filter, "is_layered": splats.is_layered,
         "rest_linear": _columns(at_rest), "rest_offset": tuple(at_rest[:3, 3]),
         "linear": _columns(placed), "turn": _columns(added), "slide": tuple(added[:3, 3]),
-        "scale": splats.scale, "nearest": RULES.near * splats.gap,
+        "has_sides": rest.sides is not None, "scale": splats.scale, "nearest": RULES.near * splats.gap,
         "view": (camera.focal, camera.cx, camera.cy), "photo_focal": photo_camera.focal,
         "limits": posed.view_limits(photo_camera),
     }  # fmt: skip
@@ -146,6 +149,16 @@ def _table_geometry(rest: RestSplats, photo_camera: Camera) -> F32:
             gaussians.normals, texture.visibility, texture.u0 - seen_at, texture.solidity,
         ]
     ).astype(np.float32)  # fmt: skip
+
+
+def _table_sides(rest: RestSplats, photo_camera: Camera) -> F32:
+    """(N, 9), see SIDES; zeros where there are none."""
+    table, sides = np.zeros((len(rest), 9)), rest.lifted.sides
+    if sides is not None:
+        slopes = sides.slopes.astype(np.float64) @ rest.world_from_object[:3, :3]
+        seen_at = photo_camera.project(rest.lifted.world_points(rest.means))
+        table = np.column_stack([slopes.reshape(len(rest), 6), sides.at - seen_at, sides.zoom])
+    return table.astype(np.float32)
 
 
 def _table_paint(rest: RestSplats) -> F32:

@@ -10,7 +10,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import U8
 
-from ..canvas.layers import Layer
+from ..canvas.layer import Layer
 from ..editor.view import View
 from .defocus_pass import DefocusPass
 from .layer_pass import LayerPass

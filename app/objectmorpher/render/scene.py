@@ -11,7 +11,7 @@ from objectmorpher_core.base.brush import Box
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Plate
 
-from ..canvas.layers import Layer
+from ..canvas.layer import Layer
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.grain import Grain

@@ -14,12 +14,13 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..editor.editor import Editor
+from objectmorpher_core.document.model import Document
+
+from ..editor.view import View
 
 CLICK_SLACK = 4.0  # points; a press that moves less is a click
 TURN_SPEED = 0.4  # degrees per point that the pointer moves
@@ -69,20 +70,12 @@ class Pointer:
 Stroke = Generator[None, Pointer, None]
 
 
-class Tool(Protocol):
-    """One tool. Stateless: everything that must last is in the Editor."""
+class Previewing(Protocol):
+    """What a stroke shows while it lasts: the editor's state."""
 
-    def press(self, editor: Editor, pointer: Pointer) -> Stroke:
-        """A button went down on the canvas."""
-        ...
-
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        """The pointer is over the canvas, no button down. Sets what the overlays show."""
-        ...
-
-    def hint(self, editor: Editor) -> str:
-        """What click, drag and the modifier keys do here and now."""
-        ...
+    view: View
+    preview: Document | None
+    rubber: tuple[float, float, float, float] | None  # box being drawn, canvas px
 
 
 class Hand:
@@ -106,7 +99,7 @@ class Hand:
         """The pointer moved, the wheel turned, or (`not pointer.is_down`) the button went up."""
         self._advance(pointer)
 
-    def abort(self, editor: Editor) -> bool:
+    def abort(self, editor: Previewing) -> bool:
         """Ends the stroke as if it had never begun. Whether there was one."""
         if self._stroke is None:
             return False
@@ -129,7 +122,7 @@ class Hand:
             self._stroke = None
 
 
-def has_moved(editor: Editor, start: Pointer, now: Pointer) -> bool:
+def has_moved(editor: Previewing, start: Pointer, now: Pointer) -> bool:
     """Whether a press has become a drag."""
     return float(np.hypot(*(now.xy - start.xy))) > CLICK_SLACK * editor.view.scale
 
@@ -148,7 +141,7 @@ def ignore() -> Stroke:
         pass
 
 
-def draw_box(editor: Editor, start: Pointer) -> Generator[None, Pointer, Pointer | None]:
+def draw_box(editor: Previewing, start: Pointer) -> Generator[None, Pointer, Pointer | None]:
     """Shows the box that is drawn; where it ended, or None where the press was a click."""
     is_box = False
     try:

@@ -96,7 +96,7 @@ def turn(editor: Editor, start: Pointer, handle: int, is_ring: bool) -> Stroke:
     if handle not in posing.selected:
         posing.select(handle)
     assert editor.document is not None
-    frame = editor.derived.facts.turn_of(editor.document, editor.current)
+    frame = editor.cache.facts.turn_of(editor.document, editor.current)
     first = posing.turn_of(handle)
     roll = float(np.degrees(turn_about(frame @ first, SIGHT)))
     centre = editor.view.canvas_from_image(posing.spot(handle).xy)

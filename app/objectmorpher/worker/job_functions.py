@@ -26,12 +26,12 @@ from objectmorpher_core.document.model import (
 )
 from objectmorpher_core.document.settings import Hint
 
-from ..canvas.layers import Rendered, Request, render
+from ..canvas.layer import ExactPicture, Rendered
+from ..canvas.layers import render
 from ..canvas.shape import rehearse_lift
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import Patch
-    from objectmorpher_core.compose.refine import Refiner
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.doctor import Stage
     from objectmorpher_core.document.gaussians import Gaussians
@@ -242,7 +242,7 @@ def write_coverage(selection: Selection, path: Path, progress: Progress) -> None
     write_all({path: encode_coverage(as_coverage(selection))})
 
 
-def render_exact(request: Request, progress: Progress) -> Rendered:
+def render_exact(request: ExactPicture, progress: Progress) -> Rendered:
     """A layer of the view."""
     return render(request)
 
@@ -321,9 +321,6 @@ def take_shadow(
     return (None if old.shadow is None else old.shadow.shadow), plate
 
 
-_refiners: dict[str, Refiner] = {}  # the last one, for its pipeline takes long to load
-
-
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
     """What of the edit a network is to see."""
     from objectmorpher_core.scripting.runner import coarse_edit
@@ -337,10 +334,7 @@ def refine(edit: CoarseEdit, how: Refining, progress: Progress) -> Refined:
     from objectmorpher_core.compose.refine import refinement
 
     refiner = refine.load(how.backend)
-    if refiner.name not in _refiners:
-        _refiners.clear()
-        _refiners[refiner.name] = refiner
-    return refinement.refine(edit, _refiners[refiner.name], progress, how.seed, how.strength)
+    return refinement.refine(edit, refiner, progress, how.seed, how.strength)
 
 
 def write_session(document: Document, path: Path, progress: Progress) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 import logging
-import math
 import multiprocessing
 import os
 import queue
@@ -17,7 +16,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +23,7 @@ from objectmorpher_core.base.progress import Cancelled
 
 from ..system.logs import crash_folder, note_crashes
 from .job_error import JobError
+from .requests import Executor, Request
 from .wire import Connection, Reader, Writer
 
 if TYPE_CHECKING:
@@ -36,28 +35,6 @@ PATIENCE = 0.35  # s between asking a job to stop and ending its process: the us
 RELUCTANCE = 2.0  # s, where nobody waits: a new process has to read the photo again
 TRIES = 3  # processes that may end before they say anything; the next one waits for a request
 REPORT_EVERY = 0.03  # s between two progress messages
-
-
-@dataclass(eq=False)
-class Job:
-    """A request, and how far it is."""
-
-    title: str  # "Lifting the object"
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    done: Callable[[Any], None]
-    failed: Callable[[JobError], None]
-    cancelled: Callable[[], None]
-    replaced: Callable[[], None]
-    kind: str
-    fraction: float = 0.0
-    note: str = ""
-    started: float = 0.0  # s, monotonic
-    stop_asked: float | None = None  # s, monotonic
-    ends_at: float = math.inf  # s, monotonic; not stopped by then, its process is ended
-    number: int = 0
-    is_quiet: bool = False
-    is_spare: bool = False
 
 
 class Worker:
@@ -82,7 +59,7 @@ class Worker:
         for target in (self._write, self._read):
             threading.Thread(target=target, daemon=True).start()
 
-    def send(self, job: Job, function: Callable[..., Any]) -> None:
+    def send(self, job: Request, function: Callable[..., Any]) -> None:
         self._requests.put((job.number, function, job.arguments))
 
     def close(self) -> None:
@@ -114,7 +91,7 @@ class Worker:
         self._wake()
 
 
-class Jobs:
+class Jobs(Executor):
     """What runs, what waits, and the answers."""
 
     def __init__(self, warm: tuple[str, ...] = (), wake: Callable[[], None] = lambda: None) -> None:
@@ -123,40 +100,12 @@ class Jobs:
         self._worker: Worker | None = Worker(warm, wake)
         self._deaths = 0  # processes in a row that ended without a word
         self.restarted: Callable[[], None] = lambda: None  # told that the worker's memory is lost
-        self._waiting: dict[str, Job] = {}  # kind -> newest request, in the order they came
-        self._count = 0
-        self.current: Job | None = None
+        self._waiting: dict[str, Request] = {}  # kind -> newest request, in the order they came
+        self.current: Request | None = None
         self.elsewhere: Elsewhere | None = None  # what has jobs done by a server
 
-    def start(
-        self,
-        title: str,
-        function: Callable[..., Any],
-        *arguments: Any,
-        done: Callable[[Any], None],
-        failed: Callable[[JobError], None],
-        cancelled: Callable[[], None] = lambda: None,
-        replaced: Callable[[], None] = lambda: None,
-        kind: str = "",
-        is_quiet: bool = False,
-        is_spare: bool = False,
-    ) -> None:
-        """Runs `function(*arguments, progress=...)` in the worker, after what runs already.
-
-        A request of the same `kind` that waits or runs is replaced: its answer never comes, and
-        `replaced` is all that it is told.
-        A quiet one is not the user's: the status line does not show it. A spare one besides gives
-        way: any other request ends it.
-        """
-        self._count += 1
-        kind = kind or function.__name__
-        job = Job(
-            title, function, arguments, done, failed, cancelled, replaced, kind,
-            number=self._count, is_quiet=is_quiet, is_spare=is_spare,
-        )  # fmt: skip
-        self._wait_for(job)
-
-    def _wait_for(self, job: Job) -> None:
+    def _begin(self, request: Request) -> None:
+        job = self._numbered(request)
         displaced = self._waiting.pop(job.kind, None)
         self._waiting[job.kind] = job
         current = self.current
@@ -179,13 +128,11 @@ class Jobs:
         job.kind, job.is_quiet, job.is_spare = wanted, False, False
         return True
 
-    def _again(self, job: Job) -> None:
-        """The request of a job that failed, once more."""
-        self._count += 1
-        self._wait_for(replace(job, number=self._count, fraction=0.0, note=""))
+    @property
+    def shown(self) -> Request | None:
+        return None if self.current is None or self.current.is_quiet else self.current
 
     def is_busy(self, kind: str) -> bool:
-        """Whether a request of this kind waits or runs."""
         current = self.current
         runs = current is not None and current.kind == kind and current.stop_asked is None
         return runs or kind in self._waiting
@@ -203,7 +150,6 @@ class Jobs:
             self._ask_to_stop(self.current, patience)
 
     def poll(self) -> bool:
-        """Delivers answers; once a frame, on the main thread. Whether anything changed."""
         is_changed = False
         while self._worker is not None and not self._worker.answers.empty():
             self._take(*self._worker.answers.get())
@@ -222,7 +168,7 @@ class Jobs:
         if self._worker is not None:
             self._worker.close()
 
-    def _ask_to_stop(self, job: Job, patience: float) -> None:
+    def _ask_to_stop(self, job: Request, patience: float) -> None:
         now = time.monotonic()
         job.ends_at = min(job.ends_at, now + patience)
         if job.stop_asked is None and self._worker is not None:
@@ -264,18 +210,16 @@ class Jobs:
             self._finish(job, lambda: self._again(job))  # here, this time
         elif what == "failed":
             value.write_log(job.title)
-            self._finish(job, lambda: job.failed(value.retried_by(lambda: self._again(job))))
+            self._finish(job, lambda: self._fail(job, value))
         else:
-            level = logging.DEBUG if job.is_quiet else logging.INFO
-            log.log(level, "%s took %.2f s", job.title, time.monotonic() - job.started)
-            self._finish(job, lambda: _accept(job, value))
+            self._finish(job, lambda: self._accept(job, value))
 
-    def _comes_back(self, job: Job, error: JobError) -> bool:
+    def _comes_back(self, job: Request, error: JobError) -> bool:
         """Whether a server gave no answer."""
         asked = self.elsewhere
         return asked is not None and asked.takes_back(job.function, error.name, error.sentence)
 
-    def _crash(self, job: Job | None) -> None:
+    def _crash(self, job: Request | None) -> None:
         """The process ended by itself, or someone ended it."""
         log.error("The worker process ended unexpectedly")
         self._restart()
@@ -284,11 +228,11 @@ class Jobs:
         elif job is not None:
             sentence = f"{job.title} stopped: the worker process ended unexpectedly"
             error = JobError("Crash", sentence, sentence, may_pass=True)
-            self._finish(job, lambda: job.failed(error.retried_by(lambda: self._again(job))))
+            self._finish(job, lambda: self._fail(job, error))
         if self._worker is not None:
             self.restarted()
 
-    def _finish(self, job: Job, tell: Callable[[], None]) -> None:
+    def _finish(self, job: Request, tell: Callable[[], None]) -> None:
         self.current = None
         is_replaced = job.kind in self._waiting
         if is_replaced:  # it is not the user's question any more
@@ -296,15 +240,6 @@ class Jobs:
         else:
             tell()
         self._send_next()
-
-
-def _accept(job: Job, value: Any) -> None:
-    """Hands the answer over; one that cannot be used is a failure, not the window's end."""
-    try:
-        job.done(value)
-    except Exception as error:
-        log.exception("The answer of %s cannot be used", job.title)
-        job.failed(JobError.of(error, job.title))
 
 
 def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Path | None) -> None:

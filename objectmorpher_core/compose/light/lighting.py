@@ -45,9 +45,23 @@ class Lit:
 NOTHING = Lit()
 
 
-def object_texture(matte: Matte) -> TextureLevels:
-    """What the object's Gaussians carry: straight colour and alpha on the matte's crop."""
-    return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
+    """What the object's Gaussians carry: straight colour and alpha on the matte's crop.
+
+    Beside it lie the invented pictures of what was `lifted`, if there are any.
+    """
+    sides = None if lifted is None else lifted.sides
+    if sides is None or not sides.pixels.size:
+        return build_levels(matte.foreground, matte.alpha, matte.left, matte.top)
+    (x0, y0, x1, y1), (height, width) = matte.box, sides.pixels.shape[:2]
+    left, top = min(x0, sides.left), min(y0, sides.top)
+    shape = max(y1, sides.top + height) - top, max(x1, sides.left + width) - left
+    foreground, alpha = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
+    at = slice(sides.top - top, None), slice(sides.left - left, None)
+    foreground[at][:height, :width] = sides.pixels / np.float32(255)
+    at = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
+    foreground[at], alpha[at] = matte.foreground, matte.alpha
+    return build_levels(foreground, alpha, left, top)
 
 
 class Lighting:
@@ -109,7 +123,7 @@ class Lighting:
             if is_sketch:
                 grain = sketch_grain(splats, self.noise, item.grain, camera, blur)
             else:
-                carried = texture or object_texture(item.matte)
+                carried = texture or object_texture(item.matte, item.lifted)
                 grain = find_grain(splats, carried, self.noise, item.grain, camera, blur)
         return Lit(gain, shade, relit, grain, blur)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,17 +10,19 @@ from typing import Any
 from ... import models
 from ...base.arrays import F32, Mask, Pixels
 from ...base.progress import Progress, part
-from ...models import ModelError, device
+from ...models import ModelError, device, ledger
+from ...models.plans import Need, Plan
+from ...models.weight_folder import count_parameters
 from .. import InpaintError
 from .hole_squares import fill_squares
 
 ID = "pixelhacker"
 PACKAGES = ("torch", "diffusers", "safetensors")
 CODEC = "vae"  # folder of the autoencoder
-WORK = 1_800_000_000  # bytes beside the weights at half precision; the decoder needs most of it
+WORK = 1_800_000_000  # bytes beside the weights; the decoder needs most of it
 CODEC_PARAMETERS = 84_000_000  # always in float32
-
-Key = tuple[Path, int, str]  # weights, when they were written (ns), the device that is asked for
+# float32 is what it was published in; bfloat16 where that does not fit.
+NUMBERS: tuple[device.Number, ...] = ("float32", "bfloat16")
 
 
 class PixelHackerInpainter:
@@ -30,9 +31,6 @@ class PixelHackerInpainter:
     name = "pixelhacker"
     is_random = True
     context = 512  # px around a hole that it looks at where the photo has them
-    # Kept in a process, as they take long to read: the tiers that are left, network, autoencoder.
-    _tiers: tuple[Key, tuple[device.Plan, ...]] | None = None
-    _opened: tuple[Key, device.Plan, Any, Any] | None = None
 
     def missing(self) -> str | None:
         """See `Inpainter`."""
@@ -58,47 +56,40 @@ class PixelHackerInpainter:
         progress(0.0, "opening the model")
         try:
             weights, codec = _files()
-            key = weights, weights.stat().st_mtime_ns, os.environ.get(device.DEVICE, "")
             side = _side(weights, codec)
 
-            def attempt(plan: device.Plan) -> Pixels:
-                network, decoder = self._open(key, codec, plan)
-
+            def attempt(networks: tuple[Any, Any], plan: Plan) -> Pixels:
                 def fill(picture: F32, inside: Mask, step: Progress, seed: int) -> F32:
-                    return sample(network, decoder, picture, inside, step, seed)
+                    return sample(*networks, picture, inside, step, seed)
 
                 return fill_squares(rgb, hole, side, fill, part(progress, 0.05, 1.0), seed)
 
-            return device.run(self._plans(key), attempt)
+            return ledger.SHARED.run(_model(weights, codec), attempt)
         except ModelError as error:
             raise InpaintError(str(error)) from error
         except OSError as error:
             raise InpaintError(f"PixelHacker cannot be read: {error.strerror or error}") from error
 
-    def _plans(self, key: Key) -> tuple[device.Plan, ...]:
-        """Where it can run: as long as it stays open, what it takes itself does not count."""
-        known = PixelHackerInpainter._tiers
-        if known is None or known[0] != key:
-            parameters = key[0].stat().st_size // 4 + 2 * CODEC_PARAMETERS
-            known = key, device.plans(device.Need(parameters, WORK))
-            PixelHackerInpainter._tiers = known
-        return known[1]
 
-    def _open(self, key: Key, codec: Path, plan: device.Plan) -> tuple[Any, Any]:
-        """The network and the autoencoder where the plan wants them."""
+def need(parameters: int) -> Need:
+    """What a network of so many, and its autoencoder, ask of memory."""
+    return Need(parameters + CODEC_PARAMETERS, WORK, numbers=NUMBERS)
+
+
+def _model(weights: Path, codec: Path) -> ledger.Model[tuple[Any, Any]]:
+    """The network and the autoencoder, for the ledger. Raises ModelError or OSError."""
+
+    def opened(plan: Plan) -> tuple[Any, Any]:
         import torch
 
         from .pixelhacker.network import load, load_codec
 
-        known = PixelHackerInpainter._opened
-        if known is None or known[:2] != (key, plan):
-            PixelHackerInpainter._opened = known = None
-            network = load(key[0], plan.device, getattr(torch, plan.number))
-            known = key, plan, network, load_codec(codec, plan.device)
-            PixelHackerInpainter._opened = known
-            tiers = self._plans(key)
-            PixelHackerInpainter._tiers = key, tiers[tiers.index(plan) :]
-        return known[2], known[3]
+        network = load(weights, plan.device, getattr(torch, plan.number))
+        return network, load_codec(codec, plan.device)
+
+    made_of = weights, weights.stat().st_mtime_ns
+    asked = need(count_parameters(weights.parent) + CODEC_PARAMETERS)
+    return ledger.Model("PixelHacker", made_of, asked, opened)
 
 
 def _files() -> tuple[Path, Path]:

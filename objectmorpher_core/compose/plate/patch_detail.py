@@ -36,7 +36,7 @@ def with_detail(
     return filled
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _copy_detail(crop, hole, rough, sources, filled):
     """Fills `filled` (H, W, 3) in its hole: low + the detail of each pixel's source.
 
@@ -65,7 +65,7 @@ def _copy_detail(crop, hole, rough, sources, filled):
                 filled[y, x, c] = np.rint(min(max(value, 0.0), top))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _find_places(sources, zoom, width, place, shares, places):
     """The four places (4, 2) where pixel (y, x) comes from, and their shares (4,), at most 1."""
     rows, columns = sources.shape[:2]
@@ -91,7 +91,7 @@ def _find_places(sources, zoom, width, place, shares, places):
                 break
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _level(rough, v, u, c):
     """Channel `c` of `rough` (h, w, 3) at (v, u) in [0, 1), linear between its pixels."""
     rows, columns = rough.shape[:2]
@@ -104,7 +104,7 @@ def _level(rough, v, u, c):
     return upper + (lower - upper) * (v - i)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _step(t, side):
     """Share of the `side` (0 or 1) at t in [0, 1] between two samples: steep in the middle."""
     t = min(max((t - 0.5) * BLEND_STEEPNESS + 0.5, 0.0), 1.0)

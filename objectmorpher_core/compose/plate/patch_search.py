@@ -23,7 +23,7 @@ MOST_BESIDE = 4.0  # px: farther is no worse
 HINT_COST = 20_000.0  # squared levels of 255, for a source that a hint does not offer
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def patch_cost(target, weight, layers, place, source, size, limit):
     """Weighted sum of squares of the patches at `place` and `source`; stops beyond `limit`.
 
@@ -46,7 +46,7 @@ def patch_cost(target, weight, layers, place, source, size, limit):
     return total
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def _penalty(wanted, offered, barred, source):
     """What a source costs whatever it looks like, per unit of a patch's weight."""
     penalty = barred[source]
@@ -60,7 +60,7 @@ def _penalty(wanted, offered, barred, source):
     return np.float32(penalty)
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def _begin(pictures, wanted, offered, barred, targets, sources, costs):
     """Fills `costs` at the targets with what their sources cost; (T,) the weights of the patches.
 
@@ -82,7 +82,7 @@ def _begin(pictures, wanted, offered, barred, targets, sources, costs):
     return weights, size, channels
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, random):
     """PatchMatch rounds over the `targets` (T, 2): neighbours' sources, then random places.
 
@@ -136,7 +136,7 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
         costs[targets[n, 0], targets[n, 1]] /= max(weights[n], np.float32(1e-6))
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def vote(layers, sources, shares, hole, voted):
     """Each pixel of the `hole` (h, w) becomes the mean of what the patches over it say.
 

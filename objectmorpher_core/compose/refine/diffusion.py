@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,16 @@ import numpy as np
 
 from ... import models
 from ...base.arrays import F32, RGB
+from ...base.pixels import unit_pixels
 from ...base.progress import Progress
-from ...models import HubModel, ModelError, device
-from ...models.weight_folder import PLAIN, check_safetensors
+from ...models import HubModel, ModelError, device, ledger
+from ...models.plans import PipelineNeed, Plan
+from ...models.weight_folder import PLAIN, check_safetensors, stamp
 from . import RefineError
-from .memory import PipelineNeed, PipelinePlan, placed, plans, quantised
+from .alignment import measure, warped
+from .memory import from_gguf, method, need_of, placed, quantised, unreadable
 
 AREA = 1024 * 1024  # px that the networks were trained on
-STEP = 32  # px of which both sides are multiples
 PACKAGES = ("torch", "diffusers", "transformers", "accelerate", "peft", "safetensors")
 INSTRUCTION = (
     "Make the edited object in the last picture look as if it had been photographed there: fit its"
@@ -28,19 +31,16 @@ INSTRUCTION = (
 
 
 class DiffusionRefiner:
-    """A refiner whose pipeline is loaded once in a process, where memory allows."""
+    """A refiner whose pipeline stays open as long as the ledger has room for it."""
 
     name: str
     families: tuple[str, ...]  # of models.registry, the best first
     adapters: str  # family of the LoRA that was trained for this job
     pipeline: str  # diffusers' class
+    transformer: str  # and of its largest network
     parts: tuple[str, ...]  # that may be in four bits
-    work: int  # bytes at half precision beside the weights
-
-    def __init__(self) -> None:
-        """Nothing is loaded yet."""
-        self._opened: tuple[object, Any] | None = None  # what it was made of, the pipeline
-        self._tiers: tuple[PipelinePlan, ...] | None = None
+    work: Mapping[str, int]  # network -> bytes beside its weights, estimated
+    step: int  # px of which both sides are multiples
 
     def missing(self) -> str | None:
         """See `Refiner`."""
@@ -50,7 +50,7 @@ class DiffusionRefiner:
             best = self.choices()[0]
             size = f"{best.size / 1e9:.0f} GB, {best.licence}"
             return f"no model is there: `objectmorpher models get {best.id}` ({size})"
-        return None
+        return unreadable(self.folder(), tuple(self.work))
 
     def choices(self) -> tuple[HubModel, ...]:
         """The models that it can use, the best first."""
@@ -67,23 +67,26 @@ class DiffusionRefiner:
         if (sentence := self.missing()) is not None:
             raise RefineError(sentence)
         height, width = coarse.shape[:2]
-        size = working_size(width, height)
-        small = [_resized(p, size) for p in (original, coarse)]
-        self._tiers = self._tiers or plans(self.need())
-        first = self._tiers
+        size = working_size((width, height), self.step, self.sees)
+        shown = [_resized(p, size) for p in (original, coarse)]
+        progress(0.0, "Loading the refiner")
+        made = ledger.SHARED.run(
+            self._model(), lambda pipeline, plan: self._run(pipeline, plan, shown, progress, seed)
+        )
+        return brought_back(made, shown[1], coarse)
 
-        def attempt(plan: PipelinePlan) -> RGB:
-            made = self._run(self._loaded(plan, progress), plan, small, progress, seed)
-            # A tier that was too small once is not tried again.
-            self._tiers = first[first.index(plan) :]
-            return made
-
-        made = device.run(first, attempt)
-        return with_detail(made, small[1], coarse)
+    def sees(self, size: tuple[int, int]) -> tuple[int, int]:
+        """The width and height px at which the pipeline itself shows a picture to the network."""
+        raise NotImplementedError
 
     def need(self) -> PipelineNeed:
-        """What the chosen model asks of memory."""
-        raise NotImplementedError
+        """What the model's files ask of memory. Raises ModelError."""
+        adapters = tuple(file for _, file in self._sources())
+        return need_of(self.folder(), self.work, self.parts, adapters)
+
+    def _model(self) -> ledger.Model[Any]:
+        made_of = (self.name, self.folder(), stamp(self.folder()), self._sources())
+        return ledger.Model("the refiner", made_of, self.need(), self._open)
 
     def _call(self, pipeline: Any, pictures: list[Any], given: dict[str, Any]) -> Any:
         raise NotImplementedError
@@ -91,7 +94,7 @@ class DiffusionRefiner:
     def _steps(self) -> int:
         raise NotImplementedError
 
-    def _load(self, folder: Path, options: dict[str, Any], plan: PipelinePlan) -> Any:
+    def _load(self, folder: Path, options: dict[str, Any]) -> Any:
         raise NotImplementedError
 
     def _sources(self) -> tuple[tuple[str, Path], ...]:
@@ -105,15 +108,7 @@ class DiffusionRefiner:
         assert found is not None, "missing() was asked"
         return found
 
-    def _loaded(self, plan: PipelinePlan, progress: Progress) -> Any:
-        made_of = (plan, self.folder(), self._sources())
-        if self._opened is None or self._opened[0] != made_of:
-            progress(0.0, "Loading the refiner")
-            self._opened = None  # not two at a time
-            self._opened = made_of, self._open(plan)
-        return self._opened[1]
-
-    def _open(self, plan: PipelinePlan) -> Any:
+    def _open(self, plan: Plan) -> Any:
         import diffusers
         import torch
 
@@ -124,10 +119,15 @@ class DiffusionRefiner:
             "dtype": getattr(torch, plan.number), "local_files_only": True,
             "use_safetensors": True,
         }  # fmt: skip
-        if plan.way == "four bits":
+        if plan.way in ("four bits", "parts in four bits"):
             options["quantization_config"] = quantised(self.parts)
+        if plan.keeps:  # at once: main memory need not hold it
+            options["device_map"] = plan.device
         try:
-            pipeline = self._load(folder, options, plan)
+            if method(folder / "transformer") == "gguf":
+                network = from_gguf(self.transformer, folder / "transformer", options["dtype"])
+                options["transformer"] = network.to(plan.device) if plan.keeps else network
+            pipeline = self._load(folder, options)
             names = []
             for name, file in self._sources():
                 check_safetensors(file)
@@ -154,7 +154,7 @@ class DiffusionRefiner:
         return placed(pipeline, plan)
 
     def _run(
-        self, pipeline: Any, plan: PipelinePlan, small: list[RGB], progress: Progress, seed: int
+        self, pipeline: Any, plan: Plan, shown: list[RGB], progress: Progress, seed: int
     ) -> RGB:
         import torch
         from PIL import Image
@@ -166,36 +166,59 @@ class DiffusionRefiner:
             return tensors
 
         progress(0.1, "Refining")
-        height, width = small[0].shape[:2]
+        height, width = shown[0].shape[:2]
         given = {
             "height": height, "width": width, "num_inference_steps": steps, "output_type": "np",
             # On the CPU, so that a seed means the same on every machine.
             "generator": torch.Generator("cpu").manual_seed(seed), "callback_on_step_end": tell,
         }  # fmt: skip
         with torch.inference_mode():
-            made = self._call(pipeline, [Image.fromarray(p) for p in small], given).images[0]
+            made = self._call(pipeline, [Image.fromarray(p) for p in shown], given).images[0]
         if not np.isfinite(made).all():
             raise RefineError("the refiner's picture holds values that are no numbers")
         return np.rint(np.clip(made, 0, 1) * 255).astype(np.uint8)
 
 
-def working_size(width: int, height: int) -> tuple[int, int]:
-    """(width, height) px nearly of a crop's shape, at most what the networks were trained on."""
-    factor = min(1.0, math.sqrt(AREA / (width * height)))
-    return tuple(max(STEP, round(side * factor / STEP) * STEP) for side in (width, height))  # type: ignore[return-value]
+Size = tuple[int, int]  # width and height, px
 
 
-def with_detail(made: RGB, small: RGB, coarse: RGB) -> RGB:
-    """`made` from `small`, at the size of `coarse`, of which `small` is the reduction.
+def working_size(size: Size, step: int, sees: Callable[[Size], Size]) -> Size:
+    """The size at which a crop of `size` is refined: about AREA, and nearly of its shape.
 
-    What the reduction lost is the coarse picture's own: only the change is enlarged.
+    It is one that the pipeline leaves as it is, so that the edit, both pictures that it is made
+    from and their positions in the network are on one grid.
+    """
+    ratio, best = size[0] / size[1], (math.inf, (step, step))
+    for height in range(step, round(2 * math.sqrt(AREA / ratio)) + 2 * step, step):
+        for width in _near(ratio * height, step) | _near(AREA / height, step):
+            if sees((width, height)) != (width, height):
+                continue
+            cost = abs(math.log(width / height / ratio)) + abs(math.log(width * height / AREA)) / 4
+            best = min(best, (cost, (width, height)))
+    return best[1]
+
+
+def _near(length: float, step: int) -> set[int]:
+    """The multiples of `step` on both sides of a length."""
+    low = max(math.floor(length / step), 1) * step
+    return {low, low + step}
+
+
+def brought_back(made: RGB, shown: RGB, coarse: RGB) -> RGB:
+    """`made` from `shown`, which was made from `coarse` (h, w, 3) for it, at the size of that.
+
+    What a reduction lost is the coarse picture's own: only the change is enlarged, once what was
+    made lies where it was shown.
     """
     height, width = coarse.shape[:2]
-    if made.shape == coarse.shape:
-        return made
-    change = made.astype(np.float32) - small.astype(np.float32)
-    large = cv2.resize(change, (width, height), interpolation=cv2.INTER_CUBIC)
-    return np.rint(np.clip(coarse + large, 0, 255)).astype(np.uint8)
+    if shown.shape[0] * shown.shape[1] >= height * width:
+        return _resized(made, (width, height))
+    found, meant = unit_pixels(made), unit_pixels(shown)
+    alignment = measure(found, meant)
+    if math.isfinite(alignment.left):
+        found = warped(found, alignment)
+    large = cv2.resize(found - meant, (width, height), interpolation=cv2.INTER_CUBIC)
+    return np.rint(np.clip(coarse + 255 * large, 0, 255)).astype(np.uint8)
 
 
 def adapter_files(*wanted: tuple[str, str]) -> tuple[tuple[str, Path], ...]:

@@ -14,12 +14,13 @@ from typing import Any
 from ... import models
 from ...models import ModelError, device
 from ...models.weight_folder import check_safetensors
-from .diffusion import INSTRUCTION, DiffusionRefiner
-from .memory import PipelineNeed, PipelinePlan
+from . import diffusion
+from .diffusion import INSTRUCTION, DiffusionRefiner, Size
 
 STEPS = 4
-VAE = 84_000_000  # parameters
-TEXT_ENCODER = 4_022_000_000
+MULTIPLE = 16  # px of the sides of what the network is shown
+LEAST = 64  # px of its shorter side
+LONGEST = 8  # x the shorter side
 KEY = "prompt_embeds"
 
 
@@ -30,8 +31,10 @@ class KleinRefiner(DiffusionRefiner):
     families = ("flux2-klein",)
     adapters = "klein-refine-lora"
     pipeline = "Flux2KleinPipeline"
+    transformer = "Flux2Transformer2DModel"
     parts = ("transformer",)
-    work = 3_000_000_000
+    work = {"transformer": 3_000_000_000, "vae": 3_000_000_000}  # noqa: RUF012
+    step = MULTIPLE
 
     def missing(self) -> str | None:
         """See `Refiner`."""
@@ -46,21 +49,19 @@ class KleinRefiner(DiffusionRefiner):
             " get the model again"
         )
 
-    def need(self) -> PipelineNeed:
-        """See `DiffusionRefiner`."""
-        model = self.model()
-        assert model is not None
-        transformer = model.parameters * 1_000_000 - TEXT_ENCODER - VAE
-        return PipelineNeed((transformer, VAE), self.work)
+    def sees(self, size: Size) -> Size:
+        """As it is, unless it is larger, smaller or longer than the published pipeline takes."""
+        short, long = sorted(size)
+        is_taken = short >= LEAST and long <= LONGEST * short
+        return size if is_taken and short * long <= diffusion.AREA else (0, 0)
 
     def _steps(self) -> int:
         return STEPS
 
-    def _load(self, folder: Path, options: dict[str, Any], plan: PipelinePlan) -> Any:
+    def _load(self, folder: Path, options: dict[str, Any]) -> Any:
         from diffusers.pipelines.flux2.pipeline_flux2_klein import Flux2KleinPipeline
 
-        if not prompt_file(folder).exists():
-            encode_instruction(folder)
+        prompt_of(folder)
         return Flux2KleinPipeline.from_pretrained(
             folder, text_encoder=None, tokenizer=None, **options
         )
@@ -68,7 +69,7 @@ class KleinRefiner(DiffusionRefiner):
     def _call(self, pipeline: Any, pictures: list[Any], given: dict[str, Any]) -> Any:
         from safetensors.torch import load_file
 
-        file = prompt_file(self.folder())
+        file = prompt_of(self.folder())
         check_safetensors(file)
         embedding = load_file(file)[KEY].to(pipeline._execution_device, pipeline.transformer.dtype)
         return pipeline(image=pictures, prompt_embeds=embedding, guidance_scale=1.0, **given)
@@ -80,6 +81,12 @@ def prompt_file(folder: Path) -> Path:
     kind = config.read_bytes() if config.exists() else folder.name.encode()
     told = hashlib.sha256(INSTRUCTION.encode() + kind).hexdigest()[:12]
     return models.folder() / f"klein-prompt-{told}.safetensors"
+
+
+def prompt_of(folder: Path) -> Path:
+    """That file, made where it is not there. Raises ModelError."""
+    file = prompt_file(folder)
+    return file if file.exists() else encode_instruction(folder)
 
 
 def encode_instruction(folder: Path) -> Path:

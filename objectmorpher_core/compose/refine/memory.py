@@ -1,119 +1,112 @@
-"""In how much memory a pipeline of several networks can run, and with which numbers.
-
-The tiers, the best first: all on the GPU; the transformer and the text encoder in four bits there
-(where bitsandbytes is installed); one network after the other; one layer after the other; the CPU.
-"""
+"""What a pipeline in a folder asks of memory, by its files, and how it is put where it runs."""
 
 from __future__ import annotations
 
-import importlib.util
-from dataclasses import dataclass
-from typing import Any, Literal
+import json
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
-from ...models import device
-from ...models.device import BYTES, SPARE, Plan
+from ...models import ModelError
+from ...models.plans import Network, PipelineNeed, Plan
+from ...models.weight_folder import CONFIG, PLAIN, QUANTISED, count_parameters
 
-Way = Literal["whole", "four bits", "networks", "layers", "cpu"]
-FOUR_BITS = 0.32  # x the bytes of half precision: four bits, their scales, and what is kept whole
-LAYERS = 1 << 30  # bytes on the GPU where layers are moved there one by one
-TOLD = {
-    "whole": "", "four bits": ", in four bits", "networks": ", one network at a time",
-    "layers": ", layer by layer", "cpu": "",
+# Layers that published folders in four bits keep whole: few numbers, through which all others go.
+WHOLE = (
+    "transformer_blocks.0.img_mod", "img_in", "txt_in", "time_text_embed", "norm_out", "proj_out",
+    "x_embedder", "context_embedder", "time_guidance_embed",
+)  # fmt: skip
+PACKAGES = {  # that read weights which are quantised already, by their method
+    "bitsandbytes": "bitsandbytes", "gguf": "gguf", "nunchaku_lite": "kernels",
+    "torchao": "torchao", "quanto": "optimum.quanto", "sdnq": "sdnq",
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class PipelinePlan(Plan):
-    """Where and how a pipeline runs."""
+def need_of(
+    folder: Path, work: Mapping[str, int], shrinks: tuple[str, ...], adapters: tuple[Path, ...]
+) -> PipelineNeed:
+    """Of the networks named in `work`, bytes beside each one's weights.
 
-    way: Way = "whole"
-
-    @property
-    def told(self) -> str:
-        """In words."""
-        name = device.NAMES[self.device]
-        return f"on {name} with {self.number}{TOLD[self.way]} ({self.reason})"
-
-
-@dataclass(frozen=True)
-class PipelineNeed:
-    """What a pipeline asks of memory."""
-
-    networks: tuple[int, ...]  # parameters of each that is in memory
-    work: int  # bytes beside the weights, at half precision
-
-    def bytes(self, way: Way) -> int:
-        """On the GPU, at half precision."""
-        half = [BYTES["bfloat16"] * n for n in self.networks]
-        weights = {
-            "whole": sum(half), "four bits": FOUR_BITS * sum(half), "networks": max(half),
-            "layers": LAYERS, "cpu": 0,
-        }[way]  # fmt: skip
-        return int(weights) + self.work
-
-
-def plans(need: PipelineNeed) -> tuple[PipelinePlan, ...]:
-    """The tiers on which a pipeline fits, the best first. The last is the CPU. Imports torch.
-
+    `shrinks` are those that may be put in four bits; `adapters` lie beside the first network.
     Raises ModelError.
     """
-    found: list[PipelinePlan] = []
-    for name in device.devices():
-        found += on_device(name, need, device.free_memory(name))
-    return tuple(found)
+    beside, networks, is_shrunk = sum(a.stat().st_size for a in adapters), [], False
+    for name, own in work.items():
+        at = folder / name
+        if method(at):
+            is_shrunk = True
+            weights = sum(p.stat().st_size for p in at.iterdir() if p.suffix in (PLAIN, QUANTISED))
+        else:
+            weights = 2 * count_parameters(at)
+        networks.append(Network(weights + (0 if networks else beside), own, name in shrinks))
+    return PipelineNeed(tuple(networks), is_shrunk)
 
 
-def on_device(
-    name: device.Device, need: PipelineNeed, free: int | None
-) -> tuple[PipelinePlan, ...]:
-    """The tiers on one device, `free` bytes of whose memory are left."""
-    room = f"{free / 2**30:.1f} GB free" if free is not None else "free memory unknown"
-    if name == "cpu":
-        return (PipelinePlan("cpu", "float32", "cpu", room, "cpu"),)
-    ways: tuple[Way, ...] = ("whole",)
-    if name == "cuda":  # the others move memory in a way that only CUDA (and ROCm) can
-        ways = ("whole", *four_bits(), "networks", "layers")
-    number: device.Number = "bfloat16" if name == "cuda" else "float16"
-    return tuple(
-        PipelinePlan(
-            name, number, "whole" if way in ("whole", "four bits") else "offload", room, way
-        )
-        for way in ways
-        if free is None or need.bytes(way) <= SPARE * free
-    )
+def method(at: Path) -> str:
+    """By which method the network in a folder is quantised; empty: it is not. Raises ModelError."""
+    if any(at.glob(f"*{QUANTISED}")):
+        return "gguf"
+    try:
+        said = json.loads((at / CONFIG).read_text(encoding="utf-8"))
+        return str((said.get("quantization_config") or {}).get("quant_method", ""))
+    except (OSError, ValueError, AttributeError) as error:
+        raise ModelError(f"{at.name}/{CONFIG} cannot be read") from error
 
 
-def four_bits() -> tuple[Way, ...]:
-    """The tier that needs bitsandbytes, where that is installed."""
-    return ("four bits",) if importlib.util.find_spec("bitsandbytes") is not None else ()
+def unreadable(folder: Path, names: tuple[str, ...]) -> str | None:
+    """Which package is missing for the quantised networks of a folder, as one sentence."""
+    for name in names:
+        try:
+            package = PACKAGES.get(method(folder / name), "")
+        except ModelError as error:
+            return f"{folder.name}: {error}"
+        if package and find_spec(package.partition(".")[0]) is None:
+            told = f"`python -m pip install {package.replace('.', '-')}`"
+            return f"{folder.name}'s {name} is quantised, and {package} is not installed: {told}"
+    return None
 
 
 def quantised(parts: tuple[str, ...]) -> Any:
     """How diffusers is told to load the networks `parts` in four bits, worked with in bfloat16."""
     import torch
     from diffusers.quantizers.pipe_quant_config import PipelineQuantizationConfig
+    from diffusers.quantizers.quantization_config import BitsAndBytesConfig
+    from transformers import BitsAndBytesConfig as TextConfig
 
     options: dict[str, Any] = {
         "load_in_4bit": True, "bnb_4bit_quant_type": "nf4",
         "bnb_4bit_compute_dtype": torch.bfloat16,
     }  # fmt: skip
-    return PipelineQuantizationConfig(
-        quant_backend="bitsandbytes_4bit",
-        quant_kwargs=options,
-        components_to_quantize=list(parts),
-    )
+    network: Any = BitsAndBytesConfig(**options, llm_int8_skip_modules=list(WHOLE))
+    kinds: dict[str, Any] = {n: network for n in parts}
+    if "text_encoder" in parts:
+        kinds["text_encoder"] = TextConfig(**options)
+    return PipelineQuantizationConfig(quant_mapping=kinds)
 
 
-def placed(pipeline: Any, plan: PipelinePlan) -> Any:
-    """The pipeline where the plan wants it."""
+def from_gguf(kind: str, at: Path, number: Any) -> Any:
+    """diffusers' network of class `kind` from the GGUF file in a folder. Raises ModelError."""
+    import diffusers
+    from diffusers.quantizers.quantization_config import GGUFQuantizationConfig
+
+    files = sorted(at.glob(f"*{QUANTISED}"))
+    if len(files) != 1:
+        raise ModelError(f"{at.parent.name}/{at.name} holds {len(files)} {QUANTISED} files")
+    return getattr(diffusers, kind).from_single_file(
+        str(files[0]), config=str(at), torch_dtype=number, local_files_only=True,
+        quantization_config=GGUFQuantizationConfig(compute_dtype=number),
+    )  # fmt: skip
+
+
+def placed(pipeline: Any, plan: Plan) -> Any:
+    """The pipeline where the plan wants it; a whole one was loaded there."""
     import torch
 
-    if plan.way == "networks":
+    if plan.way in ("parts", "parts in four bits"):
         pipeline.enable_model_cpu_offload(device=plan.device)
     elif plan.way == "layers":
         pipeline.enable_group_offload(
             onload_device=torch.device(plan.device), offload_type="leaf_level", use_stream=True
         )
-    else:
-        pipeline.to(plan.device)
     return pipeline

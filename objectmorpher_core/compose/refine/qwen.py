@@ -12,8 +12,8 @@ from typing import Any
 
 from ... import models
 from ...models import HubModel
-from .diffusion import INSTRUCTION, DiffusionRefiner, adapter_files
-from .memory import PipelineNeed, PipelinePlan
+from . import diffusion
+from .diffusion import INSTRUCTION, DiffusionRefiner, Size, adapter_files
 
 STEPS, GUIDANCE = 40, 4.0  # the publishers' own
 LIGHTNING = "lightning"
@@ -22,7 +22,7 @@ LIGHTNING_SCHEDULE = {  # what the adapters were distilled with (lightx2v/Qwen-I
     "use_dynamic_shifting": True, "time_shift_type": "exponential", "base_image_seq_len": 256,
     "max_image_seq_len": 8192, "num_train_timesteps": 1000,
 }  # fmt: skip
-TEXT_ENCODER, VAE = 8_290_000_000, 127_000_000  # parameters
+MULTIPLE = 32  # px of the sides of what the network is shown
 
 
 class QwenRefiner(DiffusionRefiner):
@@ -32,15 +32,18 @@ class QwenRefiner(DiffusionRefiner):
     families = ("qwen-image-edit",)
     adapters = "qwen-refine-lora"
     pipeline = "QwenImageEditPlusPipeline"
+    transformer = "QwenImageTransformer2DModel"
     parts = ("transformer", "text_encoder")
-    work = 6_000_000_000
+    work = {  # noqa: RUF012
+        "transformer": 2_500_000_000, "text_encoder": 1_500_000_000, "vae": 6_000_000_000,
+    }  # fmt: skip
+    step = MULTIPLE
 
-    def need(self) -> PipelineNeed:
-        """See `DiffusionRefiner`."""
-        model = self.model()
-        assert model is not None
-        transformer = model.parameters * 1_000_000 - TEXT_ENCODER - VAE
-        return PipelineNeed((transformer, TEXT_ENCODER, VAE), self.work)
+    def sees(self, size: Size) -> Size:
+        """Of the published pipeline's area, each side rounded by itself."""
+        ratio = size[0] / size[1]
+        width = math.sqrt(diffusion.AREA * ratio)
+        return round(width / MULTIPLE) * MULTIPLE, round(width / ratio / MULTIPLE) * MULTIPLE
 
     def lightning(self) -> HubModel | None:
         """The few-step adapter of the model's own version, if it is there; four steps first."""
@@ -59,7 +62,7 @@ class QwenRefiner(DiffusionRefiner):
         first = () if quick is None else adapter_files((LIGHTNING, quick.family))
         return (*first, *super()._sources())
 
-    def _load(self, folder: Path, options: dict[str, Any], plan: PipelinePlan) -> Any:
+    def _load(self, folder: Path, options: dict[str, Any]) -> Any:
         from diffusers.pipelines.qwenimage.pipeline_qwenimage_edit_plus import (
             QwenImageEditPlusPipeline,
         )

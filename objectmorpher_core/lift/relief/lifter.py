@@ -34,6 +34,7 @@ from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .rim import evened
+from .sides import with_sides
 from .silhouette import Silhouette
 from .spreading import Surface, spread
 
@@ -97,7 +98,9 @@ class ReliefLifter:
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
         is_carried = is_mirrored and hidden is None
-        return replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
+        progress(0.85, "Filling in its sides")
+        return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: Subject, settings: LiftSettings) -> Body:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -126,7 +129,7 @@ class ReliefLifter:
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
             body = flattened(body, settings.thickness)
-        if body.kind == "free":  # a shape that was recognised has its own rim
+        if body.kind in ("box", "round"):  # drawn on cells; what is free is settled already
             body = evened(body)
         if settings.uses_depth:
             progress(0.1, "Looking how deep it is")

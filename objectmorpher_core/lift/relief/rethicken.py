@@ -40,8 +40,11 @@ def with_thickness(lifted: LiftedObject, camera: Camera, factor: float) -> Lifte
         ((gaussians.means - centre) / largest).astype(np.float32), gaussians.quats,
         gaussians.scales / np.float32(largest), gaussians.opacities, gaussians.colors,
     )  # fmt: skip
+    # The same surface drawn out or in: each piece shows what it did.
+    still, sides = np.zeros_like(moved), lifted.sides
     return replace(
         lifted,
+        sides=None if sides is None else sides.moved(still, linear),
         gaussians=gaussians,
         control_points=((nodes - centre) / largest).astype(np.float32),
         world_from_object=world_from_object,

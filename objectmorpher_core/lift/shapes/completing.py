@@ -11,10 +11,12 @@ from ...base.arrays import F64, Mask
 from ...base.camera import Camera
 from ..relief.body import Body
 from ..relief.cuts import Cuts
+from ..relief.silhouette import Silhouette
 from ..relief.thickness import Thickness
 from .recognition import SHEET, Places, Recognised
 
 STRAY = 0.06  # x extent, from which a front is something else than the shape's
+ROUNDS = 4  # of a plane that is fitted to most of a front
 SOFT = 0.02  # x extent, over which one gives way to the other
 ALONG = 0.05  # x extent, over which a tube's middle is smoothed
 INNER = 0.02  # x extent from the outline, nearer to which fronts are not compared
@@ -39,7 +41,10 @@ def completed(
     if shape.plane is not None:
         share = np.full(outline.shape, trust * places.weight)
         return _sheet(body, near - SHEET * outline.extent, share, thickness)
-    share = trust * _share(places, front - near, body)
+    # How it leans the shape tells better than a network, also of what sticks out of it.
+    lean = _plane(near - front, compared, outline)
+    body = replace(body, middle=body.middle + trust * places.weight * lean)
+    share = trust * _share(places, front + lean - near, body)
     half = 0.5 * (near - far)
     sides = [side.towards(thickness * half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (near - half - body.middle)
@@ -76,6 +81,19 @@ def _sheet(body: Body, middle: F64, share: F64, thickness: float) -> Body:
     middle = body.middle + share * (middle - body.middle)
     body = replace(body, middle=middle, front=sides[0], back=sides[1], kind="flat")
     return _whole(body, share)
+
+
+def _plane(field: F64, known: Mask, outline: Silhouette) -> F64:
+    """(h, w) the plane nearest to most of `field` (h, w) where that is `known` (h, w)."""
+    cells = np.concatenate([outline.cells, np.ones((*outline.shape, 1))], -1)
+    own, values, weight = cells[known], field[known], np.ones(int(known.sum()))
+    plane = np.zeros(3)
+    for _ in range(ROUNDS):
+        scaled = own * weight[:, None]
+        plane = np.linalg.lstsq(scaled.T @ own, scaled.T @ values)[0]
+        off = (values - own @ plane) / (STRAY * outline.extent)
+        weight = 1 / (1 + off**2) ** 2
+    return cells @ plane
 
 
 def _whole(body: Body, share: F64) -> Body:

@@ -16,6 +16,7 @@ from .boxes import fit_box
 from .drawing import Grid, Mesh, drawn
 from .evidence import Evidence, Misfit
 from .flats import fit_flat
+from .rings import fit_ring
 from .round import fit_ellipsoid, fit_revolution
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
@@ -23,7 +24,7 @@ REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside
 # Of a shape's description: outline, depth and normals, each 1 where it is as far off as expected;
 # what of the mask it leaves out; and that a surface of revolution may have any profile. The outline
 # counts most: the network's depth and normals are blurred, and rounder than what they are of.
-WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, 0.4
+WEIGHTS, LEFT_OUT, PROFILE = (3.0, 0.5, 0.5), 8.0, (0.1, 0.5)
 LONGEST = 2.5  # description, of which half are what they are said to be
 WIDTH = 0.25  # of descriptions, over which that changes
 LEAST = 0.3  # weight, below which an object is free
@@ -126,9 +127,12 @@ def _solid(kind: str, evidence: Evidence) -> Recognised:
     left_out = LEFT_OUT * (1 - float(core.mask.sum()) / float(evidence.mask.sum()))
     if kind == "box":
         return _described(kind, fit_box(core), evidence, left_out)
+    if (ring := fit_ring(core)) is not None:
+        return _described(kind, ring, evidence, left_out)
     fits = [_described(kind, fit_ellipsoid(core), evidence, left_out)]
     if fits[0].weight < EXPLAINED and (turned := fit_revolution(core)) is not None:
-        fits.append(_described(kind, turned, evidence, left_out + PROFILE))
+        more = left_out + PROFILE[0] + PROFILE[1] * turned[2]
+        fits.append(_described(kind, turned[:2], evidence, more))
     return min(fits, key=_length)
 
 

@@ -24,19 +24,21 @@ def refined(build: Build, start: F64, steps: F64, evidence: Evidence) -> tuple[F
     `steps` (n,): how far off `start` may well be.
     """
 
-    def cost(change: F64) -> float:
-        return evidence.misfit(build(start + steps * change)).total
-
     if (first := evidence.misfit(build(start))).total > HOPELESS:
         return start, first
+    best = least(lambda numbers: evidence.misfit(build(numbers)).total, start, steps)
+    return best, evidence.misfit(build(best))
+
+
+def least(cost: Callable[[F64], float], start: F64, steps: F64) -> F64:
+    """Numbers (n,) near `start` that cost least, likewise."""
     best, size = np.zeros(len(start)), 1.0
     for _ in range(2):  # begun again where it ended, as it may have collapsed (Kelley 1999)
         simplex = best + size * np.vstack([np.zeros(len(start)), np.eye(len(start))])
         found = minimize(
-            cost, best, method="Nelder-Mead",
+            lambda change: cost(start + steps * change), best, method="Nelder-Mead",
             options={"initial_simplex": simplex, "maxfev": TRIALS * len(start), "fatol": CLOSE,
                      "xatol": 0.02, "adaptive": True},
         )  # fmt: skip
         best, size = np.asarray(found.x, np.float64), -0.3
-    best = start + steps * best
-    return best, evidence.misfit(build(best))
+    return start + steps * best

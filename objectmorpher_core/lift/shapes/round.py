@@ -1,32 +1,29 @@
 """Surfaces of revolution and ellipsoids that look like the photo.
 
-A circle about an axis is seen as an ellipse, as much narrower than wide as the axis leans towards
-the camera. The outline of a surface of revolution is the hull of all its circles' ellipses, each of
-which fits into it: so the radius at a place on the axis is that of the largest ellipse about it,
-and the leaning is all that is to be found.
+The outline of an ellipsoid is an ellipse; that of a surface of revolution gives its profile, once
+the axis is known: see `lathe`.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
-from .drawing import Mesh
+from .drawing import Mesh, drawn
 from .evidence import Evidence, Misfit
-from .refining import refined
-from .solids import AROUND, FINE, ellipsoid, revolved
+from .lathe import Lathe, Profile
+from .refining import HOPELESS, least
+from .solids import AROUND, FINE, ellipsoid
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane
-PLACES = 16  # on the axis
-ACROSS = 64  # rows in which outlines are compared
-TRIED = 48  # of them, at which its ends are looked for
-TRIM = 0.004  # x the outline's area, that trimmed ends may lose
+STEEPEST = 1.5  # radians, likewise
+SIMPLER = 1.0  # misfit that a radian of a profile's bend outweighs
+ALIKE = 0.998  # cosine between two axes that are tried as one
+ROUNDER = 0.5  # misfit that an ellipsoid outweighs, odd in depth by one of its steps
 KEPT = 2  # leanings that are refined
 LEAST_SHARE = 0.6  # of the mask, that is alike on both sides
-CAPS = (0.0, 0.35, 1.0)  # height of the end that is seen, x its radius
+CAPS = (-0.8, 0.0, 0.35, 1.0)  # height of the end that is seen, x its radius
 
 
 def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
@@ -37,7 +34,7 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
     right /= np.linalg.norm(right)
     frame = np.column_stack([right, np.cross(forward, right), forward])
     spread = frame[:, :2] @ (axes * half)
-    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.log(np.sqrt(half[0] * half[1])), 0.0, 0.0])
+    start = np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.log(half.min()), 0.0, 0.0])
     steps = np.array([0.02, 0.02, 0.06, 0.06, 0.06, 0.3, 0.15 * half[0], 0.15 * half[1]])
 
     def build(numbers: F64, around: int = AROUND) -> Mesh:
@@ -48,123 +45,81 @@ def fit_ellipsoid(evidence: Evidence) -> tuple[Mesh, Misfit]:
         )
         return ellipsoid(middle + away * (frame[:, 0] * x + frame[:, 1] * y), columns, around)
 
-    best, misfit = refined(build, start, steps, evidence)
-    return build(best, FINE), misfit
+    for _ in range(2):
+        start[:4] += _wider(drawn(build(start), evidence.grid).near > 0, evidence, frame, axes)
+    if evidence.misfit(build(start)).total > HOPELESS:
+        return build(start, FINE), evidence.misfit(build(start))
+
+    def cost(numbers: F64) -> float:
+        odd = (((numbers - start) / steps)[5:] ** 2).sum()  # no ball, nor an egg that lies across
+        return evidence.misfit(build(numbers)).total + ROUNDER * float(odd)
+
+    best = least(cost, start, steps)
+    return build(best, FINE), evidence.misfit(build(best))
+
+
+def _wider(met: Mask, evidence: Evidence, frame: F64, axes: F64) -> F64:
+    """(4,) how far an ellipse that is `met` (h, w) is to be moved and stretched onto the mask.
+
+    Of what is near the circle that looks the largest is not the one in the middle.
+    """
+    if not met.any():
+        return np.zeros(4)
+    own, wanted = (_spread_of(evidence.grid.tangents[mask]) for mask in (met, evidence.mask))
+    wide = [np.diag(axes.T @ spread @ axes) for spread in (wanted[1], own[1])]
+    moved = frame[:2, :2].T @ (wanted[0] - own[0])
+    return np.concatenate([moved, 0.5 * np.log(wide[0] / np.maximum(wide[1], 1e-12))])
+
+
+def _spread_of(at: F64) -> tuple[F64, F64]:
+    """Mean (2,) and covariance (2, 2) of places (n, 2)."""
+    return at.mean(0), np.cov((at - at.mean(0)).T)
 
 
 def _moments(evidence: Evidence) -> tuple[F64, F64, F64, float]:
     """Middle (3,), axes (2, 2) columns, half lengths (2,) and distance of the mask's ellipse."""
-    at = evidence.grid.tangents[evidence.mask]
-    mean = at.mean(0)
-    values, axes = np.linalg.eigh(np.cov((at - mean).T))
+    mean, spread = _spread_of(evidence.grid.tangents[evidence.mask])
+    values, axes = np.linalg.eigh(spread)
     depth = float(np.median(evidence.depth[evidence.sure])) + 0.0
-    half = 2 * np.sqrt(np.maximum(values, 1e-12)) * depth
-    middle = np.append(mean, 1.0) * (depth + 0.5 * half.min())
+    half = 2 * np.sqrt(np.maximum(values, 1e-12))
+    away = depth * (1 + 0.5 * half.min())
+    half, middle = away * half, away * np.append(mean, 1.0)
     return middle, axes, half, float(np.linalg.norm(middle))
 
 
-@dataclass(frozen=True, eq=False)
-class Lathe:
-    """An axis in the picture, and the outline about it; lengths are tangents at the middle."""
+def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit, float] | None:
+    """The best of several axes and leanings, and the bend of its profile, radians.
 
-    middle: F64  # (2,) tangents
-    along: F64  # (2,) unit, in the picture
-    outline: F64  # (n, 2) across and along
-    low: float  # ends of the mask along the axis
-    high: float
-
-    def radii(self, lean: float) -> tuple[F64, F64]:
-        """Places (PLACES,) of circles along the axis in the picture, and their radii."""
-        places = np.linspace(self.low, self.high, TRIED + 2)[1:-1]
-        # The camera looks at each circle along another ray.
-        own = lean + places / float(np.hypot(1.0, np.linalg.norm(self.middle)))
-        flat = np.maximum(np.abs(np.sin(own)), 0.02)
-        away = np.hypot(self.outline[:, :1], (self.outline[:, 1:] - places) / flat)
-        return self._trimmed(places, away.min(0), flat)
-
-    def _trimmed(self, places: F64, radii: F64, flat: F64) -> tuple[F64, F64]:
-        """Without the ends that are seen edge-on: what is left still has the same outline."""
-        grid = np.linspace(self.low, self.high, ACROSS)
-        half = radii[:, None] * np.sqrt(
-            np.clip(1 - ((grid - places[:, None]) / ((flat * radii)[:, None] + 1e-9)) ** 2, 0, 1)
-        )
-        # The outline that is left when so many are trimmed from an end, after each other
-        least = (1 - TRIM) * half.max(0).sum()
-        left = np.maximum.accumulate(half[::-1])[::-1].sum(1)
-        first = min(int(np.flatnonzero(left >= least)[-1]), len(places) - 6)
-        left = np.maximum.accumulate(half[first:]).sum(1)
-        last = max(first + int(np.flatnonzero(left >= (1 - TRIM) * left[-1])[0]), first + 5)
-        ends = (first, last + 1)
-        own = slice(*ends)
-        even = np.linspace(float(places[ends[0]]), float(places[ends[1] - 1]), PLACES)
-        radii = np.interp(even, places[own], radii[own])
-        inner = np.convolve(radii, [0.25, 0.5, 0.25], "same")  # the ends stay: there are its rims
-        return even, np.concatenate([radii[:1], inner[1:-1], radii[-1:]])
-
-
-def fit_revolution(evidence: Evidence) -> tuple[Mesh, Misfit] | None:
-    """The best of several axes and leanings; None where nothing is alike on both sides."""
+    None where nothing is alike on both sides.
+    """
     trials = []
     for lathe in _lathes(evidence):
         for lean in np.concatenate([LEANS, -LEANS]):
-            mesh = _built(lathe, lean, np.zeros(6), 0.0, evidence)
-            trials.append((evidence.misfit(mesh).total, lathe, lean))
+            if (profile := lathe.profile(lean, np.zeros(2))) is not None:
+                cost = evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
+                trials.append((cost, lathe, lean))
     trials.sort(key=lambda trial: trial[0])
     fits = [_refined(lathe, lean, evidence) for _, lathe, lean in trials[:KEPT]]
-    return min(fits, key=lambda fit: fit[1].total, default=None)
+    return min(fits, key=lambda fit: fit[1].total + SIMPLER * fit[2], default=None)
 
 
-def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit]:
-    size = lathe.high - lathe.low
-    steps = np.array([0.15, 0.06, 0.02 * size, 0.02 * size, 0.05, 0.05])
-    best, _ = refined(lambda n: _built(lathe, lean, n, 0.0, evidence), np.zeros(6), steps, evidence)
-    fits = [(cap, evidence.misfit(_built(lathe, lean, best, cap, evidence))) for cap in CAPS]
-    cap, misfit = min(fits, key=lambda fit: fit[1].total)
-    return _built(lathe, lean, best, cap, evidence, FINE), misfit
+def _refined(lathe: Lathe, lean: float, evidence: Evidence) -> tuple[Mesh, Misfit, float]:
+    def built(numbers: F64) -> Profile | None:
+        return lathe.profile(float(np.clip(lean + numbers[0], -STEEPEST, STEEPEST)), numbers[1:])
 
+    def cost(numbers: F64) -> float:
+        profile = built(numbers)
+        if profile is None:
+            return HOPELESS
+        return evidence.misfit(profile.mesh()).total + SIMPLER * profile.bend
 
-def _built(
-    lathe: Lathe, lean: float, change: F64, cap: float, evidence: Evidence, around: int = AROUND
-) -> Mesh:
-    """`change` (6,): of leaning, turn in the picture, place, and logarithms of width and length."""
-    lean = float(np.clip(lean + change[0], -1.5, 1.5))
-    places, radii = lathe.radii(lean)
-    middle = np.append(lathe.middle + change[2:4], 1.0)
-    forward = middle / np.linalg.norm(middle)
-    cosine, sine = np.cos(change[1]), np.sin(change[1])
-    along = np.append(np.array([[cosine, -sine], [sine, cosine]]) @ lathe.along, 0.0)
-    inside = along - forward * (along @ forward)
-    inside /= np.linalg.norm(inside)
-    axis = np.cos(lean) * inside + np.sin(lean) * forward
-    depth = float(np.median(evidence.depth[evidence.sure]))
-    centre = depth * (middle + along * 0.5 * (places[0] + places[-1]))
-    # Where the axis meets the rays of the circles' middles, and how far away that is
-    rays = middle + places[:, None] * along
-    across = np.cross(axis, rays)
-    steps = -(np.cross(centre, rays) * across).sum(1) / np.maximum((across**2).sum(1), 1e-9)
-    most = 2 * depth * (lathe.high - lathe.low) / max(np.cos(lean), 0.1)
-    steps = np.clip(steps, -most, most)
-    away = np.maximum(centre[2] + steps * axis[2], 0.2 * depth)
-    radii = np.exp(change[4]) * radii * away
-    steps = np.exp(change[5]) * steps
-    if cap > 0:
-        steps, radii = _capped(steps, radii, cap, lean > 0)
-    # Seen from near, a circle's rim is wider than it is far away.
-    far = np.linalg.norm(centre + steps[:, None] * axis, axis=1)
-    radii = radii * np.sqrt(np.clip(1 - (radii / far) ** 2, 0.5, 1))
-    return revolved(centre + steps[:, None] * axis, radii, axis, around)
-
-
-def _capped(steps: F64, radii: F64, cap: float, is_first_seen: bool) -> tuple[F64, F64]:
-    """With a round end where the axis comes towards the camera."""
-    angle = np.linspace(0, 0.5 * np.pi, 7)[1:]
-    end = 0 if is_first_seen else -1
-    sign = -1.0 if is_first_seen else 1.0
-    more = steps[end] + sign * cap * radii[end] * np.sin(angle)
-    less = np.maximum(radii[end] * np.cos(angle), 1e-3 * radii[end])
-    if is_first_seen:
-        return np.concatenate([more[::-1], steps]), np.concatenate([less[::-1], radii])
-    return np.concatenate([steps, more]), np.concatenate([radii, less])
+    steps = np.array([0.15, 0.04, 0.03 * (lathe.high - lathe.low)])
+    profile = built(least(cost, np.zeros(3), steps))
+    assert profile is not None, "its start was one"
+    shapes = [profile.capped(cap) for cap in CAPS]
+    fits = [evidence.misfit(shape.mesh()) for shape in shapes]
+    best = int(np.argmin([fit.total for fit in fits]))
+    return shapes[best].mesh(FINE), fits[best], profile.bend
 
 
 def _lathes(evidence: Evidence) -> list[Lathe]:
@@ -179,17 +134,14 @@ def _lathes(evidence: Evidence) -> list[Lathe]:
     found: list[Lathe] = []
     for way in ways:
         way = way * np.sign(way[1] + 1e-9)
-        if any(abs(way @ other.along) > 0.999 for other in found):
+        if any(abs(way @ other.along) > ALIKE for other in found):
             continue
         middle = _axis_of(evidence.mask, at, mean, way)
         mirrored = _both_sides(evidence, middle, way)
         mirrored = _largest(mirrored)
         if mirrored.sum() < LEAST_SHARE * evidence.mask.sum():
             continue
-        outline = evidence.within(mirrored).outline - middle
-        outline = np.column_stack([outline @ [-way[1], way[0]], outline @ way])[::4]
-        low, high = outline[:, 1].min(), outline[:, 1].max()
-        found.append(Lathe(middle, way, outline, low, high))
+        found.append(Lathe.of(evidence, middle, way))
     return found
 
 

@@ -38,6 +38,25 @@ def revolved(places: F64, radii: F64, axis: F64, around: int = AROUND) -> Mesh:
     return Mesh(np.asarray(vertices, np.float64), _rings(len(places), around))
 
 
+def tube(centre: F64, axis: F64, sizes: F64, around: int = AROUND) -> Mesh:
+    """A ring about `centre` (3,) and `axis` (3,), unit.
+
+    `sizes` (3,): its radius, and half of the tube's width, across the axis and along it.
+    """
+    across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    across /= np.linalg.norm(across)
+    turn, own = (2 * np.pi * np.arange(n) / n for n in (around, around // 2))
+    ways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * np.cross(axis, across)
+    away = sizes[0] + sizes[1] * np.cos(own)
+    vertices = away[:, None] * ways[:, None] + (sizes[2] * np.sin(own))[:, None] * axis
+    count = len(own)
+    k, m = np.meshgrid(np.arange(around), np.arange(count), indexing="ij")
+    after, beside = ((k + 1) % around) * count, (m + 1) % count
+    a, b, c, d = k * count + m, after + m, after + beside, k * count + beside
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return Mesh(centre + vertices.reshape(-1, 3), faces.astype(np.int64))
+
+
 def sheet(corner_rays: F64, inverse: F64, share: float) -> Mesh:
     """A plate: what rays (n, 3) with z = 1 around its outline meet; `share` thicker behind."""
     front = corner_rays / inverse[:, None]

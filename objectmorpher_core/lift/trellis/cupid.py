@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from ...base.arrays import F64
-from ...models.device import Plan
+from ...models.plans import Plan
 from .camera import view
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied
 from .latent import looked_up
@@ -28,8 +28,8 @@ LEAST_CELLS = 10  # whose places tell the camera; where fewer are occupied, the 
 class CupidGenerator(Generator):
     """A `Generator` whose objects know how they are seen."""
 
-    def __init__(self, folders: Folders, *tiers: Plan) -> None:
-        super().__init__(folders, *tiers)
+    def __init__(self, folders: Folders, plan: Plan) -> None:
+        super().__init__(folders, plan)
         self.pipeline.parts.setdefault(TOKENS, TOKENS_PATH)
 
     def _placed(self, latents: Tensor) -> Placed:

@@ -13,11 +13,11 @@ from .. import Subject
 from ..registration.placement import Hints
 from . import configs
 from .camera import View, pose_in
-from .lifter import UP, TrellisLifter, within_memory
+from .lifter import UP, TrellisLifter
 from .picture import Picture
 
 if TYPE_CHECKING:
-    from ...models.device import Plan
+    from ...models.plans import Plan
     from .generator import Folders, Generator
 
 
@@ -27,10 +27,10 @@ class CupidLifter(TrellisLifter):
     name = "cupid"
     ids = (configs.CUPID, configs.ENCODER, configs.TRELLIS)
 
-    def _new_generator(self, folders: Folders, tiers: tuple[Plan, ...]) -> Generator:
+    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
         from .cupid import CupidGenerator
 
-        return CupidGenerator(folders, *tiers)
+        return CupidGenerator(folders, plan)
 
     def stance(self, subject: Subject, progress: Progress, seed: int = 0) -> F64 | None:
         """(4, 4) world from the network's own frame of the object; None where no camera sees it so.
@@ -39,16 +39,15 @@ class CupidLifter(TrellisLifter):
         """
         from .picture import Picture
 
-        picture, generator = Picture.of(subject.matte), self._generator()
-        made = within_memory(generator, lambda: generator.make(picture, progress, seed))
+        picture = Picture.of(subject.matte)
+        made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
         return pose_seen(made.view, picture, subject.camera)
 
     def _made(
         self, picture: Picture, subject: Subject, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
-        generator = self._generator()
-        made = within_memory(generator, lambda: generator.make(picture, progress, seed))
+        made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
         start = pose_seen(made.view, picture, subject.camera)
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)

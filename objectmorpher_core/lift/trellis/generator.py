@@ -15,7 +15,8 @@ from torch import Tensor
 
 from ...base.progress import Progress, part, silent
 from ...document.gaussians import Gaussians
-from ...models.device import Plan, empty_cache
+from ...models.device import empty_cache
+from ...models.plans import Plan
 from .. import LiftError
 from .camera import View
 from .configs import Pipeline, Sampling, part_path, pipeline
@@ -64,12 +65,9 @@ class Extras:
 class Generator:
     """TRELLIS. Reads its description at once, and each part's weights when they are needed."""
 
-    def __init__(self, folders: Folders, *tiers: Plan) -> None:
-        """`tiers`: the plan, and what is gone on with where memory runs out.
-
-        Raises LiftError where the folders do not hold what they should.
-        """
-        self.folders, self.tiers, self.plan = folders, tiers, tiers[0]
+    def __init__(self, folders: Folders, plan: Plan) -> None:
+        """Raises LiftError where the folders do not hold what they should."""
+        self.folders, self.plan = folders, plan
         self.pipeline: Pipeline = pipeline(folders.model)
         self._parts: dict[str, Any] = {}
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...base.progress import Progress, part
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings
-from ...models import ModelError, device
+from ...models import ModelError, ledger
+from ...models.plans import Need
 from ...splat_files.splats.axes import QUARTER_TURN, turned
 from .. import LiftError, Subject
 from ..registration.imported import lift_imported
@@ -20,7 +21,7 @@ from . import configs
 from .configs import Sampling
 
 if TYPE_CHECKING:
-    from ...models.device import Plan
+    from ...models.plans import Plan
     from .generator import Folders, Generator, Made
     from .picture import Picture
 
@@ -30,7 +31,7 @@ GUIDANCE = 7.5, 3.0  # of the flows, from the same place
 UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 FITS = 0.85  # score from which a pose that the network says itself is not looked for again
 PARAMETERS = 1_924_000_000  # counted; the encoder twice: it stays in single precision
-WORK = 2 << 30  # bytes at half precision, estimated
+WORK = 2 << 30  # bytes beside the weights, estimated
 SPLATTING = "mip"  # as its Gaussians were trained
 
 
@@ -39,7 +40,6 @@ class TrellisLifter:
 
     name = "trellis"
     ids: tuple[str, ...] = (configs.TRELLIS, configs.ENCODER)
-    _kept: dict[str, Any] = {}  # noqa: RUF012  generators, loaded once in a process
 
     def missing(self) -> str | None:
         """See `Lifter`."""
@@ -65,23 +65,29 @@ class TrellisLifter:
         self, picture: Picture, subject: Subject, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         """The object in our axes, and what is known of its pose."""
-        generator = self._generator()
-        how = example_sampling(generator)
-        made = within_memory(generator, lambda: generator.make(picture, progress, seed, how))
+        made = self.make(lambda g: g.make(picture, progress, seed, example_sampling(g)))
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP)
 
-    def _generator(self) -> Generator:
+    def make(self, use: Callable[[Generator], Made]) -> Made:
+        """What `use(generator)` makes, in the best way for which there is memory.
+
+        Raises LiftError.
+        """
         from .generator import Folders
 
         folders = Folders(*(configs.weights_folder(id) for id in self.ids))
-        if (known := self._kept.get(self.name)) is None or known.folders != folders:
-            self._kept[self.name] = self._new_generator(folders, tiers())
-        return self._kept[self.name]
+        model = ledger.Model(
+            self.name.upper(), folders, need(), lambda plan: self._new_generator(folders, plan)
+        )
+        try:
+            return ledger.SHARED.run(model, lambda generator, _: use(generator))
+        except ModelError as error:
+            raise LiftError(f"{error}: close other programs, or lift it as a relief") from error
 
-    def _new_generator(self, folders: Folders, tiers: tuple[Plan, ...]) -> Generator:
+    def _new_generator(self, folders: Folders, plan: Plan) -> Generator:
         from .generator import Generator
 
-        return Generator(folders, *tiers)
+        return Generator(folders, plan)
 
 
 def placed(
@@ -107,38 +113,7 @@ def example_sampling(generator: Generator) -> tuple[Sampling, Sampling]:
     return first, second
 
 
-def need() -> device.Need:
+def need() -> Need:
     """What it asks of memory."""
-    return device.Need(PARAMETERS, WORK, parts=True, half="float16")  # as published
-
-
-def tiers() -> tuple[Plan, ...]:
-    """How it can run here, the best first; a GPU that has room is not followed by an hour's work.
-
-    Raises LiftError.
-    """
-    try:
-        found = device.plans(need())
-    except ModelError as error:
-        raise LiftError(str(error)) from error
-    return tuple(plan for plan in found if plan.device != "cpu") or found
-
-
-def within_memory(generator: Generator, make: Callable[[], Made]) -> Made:
-    """What `make()` makes; where the memory of its plan does not suffice, with the next one.
-
-    It stays with that. Raises LiftError.
-    """
-    left = generator.tiers[generator.tiers.index(generator.plan) :]
-
-    def attempt(plan: Plan) -> Made:
-        if plan != generator.plan:
-            generator.release()
-            generator.plan = plan
-        return make()
-
-    try:
-        return device.run(left, attempt)
-    except ModelError as error:
-        generator.release()
-        raise LiftError(f"{error}: close other programs, or lift it as a relief") from error
+    numbers = ("float16",)  # as published
+    return Need(PARAMETERS, WORK, parts=True, numbers=numbers, is_slow_on_cpu=True)

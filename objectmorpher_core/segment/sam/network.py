@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from ...base.arrays import F32, F64, RGB, Mask
-from ...models import HubModel
 
 OBJECT, GROUND, CORNER, OTHER_CORNER, NOTHING = 1, 0, 2, 3, -1  # labels of SAM's points
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's, of RGB in [0, 1]
@@ -47,17 +46,6 @@ class SamNetwork(Protocol):
     def decode(self, features: tuple[F32, ...], asked: Asked, is_several: bool) -> Masks:
         """Three masks, or the one where the prompt leaves no choice. Raises ModelError."""
         ...
-
-
-def open_network(model: HubModel) -> SamNetwork:
-    """The network of a model that is there. Raises ModelError."""
-    if model.family == "sam-onnx":
-        from .sam_onnx import SamOnnx
-
-        return SamOnnx(model)
-    from .sam_torch import SamTorch
-
-    return SamTorch(model)
 
 
 def normalized(picture: RGB, side: int, mean: F32 = MEAN, deviation: F32 = DEVIATION) -> F32:

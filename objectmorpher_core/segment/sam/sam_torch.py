@@ -1,5 +1,7 @@
 """SAM, SAM 2.1 and SAM 3's tracker by transformers, which needs no torchvision for the networks.
 
+The ledger keeps the network between two clicks, and the last photo's features on its device.
+
 The image encoder, which is nearly all of them, runs with the plan's numbers; prompts and masks
 stay in float32: a click in bfloat16 would be off by pixels.
 """
@@ -7,19 +9,21 @@ stay in float32: a click in bfloat16 would be off by pixels.
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ... import models
 from ...base.arrays import F32, RGB
-from ...models import HubModel, ModelError, device
-from ...models.weight_folder import CONFIG
+from ...models import HubModel, ModelError, device, ledger
+from ...models.plans import Need, Plan
+from ...models.weight_folder import CONFIG, count_parameters, stamp
 from .network import Asked, Masks, normalized
 
 HALF = np.full(3, 0.5, np.float32)  # SAM 3's mean and deviation
 CLASSES = {"sam": "SamModel", "sam2": "Sam2Model", "sam3": "Sam3TrackerModel"}
-WORK = {"sam": 2_500_000_000, "sam2": 700_000_000, "sam3": 2_500_000_000}  # bytes, half precision
+WORK = {"sam": 2_500_000_000, "sam2": 950_000_000, "sam3": 2_500_000_000}  # bytes beside the weights
 
 
 class SamTorch:
@@ -34,43 +38,37 @@ class SamTorch:
         self.side, patch = _sizes(model)
         self.low = 4 * (self.side // patch)
         self.is_padded = model.family == "sam"
-        need = device.Need(model.parameters * 1_000_000, WORK[model.family])
-        self._tiers = device.plans(need)
-        self._opened: tuple[device.Plan, Any] | None = None
-        self._held: tuple[tuple[F32, ...], Any] | None = None  # features, and as tensors
-
-    @property
-    def plan(self) -> device.Plan:
-        """Where it runs."""
-        return self._tiers[0]
+        need = Need(count_parameters(folder), WORK[model.family])
+        self._model = ledger.Model("SAM", (folder, stamp(folder)), need, self._load)
 
     def encode(self, picture: RGB) -> tuple[F32, ...]:
         """See `SamNetwork.encode`."""
-        return device.run(self._tiers, lambda plan: self._encode(plan, picture))
+        return ledger.SHARED.run(self._model, lambda sam, plan: self._encode(sam, plan, picture))
 
     def decode(self, features: tuple[F32, ...], asked: Asked, is_several: bool) -> Masks:
         """See `SamNetwork.decode`."""
-        return device.run(self._tiers, lambda plan: self._decode(plan, features, asked, is_several))
+        return ledger.SHARED.run(
+            self._model, lambda sam, plan: self._decode(sam, plan, (features, asked), is_several)
+        )
 
-    def _encode(self, plan: device.Plan, picture: RGB) -> tuple[F32, ...]:
+    def _encode(self, sam: _Opened, plan: Plan, picture: RGB) -> tuple[F32, ...]:
         import torch
 
-        network = self._network(plan)
         is_third = self._family == "sam3"
         pixels = normalized(picture, self.side, *((HALF, HALF) if is_third else ()))
         given = torch.from_numpy(pixels).to(plan.device, getattr(torch, plan.number))
-        found = network.get_image_embeddings(given)
+        found = sam.network.get_image_embeddings(given)
         tensors = [found] if isinstance(found, torch.Tensor) else list(found)
         features = tuple(t.float().cpu().numpy() for t in tensors)
-        self._held = features, found
+        sam.held = features, found
         return features
 
     def _decode(
-        self, plan: device.Plan, features: tuple[F32, ...], asked: Asked, is_several: bool
+        self, sam: _Opened, plan: Plan, told: tuple[tuple[F32, ...], Asked], is_several: bool
     ) -> Masks:
         import torch
 
-        network = self._network(plan)
+        features, asked = told
 
         def tensor(array: Any, kind: Any = np.float32) -> Any:
             return torch.from_numpy(np.ascontiguousarray(array, kind)).to(plan.device)
@@ -84,25 +82,18 @@ class SamTorch:
             given["input_boxes"] = tensor(asked.box[None, None] - 0.5)
         if asked.logits is not None:
             given["input_masks"] = tensor(asked.logits[None, None])
-        if self._held is None or self._held[0] is not features:
+        if sam.held is None or sam.held[0] is not features:
             tensors = [tensor(f) for f in features]
-            self._held = features, tensors[0] if self._family == "sam" else tensors
+            sam.held = features, tensors[0] if self._family == "sam" else tensors
         with torch.inference_mode():
-            found = network(
-                image_embeddings=self._held[1], multimask_output=is_several, **given
+            found = sam.network(
+                image_embeddings=sam.held[1], multimask_output=is_several, **given
             )  # fmt: skip
         logits = found.pred_masks[0, 0].float().cpu().numpy()
         return Masks(logits, found.iou_scores[0, 0].float().cpu().numpy())
 
-    def _network(self, plan: device.Plan) -> Any:
-        """The network where the plan wants it; a plan that needs less memory follows one."""
-        if self._opened is None or self._opened[0] != plan:
-            self._opened = self._held = None
-            self._opened = plan, self._load(plan)
-            self._tiers = self._tiers[self._tiers.index(plan) :]
-        return self._opened[1]
-
-    def _load(self, plan: device.Plan) -> Any:
+    def _load(self, plan: Plan) -> _Opened:
+        """The network where the plan wants it."""
         import torch
         import transformers
 
@@ -126,7 +117,15 @@ class SamTorch:
             raise ModelError(f"{self._folder.name} lacks some of its weights")
         network.vision_encoder.to(getattr(torch, plan.number))
         network.vision_encoder.register_forward_hook(_in_float32)
-        return network.eval().to(plan.device)
+        return _Opened(network.eval().to(plan.device))
+
+
+@dataclass(eq=False)
+class _Opened:
+    """A network, and the features that it was given last."""
+
+    network: Any
+    held: tuple[tuple[F32, ...], Any] | None = None  # features, and as tensors
 
 
 def _in_float32(module: Any, given: Any, found: Any) -> Any:

@@ -27,7 +27,7 @@ from ..selection import (
 )
 from ..subject import SubjectNet, subject_guess
 from .frame import Box, Frame
-from .network import SamNetwork, open_network
+from .network import SamNetwork
 from .view import Encoded, SamAnswer, SamView, inside_box
 
 WITHOUT_GPU = 110  # millions of parameters; a larger SAM takes minutes a photo on a CPU
@@ -294,3 +294,14 @@ def sam3() -> Sam:
 def sam_onnx() -> Sam:
     """MobileSAM or EfficientSAM, without PyTorch."""
     return Sam("sam-onnx")
+
+
+def open_network(model: HubModel) -> SamNetwork:
+    """The network of a model that is there. Raises ModelError."""
+    if model.family == "sam-onnx":
+        from .sam_onnx import SamOnnx
+
+        return SamOnnx(model)
+    from .sam_torch import SamTorch
+
+    return SamTorch(model)

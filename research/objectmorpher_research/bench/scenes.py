@@ -116,7 +116,7 @@ def lift_scene(count: int, view: int = VIEW) -> Scene:
     camera = Camera.from_fov(view, view)
     mask = made_mask(view)
     matte, lifted = lift_mask(made_photo(view, mask), camera, mask, "relief", LiftSettings(count))
-    return _dragged("lift", lifted, object_texture(matte), camera)
+    return _dragged("lift", lifted, object_texture(matte, lifted), camera)
 
 
 def made_photo(view: int, mask: Mask) -> RGB:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 from PIL import Image
 
 from conftest import wait_for_jobs
+from objectmorpher.canvas.frame import drawn_order
 from objectmorpher.cli import parser as cli
 from objectmorpher.commands import next_step, run, why_not
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import Shown, ToolName
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
@@ -57,7 +59,8 @@ def test_it_is_one_step_and_its_edge_comes_by_itself(keeping: Editor) -> None:
 
 def test_view_and_export_show_it_before_what_moves(keeping: Editor, tmp_path: Path) -> None:
     document = _moved(keeping)
-    assert list(keeping.derived.layers.order(document)) == [0, 1]
+    posed = partial(keeping.derived.posed, document)
+    assert drawn_order(document, Shown.COMPOSITE, posed) == [0, 1]
     keeping.exporting.export_to(tmp_path / "out.png")
     wait_for_jobs(keeping)
     pixels, photo = np.asarray(Image.open(tmp_path / "out.png")), document.photo.pixels

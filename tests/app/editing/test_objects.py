@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 from PIL import Image
 
 from conftest import duplicate, wait_for_jobs
+from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import PLATE
-from objectmorpher.editor.view import ToolName
+from objectmorpher.editor.view import Shown, ToolName
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session, encode_session
@@ -55,11 +57,12 @@ def test_the_export_of_a_moved_copy_keeps_the_object(
 def test_the_view_of_a_moved_copy_keeps_the_object(copied: Editor) -> None:
     document, view = copied.document, copied.view
     assert document is not None
-    assert list(copied.derived.layers.order(document)) == [0, 1]
+    assert drawn_order(document, Shown.COMPOSITE, partial(copied.derived.posed, document)) == [0, 1]
     assert not copied.derived.moved_mask(document).any()
     plate = copied.derived.plate(document)
     assert plate is not None and not plate.hole.any()
-    blend = copied.derived.blend(document, view)
+    blend = build_frame(document, view, copied.cache).blend
+    assert blend is not None
     at = view.canvas_from_image(np.array([62.0, 72.0])) / 4
     assert blend[int(at[1]), int(at[0])] == 0, "the object's left side is the photo"
 
@@ -77,7 +80,8 @@ def test_order_can_be_changed_and_says_why_not(copied: Editor) -> None:
     run(copied, "backward")
     assert copied.objects.order() == [1, 0]
     assert copied.document is not None
-    assert list(copied.derived.layers.order(copied.document)) == [1, 0]
+    posed = partial(copied.derived.posed, copied.document)
+    assert drawn_order(copied.document, Shown.COMPOSITE, posed) == [1, 0]
     assert why_not(copied, "to_back") == "It is behind all others"
     run(copied, "to_front")
     assert copied.objects.order() == [0, 1]

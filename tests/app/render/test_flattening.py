@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher.canvas.blend import CELL
-from objectmorpher.canvas.layers import Layer
+from objectmorpher.canvas.layer import Layer
 from objectmorpher.editor.view import View
 from objectmorpher.render.scene import Hatch, Scene
 from objectmorpher_core.document.model import Plate

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.fronts import Fronts
-from objectmorpher.canvas.layers import Layer, is_front
+from objectmorpher.canvas.layer import FrameObject, Layer, is_front
 from objectmorpher.editor.view import View
-from objectmorpher.gui.window.scenes import OF_THE_PHOTO
-from objectmorpher.render.scene import Scene, SplatObject
+from objectmorpher.gui.window.scenes import OF_THE_PHOTO, splat_objects
+from objectmorpher.render.scene import Scene
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
@@ -54,22 +54,15 @@ def _view(zoom: float) -> View:
 
 @pytest.mark.parametrize("kind", ["tiles", "gl"])
 def test_the_window_shows_it_as_it_is_exported(context, monkeypatch, document, kind):
-    renderer, derived, view = make_renderer(context, monkeypatch, kind, SIZE), Derived(), _view(1.0)
-    derived.layers.frame_time = np.inf
-    layers: tuple[Layer, ...] = ()
-    objects: tuple[SplatObject | Layer, ...] = ()
-    if kind == "tiles":
-        layers = derived.layers.draw(document, view)
-        assert len(layers) == 2
-    else:
-        shape = derived.shape(document.photo, document.objects[0])
-        item = SplatObject(derived.posed(document, 0), shape.texture, document.photo.camera)
-        front = derived.fronts.layer(document.objects[1], view)
-        assert front is not None
-        objects = (item, front)
+    renderer, cache, view = make_renderer(context, monkeypatch, kind, SIZE), Cache(), _view(1.0)
+    cache.frame_time = np.inf
+    frame = build_frame(document, view, cache, renderer=kind)
+    assert len(frame.objects) == 2
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
     scene = Scene(
-        document.photo.pixels, (0.0, 0.0, 0.0), derived.plate(document), (), layers, objects,
-        blend=derived.blend(document, view),
+        document.photo.pixels, (0.0, 0.0, 0.0), frame.plate, (), layers, objects,
+        blend=frame.blend,
     )  # fmt: skip
     for _ in range(2):  # the second time put together by the processor, where that is faster
         renderer.begin((0.0, 0.0, 0.0), SIZE)
@@ -78,7 +71,7 @@ def test_the_window_shows_it_as_it_is_exported(context, monkeypatch, document, k
         exported = composite(document).pixels.astype(np.float32) / 255
         assert np.abs(window - exported).mean() <= PIXEL
         assert np.abs(window - exported)[:, 114:126].max() <= PIXEL, "the post itself"
-    without = composite(edits.let_go(document, 1)).pixels.astype(np.float32) / 255
+    without = composite(edits.stop_keeping_in_front(document, 1)).pixels.astype(np.float32) / 255
     assert np.abs(without - exported).max() > 0.2
     context.finish()
 
@@ -104,5 +97,5 @@ def test_its_picture_is_the_photo_at_every_zoom(document, zoom):
 def test_it_is_shown_over_the_edit_and_not_while_selecting(document):
     assert is_front(document, 1) and not is_front(document, 0)
     assert OF_THE_PHOTO  # where the photo is shown as it was
-    shown = Derived().layers.order(document)
-    assert list(shown) == [0, 1] and shown[1] is None
+    own, front = build_frame(document, _view(1.0), Cache(), renderer="gl").objects
+    assert isinstance(own, FrameObject) and own.k == 0 and isinstance(front, Layer)

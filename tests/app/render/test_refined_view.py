@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.editor.view import View
-from objectmorpher.gui.window.scenes import REFINED
-from objectmorpher.render.scene import Scene, SplatObject
+from objectmorpher.gui.window.scenes import REFINED, splat_objects
+from objectmorpher.render.scene import Scene
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.plate.plate import plate_cover
 from objectmorpher_core.document import edits
@@ -52,18 +52,17 @@ def view() -> View:
 
 
 def scene_of(
-    document: Document, view: View, kind: str, derived: Derived, is_marked: bool = False
+    document: Document, view: View, kind: str, cache: Cache, is_marked: bool = False
 ) -> Scene:
-    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
-    texture = derived.shape(document.photo, document.objects[0]).texture
-    item = SplatObject(derived.posed(document, 0), texture, document.photo.camera)
-    objects = (item,) if kind == "gl" else ()
-    refined = derived.refined.layers(document, view, is_marked)
+    frame = build_frame(document, view, cache, renderer=kind)
+    refined = cache.refined.layers(document, view, is_marked)
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    layers = frame.layers if kind == "tiles" else ()
     return Scene(
         document.photo.pixels, (0, 0, 0), document.plate, (),
         layers + (refined if kind == "tiles" else ()),
         objects + (refined if kind == "gl" else ()), refined=REFINED,
-        blend=derived.blend(document, view),
+        blend=frame.blend,
     )  # fmt: skip
 
 
@@ -72,14 +71,14 @@ def scene_of(
 def test_the_window_shows_a_refinement_as_it_is_exported(
     context, monkeypatch, view, kind, strength
 ):
-    renderer, derived = make_renderer(context, monkeypatch, kind, SIZE), Derived()
-    derived.layers.frame_time = np.inf
+    renderer, cache = make_renderer(context, monkeypatch, kind, SIZE), Cache()
+    cache.frame_time = np.inf
     document = refined_edit(strength)
     plain = replace(document, refined=None)
 
     def shown(which: Document) -> np.ndarray:
         renderer.begin((0.0, 0.0, 0.0), SIZE)
-        renderer.draw(scene_of(which, view, kind, derived), view, (0, 0, *SIZE))
+        renderer.draw(scene_of(which, view, kind, cache), view, (0, 0, *SIZE))
         return renderer.read(SIZE).astype(np.float32) / 255
 
     def exported(which: Document) -> np.ndarray:
@@ -100,12 +99,12 @@ def test_the_window_shows_a_refinement_as_it_is_exported(
 
 @pytest.mark.parametrize("kind", ["tiles", "gl"])
 def test_the_provenance_hatches_it_in_an_ink_of_its_own(context, monkeypatch, view, kind):
-    renderer, derived = make_renderer(context, monkeypatch, kind, SIZE), Derived()
-    derived.layers.frame_time = np.inf
+    renderer, cache = make_renderer(context, monkeypatch, kind, SIZE), Cache()
+    cache.frame_time = np.inf
     document = refined_edit(1.0)
 
     def shown(is_marked: bool) -> np.ndarray:
-        scene = scene_of(document, view, kind, derived, is_marked)
+        scene = scene_of(document, view, kind, cache, is_marked)
         renderer.begin((0.0, 0.0, 0.0), SIZE)
         renderer.draw(scene, view, (0, 0, *SIZE))
         return renderer.read(SIZE).astype(np.float32) / 255
@@ -128,22 +127,22 @@ def test_the_provenance_hatches_it_in_an_ink_of_its_own(context, monkeypatch, vi
 
 
 def test_where_nothing_is_edited_the_window_shows_the_photo(context, monkeypatch, view):
-    renderer, derived = make_renderer(context, monkeypatch, "gl", SIZE), Derived()
+    renderer, cache = make_renderer(context, monkeypatch, "gl", SIZE), Cache()
     document = refined_edit(1.0)
     renderer.begin((0.0, 0.0, 0.0), SIZE)
-    renderer.draw(scene_of(document, view, "gl", derived), view, (0, 0, *SIZE))
+    renderer.draw(scene_of(document, view, "gl", cache), view, (0, 0, *SIZE))
     outside = ~composite(document).footprint
     assert np.array_equal(renderer.read(SIZE)[outside], document.photo.pixels[outside])
 
 
 def test_a_strength_of_nothing_is_no_layer(view):
-    assert Derived().refined.layers(refined_edit(0.0), view) == ()
+    assert Cache().refined.layers(refined_edit(0.0), view) == ()
 
 
 def test_another_strength_in_the_same_view_is_another_picture(view):
-    derived, document = Derived(), refined_edit(1.0)
-    (first,) = derived.refined.layers(document, view)
-    assert derived.refined.layers(document, view) == (first,), "remembered"
+    cache, document = Cache(), refined_edit(1.0)
+    (first,) = cache.refined.layers(document, view)
+    assert cache.refined.layers(document, view) == (first,), "remembered"
     weaker = edits.set_strength(document, 0.5)
-    (second,) = derived.refined.layers(weaker, view)
+    (second,) = cache.refined.layers(weaker, view)
     assert abs(int(second.rgba.max()) - int(first.rgba.max()) / 2) <= 1

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.editor.view import View
+from objectmorpher.gui.window.scenes import splat_objects
 from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
 from objectmorpher_core.compose.plate.plate import plate_cover
@@ -128,17 +129,17 @@ def test_the_window_shows_shadow_and_light_as_they_are_exported(renderer, kind):
     document = edits.set_relight(edits.set_placement(document, 0, place), 0, 1.0)
     document = edits.set_shadow(document, 0, Shadow(strength=0.7, length=1.2))
     document = edits.set_feather(edits.set_harmony(document, 0, 1.0), 1.5)
-    derived, view = Derived(), _view()
-    derived.layers.frame_time = np.inf
+    cache, view = Cache(), _view()
+    cache.frame_time = np.inf
     view.set_zoom(1.0, (80, 60), SIZE)
     view.left = view.top = 0.0
-    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
-    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
-    item = SplatObject(splats, scene.texture, scene.camera, gain=look.gain, relit=look.relit)
-    objects = (item,) if kind == "gl" else ()
+    frame = build_frame(document, view, cache, renderer=kind)
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    look = frame.objects[0].lit
     shown = Scene(
         document.photo.pixels, (0.0, 0.0, 0.0), document.plate,
-        derived.lights.layers(document, view), layers, objects, blend=derived.blend(document, view),
+        frame.shades, layers, objects, blend=frame.blend,
     )  # fmt: skip
     window = _window_picture(renderer, shown, view)
     exported = composite(document).pixels.astype(np.float32) / 255
@@ -160,15 +161,14 @@ def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
     place = Placement(move=(30.5, -8.0), scale=1.4)
     plain = edits.set_placement(scene.document(), 0, place)
     document = edits.set_grain(plain, 0, 1.0)
-    derived, view = Derived(), _view()
-    derived.layers.frame_time = np.inf
+    cache, view = Cache(), _view()
+    cache.frame_time = np.inf
     view.set_zoom(zoom, (80, 60), SIZE)
     view.left = view.top = 0.0
-    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
-    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
-    item = SplatObject(splats, scene.texture, scene.camera, grain=look.grain)
-    objects = (item,) if kind == "gl" else ()
-    blend = derived.blend(document, view)
+    frame = build_frame(document, view, cache, renderer=kind)
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    blend = frame.blend
     shown = Scene(
         document.photo.pixels, (0.0, 0.0, 0.0), document.plate, (), layers, objects, blend=blend
     )
@@ -193,18 +193,17 @@ def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
 @pytest.mark.parametrize("kind", ["tiles", "gl"])
 def test_the_window_shows_focus_as_it_is_exported(renderer, kind, zoom):
     document = focussed.farther(focussed.scene(5.0), 1.8)
-    derived, view = Derived(), View()
-    derived.layers.frame_time = np.inf
+    cache, view = Cache(), View()
+    cache.frame_time = np.inf
     view.resize(SIZE, 1.0, document.photo.size)
     view.set_zoom(zoom, (80, 60), SIZE)
     view.left, view.top = (240.0, 120.0) if zoom == 1 else (160.0, 60.0)
-    layers = derived.layers.draw(document, view) if kind == "tiles" else ()
-    splats, look = derived.posed(document, 0), derived.lights.of(document, 0)
+    frame = build_frame(document, view, cache, renderer=kind)
+    layers = frame.layers if kind == "tiles" else ()
+    objects = splat_objects(document, frame) if kind == "gl" else ()
+    look = frame.objects[0].lit
     assert look.blur > 1
-    texture = derived.shape(document.photo, document.objects[0]).texture
-    item = SplatObject(splats, texture, document.photo.camera, blur=look.blur)
-    objects = (item,) if kind == "gl" else ()
-    blend = derived.blend(document, view)
+    blend = frame.blend
     plate = document.plate
     shown = Scene(document.photo.pixels, (0, 0, 0), plate, (), layers, objects, blend=blend)
     window = _window_picture(renderer, shown, view)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import COMMANDS, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import STEEPEST, Shown, ToolName
@@ -70,20 +73,22 @@ def test_the_photos_view_comes_back(looking: Editor, way: str) -> None:
 
 @pytest.mark.parametrize("shown", [Shown.OBJECT, Shown.DEPTH, Shown.PROVENANCE, Shown.STRAIN])
 def test_pictures_are_right_when_switching_there_and_back(looking: Editor, shown: Shown) -> None:
-    layers, document = looking.derived.layers, looking.document
-    layers.frame_time = np.inf
+    cache, document = looking.cache, looking.document
+    cache.frame_time = np.inf
     assert document is not None
-    before = [layer.rgba.copy() for layer in layers.draw(document, looking.view, shown)]
+    before = [
+        layer.rgba.copy() for layer in build_frame(document, looking.view, cache, shown).layers
+    ]
     drag(looking, 120, 0)
     turned = looking.looking.document
     assert turned is not None
-    there = layers.draw(turned, looking.view, shown)
+    there = build_frame(turned, looking.view, cache, shown).layers
     assert there[-1].rgba.shape != before[-1].shape
-    after = layers.draw(document, looking.view, shown)
+    after = build_frame(document, looking.view, cache, shown).layers
     assert len(after) == len(before)
     for a, b in zip(after, before, strict=True):
         np.testing.assert_array_equal(a.rgba, b)
-    layers.frame_time = 0.028
+    cache.frame_time = 0.028
 
 
 def test_only_the_current_object_is_shown(looking: Editor) -> None:
@@ -91,7 +96,8 @@ def test_only_the_current_object_is_shown(looking: Editor) -> None:
     drag(looking, 60, 0)
     shown = looking.looking.document
     assert shown is not None
-    assert list(looking.derived.layers.order(shown, Shown.OBJECT)) == [1]
+    posed = partial(looking.derived.posed, shown)
+    assert drawn_order(shown, Shown.OBJECT, posed) == [1]
 
 
 def test_the_next_step_after_looking_is_posing(editor: Editor, ball: Document) -> None:

@@ -9,8 +9,8 @@ from conftest import duplicate
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
-from objectmorpher.tools.pointer import Button, Pointer, Shape, Tool
-from objectmorpher.tools.registry import TOOLS
+from objectmorpher.tools.pointer import Button, Pointer, Shape
+from objectmorpher.tools.registry import TOOLS, Tool
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
 

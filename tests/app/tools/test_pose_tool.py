@@ -105,8 +105,8 @@ def test_alt_drags_along_the_normal_and_alt_click_pins(posed: Editor) -> None:
     assert not handle.is_pin
     posed.undo()
     assert posed.document is not None
-    normal = posed.derived.facts.normal_at(posed.document, 0, handle.point)
-    linear = posed.derived.facts.turn_of(posed.document, 0)
+    normal = posed.cache.facts.normal_at(posed.document, 0, handle.point)
+    linear = posed.cache.facts.turn_of(posed.document, 0)
     way = linear @ (handle.target - handle.point)
     assert way @ normal / np.linalg.norm(way) == pytest.approx(1.0, abs=1e-6)
 
@@ -134,7 +134,7 @@ def test_ctrl_and_shift_turn_out_of_the_picture(posed: Editor) -> None:
     stroke(posed, centre, centre + (50, 0), ctrl=True, shift=True)
     assert posed.object is not None and posed.object.handles[0].turn is not None
     assert posed.document is not None
-    turn = posed.derived.facts.turn_of(posed.document, 0) @ posed.object.handles[0].turn
+    turn = posed.cache.facts.turn_of(posed.document, 0) @ posed.object.handles[0].turn
     assert abs(turn[1]) > 0.2
     np.testing.assert_allclose(turn[[0, 2]], 0, atol=1e-6)
 
@@ -233,7 +233,7 @@ def test_symmetry_moves_the_mirrored_point_the_mirrored_way(posed: Editor) -> No
     plane = posed.posing.mirroring.plane
     assert plane is not None and np.isfinite(plane.gap)
     assert posed.document is not None
-    across = posed.derived.facts.turn_of(posed.document, 0) @ plane.normal
+    across = posed.cache.facts.turn_of(posed.document, 0) @ plane.normal
     assert abs(across[2]) < 0.75  # it does not part the front from the back
     start = at(posed, 74, 60)
     stroke(posed, start, start + (-20, -8))
@@ -251,7 +251,7 @@ def test_symmetry_moves_the_mirrored_point_the_mirrored_way(posed: Editor) -> No
 def test_influence_is_one_at_the_handle_and_less_elsewhere(posed: Editor) -> None:
     stroke(posed, at(posed, 90, 60))
     assert posed.document is not None and posed.object is not None
-    shares = posed.derived.facts.influence(posed.document, 0, 0)
+    shares = posed.cache.facts.influence(posed.document, 0, 0)
     own = posed.object.handles[0].control_point
     assert shares[own] > 0.9
     assert shares.min() < 0.05

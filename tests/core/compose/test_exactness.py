@@ -92,7 +92,7 @@ def _reach(document: Document, item: EditObject, puppet: Puppet) -> np.ndarray:
 
 def _texture(item: EditObject) -> TextureLevels:
     assert item.matte is not None
-    return object_texture(item.matte)
+    return object_texture(item.matte, item.lifted)
 
 
 @pytest.mark.parametrize("bits", [8, 16])

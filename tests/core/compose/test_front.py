@@ -12,7 +12,7 @@ from objectmorpher_core.base.pixels import crop, unit_pixels
 from objectmorpher_core.compose import load
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.layers import layers
-from objectmorpher_core.compose.order import reordered, stack
+from objectmorpher_core.compose.order import doubt_about_front, reordered, stack
 from objectmorpher_core.compose.plate.plate import build_plate, plate_cover, plate_picture
 from objectmorpher_core.deform.puppet import puppet_of
 from objectmorpher_core.document import edits
@@ -105,7 +105,7 @@ def test_where_nothing_moves_behind_it_nothing_changes():
 def test_a_hidden_or_released_one_covers_nothing():
     moved = edits.set_placement(_document(), 0, BEHIND)
     at = (60, int(POST))
-    for changed in (edits.set_visible(moved, 1, False), edits.let_go(moved, 1)):
+    for changed in (edits.set_visible(moved, 1, False), edits.stop_keeping_in_front(moved, 1)):
         assert _order(changed) == [0]
         shown = composite(changed).pixels[at].astype(int)
         assert np.abs(shown - INK).max() < 40
@@ -184,10 +184,10 @@ def test_a_front_that_hides_what_moves_or_is_the_background_is_doubted():
 
     def doubted(front: np.ndarray) -> str | None:
         document = edits.set_mask(edits.add_object(moved), 2, front, Prompt())
-        return edits.doubt(document, 2, lambda _: posed)
+        return doubt_about_front(document, 2, lambda _: posed)
 
     y, x = np.mgrid[:HEIGHT, :WIDTH]
-    assert edits.doubt(moved, 1, lambda _: posed) is None  # the post, as it is meant
+    assert doubt_about_front(moved, 1, lambda _: posed) is None  # the post, as it is meant
     hidden = doubted(np.abs(x - POST) < 2 * RADIUS)
     assert hidden is not None and "hides" in hidden and moved.objects[0].name in hidden
     around = doubted((x < 40) | (y < 20) | (y > HEIGHT - 20))

@@ -123,7 +123,7 @@ def puppet_texture(document: Document):
 
     matte = document.objects[0].matte
     assert matte is not None
-    return object_texture(matte)
+    return object_texture(matte, document.objects[0].lifted)
 
 
 def test_what_shows_nothing_of_the_photo_is_given_all_of_its_grain():

@@ -14,10 +14,12 @@ from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import InpaintError, load
 from objectmorpher_core.compose.plate import inpaint_onnx, inpaint_pixelhacker
-from objectmorpher_core.models import ModelError, device
+from objectmorpher_core.models import ModelError, device, ledger
+from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.models.tensors_only import take_tensors
 from tests.core.compose import tiny_inpainters
 from tests.core.models.local_hub import serving
+from tests.core.models.small_networks import Ways
 
 KEYS = Path(__file__).with_name("pixelhacker_keys.json")
 F32 = 1e-5  # sums in another order
@@ -148,9 +150,8 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, ho
     torch = pytest.importorskip("torch")
     from objectmorpher_core.compose.plate.pixelhacker import network
 
-    least = device.Plan("cpu", "float32", "cpu", "8.0 GB free")
-    first = device.Plan("cpu", "bfloat16", "whole", "0.1 GB free")
-    monkeypatch.setattr(device, "plans", lambda need: (first, least))
+    ways = Ways(Plan("cpu", "bfloat16", "whole"), Plan("cpu", "float32", "cpu"))
+    monkeypatch.setattr(inpaint_pixelhacker, "need", lambda parameters: ways)
     load_network = network.load
 
     def full(at: Path, where: str, number: Any) -> Any:
@@ -161,8 +162,7 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(pixelhacker, view, ho
     monkeypatch.setattr(network, "load", full)
     filled = load("pixelhacker").inpaint(view, hole, silent)
     np.testing.assert_array_equal(filled[~hole], view[~hole])
-    known = inpaint_pixelhacker.PixelHackerInpainter._tiers
-    assert known is not None and known[1] == (least,)
+    assert next(ledger.SHARED.opened("PixelHacker")[0].parameters()).dtype == torch.float32
 
 
 def test_auto_takes_what_is_there_and_quick_and_heeds_hints(family, monkeypatch):

@@ -150,7 +150,7 @@ def test_a_script_that_moves_a_thing_takes_its_shadow_along():
     told, silent = with_it.report(), without.report()
     assert told["pixels"]["outside_footprint_changed"] == 0
     assert told["pixels"]["shadow"] > 300 and silent["pixels"]["shadow"] == 0
-    assert any("goes along" in n and "--shadow none" in n for n in told["notes"])
+    assert any("goes along" in n and "shadow none" in n for n in told["notes"])
     assert not silent["notes"]
     turned = run_script(
         photo, "a.png", script_from({**script, "move": [0, 0], "turn": [9, 0, 0]}), mask

@@ -50,7 +50,7 @@ def _bracket() -> tuple[Scene, Matte, LiftedObject]:
 
 def _drawn(scene: Scene, matte: Matte, lifted: LiftedObject, placement: Placement) -> Picture3D:
     puppet = Puppet(lifted, DeformSettings(), scene.camera)
-    return puppet.draw(None, placement, object_texture(matte), scene.camera)
+    return puppet.draw(None, placement, object_texture(matte, lifted), scene.camera)
 
 
 def _in_photo(values: np.ndarray, matte: Matte, scene: Scene) -> np.ndarray:

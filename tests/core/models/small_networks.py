@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from objectmorpher_core.models.onnx_graph import as_varint, bytes_field
+from objectmorpher_core.models.plans import Plan
 
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type, and TensorProto.data_type in field 2
 
@@ -75,3 +79,23 @@ def constant(
     tensors = [floats("told", depth[None], outside), floats("zero", np.zeros(()))]
     ends = [value("image", *takes)], [value("depth", 1, *depth.shape)]
     return model([nothing, none, node("Add", ["told", "none"], "depth")], tensors, ends)
+
+
+class Ways:
+    """Of a model's need: these ways and no other, on the CPU."""
+
+    is_slow_on_cpu = False
+
+    def __init__(self, *plans: Plan) -> None:
+        self._plans = plans
+
+    def on(self, where: str) -> tuple[Plan, ...]:
+        return self._plans if where == "cpu" else ()
+
+    def lacking(self) -> str:
+        return ""
+
+
+def in_ways(model: Any, *plans: Plan) -> Any:
+    """A model for the ledger that runs in these ways only."""
+    return replace(model, need=Ways(*plans))

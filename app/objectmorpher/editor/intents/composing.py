@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import cv2
@@ -16,7 +17,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Hint, Shadow
 
-from ...canvas.layers import Layer
+from ...canvas.layer import Layer
 from ...canvas.memo import same
 from ...system.texts import t
 from ...worker import job_functions
@@ -24,11 +25,14 @@ from ...worker.job_error import JobError
 from ...worker.job_functions import Choice, Variant
 from ..feedback import Action
 from ..tasks import PLATE
+from ..view import ToolName
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.repair import Patch
 
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .methods import Methods
 
 VARIANTS, REPAIR, SHADOW = "variants", "repair", "shadow"  # kinds of jobs, besides PLATE
 COUNT = 3  # variants
@@ -38,22 +42,48 @@ SMOOTHED = np.ones((9, 9), np.uint8)  # px: the ground's own grain is no outline
 FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """An object's shadow and reflection in the photo, which it could take along."""
+
+    document: Document  # in which they were looked for
+    k: int
+    shadow: Shadow | None  # None: there is only a reflection
+    plate: Plate  # without either
+
+    @cached_property
+    def outlined(self) -> Mask:
+        """(H, W) of the photo what would be taken off it."""
+        size = self.document.photo.size
+        if self.plate.painted is None:
+            return np.zeros(size[::-1], bool)
+        whole = crop(self.plate.painted, self.plate.box, (0, 0, *size))
+        return cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_CLOSE, SMOOTHED) > 0
+
+
 class Composing:
     """The plate and the joining."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self,
+        editor: EditorState,
+        methods: Methods,
+        tasks: Tasks,
+        choose_tool: Callable[[ToolName], None],
+    ) -> None:
         self._editor = editor
+        self._methods, self._tasks, self._choose_tool = methods, tasks, choose_tool
         self._variants: tuple[tuple[Mask | None, ...], tuple[Variant, ...]] = ((), ())
         self._ready: list[Callable[[], None]] = []  # answers that wait for the hand to be idle
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
-        self._taken: tuple[Document, Mask] | None = None  # as it was made, and what it concerns
+        self._offer: Offer | None = None  # found in the photo, not taken along yet
 
     def forget(self) -> None:
         """Another document is opened."""
         self._variants, self._ready = ((), ()), []
-        self._stroke, self._waiting, self._taken = None, [], None
+        self._stroke, self._waiting, self._offer = None, [], None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
@@ -88,15 +118,15 @@ class Composing:
     @property
     def inpainter(self) -> str:
         """The backend that is asked to fill in the background; "auto" is the best that can run."""
-        return self._editor.methods.chosen("inpaint")
+        return self._methods.chosen("inpaint")
 
     def fill_again(self) -> None:
         """A new background with another seed: a step of its own."""
-        editor, document = self._editor, self._editor.document
+        document = self._editor.document
         if document is None:
             return
         if document.plate is None:
-            editor.tasks.fill_background()
+            self._tasks.fill_background()
             return
         self._ask_plate(document.hints, document.plate.seed + 1, t("Fill in again"), _nothing)
 
@@ -128,7 +158,7 @@ class Composing:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            editor.derived.lights.hidden(document), Choice(self.inpainter, seed, hints),
+            editor.derived.hidden(document), Choice(self.inpainter, seed, hints),
             done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
         )  # fmt: skip
 
@@ -144,7 +174,7 @@ class Composing:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.fill_variants, document.photo.pixels,
-            editor.derived.lights.hidden(document), self._choice(document.plate.seed + 1), COUNT,
+            editor.derived.hidden(document), self._choice(document.plate.seed + 1), COUNT,
             done=accept, failed=editor.complain_of, kind=VARIANTS,
         )  # fmt: skip
 
@@ -302,7 +332,7 @@ class Composing:
         """From how many degrees above the ground one looks at the current object on it."""
         editor = self._editor
         assert editor.document is not None
-        return editor.derived.lights.ground(editor.document, editor.current, shadow)
+        return _seen_from(editor.document, editor.current, shadow)
 
     def toggle_shadow(self) -> None:
         """Gives the current object a shadow, or takes it."""
@@ -313,16 +343,19 @@ class Composing:
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
 
     def take_shadow(self) -> None:
-        """Imitates its shadow in the photo; takes that and its reflection off the background."""
+        """Looks for its shadow and its reflection in the photo, and outlines what it finds.
+
+        Nothing changes before `accept_shadow`; `refuse_shadow`, or any other edit, ends the offer.
+        """
         editor, document, k = self._editor, self._editor.committed, self._editor.current
         if document is None or document.plate is None or not editor.is_lifted:
             return
         masks, item = _masks(document), document.objects[k]
         assert item.matte is not None
-        lights, told = editor.derived.lights, item.shadow.ground
+        told = item.shadow.ground
         is_known = told is not None or document.horizon is not None
-        ground = lights.ground(document, k, item.shadow) if is_known else None
-        covered = lights.hidden(document)
+        ground = _seen_from(document, k, item.shadow) if is_known else None
+        covered = editor.derived.hidden(document)
         cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
 
         def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
@@ -334,7 +367,7 @@ class Composing:
             shadow, plate = answer
             if shadow is not None and is_known:
                 shadow = replace(shadow, ground=told)
-            self._ready.append(lambda: self._take_shadow(masks, k, shadow, plate))
+            self._ready.append(lambda: self._show_offer(masks, Offer(document, k, shadow, plate)))
 
         editor.jobs.start(
             t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
@@ -342,36 +375,43 @@ class Composing:
             kind=SHADOW,
         )  # fmt: skip
 
-    def _take_shadow(
-        self, masks: tuple[Mask | None, ...], k: int, shadow: Shadow | None, plate: Plate
-    ) -> None:
+    def _show_offer(self, masks: tuple[Mask | None, ...], offer: Offer) -> None:
         editor, document = self._editor, self._editor.committed
         if document is None or not same(masks, _masks(document)):
             return
-        changed = edits.set_plate(document, plate)
-        if shadow is None:
-            editor.apply(t("Remove old reflection"), changed)
-            text = t("What is outlined is taken off the background")
+        self._offer = replace(offer, document=document)
+        self._choose_tool(ToolName.COMPOSE)  # which outlines it
+        if offer.shadow is None:
+            text = t("What is outlined is its reflection, and would be taken off the background")
         else:
-            editor.apply(t("Shadow as in the photo"), edits.set_shadow(changed, k, shadow))
-            text = t("The outlined shadow goes along")
-        if editor.committed is not None and plate.painted is not None:
-            whole = crop(plate.painted, plate.box, (0, 0, *document.photo.size))
-            closed = cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_CLOSE, SMOOTHED)
-            self._taken = editor.committed, closed > 0
-        editor.say(text, Action(t("Leave it in the photo"), self._refuse))
+            text = t("What is outlined is its shadow, and would go along")
+        editor.say(text, Action(t("Leave it in the photo"), self.refuse_shadow))
 
-    def _refuse(self) -> None:
-        """What was just taken along stays in the photo after all."""
-        if self.taken is not None:
-            self._editor.undo()
+    def accept_shadow(self) -> None:
+        """What was outlined goes along; one step for undo."""
+        offer, self._offer = self.offer, None
+        if offer is None:
+            return
+        changed = edits.set_plate(offer.document, offer.plate)
+        if offer.shadow is None:
+            self._editor.apply(t("Remove old reflection"), changed)
+        else:
+            changed = edits.set_shadow(changed, offer.k, offer.shadow)
+            self._editor.apply(t("Shadow as in the photo"), changed)
+        self._editor.message = None
+
+    def refuse_shadow(self) -> None:
+        """What was outlined stays in the photo."""
+        self._offer = None
+        self._editor.message = None
 
     @property
-    def taken(self) -> Mask | None:
-        """(H, W) of the photo what was taken along last, until anything else is done."""
-        if self._taken is None or self._taken[0] is not self._editor.document:
+    def offer(self) -> Offer | None:
+        """What would be taken along, as long as the document is the one in which it was found."""
+        offer, editor = self._offer, self._editor
+        if offer is None or offer.document is not editor.document or offer.k != editor.current:
             return None
-        return self._taken[1]
+        return offer
 
     def choose_refiner(self, name: str) -> None:
         """One of `compose.REFINERS`."""
@@ -411,3 +451,12 @@ def _nothing() -> None:
 
 def _masks(document: Document) -> tuple[Mask | None, ...]:
     return tuple(o.mask for o in document.objects)
+
+
+def _seen_from(document: Document, k: int, shadow: Shadow) -> float:
+    """From how many degrees above the ground one looks at object `k` on it."""
+    from objectmorpher_core.compose.light.lighting import ground_seen_from
+
+    lifted = document.objects[k].lifted
+    assert lifted is not None
+    return ground_seen_from(lifted, document.photo.camera, document.horizon, shadow)

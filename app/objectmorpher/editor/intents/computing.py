@@ -18,7 +18,8 @@ from ..settings import SERVER, settings_path
 if TYPE_CHECKING:
     from ...server.address import Server
     from ...server.offers import Offers
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
 
 log = logging.getLogger(__name__)
 
@@ -30,8 +31,10 @@ TEST, OFFERS = "test server", "ask server"  # kinds of chores
 class Computing:
     """The user's choice, and the server that it means."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, tasks: Tasks) -> None:
         self._editor = editor
+        self._tasks = tasks
+        self.changed: Callable[[], None] = lambda: None  # another computer does the work now
         self._trouble = ""
         self._token: str | None = None  # None: not read yet
         self._known: tuple[tuple[str, str], Server | None] | None = None
@@ -155,9 +158,9 @@ class Computing:
         """What another server, or this computer, knows of the photo is another matter."""
         self._elsewhere.try_again()
         editor = self._editor
-        editor.methods.forget()
+        self.changed()
         if editor.document is not None and not editor.is_lifted:
-            editor.tasks.read_photo(is_quiet=True)
+            self._tasks.read_photo(is_quiet=True)
 
     def _understood(self, address: str, token: str) -> Server | None:
         from ...server.address import Address, AddressError, Server

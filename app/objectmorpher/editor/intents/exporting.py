@@ -6,15 +6,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from objectmorpher_core.pictures.formats import LOSSLESS_AT_100
+from objectmorpher_core.pictures.guests import missing_jxl
+
+from ...system import clipboard
 from ...system.texts import folder_of, t
-from ...worker.export_functions import write_export
-from ..export_plan import FORMATS, LENGTHS, NAMES, Format, Motion, Plan, What, format_of, is_folder
+from ...worker.export_functions import encode_export, write_export
+from ..export_plan import (
+    FORMATS,
+    LENGTHS,
+    LOSSLESS,
+    NAMES,
+    Format,
+    Motion,
+    Plan,
+    What,
+    format_of,
+    is_folder,
+)
 from ..tasks import WRITE
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
 
-KNOWN = "PNG, JPG, TIF, WEBP, ORA"
+COPY = "copy"  # kind of jobs and chores
+KNOWN = ", ".join(f.value for f in (*FORMATS[What.PHOTO], *FORMATS[What.LAYERS][:-1]))
 
 
 @dataclass(frozen=True)
@@ -35,7 +51,7 @@ class Draft:
 class Exporting:
     """The export dialog's state, and what may be done with it."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self.draft: Draft | None = None  # None: no dialog
         self._replacing: Path | None = None  # asked whether it may be overwritten
@@ -48,7 +64,7 @@ class Exporting:
         self._replacing = None
         what = next((w for w in What if w.value == settings.export_what), What.PHOTO)
         what = what if self.why_not(what) is None else What.PHOTO
-        format = next((f for f in Format if f.value == settings.export_format), Format.PNG)
+        format = next((f for f in Format if f.value == settings.export_format), self.own_format)
         file = editor.source or editor.path
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
@@ -71,6 +87,8 @@ class Exporting:
         document = editor.committed
         if what in (What.CUTOUT, What.MASK) and editor.mask is None:
             return t("Click an object in the photo first")
+        if what is What.SOLID:
+            return self._why_no_shape()
         has_plate = document is not None and document.plate is not None
         objects = () if document is None else document.objects
         if what is What.DEPTH and not any(item.lifted is not None for item in objects):
@@ -86,18 +104,19 @@ class Exporting:
         if motion is Motion.MORPH:
             is_moved = any(item.is_moved for item in objects)
             return None if is_moved else t("Move or pose an object first")
-        current = self._editor.current
-        is_lifted = current < len(objects) and objects[current].lifted is not None
-        return None if is_lifted else t("Lift an object first")
+        return self._why_no_shape()
+
+    def why_no_format(self, format: Format) -> str | None:
+        """Why nothing can be written in this format here, or None."""
+        return missing_jxl() if format is Format.JXL else None
 
     def choose_what(self, what: What) -> None:
         self._change(replace(self._draft, what=what), is_named=True)
 
     def choose_format(self, format: Format) -> None:
         draft = self._draft
-        typed = Path(draft.name)
         ending = "" if is_folder(draft.what, format) else format.endings[0]
-        name = str(typed.with_suffix(ending)) if typed.name else draft.name
+        name = _without_ending(draft.name) + ending if Path(draft.name).name else draft.name
         self._change(replace(draft, format=format, name=name))
 
     def choose_bits(self, bits: int) -> None:
@@ -106,9 +125,9 @@ class Exporting:
 
     def choose_quality(self, quality: int) -> None:
         draft = self._draft
-        is_webp = draft.format is Format.WEBP
+        is_whole = draft.format in LOSSLESS_AT_100
         self._change(
-            replace(draft, webp_quality=quality) if is_webp else replace(draft, quality=quality)
+            replace(draft, webp_quality=quality) if is_whole else replace(draft, quality=quality)
         )
 
     def choose_motion(self, motion: Motion) -> None:
@@ -120,7 +139,7 @@ class Exporting:
     def set_name(self, name: str) -> None:
         """As typed; an ending chooses the format."""
         draft = replace(self._draft, name=name)
-        format = format_of(Path(name).suffix)
+        format = format_of(name.strip())
         if format is not None and format in FORMATS[draft.what]:
             draft = replace(draft, format=format)
         self._change(draft)
@@ -128,7 +147,7 @@ class Exporting:
     def set_path(self, path: Path) -> None:
         """A file was chosen in a file dialog."""
         self._change(replace(self._draft, folder=path.parent))
-        several = is_folder(self._draft.what, format_of(path.suffix))
+        several = is_folder(self._draft.what, format_of(path.name))
         self.set_name(path.stem if several else path.name)
 
     # What it comes to
@@ -171,7 +190,12 @@ class Exporting:
     @property
     def quality(self) -> int:
         draft = self._draft
-        return draft.webp_quality if draft.format is Format.WEBP else draft.quality
+        return draft.webp_quality if draft.format in LOSSLESS_AT_100 else draft.quality
+
+    @property
+    def is_lossless(self) -> bool:
+        """Whether every pixel is kept at the quality that is chosen."""
+        return self._draft.format in LOSSLESS_AT_100 and self.quality == LOSSLESS
 
     @property
     def path(self) -> Path:
@@ -179,7 +203,7 @@ class Exporting:
         draft = self._draft
         name = Path(draft.name.strip())
         typed = draft.folder / (name.expanduser() if name.parts[:1] == ("~",) else name)
-        if self.is_folder or not typed.name or format_of(typed.suffix) is not None:
+        if self.is_folder or not typed.name or format_of(typed.name) is not None:
             return typed
         return typed.with_name(typed.name + draft.format.endings[0])
 
@@ -207,9 +231,11 @@ class Exporting:
             return reason
         if draft.what is What.VIDEO and (reason := self.why_no_motion(draft.motion)) is not None:
             return reason
-        if not self.is_folder and _is_other_kind(ending, FORMATS[draft.what]):
+        if not self.is_folder and _is_other_kind(path.name, FORMATS[draft.what]):
             known = ", ".join(f.value for f in FORMATS[draft.what])
             return t("It cannot be written as {ending}; choose {known}", ending=ending, known=known)
+        if (reason := self.why_no_format(draft.format)) is not None:
+            return reason
         try:
             return self._cannot_be_there(path)
         except (OSError, RuntimeError, ValueError):  # a name that no disk can hold
@@ -234,8 +260,8 @@ class Exporting:
     def export_to(self, path: Path) -> None:
         """The edited photo, or its layers, into a file of the kind that its ending says."""
         editor, settings = self._editor, self._editor.settings
-        format = format_of(path.suffix)
-        what = What.LAYERS if format is Format.OPENRASTER else What.PHOTO
+        format = format_of(path.name)
+        what = What.LAYERS if format in FORMATS[What.LAYERS][:-1] else What.PHOTO
         if format is None or format not in FORMATS[what]:
             editor.complain(
                 t("a photo cannot be written as {ending}; choose {known}",
@@ -244,9 +270,29 @@ class Exporting:
         elif self._is_opened(path):
             editor.complain(t("the export would overwrite the opened photo; choose another name"))
         else:
-            is_webp = format is Format.WEBP
-            quality = settings.webp_quality if is_webp else settings.quality
+            is_whole = format in LOSSLESS_AT_100
+            quality = settings.webp_quality if is_whole else settings.quality
             self._start(Plan(what, path, quality=quality))
+
+    def copy(self, what: What) -> None:
+        """Put the edited photo, or the current object alone, into the clipboard."""
+        editor, document = self._editor, self._editor.committed
+        if document is None:
+            return
+        plan = Plan(what, Path("copied.png"), editor.current, bits=8)
+        told = t("Copied the object") if what is What.CUTOUT else t("Copied the photo")
+
+        def offer(png: bytes) -> None:
+            editor.chores.start(
+                t("Copying"), lambda progress: clipboard.copy(png), kind=COPY,
+                done=lambda _: editor.say(told), failed=editor.complain_of,
+            )  # fmt: skip
+
+        editor.jobs.start(
+            t("Copying"), encode_export, document, plan, done=offer,
+            failed=lambda error: editor.complain_of(error.retried_by(lambda: self.copy(what))),
+            kind=COPY,
+        )  # fmt: skip
 
     # Inside
 
@@ -264,8 +310,22 @@ class Exporting:
 
     def _fitting(self, draft: Draft) -> Draft:
         """The format is one that can hold it."""
-        known = FORMATS[draft.what]
-        return draft if draft.format in known else replace(draft, format=known[0])
+        known, own = FORMATS[draft.what], self.own_format
+        usual = own if own in known else known[0]
+        return draft if draft.format in known else replace(draft, format=usual)
+
+    @property
+    def own_format(self) -> Format:
+        """The photo's own, where it can be written: a JPEG file becomes a JPEG file."""
+        document = self._editor.committed
+        own = None if document is None else format_of(document.photo.name)
+        return own if own is not None and own in FORMATS[What.PHOTO] else Format.PNG
+
+    def _why_no_shape(self) -> str | None:
+        document, current = self._editor.committed, self._editor.current
+        objects = () if document is None else document.objects
+        is_lifted = current < len(objects) and objects[current].lifted is not None
+        return None if is_lifted else t("Lift an object first")
 
     def _named(self, draft: Draft) -> Draft:
         document = self._editor.committed
@@ -288,8 +348,11 @@ class Exporting:
 
     def _remember(self, draft: Draft, path: Path) -> None:
         editor = self._editor
+        format = "" if draft.format is self.own_format else draft.format.value
+        if len(FORMATS[draft.what]) == 1:  # nobody chose it
+            format = editor.settings.export_format
         editor.settings = replace(
-            editor.settings, export_what=draft.what.value, export_format=draft.format.value,
+            editor.settings, export_what=draft.what.value, export_format=format,
             export_bits=draft.bits, quality=draft.quality, webp_quality=draft.webp_quality,
             export_motion=draft.motion.value, export_seconds=draft.seconds,
             export_folder=str(path.parent.absolute()),
@@ -309,8 +372,16 @@ class Exporting:
         )  # fmt: skip
 
 
-def _is_other_kind(ending: str, formats: tuple[Format, ...]) -> bool:
-    """Whether a typed ending names a file of a kind that is not offered."""
-    if format_of(ending) is not None:
-        return format_of(ending) not in formats
+def _is_other_kind(name: str, formats: tuple[Format, ...]) -> bool:
+    """Whether the ending of a typed name is that of a kind that is not offered."""
+    if format_of(name) is not None:
+        return format_of(name) not in formats
+    ending = Path(name).suffix
     return 2 < len(ending) < 6 and ending[1:].isalpha()
+
+
+def _without_ending(name: str) -> str:
+    """The name without the ending of a format, else without whatever looks like one."""
+    format = format_of(name)
+    own = [] if format is None else [e for e in format.endings if name.lower().endswith(e)]
+    return name[: -len(own[0])] if own else str(Path(name).with_suffix(""))

@@ -11,7 +11,8 @@ from objectmorpher_core.document.settings import Hint
 from ...system.texts import t
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .composing import Composing
 
 XY = tuple[float, float]
 LEAST_WAY = 4.0  # canvas px: a click is no drag
@@ -20,8 +21,9 @@ LEAST_WAY = 4.0  # canvas px: a click is no drag
 class Hinting:
     """The document's hints, and the one that is being dragged."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, composing: Composing) -> None:
         self._editor = editor
+        self._composing = composing
         self.dragged: Hint | None = None
         self._asked: tuple[Hint, ...] | None = None  # the background for these is being made
 
@@ -41,7 +43,7 @@ class Hinting:
         """A drag begins at what is to be taken; False where there is nothing to fill in."""
         editor = self._editor
         if editor.document is None or editor.document.plate is None:
-            editor.say(editor.composing.trouble or t("Open a photo first"))
+            editor.say(self._composing.trouble or t("Open a photo first"))
             return False
         if not editor.is_on_photo(canvas_xy):
             return False
@@ -86,7 +88,7 @@ class Hinting:
 
     def _ask(self, hints: tuple[Hint, ...], label: str) -> None:
         self._asked = hints
-        self._editor.composing.fill_from(hints, label, lambda: self._end(hints))
+        self._composing.fill_from(hints, label, lambda: self._end(hints))
 
     def _end(self, hints: tuple[Hint, ...]) -> None:
         """The background for these is there, or is not to be; others may be asked for by now."""

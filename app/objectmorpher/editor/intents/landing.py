@@ -17,7 +17,8 @@ from objectmorpher_core.base.arrays import F64
 from ..view import Shown, ToolName
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .objects import Objects
 
 OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that work on the photo as it was
 
@@ -32,8 +33,9 @@ class Of(Enum):
 class Landing:
     """From canvas px to what is meant by them."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, objects: Objects) -> None:
         self._editor = editor
+        self._objects = objects
         self._offset = np.zeros(2)  # image px, of the stroke in progress, beside its object
         self._is_carried = False  # whether that stroke began on an object that was moved
 
@@ -58,7 +60,7 @@ class Landing:
         document = editor.document
         if document is None or not self.is_edit_shown:
             return None
-        for k in reversed(editor.objects.order()):
+        for k in reversed(self._objects.order()):
             item = document.objects[k]
             if item.lifted is None or not item.is_visible:
                 continue
@@ -76,7 +78,7 @@ class Landing:
         is_shown = self.is_edit_shown and editor.is_on_photo(canvas_xy)
         if document is None or not is_shown:
             return None
-        for k in reversed(editor.objects.order()):
+        for k in reversed(self._objects.order()):
             item = document.objects[k]
             is_seen = item.lifted is not None and item.is_visible
             if is_seen and editor.derived.surface_at(document, k, editor.view, canvas_xy):

@@ -20,15 +20,16 @@ from ..feedback import Action
 if TYPE_CHECKING:
     from objectmorpher_core.compose.plate.residue import Ghost
 
-    from ..editor import Editor
+    from ..state import EditorState
 
 
 class LeavingOut:
     """The pieces beside the document's lifted objects."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self._offered: Action | None = None
+        self._seen: Plate | None = None  # the background that was looked at last
         self._found: tuple[Plate | None, tuple[Ghost, ...]] = (None, ())  # of which plate
 
     @property
@@ -55,8 +56,19 @@ class LeavingOut:
             for outline in contours(piece.there)
         )
 
-    def offer(self) -> None:
-        """Says so where something of the current object was left out; once for each background."""
+    def poll(self) -> bool:
+        """Offers what a new background shows; once a frame. Whether anything changed."""
+        editor, document = self._editor, self._editor.committed
+        plate = document.plate if document is not None else None
+        if plate is self._seen or editor.hand.is_busy or editor.preview is not None:
+            return False
+        self._seen = plate
+        if not editor.is_saved:  # else it was offered when it was edited
+            self._offer()
+        return True
+
+    def _offer(self) -> None:
+        """Says so where something of the current object was left out."""
         if not self.pieces or self._editor.object is None:
             return
         self._offered = Action(t("Add it"), self.add)

@@ -13,10 +13,10 @@ from objectmorpher_core.document.placement import with_centre
 
 from ...system.texts import t
 from ..view import Orbit, ToolName
-from .landing import OF_THE_PHOTO
+from .landing import OF_THE_PHOTO, Landing
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
 
 FILLS = 0.8  # x the photo's smaller side, that the object takes while one walks around it
 NEAREST = 0.9  # object diameters, from the camera to its centre
@@ -25,8 +25,9 @@ NEAREST = 0.9  # object diameters, from the camera to its centre
 class Looking:
     """What the canvas shows while the Look tool walks around an object."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, landing: Landing) -> None:
         self._editor = editor
+        self._landing = landing
         # of the last orbit: what is derived from a document is remembered by identity
         self._made: tuple[Document, int, Orbit, Document] | None = None
 
@@ -61,7 +62,7 @@ class Looking:
             return ""
         if editor.view.is_before:
             return t("The photo as it was")
-        if editor.view.tool in OF_THE_PHOTO and editor.landing.is_edit_shown:
+        if editor.view.tool in OF_THE_PHOTO and self._landing.is_edit_shown:
             return t("Your edit · Hold X to see the photo")
         return ""
 

@@ -29,7 +29,9 @@ from ..tasks import SELECT, WRITE
 from ..view import ToolName
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .landing import Landing
+    from .posing import Posing
 
 CHANGE = "change mask"  # kind of job
 READ_MASK = "read mask"
@@ -46,8 +48,9 @@ class Change:
 class Masking:
     """The current object's mask, as something to work on."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, landing: Landing, posing: Posing) -> None:
         self._editor = editor
+        self._landing, self._posing = landing, posing
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
@@ -79,12 +82,12 @@ class Masking:
         if pointer.shift and self._last is not None and self._last[0] is document.photo:
             self.painting.move_to(*map(float, self._last[1]))
         self.trail = [pointer.xy]
-        self._paint_at(editor.landing.begin(pointer.xy))
+        self._paint_at(self._landing.begin(pointer.xy))
 
     def move_stroke(self, pointer: Pointer) -> None:
         if self.painting is not None:
             self.trail.append(pointer.xy)
-            self._paint_at(self._editor.landing.go_on(pointer.xy))
+            self._paint_at(self._landing.go_on(pointer.xy))
 
     def _paint_at(self, xy: np.ndarray) -> None:
         """The brush moves to image px (2,)."""
@@ -239,7 +242,7 @@ class Masking:
         is_empty = changed.objects[k].mask is None
 
         def apply() -> None:
-            editor.posing.select(None)
+            self._posing.select(None)
             if editor.view.tool is not ToolName.MASK or is_empty:
                 editor.view.tool = ToolName.SELECT
             editor.apply(label, changed)

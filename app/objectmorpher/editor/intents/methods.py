@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
     from ...server.address import Server
     from ...server.offers import Offer, Offers
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .computing import Computing
 
 
 LOOK = "look at stages"  # kind of job
@@ -49,8 +51,10 @@ class Methods:
     Where a server does the long jobs, what can run there counts: only it is asked.
     """
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, computing: Computing, tasks: Tasks) -> None:
         self._editor = editor
+        self._computing, self._tasks = computing, tasks
+        computing.changed = self.forget
         self._stages: dict[str, Stage] = {}  # empty until looked at
         self._is_asked = self._is_told = False
         self._served: tuple[Server, Offers] | None = None  # with no offers until it answers
@@ -99,7 +103,7 @@ class Methods:
     @property
     def _server(self) -> Server | None:
         """That is asked; None: this computer does the work."""
-        return self._editor.computing.reached
+        return self._computing.reached
 
     def _offer(self, stage: str) -> Offer | None:
         """What the server says of a stage; a stage that it does not serve is done here."""
@@ -132,14 +136,14 @@ class Methods:
         backends = replace(editor.settings.backends, **{stage: name})
         editor.settings = replace(editor.settings, backends=backends)
         if stage == "segment":
-            editor.tasks.read_photo()
+            self._tasks.read_photo()
 
     def _look(self) -> None:
         """In the worker, for it may load PyTorch to ask for a GPU; and the server, if there is."""
         server = self._server
         if server is not None and (self._served is None or self._served[0] != server):
             self._served = server, {}
-            self._editor.computing.ask_offers(lambda offers: self._take_offers(server, offers))
+            self._computing.ask_offers(lambda offers: self._take_offers(server, offers))
         if self._is_asked:
             return
         self._is_asked = True
@@ -178,8 +182,9 @@ class WorkerState:
 class Workers:
     """What the window offers about them."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, methods: Methods) -> None:
         self._editor = editor
+        self._methods = methods
         self.states: tuple[WorkerState, ...] = ()  # as they were looked at last
 
     def look(self) -> None:
@@ -199,7 +204,7 @@ class Workers:
         except LiftError as error:
             self._editor.complain(str(error))
         self.look()
-        self._editor.methods.forget()
+        self._methods.forget()
 
     def is_chosen(self, name: str) -> bool:
         """Whether it lifts from now on."""
@@ -207,7 +212,7 @@ class Workers:
 
     def choose(self, name: str) -> None:
         """It lifts from now on."""
-        self._editor.methods.choose(STAGE, name)
+        self._methods.choose(STAGE, name)
         self._editor.say(t("{name} lifts from now on", name=name))
 
 

@@ -15,7 +15,7 @@ from objectmorpher_core.document.model import Document, EditObject, Handle
 if TYPE_CHECKING:
     from objectmorpher_core.deform.symmetry import MirrorPlane
 
-    from ..editor import Editor
+    from ..state import EditorState
 
 ON_PLANE = 0.04  # x diameter: a handle so near to the plane is its own partner, and free
 PIECES = 16  # of the line that shows the plane
@@ -25,7 +25,7 @@ PARTNER = 0.06  # x diameter: a handle so near to the mirrored point is the part
 class Mirroring:
     """The mirror plane of the current object, while it is dragged with symmetry."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self._masks: list[Mask] = []  # of the objects that are
 
@@ -51,7 +51,7 @@ class Mirroring:
         editor = self._editor
         if editor.document is None or not editor.is_lifted or not self.is_on:
             return None
-        return editor.derived.facts.mirror(editor.document, editor.current)
+        return editor.cache.facts.mirror(editor.document, editor.current)
 
     def is_found(self) -> bool:
         """Whether the object has a mirror plane, and it is not just an upright one."""
@@ -69,7 +69,7 @@ class Mirroring:
         away = rest @ plane.normal - plane.offset
         deformer = editor.derived.shape(document.photo, thing).puppet.deformer
         near = np.abs(away) < deformer.graph.mean_spacing
-        near &= editor.derived.facts.seen(document, k)
+        near &= editor.cache.facts.seen(document, k)
         if near.sum() < 2:
             return np.empty((0, 2))
         on_plane = rest[near] - away[near, None] * plane.normal
@@ -134,7 +134,7 @@ class Mirroring:
         k = self._editor.current
         thing = document.objects[k]
         assert thing.lifted is not None
-        tree = self._editor.derived.facts.surface(document, k).tree
+        tree = self._editor.cache.facts.surface(document, k).tree
         point = np.asarray(tree.data)[tree.query(plane.mirrored(handle.point))[1]]
         node = edits.nearest_control_point(thing.lifted, point)
         if node == handle.control_point or thing.rig.is_held(node):

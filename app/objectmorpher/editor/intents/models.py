@@ -20,7 +20,10 @@ from ..feedback import Action
 from .methods import Workers
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .methods import Methods
+    from .shaping import Shaping
 
 
 DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
@@ -47,12 +50,15 @@ NAMES = {
 class Models:
     """What the window offers about models."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self, editor: EditorState, methods: Methods, shaping: Shaping, tasks: Tasks
+    ) -> None:
         self._editor = editor
+        self._methods, self._shaping, self._tasks = methods, shaping, tasks
         self.states: tuple[State, ...] = ()  # empty until they were looked at
         self.added: tuple[Added, ...] = ()  # what users bring, likewise
-        self.hub = HubModels(editor)  # those of several files
-        self.workers = Workers(editor)  # programs of the user's
+        self.hub = HubModels(editor, self)  # those of several files
+        self.workers = Workers(editor, methods)  # programs of the user's
         self.is_open = False  # the window shows the list
         self._loading = ""
 
@@ -133,8 +139,8 @@ class Models:
 
         def accept(own: Added) -> None:
             self.look()
-            again = Action(t("Lift it again"), lambda: editor.shaping.say(t("Depth model")))
-            can_follow = editor.is_lifted and editor.shaping.why_fixed is None
+            again = Action(t("Lift it again"), lambda: self._shaping.say(t("Depth model")))
+            can_follow = editor.is_lifted and self._shaping.why_fixed is None
             editor.say(t("{name} is ready", name=own.name), again if can_follow else None)
 
         editor.jobs.start(
@@ -153,13 +159,13 @@ class Models:
     def _take(self, found: Looked) -> None:
         self.states, self.added, self.hub.states = found
         self.workers.look()
-        self._editor.methods.forget()
+        self._methods.forget()
 
     def use_anew(self) -> None:
         """The worker chooses its segmenter again, and reads the photo with it."""
         self._editor.jobs.start(
             "Changing the model", job_functions.forget_segmenter,
-            done=lambda _: self._editor.tasks.read_photo(), failed=lambda error: None,
+            done=lambda _: self._tasks.read_photo(), failed=lambda error: None,
             kind=FORGET, is_quiet=True,
         )  # fmt: skip
 
@@ -192,8 +198,9 @@ NO_TORCH = ("sam-onnx", "lama", "migan")  # families that run without PyTorch
 class HubModels:
     """What the window offers about them, family by family."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, own: Models) -> None:
         self._editor = editor
+        self._models = own
         self.states: tuple[HubState, ...] = ()  # empty until they were looked at
         self.wanted = ""  # id of the model that a folder is being chosen for
         self._chosen: dict[str, str] = {}  # family -> id
@@ -237,13 +244,13 @@ class HubModels:
             return t("Needs PyTorch: {command}", command=models.EXTRA)
         if not self.accepts(model):
             return t("Accept its licence first")
-        return t("Another model is on its way") if self._editor.models.downloading else None
+        return t("Another model is on its way") if self._models.downloading else None
 
     def download(self, id: str) -> None:
         """Gets one; the user has clicked the button, and accepted what licence needs that."""
         model = models.hub_model(id)
         accepted = model.licence if self.accepts(model) else ""
-        self._editor.models.run(id, id, lambda progress: models.get(id, progress, accepted))
+        self._models.run(id, id, lambda progress: models.get(id, progress, accepted))
 
     def use_folder(self, given: Path) -> None:
         """The folder that a chosen file is in is the model from now on."""
@@ -260,8 +267,8 @@ class HubModels:
         except models.ModelError as error:
             self._editor.complain(str(error))
         else:
-            self._editor.models.use_anew()
-        self._editor.models.look()
+            self._models.use_anew()
+        self._models.look()
 
 
 def has_torch() -> bool:

@@ -11,21 +11,23 @@ import numpy as np
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
 
-from ...canvas.layers import is_front
+from ...canvas.layer import is_front
 from ...system.texts import t
 from ..feedback import Action
 from ..tasks import LIFT, SELECT
 from ..view import USUAL_LEVEL, ToolName
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .posing import Posing
 
 
 class Objects:
     """Adding, choosing, naming, hiding and ordering them."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
+        self._posing = posing
         self.renaming: int | None = None  # whose name is being typed
         self.carried: int | None = None  # whose row is being dragged up or down the list
 
@@ -35,7 +37,7 @@ class Objects:
         if editor.document is not None:
             editor.hand.abort(editor)
             editor.current = len(editor.document.objects)
-            editor.posing.select(None)
+            self._posing.select(None)
             editor.view.tool, editor.view.selecting.level = ToolName.SELECT, USUAL_LEVEL
 
     def choose(self, k: int) -> None:
@@ -54,14 +56,14 @@ class Objects:
     def take(self, k: int) -> Callable[[], None]:
         """As `choose`, for a stroke in progress; what is returned takes it back."""
         editor = self._editor
-        before, selected = editor.current, editor.posing.selected
+        before, selected = editor.current, self._posing.selected
 
         def restore() -> None:
             editor.current = before
-            editor.posing.select(*selected)
+            self._posing.select(*selected)
 
         editor.current = k
-        editor.posing.select(None)
+        self._posing.select(None)
         if not editor.is_lifted:
             editor.view.tool = ToolName.SELECT
         return restore
@@ -160,7 +162,7 @@ class Objects:
         if document is None or item is None or editor.hand.is_busy:
             return
         if item.stays_in_front:
-            editor.apply(t("Do not keep in front"), edits.let_go(document, k))
+            editor.apply(t("Do not keep in front"), edits.stop_keeping_in_front(document, k))
             return
         editor.jobs.cancel(LIFT)  # what it would bring is to be edited
         try:
@@ -174,8 +176,10 @@ class Objects:
         """What staying in front means, or that it is hardly what was meant; one click undoes it."""
         editor, document = self._editor, self._editor.committed
         assert document is not None
+        from objectmorpher_core.compose.order import doubt_about_front
+
         name, posed = document.objects[k].name, partial(self._editor.derived.posed, document)
-        if edits.doubt(document, k, posed) is None:
+        if doubt_about_front(document, k, posed) is None:
             editor.say(t("{name} covers what moves behind it", name=name))
             return
         editor.say(

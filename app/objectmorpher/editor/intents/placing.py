@@ -22,14 +22,16 @@ from ...canvas.derived import ObjectFrame
 from ...system.texts import t
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..state import EditorState
+    from .posing import Posing
 
 
 class Placing:
     """The current object's placement."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
+        self._posing = posing
 
     @property
     def placement(self) -> Placement | None:
@@ -64,7 +66,7 @@ class Placing:
             centre = centre_of(placement, lifted, camera)
             contact = ground.lowest(centre + self._offsets(placement))
             return Hold(placement, lifted, camera, contact, ground)
-        seen = None if canvas_xy is None else editor.posing.surface_at(canvas_xy)
+        seen = None if canvas_xy is None else self._posing.surface_at(canvas_xy)
         point = self.centre() if seen is None else seen.world
         return Hold(placement, lifted, camera, np.asarray(point, np.float64))
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.deform.puppet import SurfacePoint
     from objectmorpher_core.document.hold_edits import Stays
 
-    from ..editor import Editor
+    from ..state import EditorState
 
 
 AT_REST = 2e-4  # x diameter: a smaller motion of a frame is none
@@ -35,7 +35,7 @@ REST = {"seconds": 0.012}
 class Posing:
     """The current object's handles and pose."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self.mirroring = Mirroring(editor)
         self.readout = ""  # of the turn in progress: "34°"
@@ -74,7 +74,7 @@ class Posing:
         assert editor.document is not None and editor.object is not None
         own = editor.object.handles[handle]
         place = editor.derived.world(editor.document, editor.current, own.target)
-        return place, editor.derived.facts.normal_at(editor.document, editor.current, own.point)
+        return place, editor.cache.facts.normal_at(editor.document, editor.current, own.point)
 
     def turn_of(self, handle: int) -> F64:
         """The rotation vector (3,) of a handle, object frame: its own, or as it comes."""
@@ -229,7 +229,7 @@ class Posing:
         k, document = editor.current, editor.document
         if editor.object.handles[handle].turn is None:  # from now on it is held as it is turned
             document = editor.derived.held(edits.turn_handle(document, k, handle, start), k)
-        own = editor.derived.facts.turn_of(document, k).T @ turn
+        own = editor.cache.facts.turn_of(document, k).T @ turn
         changed = edits.turn_handle(document, k, handle, turned_by(start, own))
         self.change(self.mirroring.followed(changed, (handle,)))
 
@@ -370,15 +370,16 @@ class Numbers:
 class HandleNumbers:
     """Of the handle that was selected last. A change is previewed; `finish` makes it a step."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor
+        self._posing = posing
 
     def read(self) -> Numbers | None:
         editor = self._editor
-        h = editor.posing.handle
+        h = self._posing.handle
         if h is None or editor.object is None or editor.document is None:
             return None
-        handle, spot = editor.object.handles[h], editor.posing.spot(h)
+        handle, spot = editor.object.handles[h], self._posing.spot(h)
         rest = editor.derived.spot(editor.document, editor.current, handle.point)
         return Numbers(
             float(spot.xy[0]), float(spot.xy[1]), (spot.depth - rest.depth) / spot.diameter,
@@ -390,22 +391,22 @@ class HandleNumbers:
         """Radians about the line of sight."""
         editor = self._editor
         assert editor.document is not None
-        turn = editor.derived.facts.turn_of(editor.document, editor.current)
-        return turn_about(turn @ editor.posing.turn_of(h), SIGHT)
+        turn = editor.cache.facts.turn_of(editor.document, editor.current)
+        return turn_about(turn @ self._posing.turn_of(h), SIGHT)
 
     def move(self, x: float, y: float, depth: float) -> None:
         """Previews the handle at image px, so many diameters farther than at rest."""
         editor = self._editor
-        h = editor.posing.handle
+        h = self._posing.handle
         assert h is not None and editor.object is not None and editor.document is not None
         point = editor.object.handles[h].point
         rest = editor.derived.spot(editor.document, editor.current, point)
         there = rest.moved(np.zeros(2), depth)
-        editor.posing.drag(h, replace(there, xy=np.array([x, y])))
+        self._posing.drag(h, replace(there, xy=np.array([x, y])))
 
     def turn(self, degrees: float) -> None:
         """Previews the handle turned so far about the line of sight."""
-        posing = self._editor.posing
+        posing = self._posing
         h = posing.handle
         assert h is not None
         more = np.radians(degrees) - self._roll(h)
@@ -414,23 +415,23 @@ class HandleNumbers:
     def soften(self, softness: float) -> None:
         """Previews the handle giving way from now on: 0 = not at all."""
         editor = self._editor
-        h = editor.posing.handle
+        h = self._posing.handle
         assert h is not None and editor.document is not None
-        editor.posing.hold(edits.soften_handle(editor.document, editor.current, h, softness))
+        self._posing.hold(edits.soften_handle(editor.document, editor.current, h, softness))
 
     def set_free(self, is_free: bool) -> None:
         """Whether it turns as the object does, or stays as it is turned now; one step."""
         editor = self._editor
-        h = editor.posing.handle
+        h = self._posing.handle
         assert h is not None and editor.document is not None
-        turn = None if is_free else editor.posing.turn_of(h)
-        editor.posing.hold(edits.turn_handle(editor.document, editor.current, h, turn))
-        editor.posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
+        turn = None if is_free else self._posing.turn_of(h)
+        self._posing.hold(edits.turn_handle(editor.document, editor.current, h, turn))
+        self._posing.finish(t("Free handle's turn") if is_free else t("Hold handle's turn"))
 
     def set_pin(self, is_pin: bool) -> None:
         """A pin holds, a handle is dragged; one step."""
         editor = self._editor
-        h = editor.posing.handle
+        h = self._posing.handle
         assert h is not None and editor.document is not None
-        editor.posing.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
-        editor.posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))
+        self._posing.hold(edits.set_pin(editor.document, editor.current, h, is_pin))
+        self._posing.finish(t("Make it a pin") if is_pin else t("Make it a handle"))

@@ -16,7 +16,8 @@ from ...worker.job_error import JobError
 if TYPE_CHECKING:
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
 
-    from ..editor import Editor
+    from ..state import EditorState
+    from .methods import Methods
 
 REFINE = "refine"  # kind of job
 
@@ -24,8 +25,9 @@ REFINE = "refine"  # kind of job
 class Refining:
     """The refinement of the whole edit."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, methods: Methods) -> None:
         self._editor = editor
+        self._methods = methods
         self._answer: tuple[Document, Refined] | None = None  # waits for the hand to be idle
 
     def forget(self) -> None:
@@ -54,7 +56,7 @@ class Refining:
         if asked is None:
             return
         strength = 1.0 if asked.refined is None else asked.refined.strength
-        how = How(editor.methods.chosen("refine"), seed, strength)
+        how = How(self._methods.chosen("refine"), seed, strength)
 
         def fail(error: JobError) -> None:
             editor.complain_of(error.retried_by(lambda: self._ask(seed)))

@@ -20,7 +20,7 @@ from ..view import PoseMode
 if TYPE_CHECKING:
     from objectmorpher_core.deform.rigidity import Rigidity
 
-    from ..editor import Editor
+    from ..state import EditorState
 
 
 USUAL = 1.0  # stiffness of what was not painted
@@ -42,7 +42,7 @@ class Region:
 class Rigging:
     """The current object's rig. The handles stay, and the pose is solved anew with it."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState) -> None:
         self._editor = editor
         self.painted: I32 = np.empty(0, np.int32)  # by the stroke in progress
         self.drawn: F64 = np.empty((0, 2))  # image px, its way
@@ -76,12 +76,12 @@ class Rigging:
         editor = self._editor
         assert editor.document is not None
         picture = editor.derived.control_points(editor.document, editor.current)
-        seen = editor.derived.facts.seen(editor.document, editor.current)
+        seen = editor.cache.facts.seen(editor.document, editor.current)
         gaps = gaps_to_way(picture, way)
         under = np.flatnonzero(seen & (gaps <= editor.view.brush.radius))
         if len(under) == 0 and seen.any():
             nearest = int(np.where(seen, gaps, np.inf).argmin())
-            reach = NEAREST * editor.derived.facts.spacing(editor.document, editor.current)
+            reach = NEAREST * editor.cache.facts.spacing(editor.document, editor.current)
             under = np.array([nearest] if gaps[nearest] <= reach else [])
         return under.astype(np.int32)
 

@@ -18,7 +18,10 @@ from ..tasks import SELECT, Combine, Question
 from .masking import loses_work
 
 if TYPE_CHECKING:
-    from ..editor import Editor
+    from ..candidate import Candidates, CloserLook
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .masking import Masking
 
 SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or less around it
 
@@ -31,8 +34,18 @@ class Selection:
     brush, a file) has no prompt: there a click adds the object that it is on, or takes it away.
     """
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(
+        self,
+        editor: EditorState,
+        tasks: Tasks,
+        masking: Masking,
+        candidates: Candidates,
+        closer_look: CloserLook,
+    ) -> None:
         self._editor = editor
+        self._tasks, self._masking = tasks, masking
+        self._candidates, self._closer_look = candidates, closer_look
+        candidates.answered, closer_look.improved = self.take, self.improve
         self.path: list[np.ndarray] | None = None  # the line being drawn, canvas px (2,) each
         self._told: tuple[Mask | None, float | None] = None, None  # a mask, and how sure it was
 
@@ -41,16 +54,12 @@ class Selection:
     @property
     def pending(self) -> Prompt | None:
         """What is being segmented now; shown at once, in the document when the mask is there."""
-        question = self._editor.tasks.question
-        return question.prompt if question and question.k == self._editor.current else None
+        return self._tasks.pending
 
     @property
     def prompt(self) -> Prompt:
         """What the user said about the current object, asked or answered."""
-        if self.pending is not None:
-            return self.pending
-        thing = self._editor.object
-        return thing.prompt if thing else Prompt()
+        return self._tasks.prompt
 
     @property
     def share(self) -> float:
@@ -81,7 +90,7 @@ class Selection:
         size = editor.photo_size
         if size is None or not (0 <= x < size[0] and 0 <= y < size[1]):
             return
-        question = editor.tasks.question if self.pending is not None else None
+        question = self._tasks.question if self.pending is not None else None
         before, click = self.prompt, Click(x, y, is_foreground)
         if question is None and before.is_empty and editor.mask is not None:
             self._combine_click(click, Prompt())
@@ -131,7 +140,7 @@ class Selection:
         editor.jobs.cancel(SELECT)
         if editor.document is not None and editor.mask is not None:
             cleared = edits.set_mask(editor.document, editor.current, None, Prompt())
-            editor.masking.take(t("Clear selection"), cleared, editor.current)
+            self._masking.take(t("Clear selection"), cleared, editor.current)
 
     # Answers
 
@@ -148,7 +157,7 @@ class Selection:
         if question.combine in (Combine.ANEW, Combine.REFINED):
             self._told = editor.mask, found.confidence
         if not found.is_final:
-            editor.closer_look.begin(question, base, asked or question.prompt)
+            self._closer_look.begin(question, base, asked or question.prompt)
 
     def improve(self, question: Question, base: SelectionMask | None, found: Found) -> None:
         """A better answer takes the place of the one that is shown, in the same step.
@@ -176,22 +185,22 @@ class Selection:
         except ValueError as error:
             editor.complain(str(error))
             return
-        editor.masking.take(question.label, changed, k)
+        self._masking.take(question.label, changed, k)
 
     # Questions
 
     def _ask(self, prompt: Prompt, label: str, combine: Combine = Combine.REFINED) -> None:
         editor = self._editor
         question = Question(prompt, label, editor.current, combine)
-        if not editor.candidates.take(question):
-            editor.tasks.segment(question)
+        if not self._candidates.take(question):
+            self._tasks.segment(question, self.take)
 
     def _combine_click(self, click: Click, before: Prompt) -> None:
         """The object that a click is on, besides a selection that no prompt made, or not in it.
 
         `before`: the same, asked and not answered yet.
         """
-        question = self._editor.tasks.question
+        question = self._tasks.question
         combine = Combine.ADDED if click.is_foreground else Combine.REMOVED
         is_same = before.clicks and question is not None and question.combine is combine
         clicks = (*before.clicks, replace(click, is_foreground=True)) if is_same else ()

@@ -26,7 +26,7 @@ from objectmorpher_core.document.model import (
     Placement,
 )
 
-from ...canvas.layers import Layer
+from ...canvas.layer import Layer
 from ...system.texts import t
 from ...worker import job_functions
 from ..view import Painted
@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from objectmorpher_core.lift.registration.importing import Import, Scene
     from objectmorpher_core.lift.registration.placement import Proposal
 
-    from ..editor import Editor
+    from ..state import EditorState
+    from ..tasks import Tasks
+    from .posing import Posing
 
 IMPORT = "import"  # kind of job
 DETAIL = 512  # px, longer side of the map of what is nearer
@@ -60,8 +62,9 @@ class Fitting:
 class Shaping:
     """What is said about a shape, and what comes of it."""
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
         self._editor = editor
+        self._posing, self._tasks = posing, tasks
         self._stroke: Stroke | None = None
         self._painted, self._is_inverse = Painted.DEPTH, False
         self._fitting: Fitting | None = None
@@ -129,7 +132,7 @@ class Shaping:
         if thing.lifted is None:
             editor.apply(label, edits.set_shape(document, editor.current, shape))
         else:
-            editor.tasks.lift(shape, label)
+            self._tasks.lift(shape, label)
 
     # Strokes
 
@@ -334,11 +337,11 @@ class Shaping:
             if not editor.hand.is_busy:
                 self._show_import(fitting, changed, label)
 
-        editor.tasks.make_ready(k, change, t("Placing the object"), show)
+        self._tasks.make_ready(k, change, t("Placing the object"), show)
 
     def _show_import(self, fitting: Fitting, changed: Document, label: str) -> None:
         editor = self._editor
-        editor.posing.select(None)
+        self._posing.select(None)
         editor.apply(label, changed)
         self._fitting = fitting
         share = f"{100 * fitting.chosen.iou:.0f}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from typing import TypeVar
 
 from imgui_bundle import imgui
 
 from ...editor.editor import Editor
-from ...editor.export_plan import LENGTHS, LOSSLESS, Format, Motion, What
+from ...editor.export_plan import LENGTHS, Motion, What
 from ...editor.filing import Dialog
 from ...editor.intents.exporting import Exporting
 from ...system.texts import t
@@ -27,9 +28,11 @@ from ..widgets.widgets import (
 )
 from ..window.landmarks import mark
 
+T = TypeVar("T")
 WIDTH = 480.0  # points
 LABELS = 88.0  # width of the names left of the fields
 BROWSE = 96.0
+ROW = 4  # formats that fit beside each other
 DEPTHS = (8, 16)  # bits a channel
 ABOUT = {
     What.PHOTO: "The whole photo with the edit in it.",
@@ -37,8 +40,9 @@ ABOUT = {
     What.MASK: "The current object's selection in the opened photo, white on black.",
     What.DEPTH: "How near the objects are: the nearest point white, twice as far half as bright.",
     What.BACKGROUND: "The photo with its objects painted out.",
-    What.LAYERS: "Photo, background, shadows and objects, for GIMP or Krita; PNG: in a folder.",
+    What.LAYERS: "Photo, background, shadows and objects, for paint programs; PNG: in a folder.",
     What.VIDEO: "A looping film, at most 1280 px wide.",
+    What.SOLID: "The current object as it is posed: a mesh with the photo on it, or Gaussians.",
 }
 
 
@@ -63,7 +67,8 @@ def draw_export(editor: Editor) -> None:
 def _draw_what(exporting: Exporting) -> None:
     assert exporting.draft is not None
     _name(t("What"))
-    if (chosen := _choice("what", What, exporting.draft.what, exporting)) is not None:
+    named = tuple((what, t(what.value), exporting.why_not(what)) for what in What)
+    if (chosen := _choice("what", named, exporting.draft.what)) is not None:
         exporting.choose_what(chosen)
     imgui.set_cursor_pos_x(_field())
     note(t(ABOUT[exporting.draft.what]))
@@ -73,10 +78,7 @@ def _draw_what(exporting: Exporting) -> None:
 def _draw_how(exporting: Exporting) -> None:
     assert exporting.draft is not None
     _name(t("Format"))
-    choices = tuple(Choice(format, format.value) for format in exporting.formats)
-    format = segmented("format", choices, exporting.draft.format)
-    if format is not exporting.draft.format:
-        exporting.choose_format(format)
+    _draw_format(exporting)
     if exporting.has_bits:
         _name(t("Depth"))
         depths = tuple(Choice(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
@@ -88,13 +90,26 @@ def _draw_how(exporting: Exporting) -> None:
     elif exporting.has_quality:
         _name(t("Quality"))
         imgui.set_next_item_width(FILL)
-        is_lossless = exporting.draft.format is Format.WEBP and exporting.quality == LOSSLESS
-        shown = t("lossless") if is_lossless else "%d"
+        shown = t("lossless") if exporting.is_lossless else "%d"
         is_changed, quality = imgui.slider_int("##quality", exporting.quality, 50, 100, shown)
         if is_changed:
             exporting.choose_quality(quality)
         tooltip(t("Higher is larger and truer. Below lossless, every pixel changes a little."))
     imgui.dummy(theme.size(0, 0))
+
+
+def _draw_format(exporting: Exporting) -> None:
+    """A row of formats, or a list where they are many."""
+    assert exporting.draft is not None
+    chosen = exporting.draft.format
+    if len(exporting.formats) > ROW:
+        named = tuple((f, f.value, exporting.why_no_format(f)) for f in exporting.formats)
+        format = _choice("format", named, chosen) or chosen
+    else:
+        choices = tuple(Choice(format, format.value) for format in exporting.formats)
+        format = segmented("format", choices, chosen)
+    if format is not chosen:
+        exporting.choose_format(format)
 
 
 def _draw_motion(exporting: Exporting) -> None:
@@ -186,16 +201,19 @@ def _field() -> float:
     return theme.pt(20 + LABELS)
 
 
-def _choice(name: str, choices: Iterable[What], chosen: What, exporting: Exporting) -> What | None:
-    """A list that unfolds; what cannot be chosen says why. What was chosen, or None."""
+def _choice(name: str, choices: Sequence[tuple[T, str, str | None]], chosen: T) -> T | None:
+    """A list that unfolds, of values, their names, and why each cannot be chosen.
+
+    What was chosen, or None.
+    """
     found = None
     imgui.set_next_item_width(FILL)
-    if imgui.begin_combo(f"##{name}", t(chosen.value)):
-        for choice in choices:
-            reason = exporting.why_not(choice)
+    preview = next(shown for value, shown, _ in choices if value == chosen)
+    if imgui.begin_combo(f"##{name}", preview):
+        for value, shown, reason in choices:
             flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
-            if imgui.selectable(t(choice.value), choice is chosen, flags)[0]:
-                found = choice
+            if imgui.selectable(shown, value is chosen, flags)[0]:
+                found = value
             if reason:
                 tooltip(reason)
         if imgui.is_key_pressed(imgui.Key.escape):

@@ -105,7 +105,7 @@ class StartScreen:
         low = imgui.get_cursor_screen_pos()
         imgui.begin_group()
         if drawn_button(f"##{name}", size):
-            editor.filing.open_sample(resource(f"assets/samples/{name}.jpg"), thing)
+            editor.sample.open(resource(f"assets/samples/{name}.jpg"), thing)
         mark(title)
         is_hovered = imgui.is_item_hovered()
         if is_hovered:

@@ -19,8 +19,8 @@ BARB = 10.0  # points, of an arrow
 def draw_compose(canvas: Canvas) -> None:
     """What the Compose tool shows over the photo."""
     editor = canvas.editor
-    if (taken := editor.composing.taken) is not None:
-        for outline in editor.derived.contours(taken):
+    if (offer := editor.composing.offer) is not None:
+        for outline in editor.derived.contours(offer.outlined):
             canvas.dashes(canvas.at(outline))
     if not editor.view.compose.is_bare:
         _draw_owner(canvas)

@@ -8,6 +8,7 @@ from itertools import pairwise
 from imgui_bundle import ImVec2, imgui
 
 from ...canvas.painter import DEPTH_STOPS, FULL_STRAIN, STRAIN_STOPS, Stops, shown_now
+from ...canvas.shares import shares
 from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...render.scene import Hatch
@@ -73,7 +74,7 @@ class Legend:
     def _draw_depth(self) -> None:
         document = self._editor.document
         assert document is not None
-        half = self._editor.derived.painter.spread(document).half
+        half = self._editor.cache.painter.spread(document).half
         self._bar(DEPTH_STOPS)
         self._text(t("near  −{half}", half=f"{half:.2f}"), WHITE)
         self._text(t("+{half}  far", half=f"{half:.2f}"), WHITE, side=1.0)
@@ -101,20 +102,20 @@ class Legend:
     def _draw_provenance(self) -> None:
         editor = self._editor
         assert editor.history is not None
-        shares = editor.derived.painter.shares(editor.history.document)  # too slow for a drag
+        counted = shares(editor.history.document, editor.cache)  # too slow for a drag
         grey = (0.55, 0.55, 0.55)
         rows: list[tuple[Hatch | None, str, float]] = [
-            (None, t("from the photo"), shares.from_photo),
-            (LIFTED, t("invented on the object"), shares.from_lifter),
-            (INPAINTED, t("invented behind it"), shares.from_inpainter),
+            (None, t("from the photo"), counted.from_photo),
+            (LIFTED, t("invented on the object"), counted.from_lifter),
+            (INPAINTED, t("invented behind it"), counted.from_inpainter),
         ]
         if self._provenance_rows > len(rows) + 1:
-            rows.append((REFINED, t("refined by the network"), shares.from_refiner))
+            rows.append((REFINED, t("refined by the network"), counted.from_refiner))
         for hatch, text, share in rows:
             self._swatch(grey, hatch)
             self._text(f"{share:.0%}".replace("%", " %"), WHITE, side=1.0)
             self._row(text)
-        is_changed = shares.changed > 0
+        is_changed = counted.changed > 0
         said = t("of the changed pixels")
         if editor.preview is not None:
             said = t("of the changed pixels, before this drag")

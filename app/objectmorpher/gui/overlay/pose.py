@@ -100,8 +100,8 @@ def _draw_influence(canvas: Canvas, handle: int) -> None:
     """How much each control point goes along: larger and warmer dots."""
     editor = canvas.editor
     assert editor.document is not None
-    shares = editor.derived.facts.influence(editor.document, editor.current, handle)
-    shown = editor.derived.facts.seen(editor.document, editor.current) & (shares >= MOVES)
+    shares = editor.cache.facts.influence(editor.document, editor.current, handle)
+    shown = editor.cache.facts.seen(editor.document, editor.current) & (shares >= MOVES)
     picture = editor.derived.control_points(editor.document, editor.current)
     shown &= ((picture >= 0) & (picture <= editor.document.photo.size)).all(1)
     places = canvas.at(picture[shown])

@@ -56,7 +56,7 @@ def _visible(canvas: Canvas, nodes: I32) -> F64:
     """Where these control points are seen, (n, 2) window units; those behind are left out."""
     editor = canvas.editor
     assert editor.document is not None
-    seen = editor.derived.facts.seen(editor.document, editor.current)
+    seen = editor.cache.facts.seen(editor.document, editor.current)
     picture = editor.derived.control_points(editor.document, editor.current)
     xy = editor.view.canvas_from_image(picture[nodes[seen[nodes]]])
     return xy / canvas.ratio + (canvas.rect.x, canvas.rect.y)
@@ -65,7 +65,7 @@ def _visible(canvas: Canvas, nodes: I32) -> F64:
 def _draw_hatched(canvas: Canvas, kind: PoseMode, nodes: I32) -> None:
     editor = canvas.editor
     assert editor.document is not None
-    spacing = editor.derived.facts.spacing(editor.document, editor.current)
+    spacing = editor.cache.facts.spacing(editor.document, editor.current)
     radius = max(SPREAD * spacing * editor.view.zoom / canvas.ratio, theme.pt(LEAST))
     places = _visible(canvas, nodes)
     angles, color = HATCHES[kind]

@@ -34,7 +34,9 @@ from ..widgets.widgets import (
     LABEL_WIDTH,
     SIDE,
     Change,
+    Kind,
     Number,
+    button,
     checkbox,
     command_button,
     dial,
@@ -137,7 +139,10 @@ def _draw_shadow(editor: Editor) -> None:
         note(f"{reason}.")
         return
     assert editor.object is not None
-    command_button(editor, "take_shadow", width=-1)
+    if editor.composing.offer is None:
+        command_button(editor, "take_shadow", width=-1)
+    else:
+        _draw_offer(editor)
     shadow, preview = editor.object.shadow, editor.composing.preview_shadow
     number = Number(t("Strength"), "%.0f %%", 0.5, 5.0, low=0.0, high=100.0)
     change = number_field(number, 100 * shadow.strength)
@@ -163,6 +168,15 @@ def _draw_shadow(editor: Editor) -> None:
     changed = replace(shadow, ground=ground)
     _take(editor, change, lambda: preview(changed), t("Ground of shadow"))
     _draw_direction(editor)
+
+
+def _draw_offer(editor: Editor) -> None:
+    """What is outlined on the photo goes along, or stays."""
+    note(t("The photo shows outlined what would go along."))
+    if button(t("Take it along"), Kind.PRIMARY_SMALL, width=-1):
+        editor.composing.accept_shadow()
+    if button(t("Leave it in the photo"), width=-1):
+        editor.composing.refuse_shadow()
 
 
 def _draw_direction(editor: Editor) -> None:

@@ -11,7 +11,7 @@ from ...editor.editor import Editor
 
 
 @dataclass(frozen=True)
-class Frame:
+class LoggedFrame:
     """One frame."""
 
     began: float  # s, monotonic, when its events had been taken
@@ -27,7 +27,7 @@ class FrameLog:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._frames: list[Frame] = []
+        self._frames: list[LoggedFrame] = []
         self._began = 0.0
 
     def begin(self) -> None:
@@ -39,7 +39,7 @@ class FrameLog:
         job = editor.jobs.current
         title = job.title if job is not None else ""
         now = time.monotonic()
-        self._frames.append(Frame(self._began, now, *pointer, editor.hand.is_busy, title))
+        self._frames.append(LoggedFrame(self._began, now, *pointer, editor.hand.is_busy, title))
 
     def write(self) -> None:
         """JSON, a list of frames."""

@@ -19,9 +19,9 @@ from ...editor.shortcuts import Shortcuts
 from ...editor.view import ToolName
 from ...system.texts import t
 from ...tools import navigate
-from ...tools.pointer import Button, Pointer, Shape, Tool
+from ...tools.pointer import Button, Pointer, Shape
 from ...tools.pose_strokes import DEPTH_STEP
-from ...tools.registry import TOOLS
+from ...tools.registry import TOOLS, Tool
 from .crosshair import FAR, STRIDE, Crosshair
 from .focus import ANY_POPUP, Focus
 from .layout import Rect
@@ -155,7 +155,7 @@ class Input:
         Enter is the next step; where that is the user's own, in the photo, it clicks too.
         """
         is_pose = editor.view.tool is ToolName.POSE and editor.is_lifted
-        is_awaited = next_step(editor)[1] is None and (is_pose or editor.is_click_awaited)
+        is_awaited = next_step(editor)[1] is None and (is_pose or editor.tasks.is_click_awaited)
         with _guarded(editor):
             if self.crosshair.is_down:
                 self._let_go(editor)

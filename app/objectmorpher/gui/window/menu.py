@@ -19,8 +19,8 @@ LEAST_NAME = 48.0  # points of room, with less the file's name is left out
 MENUS: dict[str, tuple[str, ...]] = {
     "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
     "Edit": (
-        "undo", "redo", "-", "select_handles", "remove_handle", "reset_handle", "reset_handles",
-        "-", "reset_pose", "reset_place",
+        "undo", "redo", "-", "copy", "copy_object", "paste", "-", "select_handles",
+        "remove_handle", "reset_handle", "reset_handles", "-", "reset_pose", "reset_place",
     ),
     "Select": (
         "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",

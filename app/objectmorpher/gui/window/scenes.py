@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from objectmorpher_core.document.model import Document
 
-from ...canvas.layers import Layer, is_front
+from ...canvas.frame import BARE, Frame, build_frame
+from ...canvas.layer import Layer, is_front
 from ...canvas.painter import shown_now
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
@@ -20,7 +21,6 @@ MISSING = Hatch((0.5, 0.5, 0.5), strength=0.35, brightness=0.25)  # pixels that 
 LIFTED = Hatch((1.0, 0.69, 0.0))  # colours that the colour-blind tell apart, too
 INPAINTED = Hatch((0.55, 0.50, 1.0), slant=-1.0)
 REFINED = Hatch((0.0, 0.85, 0.75), slant=0.0)
-BARE = (Shown.OBJECT, Shown.DEPTH, Shown.NORMALS)  # views without the photo
 
 
 def build_scene(editor: Editor, renderer: str) -> Scene | None:
@@ -41,45 +41,44 @@ def build_scene(editor: Editor, renderer: str) -> Scene | None:
     if view.is_before or (not is_edited and shown in (Shown.COMPOSITE, Shown.PROVENANCE)):
         return Scene(photo, surround)
     if shown is Shown.DEPTH and editor.preview is None:
-        editor.derived.painter.measure(document)
-    layers = editor.derived.layers.draw(document, view, shown) if renderer == "tiles" else ()
-    objects = _objects(editor, document, shown) if renderer == "gl" else ()
+        editor.cache.painter.measure(document)
     split = view.split or 0.0
     if shown in BARE:
-        paper = _paper(shown)
-        return Scene(photo, surround, layers=layers, objects=objects, paper=paper, split=split)
-    plate = editor.derived.plate(document) if is_edited else None
+        return replace(_bare(editor, document, renderer, shown), split=split)
+    frame = build_frame(document, view, editor.cache, shown, renderer)
     mask, hatch = None, None
     if document.plate is None and is_edited:
         mask, hatch = editor.derived.moved_mask(document), MISSING
     elif shown is Shown.PROVENANCE:
-        mask, hatch = editor.derived.painter.invented_background(document), INPAINTED
-    shades = editor.derived.lights.layers(document, view)
-    if shown in (Shown.COMPOSITE, Shown.PROVENANCE):  # the other views tell what is below it
-        refined = editor.derived.refined.layers(document, view, shown is Shown.PROVENANCE)
-        if renderer == "gl":
-            objects = (*objects, *refined)
-        else:
-            layers = (*layers, *refined)
+        mask, hatch = editor.derived.invented_background(document), INPAINTED
+    layers, objects = (*frame.layers, *frame.refined), ()
+    if renderer == "gl":
+        layers, objects = (), (*splat_objects(document, frame), *frame.refined)
     if is_selecting and (tint := editor.shaping.painted_layer()) is not None:
         layers = (*layers, tint)
     return Scene(
-        photo, surround, plate, shades, layers, objects, mask,
-        hatch=hatch, marks=LIFTED, refined=REFINED, blend=editor.derived.blend(document, view),
-        split=split,
+        photo, surround, frame.plate, frame.shades, layers, objects, mask,
+        hatch=hatch, marks=LIFTED, refined=REFINED, blend=frame.blend, split=split,
     )  # fmt: skip
+
+
+def _bare(editor: Editor, document: Document, renderer: str, shown: Shown) -> Scene:
+    """Objects without the photo, on a checker or on plain paper."""
+    photo, surround = document.photo.pixels, theme.rgb("surround")
+    frame = build_frame(document, editor.view, editor.cache, shown, renderer)
+    objects = splat_objects(document, frame) if renderer == "gl" else ()
+    layers = () if renderer == "gl" else frame.layers
+    paper = _paper(shown)
+    return Scene(photo, surround, layers=layers, objects=objects, paper=paper, marks=LIFTED)
 
 
 def _alone(editor: Editor, document: Document, renderer: str) -> Scene:
     """The object from somewhere else, on a checker: the photo does not show what is behind."""
-    photo, surround, shown = document.photo.pixels, theme.rgb("surround"), editor.view.shown
+    shown = editor.view.shown
     shown = Shown.OBJECT if shown is Shown.COMPOSITE else shown
     if shown is Shown.DEPTH and not editor.hand.is_busy:
-        editor.derived.painter.measure(document)
-    layers = editor.derived.layers.draw(document, editor.view, shown) if renderer == "tiles" else ()
-    objects = _objects(editor, document, shown) if renderer == "gl" else ()
-    paper = _paper(shown)
-    return Scene(photo, surround, layers=layers, objects=objects, paper=paper, marks=LIFTED)
+        editor.cache.painter.measure(document)
+    return _bare(editor, document, renderer, shown)
 
 
 def _selecting(editor: Editor, document: Document) -> Scene:
@@ -99,9 +98,9 @@ def _selecting(editor: Editor, document: Document) -> Scene:
 def _bare_scene(editor: Editor, document: Document) -> Scene:
     """The background alone, and what of it is being repaired."""
     photo, surround, split = document.photo.pixels, theme.rgb("surround"), editor.view.split or 0.0
-    mask = editor.derived.lights.hidden(document) if document.plate is None else None
+    mask = editor.derived.hidden(document) if document.plate is None else None
     fronts = [
-        editor.derived.fronts.layer(item, editor.view)
+        editor.cache.fronts.layer(item, editor.view)
         for k, item in enumerate(document.objects)
         if is_front(document, k)
     ]
@@ -118,20 +117,19 @@ def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float
     return panel, theme.rgb("raised") if is_plain else panel
 
 
-def _objects(editor: Editor, document: Document, shown: Shown) -> tuple[SplatObject | Layer, ...]:
-    camera, photo, derived = document.photo.camera, document.photo, editor.derived
+def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Layer, ...]:
+    """What the GPU is to draw of a frame, back to front."""
     found: list[SplatObject | Layer] = []
-    for part in derived.layers.parts(document, shown):
-        if is_front(document, part.k):
-            layer = derived.fronts.layer(document.objects[part.k], editor.view)
-            found += [] if layer is None else [layer]
+    for own in frame.objects:
+        if isinstance(own, Layer):
+            found.append(own)
             continue
-        splats = derived.painter.painted(document, part.k, part.look)
-        texture = derived.shape(photo, document.objects[part.k]).texture
-        is_tint = part.look is Shown.STRAIN
-        item = SplatObject(splats, texture, camera, is_marked=part.is_marked, is_tint=is_tint)
+        part, look = own.part, own.lit
+        item = SplatObject(
+            own.splats, own.shape.texture, document.photo.camera,
+            is_marked=part.is_marked, is_tint=part.look is Shown.STRAIN,
+        )  # fmt: skip
         if not part.is_painted:
-            look = derived.lights.of(document, part.k)
             light = {"gain": look.gain, "relit": look.relit, "grain": look.grain}
             item = replace(item, **light, blur=look.blur)
         found.append(item)

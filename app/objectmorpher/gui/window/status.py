@@ -11,8 +11,7 @@ from ...editor.feedback import Message
 from ...editor.intents.models import DOWNLOAD
 from ...system.report import without_names
 from ...system.texts import t
-from ...worker.jobs import Job
-from ...worker.threads import Chore
+from ...worker.requests import Executor, Request
 from ..widgets.fade import fades
 from ..widgets.panes import STATUS, edge, pane
 from ..widgets.theme import Icon, theme
@@ -67,19 +66,20 @@ def _draw_facts(editor: Editor, rect: Rect, x: float) -> None:
     imgui.text_colored(theme.vec("secondary"), _facts(editor))
 
 
-def _shown_job(editor: Editor) -> Job | Chore | None:
-    """What the user waits for most: what opens, before what is computed."""
-    chore, job = editor.chores.shown, editor.jobs.current
-    if chore is not None and (chore.kind != DOWNLOAD or job is None or job.is_quiet):
-        return chore
-    return None if job is None or job.is_quiet else job
+def _shown_job(editor: Editor) -> tuple[Executor, Request] | None:
+    """What the user waits for most: what opens, before what is computed; and who does it."""
+    chore, job = editor.chores.shown, editor.jobs.shown
+    if chore is not None and (chore.kind != DOWNLOAD or job is None):
+        return editor.chores, chore
+    return None if job is None else (editor.jobs, job)
 
 
 def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     """Name, bar, share and Cancel; the left end of what it drew."""
-    job = _shown_job(editor)
-    if job is None or time.monotonic() - job.started < JOB_DELAY:
+    shown = _shown_job(editor)
+    if shown is None or time.monotonic() - shown[1].started < JOB_DELAY:
         return right
+    executor, job = shown
     side = rect.height - theme.pt(4)
     text = job.title if job.note in ("", job.title) else f"{job.title}: {job.note}"
     share = f"{100 * job.fraction:.0f} %"
@@ -87,7 +87,7 @@ def _draw_job(editor: Editor, rect: Rect, right: float) -> float:
     x = right - theme.pt(16) - side
     imgui.set_cursor_pos(ImVec2(x, theme.pt(2)))
     if icon_button(Icon.CLOSE, "cancel", t("Cancel the job"), None, side / theme.scale):
-        (editor.jobs if isinstance(job, Job) else editor.chores).cancel(job.kind)
+        executor.cancel(job.kind)
     x -= imgui.calc_text_size("100 %").x + gap
     imgui.set_cursor_pos(ImVec2(x, _line_y(rect)))
     imgui.text_unformatted(share)

@@ -16,10 +16,10 @@ from imgui_bundle import ImVec2, imgui
 from objectmorpher_core.document.model import Document
 
 from ...canvas.derived import import_core
+from ...canvas.shares import count_changed
 from ...cli.options import WindowOptions
 from ...commands import run
 from ...editor.editor import Editor
-from ...editor.filing import Filing
 from ...editor.settings import read_settings, settings_path, write_settings
 from ...editor.shortcuts import Shortcuts
 from ...render.renderer import Renderer
@@ -105,7 +105,7 @@ class Window:
         self._renderer = Renderer(options.renderer)
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
-        self.editor.filing = Filing(self.editor, options.fov, options.seed)
+        self.editor.filing.fov, self.editor.filing.seed = options.fov, options.seed
         self._saved_settings = settings
         self._language = ENGLISH
         self._look: tuple[str, float] = ("", 0.0)
@@ -122,7 +122,7 @@ class Window:
         self._is_quiet = False  # nothing has happened for a moment
         self._frame_log = FrameLog(options.frame_log) if options.frame_log else None
         if options.frames is not None:
-            self.editor.derived.layers.frame_time = math.inf
+            self.editor.cache.frame_time = math.inf
         take_drop: Any = self._take_drop
         glfw.set_drop_callback(self._handle, take_drop)
 
@@ -192,7 +192,7 @@ class Window:
         """Sleeps until an event; how many frames to draw for it."""
         editor = self.editor
         patience = BUSY if editor.jobs.current is not None else IDLE
-        is_due = editor.derived.layers.is_waiting or editor.candidates.is_due
+        is_due = editor.cache.is_waiting or editor.candidates.is_due
         if self._dialogs.is_open or is_due:
             patience = SOON
         before = time.monotonic()
@@ -386,7 +386,7 @@ class Title:
         """Once a frame: the new one, or None; `is_quiet`: nothing has happened for a moment."""
         if is_quiet and editor.preview is None and editor.committed is not self._changed[0]:
             document = editor.committed
-            count = 0 if document is None else editor.derived.painter.count_changed(document)
+            count = 0 if document is None else count_changed(document, editor.cache)
             self._changed = (document, count)
         before, self._text = self._text, self._text_for(editor)
         return self._text if self._text != before else None

@@ -71,7 +71,7 @@ def _drag(document: Document, k: int, puppet: Puppet, start: float) -> list[Even
     item = document.objects[k]
     if not item.is_moved or item.matte is None:
         return []
-    texture = object_texture(item.matte)
+    texture = object_texture(item.matte, item.lifted)
     camera = puppet.camera
     zoom = min(1.0, VIEW / max(camera.width, camera.height))
     size = (max(1, round(camera.width * zoom)), max(1, round(camera.height * zoom)))

@@ -180,7 +180,7 @@ def _picked(puppet: Puppet, document: Document, guidance: Guidance) -> F64:
     """(n, 3) the points of the surface that are taken hold of, object frame."""
     matte = document.objects[0].matte
     assert matte is not None
-    texture = object_texture(matte)
+    texture = object_texture(matte, document.objects[0].lifted)
     found = []
     for x, y in guidance.at:
         point = puppet.pick((float(x), float(y)), None, Placement(), texture)

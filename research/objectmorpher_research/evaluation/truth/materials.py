@@ -1,7 +1,7 @@
 """What the solids look like, and the photos that they stand before.
 
 The surface photos are ones that the shape network's training has not seen; of the backgrounds it
-has seen pieces, but for the flower (docs/evaluation.md).
+has seen pieces, but for the flower (docs/evaluation-figures.md).
 """
 
 from __future__ import annotations

@@ -221,7 +221,7 @@ def drawn_in(two: Two, motion: F64, camera: Camera) -> Picture3D:
     """The object out of B, moved from B's world to A's (4, 4), as A's `camera` sees it."""
     rest = RestSplats(two.lifted, two.b.camera)
     splats = PosedSplats(rest, None, motion)
-    return tiles.render(splats, object_texture(two.b.matte), camera, two.b.camera)
+    return tiles.render(splats, object_texture(two.b.matte, two.lifted), camera, two.b.camera)
 
 
 def _check_area(area: dict[str, float], limits: Limits) -> None:

@@ -138,7 +138,7 @@ def test_every_backend_is_known_to_scripts():
 
     for name in refine.BACKENDS:
         if refine.missing(name) is not None:
-            with pytest.raises(ScriptError, match=f"--refine {name}: "):
+            with pytest.raises(ScriptError, match=f"refine {name}: "):
                 refuse_missing(EditScript(refine=name))
     with pytest.raises(ScriptError, match="there is no refiner 'paint'"):
         refuse_missing(EditScript(refine="paint"))

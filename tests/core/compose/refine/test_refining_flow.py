@@ -21,11 +21,10 @@ from objectmorpher.worker import job_functions
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose.composite import composite
-from objectmorpher_core.compose.refine import RefineError, klein
-from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
+from objectmorpher_core.compose.refine import RefineError, diffusion, klein
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
-from objectmorpher_core.models import device
+from objectmorpher_core.models import device, ledger
 from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.scripting.runner import Refining, coarse_edit
 from objectmorpher_core.scripting.script import script_from
@@ -42,7 +41,7 @@ def here(tmp_path_factory):
         patch.setenv("OBJECTMORPHER_CACHE", str(tmp_path_factory.mktemp("models")))
         patch.setenv(device.DEVICE, "cpu")
         patch.setattr(klein, "STEPS", 2)
-        patch.setattr(job_functions, "_refiners", {})
+        patch.setattr(diffusion, "AREA", 160 * 128)  # of the crop that is refined
         folder = tiny_pipelines.write_klein(tmp_path_factory.mktemp("klein") / "klein")
         models.use_folder("flux2-klein-4b", folder)
         yield
@@ -73,11 +72,9 @@ def test_the_job_refines_the_edit_and_the_export_shows_it():
 def test_the_next_one_finds_the_pipeline_open():
     bare = moved()
     first = job_functions.refine(coarse_edit(bare), Refining("klein"), silent)
-    (kept,) = job_functions._refiners.values()
-    assert isinstance(kept, DiffusionRefiner)
-    opened = kept._opened
+    opened = ledger.SHARED.opened("the refiner")
     other = job_functions.refine(coarse_edit(bare), Refining("klein", seed=1), silent)
-    assert job_functions._refiners == {"klein": kept} and kept._opened is opened
+    assert opened is not None and ledger.SHARED.opened("the refiner") is opened
     assert not np.array_equal(first.pixels, other.pixels)
 
 

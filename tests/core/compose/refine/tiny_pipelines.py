@@ -24,7 +24,7 @@ from transformers import (
 )
 from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
 
-from objectmorpher_core.compose.refine import klein, qwen
+from objectmorpher_core.compose.refine import diffusion, klein, qwen
 from objectmorpher_core.models import device
 
 SPECIAL = [
@@ -59,6 +59,9 @@ def make_small(patch: pytest.MonkeyPatch, side: int) -> None:
     patch.setenv(device.DEVICE, "cpu")
     patch.setattr(pipeline_qwenimage_edit_plus, "VAE_IMAGE_SIZE", side * side)
     patch.setattr(pipeline_qwenimage_edit_plus, "CONDITION_IMAGE_SIZE", 56 * 56)
+    patch.setattr(diffusion, "AREA", side * side)
+    for refiner in (qwen.QwenRefiner, klein.KleinRefiner):
+        patch.setattr(refiner, "work", dict.fromkeys(refiner.work, 1 << 20))
     patch.setattr(qwen, "STEPS", 2)
     patch.setattr(klein, "STEPS", 2)
 

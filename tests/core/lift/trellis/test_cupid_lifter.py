@@ -17,7 +17,7 @@ from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.registration.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
 from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
-from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter, pose_seen
+from objectmorpher_core.lift.trellis.cupid_lifter import pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.latent import looked_up
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
@@ -153,7 +153,6 @@ def test_instead_of_a_pose_that_does_not_fit_another_is_looked_for():
 
 def test_a_mask_becomes_a_registered_object(folders, subject, monkeypatch):
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(folders.model.parents[1]))
-    monkeypatch.setattr(CupidLifter, "_kept", {})
     _, lifted = lift_mask(*subject, "cupid")
     assert lifted.backend == "cupid"
     assert (lifted.world_points(lifted.body.means)[:, 2] > 0).all()

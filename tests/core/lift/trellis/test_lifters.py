@@ -13,8 +13,6 @@ pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 from objectmorpher_core import lift
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import SPLATTINGS, LiftSettings
-from objectmorpher_core.lift.trellis.cupid_lifter import CupidLifter
-from objectmorpher_core.lift.trellis.lifter import TrellisLifter
 from objectmorpher_core.lift.workers import file as worker_file
 from objectmorpher_core.models import device
 from objectmorpher_core.segment.matting.matte import build_matte
@@ -41,8 +39,6 @@ def lifter(request, tmp_path_factory):
         patch.setenv("OBJECTMORPHER_CACHE", str(root.parent))
         patch.setenv(worker_file.FOLDER, str(WORKERS))
         patch.setenv(device.DEVICE, "cpu")
-        for kind in (TrellisLifter, CupidLifter):
-            patch.setattr(kind, "_kept", {})
         yield lift.load(name)
 
 

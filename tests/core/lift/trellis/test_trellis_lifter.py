@@ -18,14 +18,16 @@ from safetensors.torch import load_file, save_file
 from objectmorpher_core import lift
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.trellis import configs
+from objectmorpher_core.lift.trellis import configs, lifter
 from objectmorpher_core.lift.trellis import generator as generators
 from objectmorpher_core.lift.trellis.generator import Generator, unseen
-from objectmorpher_core.lift.trellis.lifter import TrellisLifter, within_memory
+from objectmorpher_core.lift.trellis.lifter import TrellisLifter
 from objectmorpher_core.lift.trellis.parts import build
+from objectmorpher_core.models import ledger
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
+from tests.core.models.small_networks import Ways
 
 F32 = 1e-5
 ARRAYS = ("means", "quats", "scales", "opacities", "colors")
@@ -44,7 +46,6 @@ def generator(folders):
 @pytest.fixture
 def installed(folders, monkeypatch):
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(folders.model.parents[1]))
-    monkeypatch.setattr(TrellisLifter, "_kept", {})
 
 
 def same(one, other):
@@ -103,7 +104,7 @@ def test_lower_precision_makes_nearly_the_same(folders, picture, number):
 def test_memory_is_given_back_unless_it_is_to_be_kept(folders, generator, picture):
     generator.make(picture)
     assert not generator._parts
-    keeping = Generator(folders, replace(tiny_trellis.CPU, tier="whole"))
+    keeping = Generator(folders, replace(tiny_trellis.CPU, way="whole", kept=1))
     assert same(keeping.make(picture).gaussians, generator.make(picture).gaussians)
     assert len(keeping._parts) == 5
 
@@ -148,22 +149,24 @@ def test_too_many_cells_are_cut_to_the_surest(monkeypatch):
         generators.occupied(-logits.abs() - 1)
 
 
-def test_out_of_memory_falls_back_to_one_part_at_a_time(folders, picture):
-    generator = Generator(folders, replace(tiny_trellis.CPU, tier="whole"), tiny_trellis.CPU)
+def test_out_of_memory_falls_back_to_one_part_at_a_time(installed, picture, monkeypatch):
+    whole = replace(tiny_trellis.CPU, way="whole", kept=1)
+    monkeypatch.setattr(lifter, "need", lambda: Ways(whole, tiny_trellis.CPU))
 
-    def make():
+    def make(generator):
         if generator.plan.keeps:
             raise torch.OutOfMemoryError("no")
         return generator.make(picture)
 
-    assert len(within_memory(generator, make).gaussians)
+    assert len(TrellisLifter().make(make).gaussians)
+    generator = ledger.SHARED.opened("TRELLIS")
     assert generator.plan == tiny_trellis.CPU and not generator._parts
 
-    def never():
+    def never(_):
         raise torch.OutOfMemoryError("no")
 
     with pytest.raises(LiftError, match=r"not enough memory on the CPU.*as a relief"):
-        within_memory(generator, never)
+        TrellisLifter().make(never)
 
 
 def test_a_mask_becomes_a_registered_object_with_the_photo_on_it(installed, subject):

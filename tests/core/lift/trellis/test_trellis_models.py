@@ -15,7 +15,7 @@ pytest.importorskip("transformers", reason="TRELLIS needs transformers")
 from objectmorpher_core import lift, models
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.trellis import configs, lifter
-from objectmorpher_core.models import device
+from objectmorpher_core.models import device, ledger
 from tests.core.lift.trellis import tiny_trellis
 from tests.core.models.local_hub import serving
 
@@ -113,13 +113,16 @@ def test_a_gpu_that_is_not_there_is_one_sentence(monkeypatch):
         pytest.skip("this machine has one")
     monkeypatch.setenv(device.DEVICE, "cuda")
     with pytest.raises(LiftError, match="'cuda'; this machine has"):
-        lifter.tiers()
+        lifter.TrellisLifter().make(lambda generator: generator.make())
 
 
 def test_a_gpu_with_little_room_gets_a_part_at_a_time_and_none_is_an_hour_s_work(monkeypatch):
     monkeypatch.setattr(device, "devices", lambda: ("mps", "cpu"))
-    for free, expected in ((16, ["whole", "offload"]), (4, ["offload"]), (1, ["cpu"])):
+    model = ledger.Model("TRELLIS", 0, lifter.need(), lambda plan: plan)
+    for free, expected in ((16, "whole"), (4, "parts")):
         monkeypatch.setattr(device, "free_memory", lambda _, free=free: free << 30)
-        found = lifter.tiers()
-        assert [plan.tier for plan in found] == expected
-        assert found[0].number == ("float32" if free == 1 else "float16")  # as published
+        plan = ledger.SHARED.plan(model)
+        assert (plan.way, plan.number) == (expected, "float16")  # as published
+    monkeypatch.setattr(device, "free_memory", lambda _: 1 << 30)
+    with pytest.raises(models.ModelError, match=r"on the GPU .MPS.* a part at a time for TRELLIS"):
+        ledger.SHARED.plan(model)

@@ -11,11 +11,11 @@ from transformers import Dinov2WithRegistersConfig, Dinov2WithRegistersModel
 
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.parts import build, save_part
-from objectmorpher_core.models.device import Plan
+from objectmorpher_core.models.plans import Plan
 
 WIDTH = 24  # channels of the picture's tokens
 LATENTS, CELLS = 4, 16  # resolution of both stages
-CPU = Plan("cpu", "float32", "cpu", "a test")
+CPU = Plan("cpu", "float32", "cpu")
 SAMPLER = {
     "name": "FlowEulerGuidanceIntervalSampler",
     "args": {"sigma_min": 1e-5},

@@ -1,0 +1,106 @@
+"""Where the changed pixels of an edit come from, counted on a small picture of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from objectmorpher_core.base.arrays import F32
+from objectmorpher_core.document.model import Document
+
+from ..editor.view import View
+from .blend import CELL
+from .frame import Cache, Frame, build_frame
+from .layer import Layer
+
+SMALL = 320  # px, longer side of the picture on which shares are counted
+LEAST = 0.02  # of a pixel that something new covers: with less it counts as unchanged
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Where the changed pixels come from; these sum to 1, or are 0 where nothing changed."""
+
+    from_photo: float = 0.0
+    from_lifter: float = 0.0
+    from_inpainter: float = 0.0
+    from_refiner: float = 0.0
+    changed: float = 0.0  # of all pixels of the photo
+
+
+def shares(document: Document, cache: Cache) -> Shares:
+    """Where the changed pixels come from; remembered.
+
+    The export counts at the photo's own size and reports the exact figures.
+    """
+    return cache.counted(lambda: _count(document, cache), document)
+
+
+def count_changed(document: Document, cache: Cache) -> int:
+    """About how many pixels of the photo the edit changes: two figures of the number."""
+    if not any(o.is_moved for o in document.objects):
+        return 0
+    width, height = document.photo.size
+    count = round(shares(document, cache).changed * width * height)
+    return round(count, 2 - len(str(count)))
+
+
+def _count(document: Document, cache: Cache) -> Shares:
+    view = _small_view(document)
+    frame = build_frame(document, view, cache, renderer="gl")
+    assert frame.blend is not None, "the composite has one"
+    across, down = frame.blend.shape[1] * CELL, frame.blend.shape[0] * CELL
+    edited = cv2.resize(frame.blend, (across, down))[: view.height, : view.width]
+    hole, size = cache.derived.invented_background(document), (view.width, view.height)
+    inpainted = np.zeros(size[::-1], np.float32)
+    if hole is not None:
+        cv2.resize(hole.astype(np.float32), size, inpainted, interpolation=cv2.INTER_AREA)
+    lifted, inpainted, through = _through_objects(document, frame, view, inpainted)
+    is_changed = (edited > 0) & (through < 1 - LEAST)
+    if not is_changed.any():
+        return Shares()
+    by_lifter = float((lifted * edited)[is_changed].mean())
+    by_inpainter = float((inpainted * edited)[is_changed].mean())
+    by_refiner = float(_alpha(frame.refined, view)[is_changed].mean())
+    rest = 1 - by_refiner  # as the composite's figures: a refinement lies over all the others
+    by_lifter, by_inpainter = rest * by_lifter, rest * by_inpainter
+    from_photo = rest - by_lifter - by_inpainter
+    return Shares(from_photo, by_lifter, by_inpainter, by_refiner, float(is_changed.mean()))
+
+
+def _small_view(document: Document) -> View:
+    width, height = document.photo.size
+    view = View(zoom=min(SMALL / max(width, height), 1.0))
+    view.width, view.height = round(width * view.zoom), round(height * view.zoom)
+    return view
+
+
+def _through_objects(
+    document: Document, frame: Frame, view: View, inpainted: F32
+) -> tuple[F32, F32, F32]:
+    """What each pixel shows of what a lifter invented, of `inpainted`, and of what is unchanged."""
+    from objectmorpher_core.raster import tiles
+
+    camera = document.photo.camera
+    lifted, through_all = np.zeros_like(inpainted), 1 - inpainted
+    for own in frame.objects:
+        if isinstance(own, Layer):
+            through, invented = 1 - _alpha((own,), view), np.float32(0)
+        else:
+            picture = tiles.render(own.draft, own.shape.texture, view.camera(camera), camera)
+            through = 1 - np.minimum(picture.alpha, 1)
+            invented = np.maximum(picture.alpha - picture.from_photo, 0)
+        lifted = through * lifted + invented
+        inpainted, through_all = through * inpainted, through * through_all
+    return lifted, inpainted, through_all
+
+
+def _alpha(layers: tuple[Layer, ...], view: View) -> F32:
+    """(h, w) of pictures that lie over the canvas, px for px."""
+    alpha = np.zeros((view.height, view.width), np.float32)
+    for layer in layers:
+        x0, y0, x1, y1 = (int(v) for v in layer.box)
+        alpha[y0:y1, x0:x1] = layer.rgba[..., 3] / np.float32(255)
+    return alpha

@@ -1,0 +1,132 @@
+"""What the editor holds: the document and its history, what is shown, what runs, what was said.
+
+The intents (`intents/`) take this as what they work on, and besides it only the intents that they
+use; the editor (`editor.py`) puts them together. No GL, no ImGui, no window in here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from objectmorpher_core.base.arrays import Mask
+from objectmorpher_core.document.model import Document, EditObject
+
+from ..canvas.derived import Derived
+from ..canvas.frame import Cache
+from ..system.texts import sentence, t
+from ..tools.pointer import Hand, Pointer
+from ..worker.job_error import JobError
+from ..worker.job_functions import WARM
+from ..worker.jobs import Jobs
+from ..worker.threads import Chores
+from .feedback import Action, Hover, Message
+from .history import History
+from .settings import Settings
+from .view import View
+
+
+class EditorState:
+    """What everything that the user intends reads and changes."""
+
+    def __init__(self, settings: Settings, wake: Callable[[], None] = lambda: None) -> None:
+        """`wake` is called from another thread when a job has something to deliver."""
+        self.settings = settings
+        self.view = View()
+        self.hand = Hand()
+        self.jobs = Jobs(WARM, wake)
+        self.chores = Chores(wake)
+        self.cache = Cache()
+        self.history: History | None = None
+        self.preview: Document | None = None  # of the stroke in progress
+        self.path: Path | None = None  # the session's file
+        self.source: Path | None = None  # the photo's file
+        self.current = 0  # index of the object that the tools change
+        self.hover = Hover()
+        self.pointer: Pointer | None = None  # where it is now, on the canvas
+        self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
+        self.message: Message | None = None
+        self.is_over = False  # the window closes
+
+    # What there is
+
+    @property
+    def document(self) -> Document | None:
+        if self.preview is not None:
+            return self.preview
+        return self.committed
+
+    @property
+    def derived(self) -> Derived:
+        """Shapes, posed Gaussians and places of the document's objects."""
+        return self.cache.derived
+
+    @property
+    def committed(self) -> Document | None:
+        """The document without the stroke in progress."""
+        return self.history.document if self.history else None
+
+    @property
+    def object(self) -> EditObject | None:
+        """The object that the tools change, if it exists already."""
+        document = self.document
+        if document is None or self.current >= len(document.objects):
+            return None
+        return document.objects[self.current]
+
+    @property
+    def mask(self) -> Mask | None:
+        return self.object.mask if self.object else None
+
+    @property
+    def is_lifted(self) -> bool:
+        return self.object is not None and self.object.lifted is not None
+
+    @property
+    def photo_size(self) -> tuple[int, int] | None:
+        return self.document.photo.size if self.document else None
+
+    @property
+    def is_saved(self) -> bool:
+        return self.history is None or self.history.is_saved
+
+    def is_on_photo(self, canvas_xy: np.ndarray) -> bool:
+        if self.photo_size is None:
+            return False
+        xy = self.view.image_from_canvas(canvas_xy)
+        return bool((xy >= 0).all() and (xy < self.photo_size).all())
+
+    # Saying things
+
+    def say(self, text: str, action: Action | None = None) -> None:
+        self.message = Message(text, action=action)
+
+    def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
+        """An error: one sentence, its first letter a capital."""
+        self.message = Message(sentence(text), is_error=True, details=details, action=action)
+
+    def complain_of(self, error: JobError) -> None:
+        """A job that failed; where another try may help there is a button for it."""
+        retry = Action(t("Retry"), error.retry) if error.retry else None
+        self.complain(error.sentence, error.trace, retry)
+
+    # Steps
+
+    def forget_document(self) -> None:
+        """No document is open."""
+        self.history = self.preview = self.path = self.source = self.message = None
+        self.hover = Hover()
+
+    def apply(self, label: str, document: Document) -> None:
+        """`document` is the next step."""
+        assert self.history is not None
+        self.preview = None
+        self.history.apply(label, document)
+
+    def commit(self, label: str) -> None:
+        """The preview becomes a step; without a label it is dropped."""
+        preview, self.preview = self.preview, None
+        if preview is not None and label:
+            self.apply(label, preview)

@@ -1,0 +1,111 @@
+"""The system's clipboard: a photo out of it, a picture into it.
+
+On X11 by `x11.py`, on Wayland by wl-clipboard (where that is not installed, by XWayland's), on
+Windows and macOS by what each offers.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from . import x11
+from .desktops import copy_on_mac, copy_on_windows, grabbed
+
+PATIENCE = 30.0  # s that reading may take
+BEGIN = 10.0  # s until the clipboard is ours
+PNG, FILES = "image/png", "text/uri-list"
+
+
+class ClipboardError(ValueError):
+    """There is no photo to paste, or nothing can be copied here; one sentence."""
+
+
+@dataclass(frozen=True)
+class Pasted:
+    """What was in the clipboard: the bytes of a picture file, or where one is."""
+
+    name: str
+    data: bytes = b""
+    path: Path | None = None
+
+
+def paste() -> Pasted:
+    """Return the photo in the clipboard, or the first of the files in it. Raises ClipboardError."""
+    found = grabbed() if sys.platform in ("win32", "darwin") else _offered()
+    if found is None:
+        raise ClipboardError("there is no photo in the clipboard")
+    kind, data = found
+    if kind != FILES:
+        return Pasted(f"pasted.{kind.partition('/')[2].replace('jpeg', 'jpg')}", data)
+    for line in data.decode("utf-8", "replace").splitlines():
+        parts = urlsplit(line.strip()) if not line.startswith("#") else None
+        if parts is not None and parts.scheme == "file" and "\0" not in unquote(parts.path):
+            path = Path(unquote(parts.path))
+            return Pasted(path.name, path=path)
+    raise ClipboardError("there is no photo in the clipboard")
+
+
+def copy(png: bytes) -> None:
+    """Put a picture into the clipboard, as a PNG file. Raises ClipboardError."""
+    try:
+        if sys.platform == "win32":
+            copy_on_windows(png)
+        elif sys.platform == "darwin":
+            copy_on_mac(png)
+        else:
+            _offer(png)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise ClipboardError(f"the picture cannot be copied: {error}") from error
+
+
+def _offered() -> tuple[str, bytes] | None:
+    """Kind and bytes of what another program offers on Linux."""
+    try:
+        if _has_wayland_tools():
+            return _from_wayland()
+        done = subprocess.run(_x11("read"), capture_output=True, timeout=PATIENCE)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ClipboardError("the clipboard cannot be read: nothing answers") from error
+    kind, _, data = done.stdout.partition(b"\n")
+    return (kind.decode("ascii", "replace"), data) if done.returncode == 0 and data else None
+
+
+def _from_wayland() -> tuple[str, bytes] | None:
+    listed = subprocess.run(["wl-paste", "-l"], capture_output=True, timeout=PATIENCE)
+    offered = listed.stdout.decode(errors="replace").split()
+    for kind in x11.WANTED:
+        if kind in offered:
+            command = ["wl-paste", "-n", "-t", kind]
+            data = subprocess.run(command, capture_output=True, timeout=PATIENCE).stdout
+            return (kind, data) if data else None
+    return None
+
+
+def _offer(png: bytes) -> None:
+    """Leave a process behind that offers the picture, also when this program has ended."""
+    if _has_wayland_tools():
+        subprocess.run(["wl-copy", "-t", PNG], input=png, timeout=BEGIN, check=True)
+        return
+    process = subprocess.Popen(
+        _x11("own", PNG), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    assert process.stdin is not None and process.stdout is not None
+    process.stdin.write(png)
+    process.stdin.close()
+    if process.stdout.readline() != b"owned\n":
+        raise OSError("there is no X11 display and no wl-clipboard")
+
+
+def _x11(*arguments: str) -> list[str]:
+    return [sys.executable, "-P", x11.__file__, *arguments]
+
+
+def _has_wayland_tools() -> bool:
+    return bool(os.environ.get("WAYLAND_DISPLAY")) and shutil.which("wl-copy") is not None

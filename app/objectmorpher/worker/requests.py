@@ -1,0 +1,129 @@
+"""What is asked to be done beside the window, and what is common to those who do it.
+
+The worker process (`jobs.py`) computes, one request after another. Threads (`threads.py`) do what
+mostly waits for a disk or a network, or what must not wait behind a long computation. Of one kind
+only the newest request counts.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .job_error import JobError
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class Request:
+    """A request, and how far it is."""
+
+    title: str  # "Lifting the object"
+    kind: str
+    function: Callable[..., Any]  # called with the arguments and a keyword `progress`
+    arguments: tuple[Any, ...]
+    done: Callable[[Any], None]
+    failed: Callable[[JobError], None]
+    cancelled: Callable[[], None]
+    replaced: Callable[[], None]
+    is_quiet: bool = False
+    is_spare: bool = False
+    number: int = 0
+    fraction: float = 0.0
+    note: str = ""
+    started: float = 0.0  # s, monotonic
+    stop_asked: float | None = None  # s, monotonic
+    ends_at: float = math.inf  # s, monotonic; not stopped by then, its process is ended
+
+
+class Executor(ABC):
+    """Does requests beside the window; answers are delivered on the main thread by `poll`."""
+
+    _count = 0
+
+    def start(
+        self,
+        title: str,
+        function: Callable[..., Any],
+        *arguments: Any,
+        done: Callable[[Any], None],
+        failed: Callable[[JobError], None],
+        cancelled: Callable[[], None] = lambda: None,
+        replaced: Callable[[], None] = lambda: None,
+        kind: str = "",
+        is_quiet: bool = False,
+        is_spare: bool = False,
+    ) -> None:
+        """Runs `function(*arguments, progress=...)`.
+
+        A request of the same `kind` that waits or runs is replaced: its answer never comes, and
+        `replaced` is all that it is told.
+        A quiet one is not the user's: the status line does not show it. A spare one besides gives
+        way: any other request ends it.
+        """
+        request = Request(
+            title, kind or function.__name__, function, arguments, done, failed, cancelled,
+            replaced, is_quiet, is_spare,
+        )  # fmt: skip
+        self._begin(request)
+
+    @abstractmethod
+    def _begin(self, request: Request) -> None:
+        """Takes up a request, now or after others."""
+
+    @property
+    @abstractmethod
+    def shown(self) -> Request | None:
+        """What runs and is the user's: the status line shows it."""
+
+    @property
+    @abstractmethod
+    def is_idle(self) -> bool:
+        """Whether nothing waits or runs."""
+
+    @abstractmethod
+    def is_busy(self, kind: str) -> bool:
+        """Whether a request of this kind waits or runs."""
+
+    @abstractmethod
+    def cancel(self, kind: str | None = None) -> None:
+        """Stops the running and waiting requests of a kind, or all."""
+
+    @abstractmethod
+    def poll(self) -> bool:
+        """Delivers answers; once a frame, on the main thread. Whether anything changed."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """The program ends."""
+
+    def _numbered(self, request: Request) -> Request:
+        """Answers are told apart by their numbers."""
+        self._count += 1
+        request.number, request.started = self._count, time.monotonic()
+        return request
+
+    def _again(self, request: Request) -> None:
+        """The request that failed, once more."""
+        anew = {"fraction": 0.0, "note": "", "stop_asked": None, "ends_at": math.inf}
+        self._begin(replace(request, **anew))
+
+    def _accept(self, request: Request, value: Any) -> None:
+        """Hands the answer over; one that cannot be used is a failure, not the window's end."""
+        level = logging.DEBUG if request.is_quiet else logging.INFO
+        log.log(level, "%s took %.2f s", request.title, time.monotonic() - request.started)
+        try:
+            request.done(value)
+        except Exception as error:
+            log.exception("The answer of %s cannot be used", request.title)
+            request.failed(JobError.of(error, request.title))
+
+    def _fail(self, request: Request, error: JobError) -> None:
+        """Says so, and offers another try where that may help."""
+        request.failed(error.retried_by(lambda: self._again(request)))

@@ -1,0 +1,283 @@
+"""Pictures of the sides that a photo does not show, by patch synthesis.
+
+An object that is turned far to a side is seen as if its surface were unfolded: what the photo
+shows and what it does not lie side by side, both hardly foreshortened. There the hidden part is a
+hole in a picture, and is filled with patches from beside it, or mirrored ones, along its straight
+edges, as a background is (`compose.plate`). Each Gaussian that the photo does not show, or shows
+from nearly edge on, carries its piece of the picture that faces it most, by the same map that
+carries the photo (DESIGN section 3): it is as sharp, and stays the same however the object turns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import cv2
+import numpy as np
+
+from ...base.arrays import F32, F64, U8, Mask
+from ...base.camera import Camera
+from ...base.progress import silent
+from ...base.threads import in_threads
+from ...compose.light.lighting import estimate_light, object_texture
+from ...compose.plate.completion import complete, shrunk, smooth
+from ...compose.plate.patch_detail import with_detail
+from ...compose.plate.sources import Guide
+from ...compose.plate.structure_lines import find_lines
+from ...document.model import LiftedObject, Matte, Placement, Sides
+from ...raster import tiles
+from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
+from ...raster.rules import RULES
+from ...raster.texture import TextureLevels
+from .colours import fill_in
+
+AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
+TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
+FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
+FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
+LONGEST = 480.0  # px, longer side of the object in a picture
+SEARCH = 20_000  # px of the small picture in which patches are looked for
+LEAST = 40  # px of a hole, or of what is around it
+SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
+EDGE = 2  # px of what is known beside a hole that are filled anew: they hold what is behind
+RIM = 4  # small px of the object's edge that are no source, for what is beyond is in their patches
+STRANGE = 20_000.0  # squared levels that they cost
+FAR = 1_500.0  # squared levels that a source costs ...
+BESIDE = 3.0  # ... that is as many times as far from the hole as the hole is deep
+ELSEWHERE = 300.0  # squared levels that one in the photo costs
+KEPT = 0.85  # share of the coarse colours of a side that stays
+COARSE = 5.0  # small px, of what is coarse
+BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
+GAP = 32  # px between the matte and the pictures, and between them
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The object turned far to a side."""
+
+    motion: F64  # (4, 4) world from world
+    camera: Camera  # whose picture holds the object
+    places: F64  # (N, 3) world, after the turn
+    cosines: F64  # (N,) of the normals with the way to the camera
+
+    @staticmethod
+    def of(rest: RestSplats, camera: Camera, turn: tuple[float, float, float]) -> _View:
+        lifted = rest.lifted
+        motion = Placement(turn=turn).matrix(lifted, camera)
+        places = lifted.world_points(rest.means) @ motion[:3, :3].T + motion[:3, 3]
+        facing = -((rest.normals @ motion[:3, :3].T) * places).sum(1)
+        cosines = facing / np.linalg.norm(places, axis=1)
+        xy = camera.project(places)
+        low, high = xy.min(0), xy.max(0)
+        scale = min(1.0, LONGEST / max(float((high - low).max()), 1.0))
+        left, top = np.floor(scale * low) - 2
+        width, height = np.ceil(scale * (high - low)).astype(int) + 4
+        own = Camera(
+            scale * camera.focal, scale * camera.cx - left, scale * camera.cy - top,
+            int(width), int(height),
+        )  # fmt: skip
+        return _View(motion, own, places, cosines)
+
+    @property
+    def xy(self) -> F64:
+        """(N, 2) px of the picture."""
+        return np.asarray(self.camera.project(self.places), np.float64)
+
+    def drawn(self, rest: RestSplats, texture: TextureLevels, photo: Camera) -> _Picture:
+        """What the photo tells of this view; `rest` has the colours of what it does not."""
+        lifted = rest.lifted
+        carried = np.where(self.is_aside(rest), 0.0, lifted.texture.visibility)
+        own = replace(
+            lifted, splatting="edged solid",
+            texture=replace(lifted.texture, visibility=carried.astype(np.float32)),
+        )  # fmt: skip
+        splats = PosedSplats(RestSplats(own, photo), None, self.motion)
+        picture = tiles.render(splats, texture, self.camera, photo)
+        brighter = tiles.render(splats.brightened(), texture, self.camera, photo)
+        invented = (brighter.color - picture.color).mean(-1)  # beyond the frame nothing is, too
+        straight = picture.color / np.maximum(picture.alpha, 1e-6)[..., None]
+        is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
+        return _Picture(straight.clip(0, 1), picture.alpha > 0.5, is_known, picture.depth)
+
+    def is_aside(self, rest: RestSplats) -> Mask:
+        """(N,) which Gaussians the photo does not show well enough for this view."""
+        return rest.cosines < RULES.look_aside * self.cosines
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    colors: F32  # (h, w, 3) straight, in [0, 1]; coarse where nothing is known
+    is_object: Mask  # (h, w)
+    is_known: Mask  # (h, w)
+    depth: F32  # (h, w) world units
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """A view of Gaussians that show an invented picture of it."""
+
+    view: _View
+    index: np.ndarray  # (n,) of the Gaussians
+    picture: _Picture
+    is_wanted: Mask  # (h, w) where they are
+
+    def beside(self, front: _Picture) -> _Side:
+        """The same with what the photo shows to its right: there is the texture unforeshortened."""
+        own = self.picture
+        height, width = max(len(own.depth), len(front.depth)), front.depth.shape[1]
+        below = height - len(own.depth), height - len(front.depth)
+
+        def joined(name: str) -> np.ndarray:
+            one, other = (
+                np.pad(field, [(0, more), (0, 0), (0, 0)][: field.ndim])
+                for field, more in zip((getattr(own, name), getattr(front, name)), below)
+            )
+            return np.concatenate([one, other], axis=1)
+
+        picture = _Picture(*(joined(f.name) for f in fields(_Picture)))
+        return replace(
+            self, picture=picture, is_wanted=np.pad(self.is_wanted, ((0, below[0]), (0, width)))
+        )
+
+
+def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
+    """`lifted` with pictures of what the photo's `camera` does not see of it."""
+    rest = RestSplats(replace(lifted, sides=None), camera)
+    texture = object_texture(matte, None)
+    lit = _lit(rest, matte, camera)
+    views = [_View.of(rest, camera, turn) for turn in TURNS]
+    best = np.argmax([view.cosines for view in views], axis=0)
+    is_side = lifted.is_body & (rest.cosines > FARTHEST)
+    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, texture, camera)
+    sides: list[_Side] = []
+    for k, view in enumerate(views):
+        wanted = (best == k) & (view.cosines > FACING) & view.is_aside(rest) & is_side
+        if wanted.sum() >= 3:
+            sides.append(_side(view, np.flatnonzero(wanted), lit, texture, camera))
+    filled: list[U8 | None] = [None] * len(sides)
+
+    def fill(first: int, last: int) -> None:
+        for k in range(first, last):
+            filled[k] = _filled(sides[k], front, seed + k)
+
+    in_threads(fill, len(sides), parts=len(sides))
+    return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
+
+
+def _carried(
+    lifted: LiftedObject, sides: list[_Side], filled: list[U8 | None], corner: tuple[int, int]
+) -> LiftedObject:
+    """`lifted` with its sides, whose `filled` pictures lie in a row from `corner` on, photo px."""
+    count = len(lifted.gaussians)
+    at, slopes = np.zeros((count, 2)), np.zeros((count, 2, 3))
+    zoom, pictures = np.zeros(count), []
+    left, top = corner
+    for side, pixels in zip(sides, filled, strict=True):
+        if pixels is None:
+            continue
+        index, view = side.index, side.view
+        at[index] = view.xy[index] + [left, top]
+        jacobians = projection_jacobians(view.places[index], view.camera.focal)
+        slopes[index] = jacobians @ view.motion[:3, :3]
+        zoom[index] = view.camera.focal / view.places[index, 2]
+        pictures.append(pixels)
+        left += pixels.shape[1] + GAP
+    if not pictures:
+        return lifted
+    return replace(lifted, sides=Sides(_side_by_side(pictures), *corner, at, slopes, zoom))
+
+
+def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
+    """With the colours of what is not seen as bright as its normals want it, coarsely.
+
+    They are those of the front, which faces elsewhere.
+    """
+    lifted = rest.lifted
+    change = (rest.normals - rest.shown_normals) @ estimate_light(lifted, matte)
+    gain = np.exp(change.clip(-BRIGHTEST, BRIGHTEST))[:, None].astype(np.float32)
+    colors = (lifted.gaussians.colors * gain).clip(0, 1)
+    own = replace(lifted, gaussians=replace(lifted.gaussians, colors=colors))
+    return RestSplats(own, photo)
+
+
+def _side(
+    view: _View, wanted: np.ndarray, rest: RestSplats, texture: TextureLevels, photo: Camera
+) -> _Side:
+    """What a view shows of the `wanted` Gaussians."""
+    picture = view.drawn(rest, texture, photo)
+    xy = view.xy[wanted]
+    is_seen = _is_seen(xy, view.places[wanted, 2], picture, rest.spacing)
+    wanted, xy = wanted[is_seen], xy[is_seen]
+    there = np.ones(picture.is_known.shape, np.uint8)
+    column, row = np.floor(xy).astype(int).T
+    there[row, column] = 0
+    away = cv2.distanceTransform(there, cv2.DIST_L2, 5)
+    reach = 2 * rest.spacing * view.camera.focal / float(np.median(view.places[:, 2]))
+    return _Side(view, wanted, picture, away < reach + EDGE)
+
+
+def _is_seen(xy: F64, depth: F64, picture: _Picture, spacing: float) -> Mask:
+    """(n,) which places of a view, at px (n, 2), nothing stands before."""
+    height, width = picture.depth.shape
+    column, row = np.floor(xy).astype(int).T
+    shown = picture.depth[row.clip(0, height - 1), column.clip(0, width - 1)]
+    return depth < shown + 3 * spacing
+
+
+def _side_by_side(pictures: list[U8]) -> U8:
+    height = max(len(picture) for picture in pictures)
+    padded = [
+        np.pad(picture, ((0, height - len(picture)), (0, GAP), (0, 0)), mode="edge")
+        for picture in pictures
+    ]
+    return np.concatenate(padded, axis=1)
+
+
+def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
+    """(h, w, 3) the view of a side with what was not known of it where it is wanted.
+
+    From what it shows, and from the photo's own view. None where nothing is to be filled, or
+    nothing is known.
+    """
+    both = side.beside(front)
+    picture, wanted, width = both.picture, both.is_wanted, side.is_wanted.shape[1]
+    unknown = picture.is_object & ~picture.is_known
+    unknown = cv2.dilate(unknown.astype(np.uint8), np.ones((2 * EDGE + 1,) * 2, np.uint8)) > 0
+    known = picture.is_known & ~unknown
+    hole = picture.is_object & ~known & wanted
+    if hole.sum() < LEAST or known.sum() < LEAST:
+        return None
+    scale = min(1.0, (SEARCH / hole.size) ** 0.5)
+    size = max(8, round(hole.shape[1] * scale)), max(8, round(hole.shape[0] * scale))
+    around = fill_in(picture.colors, picture.is_object)
+    levels = 255 * np.where(picture.is_object[..., None], picture.colors, around)
+    # What nobody knows around the hole is one, too, as far as patches reach.
+    reach = int(np.ceil(2 * RIM / scale))
+    whole = cv2.dilate(hole.astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
+    whole &= ~known
+    small, share = shrunk(levels, (~whole).astype(np.float32), size)
+    guess = smooth(small, (share >= 0.5).astype(np.float32))
+    unlikely = _unlikely(known, share < 0.5, round(width * scale))
+    guide = Guide(unlikely, find_lines(guess, share < 0.5))
+    completion = complete(small, share, guide, seed, silent)
+    coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
+    change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
+    colors = np.where(completion.hole[..., None], completion.colors + KEPT * change, small)
+    crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
+    colors = np.clip(colors, 0, 255).astype(np.float32)
+    filled = with_detail(crop, whole, colors, completion.sources)
+    return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
+
+
+def _unlikely(known: Mask, hole: Mask, width: int) -> F32:
+    """(h, w) squared levels that a source costs beside a `hole` (h, w): not known, or far away.
+
+    What is beyond `width` is the photo's own view.
+    """
+    solid = cv2.resize(known.astype(np.float32), hole.shape[::-1], interpolation=cv2.INTER_AREA)
+    inner = cv2.erode((solid > 0.5).astype(np.uint8), np.ones((2 * RIM - 1,) * 2, np.uint8))
+    away = cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5)
+    deep = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5).max()
+    far = FAR * np.clip(away / (BESIDE * deep + RIM) - 1, 0, 1)
+    far[:, width:] = ELSEWHERE
+    return np.where(inner > 0, far, STRANGE).astype(np.float32)

@@ -1,0 +1,136 @@
+"""Manifests for winget and Homebrew, of installers that are built.
+
+    python packaging/store_files.py dist --address https://HOST/OWNER/NAME
+
+It writes three .yaml files (for a pull request to winget-pkgs) and `objectmorpher.rb` (a cask for a
+tap) into `dist`, with the hashes of the .msi and the .dmg files that are there. The address is the
+repository's, with assets at ADDRESS/releases/download/vVERSION/. Neither was submitted yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+ID = "ObjectMorpher.ObjectMorpher"
+SCHEMA = "1.6.0"  # of winget's manifests
+ARCHITECTURES = {"arm64": "arm", "x86_64": "intel"}  # of a .dmg's name: what Homebrew calls it
+
+VERSION_FILE = """\
+PackageIdentifier: {id}
+PackageVersion: {version}
+DefaultLocale: en-US
+ManifestType: version
+ManifestVersion: {schema}
+"""
+INSTALLER_FILE = """\
+PackageIdentifier: {id}
+PackageVersion: {version}
+InstallerType: wix
+Scope: user
+UpgradeBehavior: install
+Commands:
+- objectmorpher
+FileExtensions:
+- omorph
+Installers:
+- Architecture: x64
+  InstallerUrl: {url}
+  InstallerSha256: {sha256}
+ManifestType: installer
+ManifestVersion: {schema}
+"""
+LOCALE_FILE = """\
+PackageIdentifier: {id}
+PackageVersion: {version}
+PackageLocale: en-US
+Publisher: ObjectMorpher contributors
+PackageName: ObjectMorpher
+PackageUrl: {address}
+License: {licence}
+ShortDescription: {description}
+Tags:
+- photo-editing
+- 3d
+- gaussian-splatting
+ManifestType: defaultLocale
+ManifestVersion: {schema}
+"""
+CASK = """\
+cask "objectmorpher" do
+  arch {arches}
+
+  version "{version}"
+  sha256 {hashes}
+
+  url "{address}/releases/download/v#{{version}}/ObjectMorpher-#{{version}}-#{{arch}}.dmg"
+  name "ObjectMorpher"
+  desc "{description}"
+  homepage "{address}"
+
+  depends_on macos: ">= :monterey"
+
+  app "ObjectMorpher.app"
+  binary "#{{appdir}}/ObjectMorpher.app/Contents/MacOS/objectmorpher"
+
+  zap trash: [
+    "~/Library/Application Support/objectmorpher",
+    "~/Library/Caches/objectmorpher",
+  ]
+end
+"""
+
+
+def winget_files(msi: Path, address: str, project: dict[str, str]) -> dict[str, str]:
+    """The manifests of a .msi, by their file names. `project` is the table of pyproject.toml."""
+    known = {
+        "id": ID, "schema": SCHEMA, "version": project["version"], "address": address,
+        "licence": project["license"], "description": project["description"],
+        "url": f"{address}/releases/download/v{project['version']}/{msi.name}",
+        "sha256": sha256_of(msi).upper(),
+    }  # fmt: skip
+    files = {"": VERSION_FILE, ".installer": INSTALLER_FILE, ".locale.en-US": LOCALE_FILE}
+    return {f"{ID}{part}.yaml": text.format(**known) for part, text in files.items()}
+
+
+def cask(images: list[Path], address: str, project: dict[str, str]) -> str:
+    """The cask of one or two .dmg files, whose names end in their architectures."""
+    found = {re.sub(r".*-", "", image.stem): image for image in images}
+    known = {ARCHITECTURES[name]: (name, found[name]) for name in ARCHITECTURES if name in found}
+    hashes = [f'{brew}: "{sha256_of(image)}"' for brew, (_, image) in known.items()]
+    return CASK.format(
+        version=project["version"], address=address, description=project["description"],
+        arches=", ".join(f'{brew}: "{name}"' for brew, (name, _) in known.items()),
+        hashes=",\n         ".join(hashes) if len(hashes) > 1 else hashes[0].partition(" ")[2],
+    )  # fmt: skip
+
+
+def sha256_of(path: Path) -> str:
+    """Of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def main() -> int:
+    """Write what the installers in a folder allow; the exit code."""
+    parser = argparse.ArgumentParser(description="Manifests for winget and Homebrew.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--address", required=True, help="of the repository, without a slash")
+    options = parser.parse_args()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    address = options.address.rstrip("/")
+    for msi in sorted(options.folder.glob("*.msi"))[:1]:
+        for name, text in winget_files(msi, address, project).items():
+            (options.folder / name).write_text(text, "utf-8")
+    if images := sorted(options.folder.glob("*.dmg")):
+        (options.folder / "objectmorpher.rb").write_text(cask(images, address, project), "utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""A frame is built in one pass: each object is posed, lit and drawn once, in that order."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from types import FrameType
+
+import numpy as np
+import pytest
+
+from objectmorpher.canvas.derived import Derived
+from objectmorpher.canvas.frame import Cache, build_frame
+from objectmorpher.canvas.layer import FrameObject
+from objectmorpher.canvas.layers import Layers
+from objectmorpher.canvas.lights import Lights
+from objectmorpher.editor.view import Shown, View
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.settings import Shadow
+
+PARTS = {
+    Derived.posed.__code__: "posed", Lights.of.__code__: "lit", Layers._render.__code__: "drawn",
+}  # fmt: skip
+
+
+@pytest.fixture
+def pair(ball: Document) -> Document:
+    """The ball and a copy of it that were both moved, in a new light and with shadows."""
+    document = edits.duplicate(ball, 0)
+    for k, across in enumerate((-12.0, 30.0)):
+        document = edits.set_placement(document, k, Placement(move=(across, 6.0)))
+        document = edits.set_shadow(document, k, Shadow(strength=0.6))
+        document = edits.set_relight(edits.set_harmony(document, k, 1.0), k, 0.5)
+    return document
+
+
+def calls(document: Document, cache: Cache, shown: Shown) -> tuple[Counter[str], list[str]]:
+    """How often each part was computed for one frame, and in which order."""
+    order: list[str] = []
+
+    def note(frame: FrameType, event: str, argument: object) -> None:
+        if event == "call" and frame.f_code in PARTS:
+            order.append(PARTS[frame.f_code])
+
+    view = View()
+    view.resize((360, 280), 1.0, document.photo.size)
+    sys.setprofile(note)
+    try:
+        build_frame(document, view, cache, shown)
+    finally:
+        sys.setprofile(None)
+    return Counter(order), order
+
+
+@pytest.mark.parametrize("shown", [Shown.COMPOSITE, Shown.OBJECT, Shown.PROVENANCE])
+def test_each_part_of_an_object_is_computed_once(pair: Document, shown: Shown) -> None:
+    cache = Cache()
+    for document in (pair, edits.set_placement(pair, 0, Placement(move=(-14.0, 6.0)))):
+        counted, order = calls(document, cache, shown)
+        drawn = counted.pop("drawn")
+        assert counted == {"posed": 2, "lit": 2}
+        assert drawn == (2 if document is pair else 1), "what did not move keeps its picture"
+        firsts = [order.index(part) for part in ("posed", "lit", "drawn")]
+        assert firsts == sorted(firsts)
+
+
+def test_shadows_and_pictures_are_those_of_the_objects_of_the_frame(pair: Document) -> None:
+    cache, view = Cache(), View()
+    cache.frame_time = np.inf
+    view.resize((360, 280), 1.0, pair.photo.size)
+    frame = build_frame(pair, view, cache)
+    objects = [own for own in frame.objects if isinstance(own, FrameObject)]
+    assert [own.k for own in objects] == [0, 1]
+    assert all(own.layer is not None for own in objects)
+    assert frame.layers == tuple(own.layer for own in objects)
+    assert len(frame.shades) == sum(own.lit.shade is not None for own in objects) > 0
