@@ -264,7 +264,7 @@ def continue_script(
             how = Refining(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
-    return replace(edited, notes=notes)
+    return replace(edited, notes=(*notes, *runner.guesses(document, run.puppets)))
 
 
 class _Run:

@@ -6,7 +6,7 @@ around. Grounds are photographed or drawn, with marks, rugs, edges of another ma
 that stand there and throw shadows of their own, light that falls off, and shade of things outside
 the picture. In more than half of the scenes the thing throws no shadow at all, as one that was put
 into a photo by hand: whatever is dark beside it is something else. Even seeds are for choosing,
-odd ones are held out.
+odd ones are held out, and show other photos.
 """
 
 from __future__ import annotations
@@ -30,6 +30,13 @@ BARE = 0.4  # of the scenes on grounds that are known are without a shadow of th
 NOISE = 0.006
 DARK = 0.12  # of the ground's light, from which it counts as shaded
 LEAST_SHADE = 250  # px of it beside the thing: less is a shadow that one hardly sees
+# By halves: what is photographed on boards, whole photos, and grounds that are parts of photos.
+BOARDS = (("cat", "coffee", "pagoda"), ("dahlia", "rocket", "motorcycle", "helmet"))
+PHOTOS = (("coffee", "chelsea", "china"), ("astronaut", "rocket", "flower", "motorcycle"))
+GROUNDS = (
+    ("brick", "grass", "wood", "lawn", "roof", "fur", "coins"),
+    ("gravel", "leaves", "floor", "cloth", "moon"),
+)
 
 F64 = np.ndarray
 
@@ -48,9 +55,9 @@ class Part:
     def local(self, points: F64, is_way: bool = False) -> F64:
         """World points (n, 3) in its own frame, in which it reaches from -1 to 1."""
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        turn = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
-        shifted = points if is_way else points - np.array(self.middle)
-        return shifted @ turn.T / np.array(self.half)
+        x, y, z = (points if is_way else points - np.array(self.middle)).T
+        a, b, c = self.half
+        return np.stack([(cos * x + sin * z) / a, y / b, (cos * z - sin * x) / c], -1)
 
     def normal(self, at: F64) -> F64:
         """(n, 3) world, unit, at points of its own frame that lie on it."""
@@ -152,7 +159,7 @@ class Scene:
         return (self.dark > DARK) & ~near
 
 
-def things(rng: np.random.Generator) -> list[Part]:
+def things(rng: np.random.Generator, half: int) -> list[Part]:
     """The parts of a thing about 1 high, whose foot is on the ground at the origin."""
     colours = [tuple(rng.uniform(0.08, 0.95, 3)) for _ in range(4)]
     yaw = rng.uniform(0, np.pi)
@@ -197,8 +204,7 @@ def things(rng: np.random.Generator) -> list[Part]:
                   for x in (-1, 1) for z in (-1, 1)]  # fmt: skip
         body = part("box", (0, 0.26, 0), (0.68 * a, 0.13, 0.26))
         return [body, part("box", (0.02, 0.48, 0), (0.34 * a, 0.11, 0.22), 0, 2), *wheels]
-    names = ("cat", "dahlia", "coffee", "rocket", "motorcycle", "pagoda", "helmet")
-    name = names[rng.integers(len(names))]
+    name = BOARDS[half][rng.integers(len(BOARDS[half]))]
     height, width = photographed(name)[1].shape
     wide = min(width / height, 1.6)
     high = wide * height / width
@@ -210,6 +216,7 @@ class _World:
     """What is built of a scene before it is drawn."""
 
     rng: np.random.Generator
+    half: int  # of the photos that it may show
     thing: list[Part]
     neighbours: list[Part] = field(default_factory=list)
     wall: float | None = None  # z
@@ -219,7 +226,7 @@ class _World:
 def scene(seed: int) -> Scene:
     """The scene of that seed: always the same one."""
     rng = np.random.default_rng(900_000 + seed)
-    world = _World(rng, things(rng))
+    world = _World(rng, seed % 2, things(rng, seed % 2))
     has_shadow = rng.random() > BARE
     camera = _Camera(np.radians(rng.uniform(12, 48)), rng.uniform(2.6, 3.6))
     size = rng.uniform(0.75, 1.15)
@@ -258,7 +265,7 @@ def _add_neighbours(world: _World) -> None:
             shade = tuple(rng.uniform(0.03, 0.4, 3))
             parts = [Part("box", (0, half[1], 0), half, rng.uniform(0, np.pi), shade)]
         else:
-            parts = [p for p in things(rng)]
+            parts = things(rng, world.half)
         scale = rng.uniform(0.6, 1.2)
         world.neighbours += [_moved(p, scale, at) for p in parts]
         if "neighbour" not in world.words:
@@ -303,10 +310,10 @@ def _photographed() -> dict[str, Callable[[], np.ndarray]]:
     }  # fmt: skip
 
 
-def _material(rng: np.random.Generator) -> tuple[str, Material]:
+def _material(rng: np.random.Generator, half: int) -> tuple[str, Material]:
     """A ground or a wall, photographed or drawn."""
     drawn = ("plain", "tiles", "planks", "patches", "clouds", "checks")
-    names = (*_photographed(), *drawn)
+    names = (*GROUNDS[half], *GROUNDS[half], *drawn)
     name = names[rng.integers(len(names))]
     tint = rng.uniform(0.35, 1.0) * rng.uniform(0.75, 1.0, 3)
     if name in _photographed():
@@ -369,9 +376,7 @@ def _materials(world: _World, camera: _Camera) -> tuple[F64, F64]:
     """Linear colours (h * w, 3) of what the ground and the wall are at each pixel."""
     rng, origin, ways = world.rng, camera.origin, camera.ways()
     if rng.random() < 0.22:  # a photo as it is: nobody knows where its ground ends
-        name = ("astronaut", "coffee", "chelsea", "rocket", "flower", "china", "motorcycle")[
-            rng.integers(7)
-        ]
+        name = PHOTOS[world.half][rng.integers(len(PHOTOS[world.half]))]
         pixels = photo(name)
         share = rng.uniform(0.55, 1.0)
         high = int(share * min(pixels.shape[0], pixels.shape[1] * HEIGHT / WIDTH))
@@ -384,20 +389,20 @@ def _materials(world: _World, camera: _Camera) -> tuple[F64, F64]:
         return linear.reshape(-1, 3), linear.reshape(-1, 3)
     reach = np.where(ways[:, 1] < -1e-3, origin[1] / np.maximum(-ways[:, 1], 1e-3), 60.0)
     places = (origin + np.minimum(reach, 60.0)[:, None] * ways)[:, [0, 2]]
-    name, ground = _material(rng)
+    name, ground = _material(rng, world.half)
     colour = ground(places)
     away = np.clip((reach - 7) / 12, 0, 1)[:, None]  # far away one sees its mean colour only
     colour = colour + away * (np.median(colour, 0) - colour)
     world.words.insert(0, name)
     if rng.random() < 0.35:  # an edge of another material, a rug or a puddle
-        other = _material(rng)[1](places)
+        other = _material(rng, world.half)[1](places)
         is_other = _patch(rng, places)
         colour = np.where(is_other[:, None], other + away * (np.median(other, 0) - other), colour)
         world.words.append("edge")
     behind = colour
     if world.wall is not None:
         far = (world.wall - origin[2]) / np.maximum(ways[:, 2], 1e-3)
-        behind = _material(rng)[1]((origin + far[:, None] * ways)[:, :2])
+        behind = _material(rng, world.half)[1]((origin + far[:, None] * ways)[:, :2])
     return colour, behind
 
 
@@ -432,17 +437,16 @@ def _drawn(
                      int(rng.integers(1 << 30)))  # fmt: skip
     shading = _uneven(rng)
     surface = np.where(is_wall[:, None], wall, ground)
-    pictures, upright, mask = [], is_wall.reshape(HEIGHT, WIDTH).copy(), None
-    noise = rng.normal(0, NOISE, (HEIGHT, WIDTH, 3))
+    colours, shown = _things_seen(reach, [*others, *world.thing], camera, lamp, ambient)
+    mask = (shown >= len(others)).reshape(HEIGHT, WIDTH)
+    upright = (is_wall | (shown >= 0)).reshape(HEIGHT, WIDTH) & ~mask
+    pictures, noise = [], rng.normal(0, NOISE, (HEIGHT, WIDTH, 3))
     for light in (own, lights):
         linear = surface * (light * shading).reshape(-1, 1)
-        linear, shown = _over(linear, reach, [*others, *world.thing], camera, lamp, ambient, rng)
-        mask = (shown >= len(others)).reshape(HEIGHT, WIDTH)
-        upright |= (shown >= 0).reshape(HEIGHT, WIDTH) & ~mask
+        linear = np.where(shown[:, None] >= 0, colours, linear)
         encoded = np.clip(linear, 0, 1) ** (1 / GAMMA)
         smooth = cv2.GaussianBlur(encoded.reshape(HEIGHT, WIDTH, 3), (0, 0), 0.6)
         pictures.append(np.rint(np.clip(smooth + noise, 0, 1) * 255).astype(np.uint8))
-    assert mask is not None
     dark = np.clip(1 - own / np.maximum(lights, 1e-6), 0, 1) * ~upright
     is_seen = np.count_nonzero((dark > DARK) & ~mask) >= LEAST_SHADE
     if not (has_shadow and is_seen):
@@ -492,10 +496,9 @@ def _light(
             if not parts:
                 total += np.maximum(facing, 0)
                 continue
-            rays = np.broadcast_to(way, (int(near.sum()), 3))
-            is_met = np.zeros(len(rays), bool)
+            is_met = np.zeros(int(near.sum()), bool)
             for part in parts:
-                is_met |= np.isfinite(part.hit(points[near], rays))
+                is_met |= np.isfinite(part.hit(points[near], way[None]))
             is_free[near] = ~is_met
             total += is_free * np.maximum(facing, 0)
         shares.append(total / np.maximum((normal @ directions.T).clip(0).sum(1), 1e-6))
@@ -519,20 +522,19 @@ def _uneven(rng: np.random.Generator) -> F64:
     return rng.uniform(0.6, 1.2) * falls
 
 
-def _over(
-    linear: F64, reach: F64, parts: list[Part], camera: _Camera, lamp: F64, ambient: float,
-    rng: np.random.Generator,
-) -> tuple[F64, np.ndarray]:  # fmt: skip
-    """Parts drawn over ground and wall, and which part is seen at each pixel; -1: none."""
-    origin, ways, linear = camera.origin, camera.ways(), linear.copy()
-    shown, nearest, way = np.full(len(ways), -1), reach.copy(), lamp.mean(0)
+def _things_seen(
+    reach: F64, parts: list[Part], camera: _Camera, lamp: F64, ambient: float
+) -> tuple[F64, np.ndarray]:
+    """Linear colours (n, 3) of the part that is seen at each pixel, and which it is; -1: none."""
+    origin, ways = camera.origin, camera.ways()
+    colours, shown, nearest = np.zeros_like(ways), np.full(len(ways), -1), reach.copy()
+    way = lamp.mean(0)
     for k, part in enumerate(parts):
-        met = part.hit(np.broadcast_to(origin, ways.shape), ways)
+        met = part.hit(origin[None], ways)
         own = np.flatnonzero(met < nearest)
         if not len(own):
             continue
-        points = origin + met[own, None] * ways[own]
-        at = part.local(points)
+        at = part.local(origin + met[own, None] * ways[own])
         if part.kind == "board":
             colour = _looked_up(photographed(part.board)[0], at) ** GAMMA
         else:
@@ -540,5 +542,5 @@ def _over(
             grain = 1 + 0.1 * np.sin(at @ np.array([9.0, 13.0, 7.0]) + 3 * np.sin(at[:, 0] * 5))
             light = ambient * (0.75 + 0.25 * part.normal(at)[:, 1]) + (1 - ambient) * facing
             colour = np.array(part.colour) ** GAMMA * (light * grain)[:, None]
-        linear[own], shown[own], nearest[own] = colour, k, met[own]
-    return linear, shown
+        colours[own], shown[own], nearest[own] = colour, k, met[own]
+    return colours, shown

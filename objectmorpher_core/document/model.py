@@ -234,6 +234,9 @@ class LiftedObject:
     # the photo; what a change of the thickness leaves where it is. None: it has no such sheet.
     middle: F32 | None = None
     kind: str = ""  # of KINDS, what it was recognised as; empty: nobody looked
+    # x its size, how far its front is expected to be from where it was put; 0: nobody said
+    doubt: float = 0.0
+    stands: bool = False  # whether it was seen to stand on something
     sides: Sides | None = None  # invented; None: what the photo does not show has plain colours
 
     def __post_init__(self) -> None:

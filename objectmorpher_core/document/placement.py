@@ -32,6 +32,48 @@ def with_centre(
     return replace(placement, move=(float(move[0]), float(move[1])), depth=float(depth))
 
 
+FOOT = 0.04  # x the object's height, from its lowest point: what touches the ground
+
+
+def turned(
+    placement: Placement,
+    turn: tuple[float, float, float],
+    points: np.ndarray,
+    lifted: LiftedObject,
+    camera: Camera,
+    down: np.ndarray,
+) -> Placement:
+    """`placement` with another `turn`, degrees, about what an artist expects to stay.
+
+    A roll alone leaves the middle of the outline where it is seen. The foot of an object that
+    stands stays where it touches; everything else turns about its centre. `points` (N, 3) world
+    are the object's before the placement, `down` (3,) is the ground's normal. Raises ValueError
+    behind the camera.
+    """
+    changed = replace(placement, turn=turn)
+    before, after = placement.matrix(lifted, camera), changed.matrix(lifted, camera)
+    if turn[:2] == placement.turn[:2]:
+        seen = [
+            camera.project(points @ motion[:3, :3].T + motion[:3, 3]) for motion in (before, after)
+        ]
+        step = seen[0].mean(0) - seen[1].mean(0)
+        move = placement.move[0] + float(step[0]), placement.move[1] + float(step[1])
+        return replace(changed, move=move)
+    if not lifted.stands:
+        return changed
+    foot = _foot(points, down)
+    stays = before[:3, :3] @ foot + before[:3, 3]
+    offset = after[:3, :3] @ (foot - lifted.centre)
+    return with_centre(changed, stays - offset, lifted, camera)
+
+
+def _foot(points: np.ndarray, down: np.ndarray) -> F64:
+    """(3,) the middle of the lowest of the points (N, 3)."""
+    depth = points @ down
+    lowest = points[depth >= depth.max() - FOOT * np.ptp(depth)]
+    return np.asarray(0.5 * (lowest.min(0) + lowest.max(0)), np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class Hold:
     """A placed object, held by one of its points."""

@@ -41,7 +41,8 @@ def project(
         ]
     )  # fmt: skip
     inputs: tuple[Any, ...] = (
-        *_motion(splats), rest.blocks.reshape(-1), rest.side_blocks.reshape(-1), frozen(frame), RULES, rest.splatting,
+        *_motion(splats), rest.blocks.reshape(-1), rest.side_blocks.reshape(-1), frozen(frame),
+        RULES, rest.splatting,
         splats.is_layered, out, _NO_DEPTHS if depths is None else depths,
     )  # fmt: skip
     in_threads(lambda first, last: _project(first, last, *inputs), len(rest.blocks), 2)

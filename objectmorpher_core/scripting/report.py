@@ -17,6 +17,7 @@ import numpy as np
 from ..compose.composite import Composite
 from ..deform.puppet import Puppet
 from ..document.model import Document, EditObject, Placement
+from ..raster.trust import trust_in
 
 VERSION = 1
 STAGES = (
@@ -137,7 +138,12 @@ def _of_object(
             "from": _px(at), "to": _px(to), "reached": _px(reached),
             "error_px": round(float(np.linalg.norm(reached - to)), 4),
         })  # fmt: skip
+    trust = trust_in(puppet.posed(item.pose, item.placement))
     return {
+        "trust": {
+            "sign": trust.sign, "risk": round(trust.risk, 4),
+            "invented": round(trust.invented, 4), "astray": round(trust.astray, 4),
+        },
         "object": {
             "mask_area_px": int(item.mask.sum()),
             "gaussians": len(lifted.body),

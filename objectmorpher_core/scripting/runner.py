@@ -37,6 +37,7 @@ from ..document.model import (
 )
 from ..document.settings import Hint, Shadow
 from ..pictures.image import read_mask
+from ..raster.trust import SIGNS, trust_in
 from .report import Stopwatch
 from .script import ALONE, EditScript, FurtherObject, Others, ScriptError
 
@@ -192,6 +193,21 @@ def placed(document: Document, k: int, script: EditScript) -> Document:
     """Object `k` where the script wants it, or gone."""
     document = edits.set_placement(document, k, _placement(script))
     return edits.set_visible(document, k, False) if script.remove else document
+
+
+def guesses(document: Document, puppets: dict[int, Puppet]) -> tuple[str, ...]:
+    """What is more guessed than known of the edit, each a sentence."""
+    found = []
+    for k, puppet in puppets.items():
+        item = document.objects[k]
+        if item.is_moved and item.is_visible:
+            trust = trust_in(puppet.posed(item.pose, item.placement))
+            if trust.sign == SIGNS[-1]:
+                found.append(
+                    f"{item.name} is turned so far that it is guesswork: the photo does not show"
+                    f" {trust.invented:.0%} of what is seen of it now"
+                )
+    return tuple(found)
 
 
 def _placement(script: EditScript) -> Placement:

@@ -52,6 +52,7 @@ NONSENSE = (
 )  # fmt: skip
 UPWARDS = "One folder up"  # leads out of the folder where everything may be overwritten
 ASKED = "Don't save"
+KEYS_PAGE, KEYS_BACK = "Keyboard and pointer…", "Reset all"
 
 
 @dataclass
@@ -93,8 +94,7 @@ class Player:
             command, env=self._environment, cwd=ROOT, stderr=self._noise
         )
         self.hands = Hands(self._environment, self.process)
-        self._script = self.hands.script()
-        self._write = self._script.__enter__()
+        self._typist: subprocess.Popen[str] | None = None
         self.starts += 1
         self.size = USUAL
         self.hands.wait(lambda: bool(self.hands.title()), "starting")
@@ -103,8 +103,7 @@ class Player:
 
     def close(self) -> None:
         """Ends the program, if it has not ended, and checks what it said."""
-        with contextlib.suppress(BrokenPipeError):
-            self._script.__exit__(None, None, None)
+        self._stop_typing()
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
@@ -114,8 +113,27 @@ class Player:
         assert "Traceback" not in said, said[-2000:]
 
     def write(self, lines: str) -> None:
-        """Lines for xdotool, which does them one after the other."""
-        self._write(lines)
+        """Lines for xdotool, which does them one after the other.
+
+        It ends where a window is gone: another one does what comes later.
+        """
+        if self._typist is None or self._typist.poll() is not None:
+            self._stop_typing()
+            self._typist = subprocess.Popen(
+                ["xdotool", "-"], env=self._environment, stdin=subprocess.PIPE, text=True,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        assert self._typist.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._typist.stdin.write(lines + "\n")
+            self._typist.stdin.flush()
+
+    def _stop_typing(self) -> None:
+        if self._typist is not None:
+            self._typist.kill()
+            with contextlib.suppress(BrokenPipeError):
+                self._typist.communicate()
+            self._typist = None
 
     def answered(self) -> bool:
         """Waits until the window has seen all that was done; False where it was quit.
@@ -131,6 +149,8 @@ class Player:
             if self.process.poll() is not None:
                 assert self.process.returncode == 0, f"it ended with {self.process.returncode}"
                 return False
+            if self._typist is None or self._typist.poll() is not None:
+                self.write(f"mousemove {x} {y}")
             taken = time.monotonic() - start
             own = taken - (_waited(self.process.pid) - waited)
             if (own > STUCK and taken > STUCK) or taken > GONE:
@@ -168,7 +188,28 @@ class Player:
             self.hands.xdotool("mouseup", button)
         self.hands.xdotool("keyup", "shift", "keyup", "ctrl", "keyup", "alt", "keyup", "space")
         self.resize(USUAL)
-        self.hands.catch_up()
+        self._use_the_usual_keys()
+
+    def _use_the_usual_keys(self) -> None:
+        """By the menu: the monkey may have given any key to anything."""
+        end = time.monotonic() + GONE
+        while KEYS_BACK not in self.hands.places():
+            assert time.monotonic() < end, f"{KEYS_PAGE} does not open"
+            self.hands.press("Escape")
+            for label in ("Menu: Help", KEYS_PAGE):
+                if self._appears(label):
+                    self.hands.choose(label)
+            self._appears(KEYS_BACK)
+        self.hands.choose(KEYS_BACK)
+        while KEYS_BACK in self.hands.places():
+            assert time.monotonic() < end, f"{KEYS_PAGE} does not close"
+            self.hands.press("Escape")
+
+    def _appears(self, label: str) -> bool:
+        end = time.monotonic() + 3
+        while label not in self.hands.places() and time.monotonic() < end:
+            time.sleep(0.02)
+        return label in self.hands.places()
 
     def resize(self, size: tuple[int, int]) -> None:
         self.write(f"search --name ObjectMorpher windowsize %@ {size[0]} {size[1]}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from objectmorpher_core.document.placement import (
     Hold,
     centre_of,
     ground_under,
+    turned,
     with_centre,
 )
 from tests import shapes
@@ -139,3 +142,42 @@ def test_a_turn_is_found_from_its_matrix(turn):
 def test_at_right_angles_the_turn_is_the_same_with_no_roll(pitch):
     matrix = turn_matrix(25, pitch, 10)
     np.testing.assert_allclose(turn_matrix(*turn_of(matrix)), matrix, atol=1e-7)
+
+
+DOWN = np.array([0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize("turn", [(25.0, 0.0, 0.0), (0.0, -20.0, 0.0), (-30.0, 10.0, 15.0)])
+def test_the_foot_of_what_stands_stays_where_it_touches(scene, turn):
+    """From another start, too; what does not stand turns about its centre."""
+    points = _points(scene)
+    lowest = points[points[:, 1] > points[:, 1].max() - 0.04 * np.ptp(points[:, 1])]
+    foot = 0.5 * (lowest.min(0) + lowest.max(0))
+    start = Placement(move=(12.0, -5.0), depth=0.2, turn=(10.0, 40.0, 0.0), scale=1.2)
+    lifted, free = (replace(scene.lifted, stands=stands) for stands in (True, False))
+    now = turned(start, turn, points, lifted, scene.camera, DOWN)
+    assert now.turn == turn and now.scale == start.scale
+    floating = turned(start, turn, points, free, scene.camera, DOWN)
+    assert floating == replace(start, turn=turn)
+    before, kept, moved = (
+        place.matrix(scene.lifted, scene.camera) @ [*foot, 1.0] for place in (start, now, floating)
+    )
+    size = scene.lifted.diameter * scene.lifted.scale
+    assert np.linalg.norm(kept - before) < PLANE * size
+    assert np.linalg.norm(moved - before) > 0.05 * size
+
+
+def test_a_roll_keeps_the_middle_of_the_outline(scene):
+    """Away from the middle of the photo, where near parts are seen larger."""
+    points, camera = _points(scene), scene.camera
+
+    def middle(place: Placement) -> np.ndarray:
+        motion = place.matrix(scene.lifted, camera)
+        return camera.project(points @ motion[:3, :3].T + motion[:3, 3]).mean(0)
+
+    start = Placement(move=(60.0, 45.0), turn=(35.0, 10.0, 0.0))
+    rolled = (*start.turn[:2], 90.0)
+    kept = turned(start, rolled, points, scene.lifted, camera, DOWN)
+    about_centre = middle(replace(start, turn=rolled)) - middle(start)
+    assert np.linalg.norm(about_centre) > 0.5
+    assert np.linalg.norm(middle(kept) - middle(start)) < 0.1 * np.linalg.norm(about_centre)

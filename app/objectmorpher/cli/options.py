@@ -22,3 +22,4 @@ class WindowOptions:
     frames: int | None = None  # close after so many frames; None: stay
     screenshot: Path | None = None  # PNG of the last frame
     frame_log: Path | None = None  # JSON, when which frame was shown
+    returns: Path | None = None  # where another program, which waits, wants the edit

@@ -93,6 +93,13 @@ def window_parser() -> argparse.ArgumentParser:
     add("--size", type=_list(2, 2), metavar="W,H", default=(1440.0, 900.0), help="points")
     add("--fov", type=float, metavar="DEG", help="horizontal; default from EXIF, else 50")
     add("--seed", type=int, default=0, help="of everything random")
+    add(
+        "--return",
+        dest="returns",
+        type=Path,
+        metavar="FILE",
+        help="for plug-ins: Send back writes the edit there (.ora .psd .png .tif) and closes",
+    )
     add("--frames", type=int, metavar="N", help="close after N frames")
     add("--screenshot", type=Path, metavar="F.png", help="picture of the last frame")
     add("--frame-log", type=Path, metavar="F.json", help="when each frame was shown")
@@ -117,6 +124,7 @@ def window_options(options: argparse.Namespace) -> WindowOptions:
     return WindowOptions(
         file, options.renderer, options.theme, options.scale, (int(width), int(height)),
         options.fov, options.seed, options.frames, options.screenshot, options.frame_log,
+        options.returns,
     )  # fmt: skip
 
 
@@ -262,7 +270,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add("--photo", type=Path, action="append", metavar="PHOTO",
         help="photos, or folders of them, for scripts that name none")  # fmt: skip
     add("--format", choices=FORMATS, metavar="ENDING",
-        help="of those outputs: png, jpg, tif, webp, avif or jxl; default as the photo")  # fmt: skip
+        help="of those outputs: png, jpg, tif, webp, avif, jxl; default as the photo")  # fmt: skip
     add("--overwrite", action="store_true", help="redo outputs that are up to date")
     add("--report", type=Path, metavar="R.json", help="the outcome and the figures of each edit")
     add_ray(parser)
@@ -453,6 +461,10 @@ SUBCOMMANDS = (
     Subcommand(
         "doctor", "show what runs on this machine, and what would help", _add_doctor,
         lazily("doctor", "run_doctor"),
+    ),
+    Subcommand(
+        "plugin", "install the plug-in for Krita, GIMP or ComfyUI",
+        lazily("plugin", "add_plugin"), lazily("plugin", "run_plugin"),
     ),
     _command("warm-up", "compile the kernels in advance", _add_warm_up),
     Subcommand(

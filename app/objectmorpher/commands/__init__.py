@@ -83,4 +83,5 @@ def next_step(editor: Editor) -> tuple[str, str | None]:
     if not is_moved:
         is_posing = editor.view.tool is ToolName.POSE
         return (t("Drag a point on the object") if is_posing else t("Drag the object")), None
-    return t("Export photo…"), "export"
+    is_awaited = editor.exporting.returns is not None
+    return (t("Send back"), "send_back") if is_awaited else (t("Export photo…"), "export")

@@ -128,7 +128,8 @@ def _uniforms(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Unif
         **kind._asdict(), "low_pass": kind.filter, "is_layered": splats.is_layered,
         "rest_linear": _columns(at_rest), "rest_offset": tuple(at_rest[:3, 3]),
         "linear": _columns(placed), "turn": _columns(added), "slide": tuple(added[:3, 3]),
-        "has_sides": rest.sides is not None, "scale": splats.scale, "nearest": RULES.near * splats.gap,
+        "has_sides": rest.sides is not None,
+        "scale": splats.scale, "nearest": RULES.near * splats.gap,
         "view": (camera.focal, camera.cx, camera.cy), "photo_focal": photo_camera.focal,
         "limits": posed.view_limits(photo_camera),
     }  # fmt: skip

@@ -193,8 +193,8 @@ def _along(part: str) -> Callable[[Editor, Pointer], Change]:
             if now.shift:
                 turn[axis] = round(turn[axis] / SNAP) * SNAP
             turn[axis] = wrapped(turn[axis])
-            changed = replace(start, turn=(turn[0], turn[1], turn[2]), depth=start.depth + away)
-            return editor.placing.stood(changed)
+            farther = replace(start, depth=start.depth + away)
+            return editor.placing.turned(farther, (turn[0], turn[1], turn[2]))
 
         return change
 
@@ -265,7 +265,7 @@ def _ball(editor: Editor, first: Pointer) -> Change:
             angle = np.radians(SNAP) * round(np.degrees(angle) / SNAP)
         turned = matrix_from_vector(angle * across / size if size > 1e-9 else np.zeros(3))
         turn = start.turn if size <= 1e-9 else turn_of(turned @ matrix)
-        return editor.placing.stood(replace(start, turn=turn, depth=start.depth + away))
+        return editor.placing.turned(replace(start, depth=start.depth + away), turn)
 
     return change
 
@@ -279,7 +279,7 @@ def _turn(editor: Editor, first: Pointer) -> Change:
         delta = one_axis((now.xy - first.xy) / editor.view.scale * TURN_SPEED, now)
         yaw, pitch, roll = start.turn
         turn = (wrapped(yaw - delta[0]), wrapped(pitch + delta[1]), roll)
-        return editor.placing.stood(replace(start, turn=turn, depth=start.depth + away))
+        return editor.placing.turned(replace(start, depth=start.depth + away), turn)
 
     return change
 

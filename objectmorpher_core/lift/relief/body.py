@@ -36,6 +36,7 @@ class Body:
     cuts: Cuts | None = None  # between cells where one part ends before another
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
     kind: str = "free"  # what it was recognised as: see `shapes`
+    doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
 
     @staticmethod
     def of(

@@ -122,6 +122,7 @@ class ReliefLifter:
             progress(0.05, "Looking at its shape")
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
+                body = replace(body, doubt=seen.doubt)
                 shape = recognised(seen, settings.kind)
                 if shape is not None and not _contradicts(shape, body, settings):
                     body = completed(body, shape, camera, settings.thickness, settings.trust)
@@ -284,6 +285,8 @@ def _assemble(
         "relief",
         middle=middle,
         kind=body.kind,
+        stands=body.standing.is_known,
+        doubt=body.doubt,
     )  # fmt: skip
 
 

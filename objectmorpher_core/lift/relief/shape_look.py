@@ -38,6 +38,14 @@ class SeenShape:
     front_error: F32  # expected
     depth_error: F32  # expected
 
+    @property
+    def doubt(self) -> float:
+        """Expected error of the front, and of half the depth behind it, x the object's size."""
+        rows, columns = np.nonzero(self.mask)
+        size = max(np.ptp(rows), np.ptp(columns), 1) / len(self.mask)
+        error = self.front_error[self.mask].mean() + 0.5 * self.depth_error[self.mask].mean()
+        return float(error / size)
+
     @staticmethod
     def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
         """Of what the network says, (9, s, s); see `training.shape_net`."""

@@ -128,11 +128,12 @@ class _Side:
         below = height - len(own.depth), height - len(front.depth)
 
         def joined(name: str) -> np.ndarray:
-            one, other = (
-                np.pad(field, [(0, more), (0, 0), (0, 0)][: field.ndim])
-                for field, more in zip((getattr(own, name), getattr(front, name)), below)
-            )
-            return np.concatenate([one, other], axis=1)
+            parts = getattr(own, name), getattr(front, name)
+            padded = [
+                np.pad(part, [(0, more), (0, 0), (0, 0)][: part.ndim])
+                for part, more in zip(parts, below, strict=True)
+            ]
+            return np.concatenate(padded, axis=1)
 
         picture = _Picture(*(joined(f.name) for f in fields(_Picture)))
         return replace(

@@ -185,7 +185,7 @@ def test_the_cup_on_the_table():
     assert 0.55 * means[2] < means[3] < means[2]
 
 
-SHADOWLESS, SHADED = (0, 2, 4, 11, 14, 16, 17, 19), (3, 5, 13)  # seeds of scenes
+SHADOWLESS, SHADED = (0, 2, 4, 11, 12, 14, 16, 17), (1, 5, 13)  # seeds of scenes
 
 
 @pytest.mark.slow

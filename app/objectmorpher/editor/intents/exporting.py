@@ -55,6 +55,7 @@ class Exporting:
         self._editor = editor
         self.draft: Draft | None = None  # None: no dialog
         self._replacing: Path | None = None  # asked whether it may be overwritten
+        self.returns: Path | None = None  # where another program, which waits, wants the edit
 
     # Choosing
 
@@ -91,10 +92,11 @@ class Exporting:
             return self._why_no_shape()
         has_plate = document is not None and document.plate is not None
         objects = () if document is None else document.objects
-        if what is What.DEPTH and not any(item.lifted is not None for item in objects):
+        is_lifted = any(item.lifted is not None for item in objects)
+        if what is What.DEPTH and not is_lifted:
             return t("Lift an object first")
         if what in (What.BACKGROUND, What.LAYERS, What.VIDEO) and not has_plate:
-            return t("Lift an object first")
+            return t("The background is not ready yet" if is_lifted else "Lift an object first")
         return None
 
     def why_no_motion(self, motion: Motion) -> str | None:
@@ -260,8 +262,7 @@ class Exporting:
     def export_to(self, path: Path) -> None:
         """The edited photo, or its layers, into a file of the kind that its ending says."""
         editor, settings = self._editor, self._editor.settings
-        format = format_of(path.name)
-        what = What.LAYERS if format in FORMATS[What.LAYERS][:-1] else What.PHOTO
+        format, what = format_of(path.name), _what_of(path)
         if format is None or format not in FORMATS[what]:
             editor.complain(
                 t("a photo cannot be written as {ending}; choose {known}",
@@ -273,6 +274,25 @@ class Exporting:
             is_whole = format in LOSSLESS_AT_100
             quality = settings.webp_quality if is_whole else settings.quality
             self._start(Plan(what, path, quality=quality))
+
+    @property
+    def why_not_back(self) -> str | None:
+        """Why the edit cannot be sent back now, or None."""
+        if self.returns is None:
+            return t("No other program waits for this edit")
+        return self.why_not(_what_of(self.returns))
+
+    def send_back(self) -> None:
+        """Write the edit where the other program waits for it, and close the window."""
+        editor, document, path = self._editor, self._editor.committed, self.returns
+        if document is None or path is None:
+            return
+        editor.jobs.start(
+            t("Sending back"), write_export, document, Plan(_what_of(path), path),
+            done=lambda _: editor.quit(),
+            failed=lambda error: editor.complain_of(error.retried_by(self.send_back)),
+            kind=f"{WRITE} {path}",
+        )  # fmt: skip
 
     def copy(self, what: What) -> None:
         """Put the edited photo, or the current object alone, into the clipboard."""
@@ -370,6 +390,11 @@ class Exporting:
             failed=lambda error: editor.complain_of(error.retried_by(lambda: self._start(plan))),
             kind=f"{WRITE} {plan.path}",
         )  # fmt: skip
+
+
+def _what_of(path: Path) -> What:
+    """What a file of that name holds: layers where it can, else the edited photo."""
+    return What.LAYERS if format_of(path.name) in FORMATS[What.LAYERS][:-1] else What.PHOTO
 
 
 def _is_other_kind(name: str, formats: tuple[Format, ...]) -> bool:

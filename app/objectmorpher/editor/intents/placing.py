@@ -15,6 +15,7 @@ from objectmorpher_core.document.placement import (
     Hold,
     centre_of,
     ground_under,
+    turned,
     with_centre,
 )
 
@@ -138,6 +139,23 @@ class Placing:
             return placement
         standing = ground.stood(centre, self._offsets(placement))
         return with_centre(placement, standing, thing.lifted, camera)
+
+    def turned(self, start: Placement, turn: tuple[float, float, float]) -> Placement:
+        """`start` with another turn, about the object's foot or the middle of its outline."""
+        document, thing = self._editor.document, self._editor.object
+        assert document is not None and thing is not None and thing.lifted is not None
+        lifted, camera = thing.lifted, document.photo.camera
+        own = self._editor.derived.body_points(document, self._editor.current)
+        points = lifted.world_points(own)
+        try:
+            down = ground_under(points, camera, self.horizon).normal
+        except GroundError:
+            down = np.array([0.0, 1.0, 0.0])
+        try:
+            changed = turned(start, turn, points, lifted, camera, down)
+        except ValueError:  # behind the camera, as `move_to` will say
+            changed = replace(start, turn=turn)
+        return self.stood(changed)
 
     def _offsets(self, placement: Placement) -> np.ndarray:
         """(N, 3) world: where the object's Gaussians are from its centre, turned and scaled."""

@@ -22,6 +22,8 @@ COLOURS = {"yaw": "#70A020", "pitch": "#F08080", "roll": WHITE}
 SHAFT = 5.0  # points, half the arrow's width at its near end
 HEAD = 11.0  # points, length of the arrow's heads
 BESIDE = (18.0, 14.0)  # points from the pointer to the value
+BELOW = 22.0  # points from there to how far the object is to be believed
+TRUST = {"fine": "#70A020", "look closely": "#E0A030", "guesswork": "#E05040"}
 
 
 def draw_frame(canvas: Canvas) -> None:
@@ -141,6 +143,21 @@ def _draw_value(canvas: Canvas, part: str | None) -> None:
     if text:
         at = canvas.on_canvas(pointer.xy)[0]
         canvas.label(text, at.x + theme.pt(BESIDE[0]), at.y + theme.pt(BESIDE[1]))
+        if editor.hand.is_busy and part in (*TURNS, "turn", "ball"):
+            _draw_trust(canvas, at)
+
+
+def _draw_trust(canvas: Canvas, at: ImVec2) -> None:
+    """Below the value: how far the turned object is to be believed."""
+    from objectmorpher_core.raster.trust import trust_in
+
+    editor = canvas.editor
+    assert editor.document is not None, "its object is being turned"
+    sign = trust_in(editor.derived.draft(editor.document, editor.current)).sign
+    words = {"fine": t("Fine"), "look closely": t("Look closely"), "guesswork": t("Guesswork")}
+    x, y = at.x + theme.pt(BESIDE[0]), at.y + theme.pt(BESIDE[1] + BELOW)
+    canvas.disc(ImVec2(x + theme.pt(4), y + theme.pt(8)), 4, TRUST[sign])
+    canvas.label(words[sign], x + theme.pt(14), y)
 
 
 def _value(part: str, placement: Placement, horizon: float) -> str:

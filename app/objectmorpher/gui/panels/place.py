@@ -122,8 +122,12 @@ def _draw_depth(editor: Editor, placement: Placement) -> None:
 
 def _change(editor: Editor, group: Group, placement: Placement) -> None:
     """Numbers of the position count as they are; what is turned or scaled stays on the ground."""
-    is_position = group.title == "Position"
-    editor.placing.move_to(placement if is_position else editor.placing.stood(placement))
+    placing, was = editor.placing, editor.placing.placement
+    if was is not None and placement.turn != was.turn:
+        placement = placing.turned(replace(placement, turn=was.turn), placement.turn)
+    elif group.title != "Position":
+        placement = placing.stood(placement)
+    placing.move_to(placement)
 
 
 def _names() -> list[str]:

@@ -17,7 +17,7 @@ from .layout import Rect
 
 LEAST_NAME = 48.0  # points of room, with less the file's name is left out
 MENUS: dict[str, tuple[str, ...]] = {
-    "File": ("open", "recent", "-", "save", "save_as", "export", "-", "close", "quit"),
+    "File": ("open", "recent", "-", "save", "save_as", "export", "send_back", "-", "close", "quit"),
     "Edit": (
         "undo", "redo", "-", "copy", "copy_object", "paste", "-", "select_handles",
         "remove_handle", "reset_handle", "reset_handles", "-", "reset_pose", "reset_place",

@@ -106,6 +106,7 @@ class Window:
         settings = read_settings(settings_path())
         self.editor = Editor(settings, wake=glfw.post_empty_event)
         self.editor.filing.fov, self.editor.filing.seed = options.fov, options.seed
+        self.editor.exporting.returns = options.returns
         self._saved_settings = settings
         self._language = ENGLISH
         self._look: tuple[str, float] = ("", 0.0)

@@ -1,0 +1,209 @@
+"""Doors to other programs: the window sends layers back; Krita and ComfyUI's nodes take them.
+
+Krita is the real one. ComfyUI hands its nodes tensors, which is done here. GIMP 3 is in no
+distribution that these tests run on: its plug-in runs against a stand-in for what it calls.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import shutil
+import subprocess
+import sys
+import types
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from conftest import CENTRE, HEIGHT, WIDTH
+from gimp_stub import make_gimp
+from hands import ROOT, opened
+from objectmorpher.__main__ import main
+from objectmorpher.cli.plugin import HOSTS, plugin_files
+from test_window import screen_xy
+
+PLUGINS = ROOT / "assets" / "plugins"
+FLOWER = ROOT / "assets" / "samples" / "flower.jpg"
+TURN = ("--subject", "--turn", "20,0,0")
+IN_KRITA = """
+import os, traceback
+from krita import InfoObject, Krita
+def run(*_):
+    try:
+        import objectmorpher
+        Krita.instance().setBatchmode(True)
+        document = Krita.instance().openDocument("photo.png")
+        node = document.topLevelNodes()[0]
+        objectmorpher.send(document, node, "sent.png")
+        group = objectmorpher.bring_back(document, node, "back.ora")
+        names = [child.name() for child in group.childNodes()]
+        document.waitForDone()
+        document.exportImage("shown.png", InfoObject())
+        open("said.txt", "w").write("\\n".join(names))
+    except BaseException:
+        open("said.txt", "w").write(traceback.format_exc())
+    os._exit(0)
+"""
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a photo, the same edited, and the layers that come back of it."""
+    folder = tmp_path_factory.mktemp("door")
+    Image.open(FLOWER).save(folder / "photo.png")
+    told = [str(folder / "photo.png"), "-o", str(folder / "edited.png"), *TURN]
+    assert main(["edit", *told, "--save-layers", str(folder / "back.ora")]) == 0
+    return folder
+
+
+@pytest.mark.window
+def test_the_window_sends_layers_back_and_closes(
+    window_environment: dict[str, str], photo_path: Path, tmp_path: Path
+) -> None:
+    back = tmp_path / "back.ora"
+    with opened(window_environment, photo_path, "--return", str(back)) as hands:
+        hands.click(*screen_xy(*CENTRE))
+        hands.choose("Lift object")
+        hands.place("Drag a point on the object")
+        hands.drag(screen_xy(*CENTRE), screen_xy(CENTRE[0] + 14, CENTRE[1] - 10))
+        hands.place("Send back")
+        hands.settle()  # the background is filled in
+        hands.choose("Send back")
+        hands.wait(back.exists, "sending back")
+    with zipfile.ZipFile(back) as archive:
+        merged = Image.open(io.BytesIO(archive.read("mergedimage.png")))
+        assert "Object 1" in archive.read("stack.xml").decode()
+    assert merged.size == (WIDTH, HEIGHT)
+    changed = np.abs(np.asarray(merged.convert("RGB")).astype(int) - pixels(photo_path)).max(2) > 8
+    assert changed.any() and not changed[:, :20].any()
+
+
+@pytest.mark.parametrize("host", HOSTS)
+def test_a_plugin_is_installed_with_the_way_to_this_program(host: str, tmp_path: Path) -> None:
+    assert main(["plugin", host, "--folder", str(tmp_path)]) == 0
+    for name, data in plugin_files(host).items():
+        assert (tmp_path / name).read_bytes() == data
+    door = module("door", tmp_path / "objectmorpher" / "door.py")
+    said = subprocess.run([*door.program(), "--version"], capture_output=True, text=True)
+    assert said.returncode == 0 and "objectmorpher" in said.stdout.lower()
+    assert door.command("a.png", "b.ora")[-3:] == ["a.png", "--return", "b.ora"]
+
+
+def test_a_folder_has_to_be_there_and_some_have_to_be_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plugin", "comfyui"]) != 0
+    assert "--folder PATH/TO/ComfyUI/custom_nodes" in capsys.readouterr().err
+    assert main(["plugin", "krita", "--folder", str(tmp_path / "none")]) != 0
+    assert "there is no folder" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_krita_sends_a_layer_and_shows_what_comes_back(edited: Path, tmp_path: Path) -> None:
+    if shutil.which("kritarunner") is None or shutil.which("xvfb-run") is None:
+        pytest.skip("needs Krita and xvfb-run")
+    folder = tmp_path / ".local" / "share" / "krita" / "pykrita"
+    folder.mkdir(parents=True)
+    assert main(["plugin", "krita", "--folder", str(folder)]) == 0
+    (folder / "driver.py").write_text(IN_KRITA)
+    command = ["xvfb-run", "-a", "kritarunner", "-s", "driver", "-f", "run"]
+    environment = {**os.environ, "HOME": str(tmp_path), "PYTHONPATH": str(folder)}
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+        environment.pop(name, None)
+    subprocess.run(command, cwd=edited, env=environment, timeout=180, capture_output=True)
+    said = edited / "said.txt"
+    if not said.exists():
+        pytest.skip("Krita has no Python here (package python3-pyqt5)")
+    assert said.read_text().splitlines()[0] == "Photo", said.read_text()
+    np.testing.assert_array_equal(pixels(edited / "sent.png"), pixels(edited / "photo.png"))
+    assert np.abs(pixels(edited / "shown.png") - pixels(edited / "edited.png")).max() <= 2
+
+
+def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
+    edited: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gimp = make_gimp(monkeypatch)
+    plugin = module("gimp_plugin", PLUGINS / "gimp" / "objectmorpher" / "objectmorpher.py",
+                    beside=PLUGINS)  # fmt: skip
+    image = gimp.Image(640, 427)
+    layer = gimp.Layer(np.asarray(Image.open(edited / "photo.png").convert("RGBA")))
+    image.insert_layer(layer, None, 0)
+
+    def program(command: list[str], check: bool) -> None:
+        """What a user would do in the window."""
+        photo, back = command[-3], command[-1]
+        np.testing.assert_array_equal(pixels(Path(photo)), pixels(edited / "photo.png"))
+        shutil.copy(edited / "back.ora", back)
+
+    monkeypatch.setattr(plugin.subprocess, "run", program)
+    found = plugin.edit(gimp.Procedure(), None, image, [layer], None, None)
+    assert found[0] == gimp.PDBStatusType.SUCCESS
+    (group,) = [item for item in image.layers if item.children]
+    assert image.layers.index(group) < image.layers.index(layer)  # above it
+    assert group.children[-1].name == "Photo"
+    assert np.abs(image.shown()[..., :3].astype(int) - pixels(edited / "edited.png")).max() <= 2
+    refused = plugin.edit(gimp.Procedure(), None, image, [], None, None)
+    assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
+
+
+def test_comfyuis_nodes_select_lift_pose_render_and_save(tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    nodes = module("comfy", PLUGINS / "comfyui" / "objectmorpher" / "__init__.py")
+    kinds = nodes.NODE_CLASS_MAPPINGS
+    assert set(kinds) == set(nodes.NODE_DISPLAY_NAME_MAPPINGS)
+    photo = np.asarray(Image.open(FLOWER).convert("RGB"))
+    image = torch.from_numpy(photo.astype(np.float32) / 255)[None]
+    chosen, mask = run(kinds["ObjectMorpherSelect"], image=image, x=310.0, y=210.0)
+    assert mask.shape == (1, 427, 640) and 0.1 < float(mask.mean()) < 0.5
+    again, same = run(kinds["ObjectMorpherSelect"], image=image, x=0.0, y=0.0, mask=mask)
+    assert torch.equal(same, mask)
+    (lifted,) = run(kinds["ObjectMorpherLift"], object=again, thickness=1.0)
+    (still,) = run(kinds["ObjectMorpherPose"], object=lifted)
+    (posed,) = run(kinds["ObjectMorpherPose"], object=still, yaw=25.0)
+    rendered, alpha, background = run(kinds["ObjectMorpherRender"], object=posed)
+    assert rendered.shape == background.shape == image.shape and alpha.shape == mask.shape
+    difference = (rendered - image).abs()[0].max(-1).values
+    assert float(difference[mask[0] > 0.5].mean()) > 0.03 and float(difference[:60].max()) == 0
+    (nothing, _, _) = run(kinds["ObjectMorpherRender"], object=still)
+    assert float((nothing - image).abs().max()) < 1e-6
+    for name in ("flower.ply", "flower.glb"):
+        run(kinds["ObjectMorpherSaveSolid"], object=posed, file=str(tmp_path / name))
+        assert (tmp_path / name).stat().st_size > 10_000
+    assert chosen is not None
+
+
+def run(kind: Any, **inputs: Any) -> Any:
+    """As ComfyUI runs a node: the widgets' defaults where nothing is connected."""
+    asked = kind.INPUT_TYPES()
+    known = {**asked["required"], **asked.get("optional", {})}
+    assert set(inputs) <= set(known)
+    for name, (_, *widget) in asked["required"].items():
+        if widget:
+            inputs.setdefault(name, widget[0]["default"])
+    found = getattr(kind(), kind.FUNCTION)(**inputs)
+    assert len(found) == len(kind.RETURN_TYPES)
+    return found
+
+
+def module(name: str, path: Path, beside: Path | None = None) -> types.ModuleType:
+    """A plug-in's module, from its file; `beside`: a folder whose modules it finds, too."""
+    before = list(sys.path)
+    sys.path[:0] = [] if beside is None else [str(beside)]
+    try:
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None and spec.loader is not None
+        found = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(found)
+    finally:
+        sys.path[:] = before
+    return found
