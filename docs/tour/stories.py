@@ -107,6 +107,10 @@ def _turn_cup(guide: Guide) -> None:
     guide.point(guide.place("Coffee"))
     guide.shoot("Start", "The samples; the frame is the pointer's.")
     guide.choose("Coffee")
+    guide.area("Drag a point on the object")  # a sample opens lifted: back to the photo
+    guide.press("ctrl+z")
+    guide.press("ctrl+z")
+    guide.choose("Tool: Select")
     guide.point(EMPTY)
     guide.area("Photo")
     guide.shoot("Opened", "The same window in the light theme; what surrounds the photo stays a "

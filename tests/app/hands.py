@@ -225,7 +225,7 @@ def x_display(width: int, height: int) -> Iterator[str | None]:
 def window_environment(display: str, folder: Path, settings: str) -> dict[str, str]:
     """For a process with a window: its display, and settings and data of its own in `folder`."""
     path = folder / "settings.toml"
-    path.write_text(settings, encoding="utf-8")
+    path.write_text(f'dismissed = ["posing"]\n{settings}', encoding="utf-8")
     return {
         **os.environ,
         "DISPLAY": display,

@@ -19,6 +19,7 @@ from conftest import CENTRE, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.recovery import Left
 from objectmorpher.editor.settings import Backends
+from objectmorpher.editor.view import ToolName
 from objectmorpher.system.freed_memory import set_aside
 from objectmorpher.system.texts import sentence
 from objectmorpher.worker.jobs import Jobs
@@ -195,6 +196,22 @@ def test_a_sample_is_nobodys_file(editor: Editor, photo_path: Path) -> None:
     assert editor.settings is settings
     open_file(editor, photo_path)
     assert editor.source == photo_path
+
+
+def test_a_sample_opens_with_its_thing_lifted_and_nothing_to_save(
+    editor: Editor, photo_path: Path
+) -> None:
+    editor.sample.open(photo_path, CENTRE)
+    wait_until(editor, lambda: editor.is_lifted)
+    wait_for_jobs(editor)
+    assert editor.view.tool is ToolName.POSE
+    assert editor.is_saved, "the artist has done nothing yet"
+    assert editor.document is not None and editor.document.plate is not None
+    editor.undo()
+    editor.undo()
+    assert editor.mask is None, "both steps can be taken back"
+    wait_for_jobs(editor)
+    assert not editor.is_lifted, "and it does not begin anew"
 
 
 def test_what_was_computed_for_a_closed_document_is_let_go(editor: Editor, ball: Document) -> None:

@@ -33,6 +33,7 @@ from .shape import Shape, Shapes, build_shape
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
+    from objectmorpher_core.compose.plate.residue import Ghost
     from objectmorpher_core.deform.deformer import Deformer
     from objectmorpher_core.deform.puppet import SurfacePoint
     from objectmorpher_core.raster.posed import PosedSplats
@@ -82,6 +83,8 @@ class Derived:
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
         self._carriers, self._invented, self._hidden = Memo(), Memo(), Memo()
+        self._ghosts = Memo()
+        self._ghost_shares: tuple[float, ...] = ()
 
     def share(self, mask: Mask) -> float:
         """Share of the photo that a mask covers."""
@@ -105,12 +108,25 @@ class Derived:
         """What is seen behind the objects: the photo around those that are still there."""
         from objectmorpher_core.compose.order import holes
         from objectmorpher_core.compose.plate.plate import plate_of_holes
+        from objectmorpher_core.compose.plate.residue import shown_shares
 
-        gone = holes(document)
+        gone, ghosts = holes(document), self.ghosts(document)
+        shares = shown_shares(document, ghosts, gone)
+        if shares != self._ghost_shares:  # remembered by identity, as all else is
+            self._ghost_shares = shares
         return self._plates(
-            lambda: plate_of_holes(document, gone), document.plate,
-            *gone, *(o.mask for o in document.objects),
+            lambda: plate_of_holes(document, gone, ghosts), document.plate,
+            *gone, *(o.mask for o in document.objects), self._ghost_shares,
         )  # fmt: skip
+
+    def ghosts(self, document: Document) -> tuple[Ghost, ...]:
+        """What the objects leave beside their cut-outs."""
+        from objectmorpher_core.compose.plate.plate import SEAM, hole_margin
+        from objectmorpher_core.compose.plate.residue import find_ghosts
+
+        near = SEAM * hole_margin(*document.photo.size)
+        parts = tuple(part for o in document.objects for part in (o.matte, o.mask, o.lifted))
+        return self._ghosts(lambda: find_ghosts(document, near), document.plate, *parts)
 
     def invented_background(self, document: Document) -> Mask | None:
         """(H, W) where the plate is invented; None while there is no plate."""

@@ -206,6 +206,8 @@ def _blend(
     looks = [look for _, look in moved]
     key = (*view.place, *(id(look.shade) for look in looks), *(look.blur for look in looks))
     if cache.blended is None or cache.blended[0] is not document or cache.blended[1] != key:
-        touched = cache.lights.touched(document, looks, view, CELL)
+        is_edited = any(o.is_moved for o in document.objects)
+        plate = cache.derived.plate(document) if is_edited else None
+        touched = cache.lights.touched(plate, looks, view, CELL)
         cache.blended = (document, key, build_blend(document, moved, view, touched))
     return cache.blended[2]

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.base.arrays import F32, Mask
-from objectmorpher_core.document.model import Document, Placement
+from objectmorpher_core.document.model import Document, Placement, Plate
 
 from ..editor.view import View
 from .layer import Layer, PosedObject
@@ -133,23 +133,21 @@ class Lights:
 
     # Where it is shown
 
-    def touched(self, document: Document, looks: Iterable[Lit], view: View, cell: int) -> F32:
-        """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are."""
+    def touched(self, plate: Plate | None, looks: Iterable[Lit], view: View, cell: int) -> F32:
+        """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are.
+
+        `plate` is the one that the edit shows; None where nothing has moved.
+        """
         shape = (-(-view.height // cell), -(-view.width // cell))
         touched = np.zeros(shape, np.float32)
         for look in looks:
             if (shade := look.shade) is not None:
                 corner = (shade.left, shade.top)
                 _mark(touched, shade.alpha > 0, corner, shade.pitch, (view, cell))
-        plate = document.plate
-        if plate is not None and plate.painted is not None and _is_edited(document):
+        if plate is not None and plate.painted is not None:
             small, pitch = self._painted(lambda: _shrunk(plate.painted), plate.painted)
             _mark(touched, small, (plate.left, plate.top), pitch, (view, cell))
         return touched
-
-
-def _is_edited(document: Document) -> bool:
-    return any(o.is_moved for o in document.objects)
 
 
 def _inked(alpha: F32, colour: tuple[float, float, float]) -> np.ndarray:

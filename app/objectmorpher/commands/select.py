@@ -16,6 +16,11 @@ def _no_soft_edge(editor: Editor) -> str | None:
     )
 
 
+def _nothing_left_out(editor: Editor) -> str | None:
+    is_any = bool(editor.leaving_out.pieces)
+    return no_lift(editor) or (None if is_any else t("Nothing beside it looks like a part of it"))
+
+
 def _not_a_file(editor: Editor) -> str | None:
     is_file = editor.shaping.why_fixed is not None
     return no_lift(editor) or (None if is_file else t("It was lifted from this photo"))
@@ -40,6 +45,9 @@ COMMANDS: dict[str, Command] = {
     "fill_holes": Command("Fill holes", "", lambda e: e.masking.fill_holes(), no_selection),
     "remove_islands": Command(
         "Remove islands", "", lambda e: e.masking.remove_islands(), no_selection
+    ),
+    "add_left_out": Command(
+        "Add what was left out", "", lambda e: e.leaving_out.add(), _nothing_left_out
     ),
     "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
     "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),

@@ -17,6 +17,6 @@ def _toggle(popup: Popup) -> Command:
     return Command(popup.value, _KEYS.get(popup, ""), run, never, is_on)
 
 
-_KEYS = {Popup.SHORTCUTS: "F1", Popup.PREFERENCES: "Ctrl+,"}
+_KEYS = {Popup.PALETTE: "Ctrl+K", Popup.SHORTCUTS: "F1", Popup.PREFERENCES: "Ctrl+,"}
 
 COMMANDS: dict[str, Command] = {popup.name.lower(): _toggle(popup) for popup in Popup}

@@ -28,6 +28,7 @@ from .intents.computing import Computing
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
 from .intents.landing import Landing
+from .intents.leaving_out import LeavingOut
 from .intents.looking import Looking
 from .intents.masking import Masking
 from .intents.methods import Methods
@@ -37,6 +38,7 @@ from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
 from .intents.refining import Refining
 from .intents.rigging import Rigging
+from .intents.sample import Sample
 from .intents.selection import Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
@@ -74,6 +76,8 @@ class Editor(EditorState):
         self.hinting = Hinting(self, self.composing)
         self.refining, self.exporting = Refining(self, self.methods), Exporting(self)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
+        self.leaving_out = LeavingOut(self)
+        self.sample = Sample(self, self.filing, self.selection, self.tasks)
         self.autosave = Autosave(self)
         self.recovery = Recovery(self, self.autosave, self.filing, self.start, self.close)
         self._pollers = self._in_order()
@@ -95,7 +99,8 @@ class Editor(EditorState):
         return (
             self.jobs.poll, self.chores.poll, tasks.rehearse, tasks.ensure_fronts,
             self.refits.ensure, tasks.ensure_plate, self.composing.deliver, self.refining.deliver,
-            self.autosave.poll, self.candidates.poll, self.closer_look.poll,
+            self.autosave.poll, self.candidates.poll, self.closer_look.poll, self.sample.poll,
+            self.leaving_out.poll,
         )  # fmt: skip
 
     def _ask_elsewhere(self) -> None:

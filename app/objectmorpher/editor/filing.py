@@ -99,13 +99,14 @@ class Filing:
 
         self.guard(lambda: self._open(chosen, then))
 
-    def open_sample(self, path: Path) -> None:
+    def open_sample(self, path: Path, then: Callable[[], None] = lambda: None) -> None:
         """Opens a photo that came with the program: it is nobody's file to go back to."""
 
-        def forget_file() -> None:
+        def start() -> None:
             self._editor.source = None
+            then()
 
-        self.guard(lambda: self._open(path, forget_file))
+        self.guard(lambda: self._open(path, start))
 
     def _remember(self, path: Path) -> None:
         self._editor.settings = self._editor.settings.with_recent(path)

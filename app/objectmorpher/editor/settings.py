@@ -49,6 +49,7 @@ class Settings:
     export_seconds: float = 4.0
     export_folder: str = ""  # for photos that are no file of the user's
     declined_models: tuple[str, ...] = ()  # ids of those that are not offered any more
+    dismissed: tuple[str, ...] = ()  # cards with help that are not shown any more
     gaussians: int = GAUSSIANS  # of a lifted object
     history_mb: int = 1024  # MiB that steps which can be undone may hold
     recent: tuple[str, ...] = ()  # paths, newest first
@@ -85,7 +86,7 @@ def read_settings(path: Path) -> Settings:
     shortcuts = _words(values.pop("shortcuts", {}))
     if values.pop("is_motion_reduced", False) is True:  # its earlier name
         values.setdefault("motion", "reduced")
-    for name in ("recent", "declined_models"):
+    for name in ("recent", "declined_models", "dismissed"):
         if isinstance(values.get(name), list):
             values[name] = tuple(str(r) for r in values[name])
     return replace(

@@ -105,6 +105,8 @@ class Shown(Enum):
 class Popup(Enum):
     """Panels over the window, one at a time."""
 
+    PALETTE = "Find a command…"
+    HELP = "Tutorial and how-to…"
     SHORTCUTS = "Keyboard and pointer…"
     PREFERENCES = "Preferences…"
     ABOUT = "About ObjectMorpher"
@@ -157,6 +159,7 @@ class View:
     has_panel: bool = True  # whether that is so, as the window has it
     shown: Shown = Shown.COMPOSITE
     popup: Popup | None = None
+    help_page: str = "tutorial"  # of system.help_pages, the one that Help shows
     orbit: Orbit | None = None  # of the Look tool; None: as the photo's camera sees it
     color: tuple[int, int, int] | None = None  # 8-bit sRGB shown under the pointer, if so near
     brush: Brush = field(default_factory=Brush)  # of every tool that paints

@@ -1,9 +1,10 @@
 """The photo behind its objects: what is invented, and how it joins what is true.
 
 The inpainter fills a hole that reaches well past the object, so that it never copies the object's
-rim. Of the fill only what the object covers is kept, and a narrow seam: beyond, the photo is
-true. Where the two meet, the fill takes on the photo's colour (a membrane, as in Poisson image
-editing, Perez et al. 2003), so that no line shows where the object was.
+rim. Of the fill only what the object covers is kept, what it leaves beside its cut-out (`residue`),
+and a narrow seam: beyond, the photo is true. Where the two meet, the fill takes on the photo's
+colour (a membrane, as in Poisson image editing, Perez et al. 2003), so that no line shows where the
+object was.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ...base.progress import Progress, part, silent
 from ...document.model import Document, Matte, Plate
 from ...document.settings import Hint
 from .. import Inpainter, InpaintError, LooksFar, TakesHints
+from .residue import Ghost, find_ghosts, find_residue, shown_shares, visible_residue, with_ghosts
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
@@ -70,17 +72,13 @@ def build_plate(
         raise InpaintError("the object is too thin to be cut out of the photo")
     height, width = covered.shape
     margin = hole_margin(width, height)
-    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    residue = find_residue(pixels, covered, margin)
+    away = _away(covered | residue)
     hole = away < margin
     rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
-    x0, y0, x1, y1 = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
-    context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
-    if isinstance(inpainter, LooksFar):
-        context = max(context, inpainter.context)
-    if hints:  # from anywhere
-        context = max(width, height)
-    top, left = max(y0 - context, 0), max(x0 - context, 0)
-    window = (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width)))
+    box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+    x0, y0, x1, y1 = box
+    window, left, top = _window(box, inpainter, hole.shape, bool(hints))
     cut_out, step = (pixels[window], hole[window]), part(progress, 0.0, 0.9)
     if hints and isinstance(inpainter, TakesHints):
         moved = tuple(hint.moved(-left, -top) for hint in hints)
@@ -90,7 +88,10 @@ def build_plate(
     progress(0.9, "joining it to the photo")
     inner = (slice(y0, y1), slice(x0, x1))
     fill, photo = filled[y0 - top : y1 - top, x0 - left : x1 - left], pixels[inner]
-    weight = fill_weight(np.asarray(away[inner], np.float32), margin)
+    if residue.any():
+        residue[inner] = visible_residue(residue[inner], photo, fill)
+        away = _away(covered | residue)
+    weight = fill_weight(away[inner].copy(), margin)
     is_invented = weight > 0
     ring = hole[inner] & ~is_invented  # filled, and true
     difference = np.zeros(photo.shape, np.float32)
@@ -106,7 +107,28 @@ def build_plate(
         mixed = true + weight[strip, :, None] * (np.clip(new + change[strip], 0, 1) - true)
         mixed = pixels_from_unit(mixed, pixels.dtype)
         joined[strip] = np.where(is_invented[strip, :, None], mixed, photo[strip])
-    return Plate(int(x0), int(y0), joined, is_invented, inpainter.name, seed)
+    return Plate(x0, y0, joined, is_invented, inpainter.name, seed)
+
+
+def _window(
+    box: Box, inpainter: Inpainter, shape: tuple[int, ...], has_hints: bool
+) -> tuple[tuple[slice, slice], int, int]:
+    """What an inpainter sees around the `box` of a hole: rows and columns, and their corner."""
+    height, width = shape
+    x0, y0, x1, y1 = box
+    context = int(max(CONTEXT * max(x1 - x0, y1 - y0), LEAST_CONTEXT))
+    if isinstance(inpainter, LooksFar):
+        context = max(context, inpainter.context)
+    if has_hints:  # from anywhere
+        context = max(width, height)
+    top, left = max(y0 - context, 0), max(x0 - context, 0)
+    return (slice(top, min(y1 + context, height)), slice(left, min(x1 + context, width))), left, top
+
+
+def _away(covered: Mask) -> F32:
+    """(H, W) px to the nearest pixel that is covered."""
+    px = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(px, np.float32)
 
 
 def fill_weight(away: F32, margin: float) -> F32:
@@ -149,20 +171,26 @@ def _enlarged(small: F32, shape: tuple[int, ...]) -> F32:
     return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def plate_of_holes(document: Document, holes: tuple[Matte, ...]) -> Plate | None:
+def plate_of_holes(
+    document: Document, holes: tuple[Matte, ...], ghosts: tuple[Ghost, ...] | None = None
+) -> Plate | None:
     """The document's plate, invented only where what stood in these `holes` is gone.
 
     Around objects that are still there it is the photo, except where it was repaired by hand.
+    `ghosts` saves finding them again.
     """
-    plate = document.plate
+    plate, near = document.plate, SEAM * hole_margin(*document.photo.size)
+    ghosts = find_ghosts(document, near) if ghosts is None else ghosts
+    if plate is not None and ghosts:
+        shares = shown_shares(document, ghosts, holes)
+        plate = with_ghosts(plate, document.photo.pixels, ghosts, shares)
     rest = [o for o in document.objects if o.mask is not None and o.matte not in holes]
     if plate is None or not rest:
         return plate
     covered = np.zeros(plate.hole.shape, bool)
     for matte in holes:
         covered |= crop(matte.alpha, matte.box, plate.box) > 0
-    away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
-    is_shown, painted = away < SEAM * hole_margin(*document.photo.size), plate.painted
+    is_shown, painted = _away(covered) < near, plate.painted
     if painted is not None:
         painted = painted.copy()
         for item in rest:

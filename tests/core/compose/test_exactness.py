@@ -76,6 +76,9 @@ def _reach(document: Document, item: EditObject, puppet: Puppet) -> np.ndarray:
     """(H, W) all that an edit without a shadow may change, found another way."""
     width, height = document.photo.size
     where = plate_cover(document).astype(np.uint8)
+    assert document.plate is not None
+    x0, y0, x1, y1 = document.plate.box  # what the object left beside it is gone, too
+    where[y0:y1, x0:x1] |= document.plate.hole
     shape = silhouette(puppet.posed(None, item.placement), _texture(item), puppet.camera)
     if shape is not None:
         matrix = np.array([[shape.pitch, 0, shape.left], [0, shape.pitch, shape.top]])

@@ -21,7 +21,10 @@ from ..widgets.widgets import Kind, bold_text, button, drawn_button, fitted, sma
 from ..window.landmarks import mark
 from ..window.layout import Rect
 
-SAMPLES = (("chelsea", "Cat"), ("coffee", "Coffee"), ("rocket", "Rocket"), ("flower", "Flower"))
+SAMPLES = {  # title, and a place of the thing that is lifted when it is opened, image px
+    "chelsea": ("Cat", (189, 153)), "coffee": ("Coffee", (280, 260)),
+    "rocket": ("Rocket", (322, 264)), "flower": ("Flower", (307, 223)),
+}  # fmt: skip
 COLUMN = 720.0  # points, width of everything
 DROP_HEIGHT = 240.0
 THUMB = (168.0, 112.0)
@@ -92,16 +95,17 @@ class StartScreen:
         count, least = len(SAMPLES), theme.pt(LEAST_GAP)
         width = min(theme.pt(THUMB[0]), (column - (count - 1) * least) / count)
         gap = (column - count * width) / (count - 1)
-        for i, (name, title) in enumerate(SAMPLES):
+        for i, name in enumerate(SAMPLES):
             if i:
                 imgui.same_line(0, gap)
-            self._draw_sample(editor, name, title, ImVec2(width, width * THUMB[1] / THUMB[0]))
+            self._draw_sample(editor, name, ImVec2(width, width * THUMB[1] / THUMB[0]))
 
-    def _draw_sample(self, editor: Editor, name: str, title: str, size: ImVec2) -> None:
+    def _draw_sample(self, editor: Editor, name: str, size: ImVec2) -> None:
+        title, thing = SAMPLES[name]
         low = imgui.get_cursor_screen_pos()
         imgui.begin_group()
         if drawn_button(f"##{name}", size):
-            editor.filing.open_sample(Path(str(resource(f"assets/samples/{name}.jpg"))))
+            editor.sample.open(resource(f"assets/samples/{name}.jpg"), thing)
         mark(title)
         is_hovered = imgui.is_item_hovered()
         if is_hovered:

@@ -51,6 +51,12 @@ def draw_edge(canvas: Canvas) -> None:
         canvas.polyline(canvas.at(outline), ACCENT)
 
 
+def draw_left_out(canvas: Canvas) -> None:
+    """Dotted lines around what is offered to be added to the selection."""
+    for outline in canvas.editor.leaving_out.outlines:
+        _draw_dots(canvas, outline, WHITE, 1.0)
+
+
 def _draw_dots(canvas: Canvas, outline: np.ndarray, color: str, share: float) -> None:
     """A dotted closed line (N, 2) image px: what a click would select, add or take away."""
     corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))

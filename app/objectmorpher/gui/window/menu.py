@@ -24,7 +24,7 @@ MENUS: dict[str, tuple[str, ...]] = {
     ),
     "Select": (
         "subject", "invert", "clear", "-", "grow", "shrink", "smooth", "feather", "fill_holes",
-        "remove_islands", "-", "import_mask", "export_mask",
+        "remove_islands", "add_left_out", "-", "import_mask", "export_mask",
     ),
     "Object": (
         "lift", "import_shape", "fit_again", "-", "rename", "duplicate", "remove_object", "-",
@@ -37,7 +37,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
     "Window": ("panel", "history", "models", "preferences"),
-    "Help": ("shortcuts", "about"),
+    "Help": ("palette", "help", "shortcuts", "-", "about"),
 }  # fmt: skip
 
 

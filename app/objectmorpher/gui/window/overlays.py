@@ -11,12 +11,13 @@ from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import ToolName
 from ..overlay.canvas import Canvas
+from ..overlay.card import draw_card
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
 from ..overlay.look import draw_comparison, draw_look, draw_pixel_grid
 from ..overlay.place import draw_frame
 from ..overlay.pose import draw_control_points, draw_pose
-from ..overlay.select import draw_mask, draw_selection
+from ..overlay.select import draw_left_out, draw_mask, draw_selection
 from .landmarks import mark_on_canvas
 from .layout import Rect
 
@@ -43,8 +44,10 @@ def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
             draw_control_points(canvas)
         if editor.is_lifted or view.tool in OF_THE_PHOTO:
             DRAWN[view.tool](canvas)
+        draw_left_out(canvas)
         Legend(editor, rect).draw()
     is_split = view.split is not None and editor.looking.orbit is None
     if editor.looking.badge or is_split:
         draw_comparison(canvas)
     canvas.draw.pop_clip_rect()
+    draw_card(editor, rect)

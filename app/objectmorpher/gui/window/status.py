@@ -152,6 +152,7 @@ def _draw_buttons(editor: Editor, message: Message) -> None:
         if imgui.button(message.action.label):
             editor.message = None
             message.action.run()
+        mark(message.action.label)
         imgui.same_line(0, theme.pt(8))
     if message.details:
         imgui.set_cursor_pos_y(top)

@@ -1,4 +1,4 @@
-"""Panels over the window: shortcuts, preferences, about. Nothing waits for them."""
+"""Panels over the window: the command palette, help, preferences. Nothing waits for them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from ....editor.shortcuts import Shortcuts
 from ....editor.view import Popup
 from ...widgets.fade import fades
 from .about import draw_about
+from .help import draw_help
+from .palette import Palette
 from .preferences import ComputeFields, draw_preferences
 from .shortcuts import ShortcutsPopup
 
@@ -24,6 +26,8 @@ class Popups:
     def __init__(self, shortcuts: Shortcuts) -> None:
         self._shortcuts = shortcuts
         self._drawn: dict[Popup, Callable[[Editor], None]] = {
+            Popup.PALETTE: Palette().draw,
+            Popup.HELP: draw_help,
             Popup.SHORTCUTS: ShortcutsPopup(shortcuts).draw,
             Popup.PREFERENCES: partial(draw_preferences, compute=ComputeFields()),
             Popup.ABOUT: draw_about,

@@ -1,0 +1,342 @@
+"""What an object leaves beside its cut-out in the photo: a toe, a rim, the shadow at its foot.
+
+A selection that misses a little leaves it standing where the object was. Close around the
+cut-out, whatever the background farther out cannot explain belongs to the object, if it touches
+the cut-out and ends nearby; what goes on beyond is background. How unlike the background a place
+may be is measured on the background itself, at the same distance. The shadow at the foot is
+looked for in coarser colours, where only the mean of a texture counts.
+
+The plate is invented there, too. It is shown as far as what stands beside it has moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...base.arrays import F32, F64, I64, Mask, Pixels
+from ...base.camera import Camera
+from ...base.pixels import crop, pixels_from_unit, unit_pixels
+from ...document.model import Document, EditObject, Matte, Plate
+
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
+
+REACH = 3.0  # x hole margin: how far from the cut-out something may be left
+ENDS = 0.85  # x reach: what goes on to here is background
+AROUND = 2.4  # x reach: the background that a place is compared with
+SIDE = 420.0  # px: size of the picture in which residue is looked for
+LEAST_REACH = 12.0  # px of that picture
+SEEDS, PROBES = 12_000, 3_000  # places of the background, and those on which it is measured
+NEIGHBOURS = 60
+APART = 0.4  # x reach: a place of the background is compared with others that are so far off
+STEEP = 6.0  # levels of CIE Lab that a background as far off as the reach costs
+USUAL = 0.9  # quantile of what the background costs around a place
+TOUCHES = 2.2  # px of that picture: so near to the cut-out is beside it
+LEAST = 6  # px of that picture
+DARKER = 3.0  # levels of L by which a shadow is darker than what is around
+BELOW = 0.3  # mean downwardness of a shadow's places, of [-1, 1]
+VISIBLE = 6.0 / 255  # mean difference from the fill: with less nothing would be seen
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How colours are compared: blurs in px, and what is more than the background's own cost."""
+
+    blurs: tuple[tuple[float, float], ...]  # standard deviation and weight
+    factor: float
+    floor: float  # levels of CIE Lab
+
+
+def find_residue(pixels: Pixels, covered: Mask, margin: float) -> Mask:
+    """(H, W) True where the photo (H, W, 3) shows more of what is `covered` (H, W).
+
+    `margin` is the photo's `hole_margin`, px.
+    """
+    height, width = covered.shape
+    reach, found = REACH * margin, np.zeros_like(covered)
+    rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
+    pad = int((AROUND + 0.1) * reach) + 2
+    window = (
+        slice(max(rows[0] - pad, 0), min(rows[-1] + 1 + pad, height)),
+        slice(max(columns[0] - pad, 0), min(columns[-1] + 1 + pad, width)),
+    )
+    part, own = pixels[window], covered[window]
+    scale = min(1.0, max(SIDE / max(own.shape), LEAST_REACH / reach))
+    size = (max(round(own.shape[1] * scale), 1), max(round(own.shape[0] * scale), 1))
+    small = cv2.resize(unit_pixels(part), size, interpolation=cv2.INTER_AREA)
+    share = cv2.resize(own.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    residue = _Surroundings(np.asarray(small, np.float32), share > 0, reach * scale).residue()
+    wide = cv2.dilate(residue.astype(np.uint8), np.ones((3, 3), np.uint8))
+    large = cv2.resize(wide, own.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    found[window] = (large > 0) & ~own
+    return found
+
+
+class _Surroundings:
+    """A small picture around what is covered."""
+
+    def __init__(self, rgb: F32, covered: Mask, reach: float) -> None:
+        self._lab = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB), np.float32)
+        self._known, self._reach = (~covered).astype(np.float32), reach
+        self._away = cv2.distanceTransform((~covered).astype(np.uint8), cv2.DIST_L2, 5)
+        self._band = (self._away > 0) & (self._away <= reach)
+        self._ring = (self._away > reach) & (self._away <= AROUND * reach)
+
+    def residue(self) -> Mask:
+        """(h, w) what the background does not explain."""
+        found = np.zeros_like(self._band)
+        if np.count_nonzero(self._ring) <= NEIGHBOURS or not self._band.any():
+            return found
+        is_darker = self._blurred(1.5)[..., 0] < self._usual()[..., 0] - DARKER
+        fine = self._unexplained(_Look(((0.8, 1.0), (2.0, 0.7)), 1.6, 5.0))
+        coarse = self._unexplained(_Look(((self._reach / 7, 1.0),), 1.3, 4.5))
+        dark = fine & is_darker
+        for part in (fine, dark, fine & ~is_darker):
+            found |= self._attached(part, is_shadow=False)
+        for part in (coarse & is_darker, (coarse & is_darker) | dark):
+            found |= self._attached(part, is_shadow=True)
+        return found & self._band
+
+    def _blurred(self, sigma: float) -> F32:
+        share = cv2.GaussianBlur(self._known, (0, 0), sigma)
+        mean = cv2.GaussianBlur(self._lab * self._known[..., None], (0, 0), sigma)
+        return np.asarray(mean / np.maximum(share, 1e-3)[..., None], np.float32)
+
+    def _usual(self) -> F32:
+        """(h, w, 3) the background's colour around each place."""
+        ring, total = self._ring.astype(np.float32), np.zeros(self._ring.shape, np.float32)
+        mean = np.zeros_like(self._lab)
+        for n, sigma in enumerate((2.0, 4.0, 8.0, 16.0, 32.0)):
+            share = np.float32(100.0**-n)
+            total += share * cv2.GaussianBlur(ring, (0, 0), sigma)
+            mean += share * cv2.GaussianBlur(self._lab * ring[..., None], (0, 0), sigma)
+        return np.asarray(mean / np.maximum(total, 1e-12)[..., None], np.float32)
+
+    def _unexplained(self, look: _Look) -> Mask:
+        """(h, w) where the colours are farther from the background's than it is from itself."""
+        rows, columns = np.indices(self._band.shape, np.float32) * (STEEP / self._reach)
+        colours = [weight * self._blurred(sigma) for sigma, weight in look.blurs]
+        features = np.dstack([*colours, rows, columns])
+        random = np.random.default_rng(0)
+        seeds = _some(np.argwhere(self._ring), SEEDS, random)
+        probes = _some(seeds, PROBES, random)
+        tree = KDTree(features[seeds[:, 0], seeds[:, 1]])
+        costs, which = tree.query(features[probes[:, 0], probes[:, 1]], k=NEIGHBOURS)
+        gaps = np.linalg.norm(seeds[which] - probes[:, None], axis=-1)
+        costs = np.where(gaps > APART * self._reach, costs, np.inf).min(1)
+        is_known = np.isfinite(costs)
+        costs[~is_known] = costs[is_known].max(initial=0.0)
+        places = np.argwhere(self._band)
+        around = KDTree(probes).query(places, k=min(NEIGHBOURS, len(probes)))[1]
+        limit = look.factor * np.quantile(costs[around], USUAL, axis=1) + look.floor
+        result = np.zeros_like(self._band)
+        result[self._band] = tree.query(features[places[:, 0], places[:, 1]])[0] > limit
+        return result
+
+    def _attached(self, part: Mask, is_shadow: bool) -> Mask:
+        """(h, w) the pieces of `part` that touch what is covered, and end within reach."""
+        closed = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=8)
+        labels = np.asarray(labels, np.int32)
+        keeps = np.zeros(count, bool)
+        keeps[np.unique(labels[(self._away > 0) & (self._away <= TOUCHES)])] = True
+        keeps &= stats[:, cv2.CC_STAT_AREA] >= LEAST
+        keeps[np.unique(labels[self._away > ENDS * self._reach])] = False
+        if is_shadow:  # it lies at the foot
+            down = cv2.Sobel(self._away, cv2.CV_32F, 0, 1, scale=1 / 8)
+            sums = np.bincount(labels.ravel(), down.ravel(), count)
+            keeps &= sums > BELOW * stats[:, cv2.CC_STAT_AREA]
+        keeps[0] = False
+        return keeps[labels]
+
+
+def _some(places: I64, most: int, random: np.random.Generator) -> I64:
+    return places if len(places) <= most else places[random.choice(len(places), most, False)]
+
+
+def visible_residue(residue: Mask, photo: Pixels, fill: Pixels) -> Mask:
+    """The pieces of a residue (h, w) that would be seen: they differ from what was filled in."""
+    count, labels = cv2.connectedComponents(residue.astype(np.uint8), connectivity=8)
+    labels = np.asarray(labels, np.int32)
+    unlike = np.abs(unit_pixels(photo[residue]) - unit_pixels(fill[residue])).mean(-1)
+    sums = np.bincount(labels[residue], unlike, count)
+    keeps = sums > VISIBLE * np.bincount(labels[residue], minlength=count)
+    return residue & keeps[labels]
+
+
+# How much of it is shown: as much as what stands beside it has moved.
+
+MOVED = (1.0, 6.0)  # px of the photo: from here on it begins to be shown, and from here it is
+STEPS = 4  # in which it appears
+NEAREST = 4  # control points that say how what stands beside it has moved
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """A piece of residue in a plate, and what it is part of."""
+
+    box: Box  # px of the plate
+    there: Mask  # (h, w) of the box
+    owner: int  # index of the object beside it
+    points: I64  # the object's control points that are nearest; empty where it is not lifted
+
+
+def find_ghosts(document: Document, near: float) -> tuple[Ghost, ...]:
+    """The residue in the document's plate: what is invented there farther than `near` px away.
+
+    So the plate of an older session, or one that was only repaired by hand, has none.
+    """
+    plate = document.plate
+    if plate is None:
+        return ()
+    away = [_away(item, plate.box) for item in document.objects]
+    if not away:
+        return ()
+    beside = plate.hole & (np.min(away, axis=0) >= near)
+    if plate.painted is not None:
+        beside &= ~plate.painted
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        beside.astype(np.uint8), connectivity=8
+    )
+    labels, ghosts = np.asarray(labels, np.int32), []
+    for n in range(1, count):
+        x0, y0, width, height = (int(v) for v in stats[n, : cv2.CC_STAT_AREA])
+        box = (x0, y0, x0 + width, y0 + height)
+        inner = (slice(y0, box[3]), slice(x0, box[2]))
+        there = labels[inner] == n
+        gaps = [np.where(there, px[inner], np.inf) for px in away]
+        owner = int(np.argmin([gap.min() for gap in gaps]))
+        row, column = np.unravel_index(int(np.argmin(gaps[owner])), there.shape)
+        foot = np.array([column + x0 + plate.left, row + y0 + plate.top])
+        points = _nearest_points(document.objects[owner], document.photo.camera, foot)
+        ghosts.append(Ghost(box, there, owner, points))
+    return tuple(ghosts)
+
+
+def _away(item: EditObject, box: Box) -> F32:
+    """(h, w) px of the box to what an object covers."""
+    x0, y0, x1, y1 = box
+    if item.matte is not None:
+        own = crop(item.matte.alpha, item.matte.box, box) > 0
+    elif item.mask is not None:
+        own = item.mask[y0:y1, x0:x1]
+    else:
+        own = np.zeros((y1 - y0, x1 - x0), bool)
+    if not own.any():
+        return np.full(own.shape, np.inf, np.float32)
+    return np.asarray(cv2.distanceTransform((~own).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+
+
+def _nearest_points(item: EditObject, camera: Camera, foot: F64 | I64) -> I64:
+    if item.lifted is None:
+        return np.empty(0, np.int64)
+    rest = camera.project(item.lifted.world_points(item.lifted.control_points))
+    return np.argsort(np.linalg.norm(rest - foot, axis=1))[:NEAREST]
+
+
+def shown_shares(
+    document: Document, ghosts: Sequence[Ghost], holes: Sequence[Matte]
+) -> tuple[float, ...]:
+    """In [0, 1] how much of each ghost is gone; `holes` are where objects were and are not."""
+    shares = []
+    for ghost in ghosts:
+        item = document.objects[ghost.owner]
+        is_gone = any(item.matte is hole for hole in holes)
+        px = _moved_by(item, document.photo.camera, ghost.points) if is_gone else 0.0
+        share = np.clip((px - MOVED[0]) / (MOVED[1] - MOVED[0]), 0, 1)
+        shares.append(float(np.rint(share * STEPS) / STEPS))
+    return tuple(shares)
+
+
+def _moved_by(item: EditObject, camera: Camera, points: I64) -> float:
+    """Px by which those control points of an object are not where they were; the farthest."""
+    if not item.is_visible:
+        return np.inf
+    if item.lifted is None:
+        return 0.0
+    rest = item.lifted.control_points[points].astype(np.float64)
+    posed = rest if item.pose is None else item.pose.points[points]
+    motion = item.placement.matrix(item.lifted, camera)
+    world = item.lifted.world_points(posed) @ motion[:3, :3].T + motion[:3, 3]
+    if (world[:, 2] <= 0).any():
+        return np.inf
+    gaps = camera.project(world) - camera.project(item.lifted.world_points(rest))
+    return float(np.linalg.norm(gaps, axis=1).max(initial=0.0))
+
+
+def with_ghosts(
+    plate: Plate, photo: Pixels, ghosts: Sequence[Ghost], shares: Sequence[float]
+) -> Plate:
+    """The plate with so much of each ghost taken away, wherever the edit reaches."""
+    if not ghosts:
+        return plate
+    pixels, hole = plate.pixels.copy(), plate.hole.copy()
+    painted = np.zeros_like(hole) if plate.painted is None else plate.painted.copy()
+    behind = photo[plate.top : plate.box[3], plate.left : plate.box[2]]
+    for ghost, share in zip(ghosts, shares, strict=True):
+        x0, y0, x1, y1 = ghost.box
+        inner, there = (slice(y0, y1), slice(x0, x1)), ghost.there
+        if share < 1:
+            old, new = unit_pixels(behind[inner][there]), unit_pixels(pixels[inner][there])
+            mixed = pixels_from_unit(old + share * (new - old), pixels.dtype)
+            pixels[inner][there] = mixed
+        hole[inner][there] = share > 0
+        painted[inner][there] = share > 0
+    return replace(plate, pixels=pixels, hole=hole, painted=painted if painted.any() else None)
+
+
+# What of it may be a part of the object, to be added to its selection.
+
+LEAST_PART = 1.5  # x hole margin, squared: a smaller piece is hardly worth a question
+SHADE = 0.25  # of a darkening, by how much it may differ between the channels of a shadow
+BLACK = 0.02  # of sRGB's range, added before ratios are taken
+
+
+def left_out(document: Document, ghosts: Sequence[Ghost], margin: float) -> tuple[Ghost, ...]:
+    """The ghosts that look like a part of their object rather than like its shadow.
+
+    `margin` is the photo's `hole_margin`, px.
+    """
+    plate = document.plate
+    if plate is None:
+        return ()
+    photo = document.photo.pixels[plate.top : plate.box[3], plate.left : plate.box[2]]
+
+    def is_part(ghost: Ghost) -> bool:
+        if np.count_nonzero(ghost.there) < (LEAST_PART * margin) ** 2:
+            return False
+        x0, y0, x1, y1 = ghost.box
+        seen, behind = (
+            unit_pixels(image[y0:y1, x0:x1][ghost.there]).mean(0) + BLACK
+            for image in (photo, plate.pixels)
+        )
+        change = np.log(seen / behind)
+        is_shadow = change.max() < 0 and np.ptp(change) < SHADE * -change.mean()
+        return not is_shadow
+
+    return tuple(ghost for ghost in ghosts if is_part(ghost))
+
+
+def with_parts(mask: Mask, document: Document, parts: Sequence[Ghost], margin: float) -> Mask:
+    """A selection (H, W) with those pieces added, and joined to it.
+
+    Of a piece only that is added which the background does not look like: it has a seam around it.
+    """
+    grown, plate = mask.copy(), document.plate
+    assert plate is not None, "pieces are of a plate"
+    for part in parts:
+        x0, y0, x1, y1 = part.box
+        inner = (slice(plate.top + y0, plate.top + y1), slice(plate.left + x0, plate.left + x1))
+        seen, behind = document.photo.pixels[inner], plate.pixels[y0:y1, x0:x1]
+        unlike = np.abs(unit_pixels(seen) - unit_pixels(behind)).max(-1)
+        grown[inner] |= part.there & (cv2.blur(unlike, (3, 3)) > 2 * VISIBLE)
+    added = grown & ~mask
+    reach = int(np.ceil(margin)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    joined = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, kernel) > 0
+    near = cv2.dilate(added.astype(np.uint8), kernel) > 0
+    return grown | (joined & near)

@@ -1,0 +1,90 @@
+"""The command palette and the pages of help, which come with the program."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from hands import opened
+from objectmorpher.commands import COMMANDS
+from objectmorpher.commands.settings import SETTINGS
+from objectmorpher.editor.editor import Editor
+from objectmorpher.gui.dialogs.popups.palette import Palette
+from objectmorpher.system.help_pages import FIRST, ORDER, Kind, blocks_of, pages
+
+ROOT = Path(__file__).parents[2]
+PANELS = ROOT / "app" / "objectmorpher" / "gui"
+SEARCH = "Type what you want to do"
+
+
+def test_every_page_of_help_is_there_without_markdowns_marks() -> None:
+    assert {path.stem for path in (ROOT / "docs" / "howto").glob("*.md")} == set(ORDER)
+    assert pages()[0].name == FIRST
+    for page in pages():
+        assert page.title and len(page.blocks) > 3, page.name
+        plain = [block.text for block in page.blocks if block.kind is not Kind.CODE]
+        marked = [text for text in plain if re.search(r"\]\(|\*\*|^#|^\||`", text)]
+        assert marked == [], page.name
+
+
+def test_a_page_keeps_its_order_and_its_code() -> None:
+    text = "# One\n\nA [link](x.md), *this*\nline.\n\n```sh\na  b\n```\n\n- **a *2nd* one**\n"
+    found = [(block.kind, block.text) for block in blocks_of(text)]
+    assert found == [
+        (Kind.HEADING, "One"), (Kind.TEXT, "A link, this line."), (Kind.CODE, "a  b"),
+        (Kind.ITEM, "a 2nd one"),
+    ]  # fmt: skip
+
+
+def test_the_settings_it_names_are_those_of_the_panels() -> None:
+    source = "".join(path.read_text(encoding="utf-8") for path in PANELS.rglob("*.py"))
+    assert set(SETTINGS) <= set(COMMANDS)
+    missing = [
+        label for labels in SETTINGS.values() for label in labels if f't("{label}")' not in source
+    ]
+    assert missing == []
+
+
+def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Editor) -> None:
+    palette = Palette()
+
+    def first(typed: str) -> tuple[str, str]:
+        palette._typed = typed
+        entry = palette._found(editor)[0]
+        return entry.title, entry.command
+
+    assert first("invert") == ("Invert selection", "invert")
+    assert first("thickn") == ("Thickness", "look")
+    assert first("bend a") == ("Bend a part and keep the rest", "")
+    assert first("stays pin")[0] == "Pin that stays"
+    palette._typed = ""
+    everything = {entry.command for entry in palette._found(editor)}
+    assert everything >= set(COMMANDS) - {"palette"}
+    palette._typed = "xyzzy"
+    assert palette._found(editor) == []
+
+
+@pytest.mark.window
+def test_a_command_is_found_and_run_by_typing(
+    window_environment: dict[str, str], photo_path: Path
+) -> None:
+    with opened(window_environment, photo_path) as hands:
+        hands.area("Photo")
+        hands.press("ctrl+k")
+        hands.area(SEARCH)
+        hands.settle()
+        hands.xdotool("type", "--delay", 30, "panel")
+        hands.area("Panel")
+        hands.press("Return")
+        hands.wait(lambda: "Another object" not in hands.places(), "folding the panel up")
+        hands.press("ctrl+k")
+        hands.area(SEARCH)
+        hands.settle()
+        hands.xdotool("type", "--delay", 30, "take an object away")
+        hands.press("Return")
+        hands.area("Take an object away")
+        hands.wait(lambda: "A first edit" in hands.places(), "reading help")
+        hands.press("Escape")
+        hands.wait(lambda: "A first edit" not in hands.places(), "closing help")

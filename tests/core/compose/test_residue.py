@@ -1,0 +1,155 @@
+"""What an object leaves beside its cut-out: found where the true background is known."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+from skimage import data
+
+from objectmorpher_core import compose
+from objectmorpher_core.base.arrays import F32, Mask, Pixels
+from objectmorpher_core.compose.composite import composite
+from objectmorpher_core.compose.plate.plate import SEAM, build_plate, hole_margin, plate_crop
+from objectmorpher_core.compose.plate.residue import find_ghosts, left_out, with_parts
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Photo, Placement, Prompt
+from objectmorpher_core.pictures.image import Picture
+from objectmorpher_core.pipeline import lift_mask
+from objectmorpher_core.segment.matting.matte import cut_out
+from tests.photos import outlined, photo
+from tests.shapes import camera, png
+
+HEIGHT, WIDTH = 360, 480
+MARGIN = hole_margin(WIDTH, HEIGHT)
+VISIBLE = 10  # levels by which a ghost differs from the background
+
+
+@cache
+def _scene(name: str, source: str, ground: str) -> tuple[Pixels, Pixels, Mask]:
+    """A thing on a background: the photo, the background alone, and what the thing covers."""
+    cut = cut_out(photo(source), outlined(name))
+    rows, columns = np.flatnonzero((cut.alpha > 0).any(1)), np.flatnonzero((cut.alpha > 0).any(0))
+    own = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    scale = min(0.5 * HEIGHT / len(rows), 0.5 * WIDTH / len(columns))
+    size = (round(len(columns) * scale), round(len(rows) * scale))
+    alpha, colour = (
+        cv2.resize(part[own], size, interpolation=cv2.INTER_AREA)
+        for part in (cut.alpha, cut.foreground)
+    )
+    top, left = (HEIGHT - size[1]) // 2, (WIDTH - size[0]) // 2
+    there = np.s_[top : top + size[1], left : left + size[0]]
+    whole, full = np.zeros((HEIGHT, WIDTH), np.float32), np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    whole[there], full[there] = alpha, colour
+    behind = _background(ground)
+    mixed = behind / np.float32(255) * (1 - whole[..., None]) + full * whole[..., None]
+    return np.rint(mixed * 255).astype(np.uint8), behind, whole > 0.5
+
+
+def _background(name: str) -> Pixels:
+    if name == "wood":
+        picture = photo("coffee")[300:, 420:]
+    elif name == "brick":
+        picture = np.rint(data.brick()[..., None] * np.array([1, 0.7, 0.6])).astype(np.uint8)
+    else:
+        picture = photo("motorcycle")[300:]
+    scale = max(HEIGHT / picture.shape[0], WIDTH / picture.shape[1])
+    whole = cv2.resize(picture, None, fx=scale, fy=scale)
+    return np.ascontiguousarray(whole[:HEIGHT, :WIDTH], np.uint8)
+
+
+def _missing(own: Mask, kind: str) -> Mask:
+    """A selection of what a thing covers that misses its foot, or its rim at the left."""
+    if kind == "foot":
+        selection = own.copy()
+        selection[np.flatnonzero(own.any(1))[-1] - round(2 * MARGIN) :] = False
+        return selection
+    return own & np.roll(own, (round(0.6 * MARGIN), round(1.2 * MARGIN)), (0, 1))
+
+
+def _away(mask: Mask) -> F32:
+    px = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(px, np.float32)
+
+
+SCENES = (
+    ("cameraman", "camera", "brick"), ("patch", "astronaut", "street"),
+    ("valve", "astronaut", "wood"), ("headlight", "motorcycle", "wood"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["foot", "rim"])
+def test_what_a_selection_missed_is_gone_from_the_plate(kind):
+    before, after = 0.0, 0.0
+    for name, source, ground in SCENES:
+        pixels, behind, own = _scene(name, source, ground)
+        covered = _away(_missing(own, kind)) < 2
+        plate = build_plate(pixels, covered, compose.load("telea"))
+        picture = plate_crop(pixels, plate, (0, 0, WIDTH, HEIGHT))
+        unlike = np.abs(pixels.astype(int) - behind).max(-1)
+        ghost = (unlike > VISIBLE) & (_away(covered) > SEAM * MARGIN)
+        assert ghost.sum() > 100, "there is something to be found"
+        before += float(unlike[ghost].mean())
+        after += float(np.abs(picture.astype(int) - behind).max(-1)[ghost].mean())
+    assert after < {"foot": 0.4, "rim": 0.6}[kind] * before
+
+
+def test_beside_a_good_selection_hardly_anything_is_replaced():
+    for name, source, ground in SCENES:
+        pixels, behind, own = _scene(name, source, ground)
+        covered = _away(own) < 3
+        fringe = (np.abs(pixels.astype(int) - behind).max(-1) > VISIBLE) & ~covered
+        plate = build_plate(pixels, covered, compose.load("telea"))
+        hole = np.zeros_like(own)
+        hole[plate.top : plate.box[3], plate.left : plate.box[2]] = plate.hole
+        needless = hole & (_away(covered) > SEAM * MARGIN) & (_away(fringe) > 3)
+        assert needless.sum() < 0.06 * covered.sum(), name
+
+
+@pytest.fixture(scope="module")
+def footless() -> Document:
+    """A lifted patch whose lower end was left out."""
+    pixels, _, own = _scene("patch", "astronaut", "street")
+    view, mask = camera(WIDTH, HEIGHT), _missing(own, "foot")
+    document = Document(Photo(Picture(pixels), view, png(pixels), "patch.png"))
+    document = edits.set_mask(edits.add_object(document), 0, mask, Prompt())
+    document = edits.set_lifted(document, 0, *lift_mask(pixels, view, mask, "relief"))
+    covered = np.zeros_like(mask)
+    matte = document.objects[0].matte
+    assert matte is not None
+    x0, y0, x1, y1 = matte.box
+    covered[y0:y1, x0:x1] = matte.alpha > 0
+    return edits.set_plate(document, build_plate(pixels, covered, compose.load("telea")))
+
+
+def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
+    pixels, behind, own = _scene("patch", "astronaut", "street")
+    ghosts = find_ghosts(footless, SEAM * MARGIN)
+    assert ghosts
+    foot = own & (_away(_missing(own, "foot")) > 1.5 * MARGIN)
+    unlike = np.abs(pixels.astype(int) - behind).max(-1)[foot].mean()
+
+    def left(document: Document) -> float:
+        return float(np.abs(composite(document).pixels.astype(int) - behind).max(-1)[foot].mean())
+
+    away = edits.set_placement(footless, 0, Placement(move=(0.0, -120.0)))
+    assert left(away) < 0.4 * unlike
+    near = edits.set_placement(footless, 0, Placement(move=(0.0, -0.3)))
+    assert left(near) > 0.9 * unlike, "what hardly moved leaves its foot where it is"
+
+
+def test_a_part_that_was_left_out_can_be_added(footless: Document):
+    _, _, own = _scene("patch", "astronaut", "street")
+    mask = footless.objects[0].mask
+    assert mask is not None
+    parts = left_out(footless, find_ghosts(footless, SEAM * MARGIN), MARGIN)
+    assert parts
+    grown = with_parts(mask, footless, parts, MARGIN)
+
+    missed = own & ~mask
+    assert (grown | ~mask).all()
+    assert (grown & missed).sum() > 0.6 * missed.sum()
+    assert (grown ^ own).sum() < 0.6 * (mask ^ own).sum()
+    assert cv2.connectedComponents(grown.astype(np.uint8))[0] == 2, "it is joined to the object"
