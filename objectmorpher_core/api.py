@@ -1,4 +1,4 @@
-"""The library's stable names: an edit is told step by step, and done by what the program runs.
+"""The library's stable names: an edit is described step by step, then carried out.
 
 `import objectmorpher_core as om` gives them as `om.open` and so on; docs/python.md tells how they
 are used and what of them stays. An `Edit` is an `EditScript` and an opened photo, so that it gives
@@ -54,7 +54,7 @@ OF_THE_SHAPE = {
 
 
 class Shape(TypedDict, total=False):
-    """What can be said about an object's shape: the options of `edit` of these names."""
+    """Options about an object's shape, named as those of `edit`."""
 
     lift: str  # backend: auto, relief, trellis, cupid, or a worker
     gaussians: int
@@ -119,7 +119,7 @@ def replay(session: File | bytes, progress: Progress | Bar | None = None) -> Res
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Edit:
-    """A photo and what is to be done to it. Every method gives a new edit; this one stays.
+    """A photo and the edit that is to be made. Every method returns a new edit; this one stays.
 
     Points are px of the upright photo, x to the right and y down, from its corner. What makes no
     sense raises a ValueError of one sentence: at once where it can be told, else by `render`.
@@ -138,7 +138,7 @@ class Edit:
         return self.options(click=[*self.script.click, (x, y)])
 
     def not_click(self, x: float, y: float) -> Edit:
-        """What is seen at this point is not of the object."""
+        """Exclude the thing seen at this point from the object."""
         return self.options(not_click=[*self.script.not_click, (x, y)])
 
     def box(self, x0: float, y0: float, x1: float, y1: float) -> Edit:
@@ -217,7 +217,7 @@ class Edit:
     # ---- putting it back ---------------------------------------------------------------------
 
     def plate(self, inpaint: str = "auto") -> Edit:
-        """What is behind the object is filled in by this backend, even where nothing moves."""
+        """Fill in the background with this backend, even where nothing moves."""
         return replace(self.options(inpaint=inpaint), needs_plate=True)
 
     def harmonise(self) -> Edit:
@@ -284,7 +284,7 @@ class Result:
 
     @property
     def report(self) -> dict[str, Any]:
-        """What `--report` writes: seconds, handles, footprint and more, in plain values."""
+        """Return the contents of `--report`: seconds, handles, footprint and more."""
         return self.edited.report()
 
     def to_numpy(self, what: str = "photo") -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What each stage would use on this machine, why, and what would make it better."""
+"""The doctor: each stage's backend on this machine, the reason for it, and what would be better."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PACKAGES = (
 
 @dataclass(frozen=True)
 class Stage:
-    """One step of the work."""
+    """One stage of the work."""
 
     name: str
     uses: str  # the backend that "auto" takes
@@ -47,7 +47,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Machine:
-    """What there is to compute with."""
+    """The hardware to compute with."""
 
     system: str
     cores: int
@@ -76,7 +76,7 @@ def look_at_machine() -> Machine:
 
 
 def look_at_stages() -> tuple[Stage, ...]:
-    """Each stage, in the order of the work."""
+    """Return each stage, in the order of the work."""
     stages = (
         (_selecting(), segment.BACKENDS), (_lifting(), lift.BACKENDS),
         (_filling(), compose.BACKENDS), (_harmonising(), refine.BACKENDS),

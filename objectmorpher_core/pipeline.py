@@ -72,7 +72,7 @@ def open_photo(data: bytes, name: str, fov: float | None = None, seed: int = 0) 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a segmenter has made of a photo: costly once, then every click is cheap."""
+    """A segmenter's reading of a photo: costly once, then every click is cheap."""
 
     pixels: Pixels  # the photo's
     segmenter: Segmenter
@@ -149,7 +149,7 @@ def export(
 
 @dataclass(frozen=True, eq=False)
 class Edited:
-    """What `run_script` and `replay` make."""
+    """The result of `run_script` and `replay`."""
 
     document: Document
     composite: Composite
@@ -167,7 +167,7 @@ class Edited:
 
     @property
     def puppet(self) -> Puppet:
-        """Of that object."""
+        """Return the puppet of that object."""
         return self.puppets[self.first]
 
     def report(self) -> dict[str, Any]:
@@ -328,7 +328,7 @@ class _Run:
         self.document = document.with_backend("segment", backend)
 
     def keep_fronts(self, script: EditScript, progress: Progress) -> None:
-        """What the script's `front` clicks and mask mean stays in front."""
+        """Keep the things of the script's `front` clicks and mask in front."""
         wishes: list[tuple[EditScript, bytes | None]] = [
             (replace(script, **NO_CHOICE | {"click": (xy,)}), None) for xy in script.front
         ]
@@ -345,7 +345,7 @@ class _Run:
             self.document = edits.rename(self.document, k, f"Front {number}")
 
     def doubts(self) -> tuple[str, ...]:
-        """What is odd about what stays in front, each a sentence."""
+        """Return the doubts about what stays in front, each a sentence."""
         found = []
         for k, item in enumerate(self.document.objects):
             doubt = None

@@ -1,1 +1,1 @@
-"""What every other folder builds on: arrays, the camera, rotations, files, limits, threads."""
+"""The foundation of every other folder: arrays, the camera, rotations, files, limits, threads."""

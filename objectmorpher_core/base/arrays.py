@@ -50,7 +50,7 @@ def all_finite(array: np.ndarray) -> bool:
 
 
 def frozen_rows(matrix: Sparse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the rows of a sparse matrix start, its columns and its values, as kernels take them.
+    """Return the row starts, columns and values of a sparse matrix as kernels take them.
 
     scipy's indices are of 64 bits after some sums: a kernel would be compiled anew for them.
     """

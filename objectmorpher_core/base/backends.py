@@ -13,10 +13,10 @@ Table = Mapping[str, str]  # name -> "package.module:what makes one"
 
 
 class Backend(Protocol):
-    """What every stage's backends have."""
+    """The common protocol of every stage's backends."""
 
     def missing(self) -> str | None:
-        """What has to be installed or got first, as one sentence; None where it can run."""
+        """Return what has to be installed first, as one sentence; None where it can run."""
         ...
 
 
@@ -42,13 +42,13 @@ def known(
 
 
 def able(backend: Kind, error: type[ValueError]) -> Kind:
-    """The same, if it can run here; raises `error` with what is missing."""
+    """Return the backend if it can run here; raise `error` with what is missing otherwise."""
     if (sentence := backend.missing()) is not None:
         raise error(sentence)
     return backend
 
 
 def absent(table: Table) -> tuple[tuple[str, str], ...]:
-    """Those that cannot run here, each with its sentence."""
+    """Return the backends that cannot run here, each with its sentence."""
     told = ((name, create(table, name).missing()) for name in table)
     return tuple((name, reason) for name, reason in told if reason is not None)

@@ -20,7 +20,7 @@ class Brush:
     hardness: float = 0.8  # share of the radius that covers fully, in [0, 1]
 
     def coverage(self, distance: np.ndarray) -> F32:
-        """In [0, 1] at so many px from the middle: smooth from full to nothing."""
+        """Return the coverage in [0, 1] at these distances, px, from the middle: smooth."""
         inner = min(self.hardness * self.radius, self.radius - EDGE)
         outer = self.radius + EDGE
         share = np.clip((outer - distance) / (outer - inner), 0, 1)
@@ -28,7 +28,7 @@ class Brush:
 
 
 class Stroke:
-    """What a brush has covered of a picture since it was put down."""
+    """The coverage of a brush on a picture since it was put down."""
 
     def __init__(self, size: tuple[int, int], brush: Brush) -> None:
         """`size`: (width, height) px of the picture."""

@@ -11,7 +11,7 @@ SNAPPED = 1400.0  # px; the squares of larger distances have steps in float32 th
 
 
 def distance_inside(mask: Mask | np.ndarray) -> F32:
-    """(H, W) px, exact: from each pixel of `mask` (H, W) to the nearest one outside, centre to it.
+    """Return the exact distances (H, W), px, from pixels of `mask` to the nearest one outside.
 
     Where everything is inside, distances are larger than the mask.
 

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: everything that is written goes through here.
+"""Files that are written whole or not at all; everything that is written goes through here.
 
 A file is written under a temporary name in its own folder, down to the disk, renamed, and the
 folder is brought down to the disk, too. Whatever fails in between, and wherever the power is cut,

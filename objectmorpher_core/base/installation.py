@@ -1,4 +1,4 @@
-"""How this copy of the program is installed: by pip, or as a whole by an installer.
+"""The kind of installation: by pip, or as a whole by an installer.
 
 An installer's copy holds its own Python, in which nothing can be installed; its folder may be read
 only, or another one at every start (AppImage).
@@ -46,14 +46,14 @@ def extra(name: str) -> str:
 
 
 def kernel_folder() -> Path:
-    """Where an installer's copy keeps the kernels that were compiled for this processor."""
+    """Return the folder of the kernels that an installer's copy compiled for this processor."""
     if named := os.environ.get(KERNELS):
         return Path(named)
     return platformdirs.user_cache_path("objectmorpher", appauthor=False) / "kernels"
 
 
 def prepare(inside: Path) -> None:
-    """For this process and those that it starts: an installer's copy is in the folder `inside`.
+    """Prepare this process and its children for an installer's copy in the folder `inside`.
 
     numba keeps what it compiles beside the sources, or under a name made of their folder: neither
     would be found again by a copy that is read only, or in another folder every time.

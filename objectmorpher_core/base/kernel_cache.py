@@ -1,4 +1,4 @@
-"""Where an installed copy finds the kernels again that it compiled (`installation.prepare`)."""
+"""The lookup of an installed copy's compiled kernels (`installation.prepare`)."""
 
 from __future__ import annotations
 

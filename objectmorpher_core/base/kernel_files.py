@@ -1,4 +1,4 @@
-"""Compiled kernels of several processes in one folder: each file's name tells what is in it.
+"""Compiled kernels of several processes in one folder, in files named by their contents.
 
 numba numbers the files of a kernel's variants (of 8 and of 16 bits, say) in the order in which they
 are compiled. Two processes that compile different variants at the same time both take the next

@@ -1,4 +1,4 @@
-"""What libraries print about a file goes to the log, not to whoever asked for the file.
+"""Output that libraries print about a file, sent to the log and not to the user.
 
 libtiff and OpenCV write to the file descriptor itself, past `sys.stderr`. It is redirected for as
 long as something is read, for all threads: their output is logged, too.

@@ -1,4 +1,4 @@
-"""What a file or a message may claim before it is believed: every limit on what is read.
+"""Limits on the claims of a file or a message: everything that is read is checked against them.
 
 A limit is refused with one sentence, before anything is allocated for it. docs/reliability-tests.md
 lists them; a test keeps that list complete.

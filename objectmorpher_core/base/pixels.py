@@ -10,7 +10,7 @@ from .arrays import F32, Pixels
 
 
 class Samples(Protocol):
-    """What a picture file stores (H, W, 1..4): an array, or what gives its rows like one."""
+    """The stored pixels of a picture file (H, W, 1..4): an array, or a source of rows like one."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...

@@ -40,7 +40,7 @@ def count_range(least: int, most: int) -> str:
 
 
 def reason(error: BaseException) -> str:
-    """What an error says, which may quote a file: on one line, and cut where it is long."""
+    """Return an error's text, which may quote a file, on one line and cut where it is long."""
     text = "".join(c if c.isprintable() else "?" for c in str(error))
     return text if len(text) <= REASON else f"{text[: REASON - 3]}..."
 

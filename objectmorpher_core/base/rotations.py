@@ -50,7 +50,7 @@ def vector_from_matrix(matrix: np.ndarray, near: np.ndarray | None = None) -> F6
 
 
 def turn_about(vector: np.ndarray, axis: np.ndarray) -> float:
-    """How far the rotation `vector` (3,) turns about a unit `axis` (3,): radians.
+    """Return the angle, radians, by which the rotation `vector` (3,) turns about unit `axis` (3,).
 
     The twist of swing and twist: one more turn by a about the axis adds a to it. Any angle where
     the rotation is about the axis itself; else it is in (-pi, pi], as whole turns are not told

@@ -42,7 +42,7 @@ class TakesHints(Protocol):
     def inpaint_from(
         self, rgb: Pixels, hole: Mask, hints: tuple[Hint, ...], progress: Progress, seed: int = 0
     ) -> Pixels:
-        """As `Inpainter.inpaint`; the hints are in px of `rgb`, some perhaps outside."""
+        """Fill like `Inpainter.inpaint`; the hints are in px of `rgb`, some perhaps outside."""
         ...
 
 

@@ -50,7 +50,7 @@ class Rows:
 
     @property
     def box(self) -> Box:
-        """Where in the photo they are."""
+        """Return their box in the photo."""
         height, width = self.moved.shape
         return self.left, self.top, self.left + width, self.top + height
 
@@ -236,7 +236,7 @@ class Blend:
         )
 
     def shares(self) -> tuple[float, float, float]:
-        """Of the changed pixels: from photo, lifter and inpainter. All 0 where there are none."""
+        """Return the shares of photo, lifter and inpainter in the changed pixels; else all 0."""
         photo, lifter, inpainter = (math.fsum(sums) for sums in zip(*self._sums, strict=True))
         whole = photo + lifter + inpainter or 1.0
         return photo / whole, lifter / whole, inpainter / whole

@@ -52,7 +52,7 @@ PIECE = 2 * TILE  # rows that a thread works on: what it computes stays in the p
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Where the changed pixels come from; the four sum to 1 (or are 0 where nothing changed)."""
+    """Origins of the changed pixels; the four sum to 1 (or are 0 where nothing changed)."""
 
     from_photo: float = 0.0
     from_lifter: float = 0.0
@@ -71,7 +71,7 @@ class Moved:
 
     @property
     def matte(self) -> Matte:
-        """Where it was, and what it looked like."""
+        """Return the object's old place and look."""
         assert self.item.matte is not None, "what is drawn has a matte"
         return self.item.matte
 

@@ -1,4 +1,4 @@
-"""How far away the lifted objects are, as a picture for other programs."""
+"""The distance of the lifted objects as a picture for other programs."""
 
 from __future__ import annotations
 

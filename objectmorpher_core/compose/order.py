@@ -24,7 +24,7 @@ Stack = dict[int, PosedSplats | None]  # None: drawn by its matte, it was never 
 
 
 def stack(document: Document, posed: Posed) -> Stack:
-    """What is drawn over the plate, back to front, by the objects' indices.
+    """Return the objects' indices in drawing order over the plate, back to front.
 
     These are the moved objects, also the hidden ones, whose holes show; and objects at rest, and
     what stays in front, where a moved one comes near, which may hide them or be hidden by them.
@@ -81,7 +81,7 @@ def _hidden(mask: Mask, splats: PosedSplats, camera: Camera) -> float:
 def back_to_front(
     objects: tuple[EditObject, ...], splats: Mapping[int, PosedSplats | None]
 ) -> list[int]:
-    """The keys of `splats` by layer, and within a layer by depth, the farthest first.
+    """Return the keys of `splats` by layer, and within a layer by depth, the farthest first.
 
     Of two at one depth the later is in front: a copy that was moved aside. What has no depth, for
     it was told to stay in front, is the nearest.
@@ -130,7 +130,7 @@ def leaves_a_hole(objects: tuple[EditObject, ...], k: int) -> bool:
 
 
 def holes(document: Document) -> tuple[Matte, ...]:
-    """Where objects were in the photo that are not there any more."""
+    """Return the places of the photo that objects have left."""
     objects = document.objects
     return tuple(
         item.matte

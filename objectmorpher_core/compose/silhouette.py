@@ -1,4 +1,4 @@
-"""What of the picture an object covers, at a resolution that costs a few milliseconds.
+"""The part of the picture that an object covers, at a resolution that costs a few milliseconds.
 
 Shadow and light follow from it. It depends on the document alone, not on the view: so what the
 window shows of them is what is exported.
@@ -48,7 +48,7 @@ class Grid:
     height: int
 
     def camera(self, camera: Camera) -> Camera:
-        """What sees it."""
+        """Return the camera that sees it."""
         return camera.windowed(self.left, self.top, self.width, self.height, 1 / self.pitch)
 
     def cells(self, means: F64, camera: Camera) -> tuple[np.ndarray, Mask]:
@@ -172,7 +172,7 @@ def cells_bounds(
 def cell_places(
     first: int, last: int, start: float, pitch: float, count: int
 ) -> tuple[np.ndarray, F32]:
-    """Where the pixels first..last lie on an axis of `count` cells, padded by one on each side.
+    """Return the places of the pixels first..last on an axis of `count` cells, one more each side.
 
     The cell before each (n,), and how far on the way to the next it is (n,).
     """

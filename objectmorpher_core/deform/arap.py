@@ -234,7 +234,7 @@ class ArapSolver:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where the iteration ended."""
+    """The end of the iteration."""
 
     positions: F64  # (M, 3)
     rotations: F64  # (M, 3, 3)

@@ -45,7 +45,7 @@ class Binding:
         return frozen(columns.reshape(blocks, 4 * own * LANES))
 
     def select(self, index: np.ndarray) -> Binding:
-        """Of the points at `index` only."""
+        """Return the binding of the points at `index` only."""
         return Binding(
             self.control_points[index], self.weights[index], self.weight_gradients[index]
         )
@@ -54,7 +54,7 @@ class Binding:
 def bind(
     points: np.ndarray, control_points: np.ndarray, graph: Graph, normals: np.ndarray | None = None
 ) -> Binding:
-    """Binds points (N, 3) or (3,) to their K = 4 of control points (M, 3).
+    """Bind points (N, 3) or (3,) to their K = 4 nearest control points of (M, 3).
 
     The nearest control point is found by straight distance, the others among its neighbours
     along the surface (paper 3.2.2). Where two surfaces come near each other the first is found

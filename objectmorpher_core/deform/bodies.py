@@ -65,7 +65,7 @@ class Bodies:
         return settled
 
     def pivot(self, group: I32, positions: F64, handles: tuple[F64, F64]) -> Pivot:
-        """What the body turns about: the handles inside it, or else its centre."""
+        """Return the body's pivot: the handles inside it, or else its centre."""
         points, targets = handles
         if len(points) == 0:
             return Pivot(self.points[group].mean(0), positions[group].mean(0), np.zeros((3, 3)))

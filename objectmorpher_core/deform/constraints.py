@@ -1,4 +1,4 @@
-"""What holds an object: surface points with targets, held control points, patches gripped harder.
+"""Constraints on an object: surface points with targets, held control points, stiffer patches.
 
 Each of them adds a few rows to a system whose inverse is known (`response.py`), so that a change
 of the set costs the solution of a small system, not a factorisation (Woodbury's identity and a
@@ -85,7 +85,7 @@ class Constraints:
         return coupling(self._binding, rotations) - self._linear
 
     def excess(self, bends: F64, turned: F64, positions: F64) -> F64:
-        """How far (H, 3) the surface points are from where a linear blend would put them.
+        """Return how far (H, 3) the surface points are from the places of a linear blend.
 
         `turned` are `turned_arms`, (H, K, 3).
         """
@@ -94,7 +94,7 @@ class Constraints:
         return out
 
     def placed(self, positions: F64, rotations: F64) -> F64:
-        """Where the surface points are (H, 3)."""
+        """Return the places (H, 3) of the surface points."""
         turned = self.turned_arms(rotations)
         linear = self.mean(positions[self.nodes] + turned)
         if self.is_linear:
@@ -112,7 +112,7 @@ class Constraints:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Where the constraints are."""
+    """The places of the constraints."""
 
     points: F64  # (H, 3) of the surface points
     held: F64  # (P, 3) of the held control points

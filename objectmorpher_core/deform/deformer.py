@@ -88,7 +88,7 @@ class Deformer:
         self._prepare_solver()
 
     def with_rig(self, rig: Rig) -> Deformer:
-        """The same object with another rig. Only other seams need another graph and binding."""
+        """Return the same object with another rig. Only other seams need a new graph."""
         if rig.seams != self.rig.seams:
             return Deformer(self.lifted, self.settings, rig)
         other = copy.copy(self)
@@ -302,7 +302,7 @@ class Deformer:
     def skin_points(
         self, points: np.ndarray, pose: Pose, normals: np.ndarray | None = None
     ) -> Skinned:
-        """Rest surface points (N, 3) under `pose`, with the motion's Jacobian.
+        """Skin rest surface points (N, 3) by `pose`, and return the motion's Jacobian too.
 
         `normals` (N, 3), where they are known, tell the sides of a contact apart.
         """
@@ -313,7 +313,7 @@ class Deformer:
         return self._skin(self._means, self.binding, pose)
 
     def gaussians_motion(self, pose: Pose, chosen: I32 | None = None) -> Skin | Skinned:
-        """The same, left to the renderer where it can be: it projects what is still in reach.
+        """Skin the Gaussians, or leave it to a renderer that projects only those within reach.
 
         `chosen` (n,): of these Gaussians only.
         """
@@ -338,7 +338,7 @@ class Deformer:
         return skin(points, binding, motion)
 
     def strain(self, pose: Pose) -> Strain:
-        """How much `pose` bends and stretches the object at each control point."""
+        """Return how much `pose` bends and stretches the object at each control point."""
         return measure_strain(self.points, self._solver.weights, pose)
 
     @_alone

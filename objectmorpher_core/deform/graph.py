@@ -63,7 +63,7 @@ def build_graph(
     surface: Surface | None = None,
     seams: tuple[Seam, ...] = (),
 ) -> Graph:
-    """The paper's graph on control points (M, 3), object frame.
+    """Build the paper's graph on control points (M, 3), object frame.
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
     the geodesics; points within 0.3 diameters along the surface are linked, or within six

@@ -1,4 +1,4 @@
-"""From handles to constraints: which rows a set of handles is, and where they must be."""
+"""The constraints of a set of handles: which rows they are, and their targets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .surface_links import Surface, thickness
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """What a set of handles takes hold of."""
+    """The grip of a set of handles."""
 
     binding: Binding  # of the handles' points
     around: tuple[I32, ...]  # control points that turn with each, if it is turned
@@ -40,7 +40,7 @@ class Frozen:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a set of handles begins, and what stays there."""
+    """The start of a set of handles, and the parts that stay there."""
 
     pose: Pose | None  # None: the object at rest
     handles: tuple[Handle, ...]  # the same ones, as they are in that pose
@@ -112,7 +112,7 @@ class Hold:
         )  # fmt: skip
 
     def targets(self, handles: tuple[Handle, ...], share: float = 1.0) -> Targets:
-        """Where all must be for handles that begin where these do.
+        """Return the targets of handles that begin where these do.
 
         What is frozen has gone a `share` of its way.
         """

@@ -56,7 +56,7 @@ class Links:
         return cls(centred, weights, _totals_of(centred, weights), *packed)
 
     def reweighted(self, data: F64) -> Links:
-        """The same links with other weights (E,), in the order of `weights.data`."""
+        """Return the same links with other weights (E,), in the order of `weights.data`."""
         weights = csr_array((data, self.weights.indices, self.weights.indptr), self.weights.shape)
         blocks = np.zeros(len(self.blocks), np.float32)
         blocks[self.slots] = data
@@ -64,7 +64,7 @@ class Links:
         return replace(self, weights=weights, totals=totals, blocks=frozen(blocks))
 
     def prestressed(self, changes: F64) -> Links:
-        """The same links, at rest by `changes` (E, 3) from where they are at rest."""
+        """Return the same links with rest lengths changed by `changes` (E, 3)."""
         w, ends = self.weights.data, self.weights.indices
         starts = np.repeat(np.arange(len(self.points)), np.diff(self.weights.indptr))
         edges = self.points[ends] - self.points[starts]

@@ -74,7 +74,7 @@ class Puppet:
         return Deformer(self.lifted, self._settings, self._rig)
 
     def with_rig(self, rig: Rig) -> Puppet:
-        """The same object with another rig; what does not depend on it is kept."""
+        """Return the same object with another rig; whatever does not depend on it is kept."""
         other = copy.copy(self)
         other._rig, other._lock = rig, Lock()
         other._similar, other._deformer = self._deformer or self._similar, None
@@ -100,7 +100,7 @@ class Puppet:
         return self._draft_rest is not None
 
     def draft(self, pose: Pose | None, placement: Placement) -> PosedSplats:
-        """The same from about `DRAFT` wider Gaussians: where the object is and where it looks."""
+        """Return a draft of about `DRAFT` wider Gaussians, with the object's place and look."""
         assert self._draft_rest is not None, "it has few Gaussians"
         return self._moved(*self._draft_rest, pose, placement)
 
@@ -185,7 +185,7 @@ class Puppet:
         placement: Placement,
         reach: float = 0.0,
     ) -> SurfacePoint | None:
-        """The same in a view of the object, which is projected already.
+        """Pick in a view of the object that is projected already.
 
         `xy` in px of the view; within `reach` px beside the object its nearest point counts. The
         depth there gives the world point; the motion is inverted by Newton's method from the

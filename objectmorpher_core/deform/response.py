@@ -1,4 +1,4 @@
-"""How control points answer to forces: the inverse of the grounded Laplacian.
+"""The response of control points to forces: the inverse of the grounded Laplacian.
 
 Factored once per graph. Handles, pins and grips only add a few rows and columns to it
 (`constraints.py`), so a change of their set needs no new factorisation.

@@ -35,5 +35,5 @@ def rigidity_of(settings: DeformSettings) -> Rigidity | None:
 
 
 def with_rigidity(settings: DeformSettings, rigidity: Rigidity) -> DeformSettings:
-    """The same settings for another material."""
+    """Return the same settings for another material."""
     return replace(settings, stiffness=rigidity.value)

@@ -21,7 +21,7 @@ LONGEST = 1.0  # rad, of one turn
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def fit_rotations(a, r):
-    """r (9, N) := the rotations that maximise the traces of r^T a, `a` (9, N), from r itself.
+    """Improve r (9, N) to the rotations that maximise the traces of r^T a, `a` (9, N).
 
     A product of rotations never becomes a mirror image. A thin bar's twist, which its matrix
     hardly tells, is found as quickly as its axis. From afar the second derivative is pushed to

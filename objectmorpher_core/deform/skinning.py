@@ -1,4 +1,4 @@
-"""From control points to surface points: blended dual quaternions, and the motion's Jacobian.
+"""Skinning of surface points: blended dual quaternions, and the motion's Jacobian.
 
 The paper (Eq. 5) blends the displaced points themselves; where control points turn against each
 other, that mean lies inside the body, and a twisted limb grows thin. Blending the rigid motions
@@ -48,7 +48,7 @@ ROWS = MARGIN + 1
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How the control points move."""
+    """The motion of the control points."""
 
     rest: np.ndarray  # (M, 3) object frame
     points: F64  # (M, 3) posed
@@ -72,7 +72,7 @@ class Skin:
     motion: Motion
 
     def inputs(self) -> tuple[Any, ...]:
-        """What `skin_block` reads: x, control points, shares, nodes, frame."""
+        """Return the input of `skin_block`: x, control points, shares, nodes, frame."""
         x = frozen(np.atleast_2d(self.points), np.float64)
         nodes = frozen(self.binding.control_points.view(np.uint32))
         return x, nodes, self.binding.shares, *nodes_of(self.motion)

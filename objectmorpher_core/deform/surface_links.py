@@ -44,7 +44,7 @@ TINY = 1e-9  # x mean spacing: coincident points; to scipy 0 is no edge
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What lies between the control points: the solid Gaussians."""
+    """The solid Gaussians between the control points."""
 
     means: np.ndarray  # (N, 3) object frame
     normals: np.ndarray  # (N, 3) outward, unit
@@ -98,7 +98,7 @@ class Edges:
 
     @staticmethod
     def within(points: F64, radius: float, shortest: float) -> Edges:
-        """All pairs of points (N, 3) within `radius`; no length comes out below `shortest`."""
+        """Return all pairs of points (N, 3) within `radius`; no length is below `shortest`."""
         # On a grid many pairs are just at the radius: rounding must not decide about them.
         tree = KDTree(points, balanced_tree=False, compact_nodes=False)
         first, second = tree.query_pairs(radius * (1 + 1e-9), output_type="ndarray").T.copy()
@@ -107,7 +107,7 @@ class Edges:
         return Edges(first, second, np.maximum(lengths, shortest))
 
     def where(self, kept: np.ndarray) -> Edges:
-        """Those that `kept` names, by number or by a mask."""
+        """Return the edges named by `kept`, a list of numbers or a mask."""
         return Edges(self.first[kept], self.second[kept], self.lengths[kept])
 
     def and_also(self, others: Edges, count: int) -> Edges:
@@ -118,7 +118,7 @@ class Edges:
         return Edges(first, second, lengths).shortest(count)
 
     def shortest(self, count: int) -> Edges:
-        """Of several edges between two of `count` points the shortest."""
+        """Return the shortest of several edges between two of `count` points."""
         keys = self.first.astype(np.int64) * count + self.second
         keys, place = np.unique(keys, return_inverse=True)
         lengths = np.full(len(keys), np.inf)
@@ -156,7 +156,7 @@ class _Attitude:
 def without_gaps(
     edges: Edges, points: F64, spacing: float, surface: Surface
 ) -> tuple[Edges, Cells | None]:
-    """Those of `edges` between control points (M, 3) that do not bridge a gap; the cells.
+    """Return the `edges` between control points (M, 3) that do not bridge a gap, and the cells.
 
     There are no cells where no gap is in question. `spacing` is the control points' mean one. An
     edge bridges a gap when it leaves the body, or joins opposed surfaces, and the way along the
@@ -194,7 +194,7 @@ class _Sheet:
 
     @staticmethod
     def of(points: F64, normals: F64, spacing: float, surface: Surface) -> _Sheet:
-        """Of control points (M, 3) with `normals` (M, 3), `spacing` apart."""
+        """Build the links of control points (M, 3) with `normals` (M, 3), `spacing` apart."""
         count = len(points)
         grain = GRAIN * spacing * min(1.0, np.sqrt(count / EVEN_COUNT))
         x, n = _thinned(points, normals, grain, surface)
@@ -322,7 +322,7 @@ def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> 
 
 
 def thickness(points: F64, normals: F64, spacing: float, radius: float, surface: Surface) -> F64:
-    """How thick (M,) the body is under surface points (M, 3), seen against their normals.
+    """Return the body's thickness (M,) under surface points (M, 3), measured against their normals.
 
     The first of some points on the way in at which a surface faces outwards; 0 where there is none
     within `radius`.

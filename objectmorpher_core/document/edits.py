@@ -81,7 +81,7 @@ def change_mask(document: Document, k: int, mask: Selection) -> Document:
 
 
 def beside(document: Document, k: int, prompt: Prompt) -> Prompt:
-    """What to ask for object `k`: what the others cover is background.
+    """Return the prompt for object `k`: what the others cover is background.
 
     Another object that a positive click is on is not: what is clicked is meant.
     """
@@ -210,7 +210,7 @@ def set_thickness(document: Document, k: int, thickness: float) -> Document:
 
 
 def set_shape(document: Document, k: int, shape: LiftSettings) -> Document:
-    """How object `k`, which is not lifted yet, is to be lifted."""
+    """Set how object `k`, which is not lifted yet, is to be lifted."""
     return document.with_object(k, replace(document.objects[k], shape=shape))
 
 
@@ -290,7 +290,7 @@ def set_pin(document: Document, k: int, h: int, is_pin: bool) -> Document:
 
 
 def soften_handle(document: Document, k: int, h: int, softness: float) -> Document:
-    """How much handle `h` of object `k` gives way: 0 = not at all."""
+    """Set how much handle `h` of object `k` gives way; 0 is not at all."""
     if not 0 <= softness < np.inf:
         raise EditError(f"a softness of {softness:g} is not 0 or more")
     item = document.objects[k]
@@ -342,12 +342,12 @@ def resample(document: Document, k: int, count: int) -> Document:
 
 
 def set_pose(document: Document, k: int, pose: Pose | None) -> Document:
-    """Where the control points of object `k` are; None puts it back to rest."""
+    """Set the places of the control points of object `k`; None puts it back to rest."""
     return document.with_object(k, replace(document.objects[k], pose=pose))
 
 
 def set_placement(document: Document, k: int, placement: Placement) -> Document:
-    """Where object `k` is as a whole. Raises EditError behind the camera or for scale <= 0."""
+    """Set the placement of object `k`. Raises EditError behind the camera or for scale <= 0."""
     item = document.objects[k]
     if not placement.scale > 0:
         raise EditError(f"a scale of {placement.scale:g} is not above 0")
@@ -365,7 +365,7 @@ def set_grounded(document: Document, k: int, is_grounded: bool) -> Document:
 
 
 def set_deform(document: Document, k: int, settings: DeformSettings) -> Document:
-    """How object `k` deforms; its pose was solved with the old settings and is gone."""
+    """Set how object `k` deforms; its pose, solved with the old settings, is dropped."""
     item = document.objects[k]
     return document.with_object(
         k, replace(item, deform=settings, pose=None, base=item.base.at_rest)
@@ -384,7 +384,7 @@ def set_plate(document: Document, plate: Plate | None) -> Document:
 
 
 def set_hints(document: Document, hints: tuple[Hint, ...]) -> Document:
-    """From where the background is to be filled in, from its next filling on."""
+    """Set the sources from which the background is filled in next time."""
     return replace(document, hints=hints)
 
 
@@ -433,28 +433,28 @@ def set_shadow(document: Document, k: int, shadow: Shadow) -> Document:
 
 
 def set_harmony(document: Document, k: int, harmony: float) -> Document:
-    """How far object `k` takes on the light of where it is now, in [0, 1]."""
+    """Set how far object `k` takes on the light of its new place, in [0, 1]."""
     if not 0 <= harmony <= 1:
         raise EditError(f"a harmony of {harmony:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], harmony=float(harmony)))
 
 
 def set_relight(document: Document, k: int, relight: float) -> Document:
-    """How far the light on object `k` stays where it was while the object turns, in [0, 1]."""
+    """Set how far the light on object `k` stays in place while the object turns, in [0, 1]."""
     if not 0 <= relight <= 1:
         raise EditError(f"a relighting of {relight:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], relight=float(relight)))
 
 
 def set_grain(document: Document, k: int, grain: float) -> Document:
-    """How much of the photo's grain object `k` is given where it has lost it, in [0, 1]."""
+    """Set how much of the lost grain object `k` is given, in [0, 1]."""
     if not 0 <= grain <= 1:
         raise EditError(f"a grain of {grain:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], grain=float(grain)))
 
 
 def set_defocus(document: Document, k: int, defocus: float) -> Document:
-    """How far object `k` is as blurred as the photo is at its new depth, in [0, 1]."""
+    """Set how far object `k` is blurred like the photo at its new depth, in [0, 1]."""
     if not 0 <= defocus <= 1:
         raise EditError(f"a defocus of {defocus:g} is not between 0 and 1")
     return document.with_object(k, replace(document.objects[k], defocus=float(defocus)))
@@ -516,7 +516,7 @@ def set_refined(document: Document, refined: Refined | None) -> Document:
 
 
 def set_strength(document: Document, strength: float) -> Document:
-    """How much of the refinement is shown, in [0, 1]."""
+    """Set how much of the refinement is shown, in [0, 1]."""
     if not 0 <= strength <= 1:
         raise EditError(f"a strength of {strength:g} is not between 0 and 1")
     if document.refined is None:
@@ -539,7 +539,7 @@ def show_the_same(one: Document, other: Document) -> bool:
 
 
 def set_rig(document: Document, k: int, rig: Rig) -> Document:
-    """How the regions of object `k` move; its pose was solved with the old rig and is gone."""
+    """Set how the regions of object `k` move; its pose, solved with the old rig, is dropped."""
     item = document.objects[k]
     if item.lifted is None:
         raise EditError("lift the object before saying how its parts move")

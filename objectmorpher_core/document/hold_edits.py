@@ -24,7 +24,7 @@ AROUND = 0.25  # likewise: where nothing else is to move, as much as this goes w
 
 
 class Stays(Enum):
-    """What of an object stays where it is by itself while a handle is dragged."""
+    """The part of an object that stays in place by itself while a handle is dragged."""
 
     FAR = "the far side"
     ELSE = "everything else"
@@ -32,7 +32,7 @@ class Stays(Enum):
 
 
 def stays_of(item: EditObject) -> Stays:
-    """What of an object stays by itself."""
+    """Return the part of an object that stays by itself."""
     if item.is_held_around:
         return Stays.ELSE
     return Stays.FAR if item.has_auto_anchors else Stays.NOTHING

@@ -59,7 +59,7 @@ SELECTED = 128  # of 255: from this coverage on a pixel belongs to the mask
 
 @dataclass(frozen=True)
 class Prompt:
-    """What the user said about which object is meant. `is_subject`: the photo's salient subject."""
+    """The user's prompt for the object that is meant. `is_subject` asks for the salient subject."""
 
     clicks: tuple[Click, ...] = ()
     box: tuple[float, float, float, float] | None = None  # x0, y0, x1, y1 px
@@ -118,7 +118,7 @@ class Matte:
 
 @dataclass(frozen=True, eq=False)
 class PhotoTexture:
-    """What each Gaussian carries of the photo (DESIGN section 3)."""
+    """The photo's texture on each Gaussian."""
 
     u0: F32  # (N, 2) px, its rest mean in the photo
     visibility: F32  # (N,) in [0, 1], 1 = its surface was seen in the photo
@@ -181,7 +181,7 @@ LEAST_THICKNESS, MOST_THICKNESS = 0.05, 3.0  # x what the silhouette says
 
 @dataclass(frozen=True, eq=False)
 class LiftSettings:
-    """What the user says about an object's shape; the defaults are what its picture says."""
+    """The user's words about an object's shape; the defaults follow its picture."""
 
     count: int = GAUSSIANS
     thickness: float = 1.0  # x what the silhouette says
@@ -292,7 +292,7 @@ UNMOVED = frozen(np.eye(4))
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the whole object went (DESIGN section 6): scale, then turn, then move."""
+    """The placement of the whole object: scale, then turn, then move."""
 
     move: tuple[float, float] = (0.0, 0.0)  # px, of the centre's picture
     depth: float = 0.0  # object diameters away from the camera
@@ -329,7 +329,7 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class DeformSettings:
-    """How the control points move together. The defaults are ours; the rest are ablations."""
+    """Settings of the deformation. The defaults are ours; the others serve ablations."""
 
     mode: str = "arap"  # or "laplacian"
     links: str = "geodesic"  # or "euclidean"
@@ -341,7 +341,7 @@ class DeformSettings:
 
 @dataclass(frozen=True, eq=False)
 class EditObject:
-    """One object of the photo and everything that was done to it."""
+    """An object of the photo with everything that was done to it."""
 
     name: str
     prompt: Prompt = Prompt()
@@ -373,7 +373,7 @@ class EditObject:
 
     @property
     def footing(self) -> Base:
-        """What the handles move the object from, and what stays there."""
+        """Return the pose from which the handles move the object, and the parts that stay."""
         if self.base.anchors is None and not self.has_auto_anchors:
             return replace(self.base, anchors=UNHELD.anchors)
         return self.base
@@ -480,7 +480,7 @@ def is_shown_alike(one: EditObject, other: EditObject) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """All that is saved and undone."""
+    """Everything that is saved and undone."""
 
     photo: Photo
     objects: tuple[EditObject, ...] = ()

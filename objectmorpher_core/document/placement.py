@@ -26,7 +26,7 @@ def centre_of(placement: Placement, lifted: LiftedObject, camera: Camera) -> F64
 def with_centre(
     placement: Placement, centre: np.ndarray, lifted: LiftedObject, camera: Camera
 ) -> Placement:
-    """The same turn and scale with the object's centre at `centre` (3,), world."""
+    """Return the same turn and scale with the object's centre at `centre` (3,), world."""
     move = camera.project(np.asarray(centre)) - camera.project(lifted.centre)
     depth = (centre[2] - lifted.centre[2]) / (lifted.diameter * lifted.scale)
     return replace(placement, move=(float(move[0]), float(move[1])), depth=float(depth))

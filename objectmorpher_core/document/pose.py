@@ -1,4 +1,4 @@
-"""What the user asks of an object's control points, where they go, and from where."""
+"""Handles and poses: the user's wishes for an object's control points, and where they start."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Handle:
         return np.zeros(3) if self.turn is None else self.turn
 
     def pinned(self, is_pin: bool, pose: Pose | None) -> Handle:
-        """As a pin, which is held as it is turned in `pose`; or to be dragged, as it comes."""
+        """Return the handle as a pin, held as it is turned in `pose`, or free to be dragged."""
         if is_pin == self.is_pin:
             return self
         turn = turn_at(pose, self.control_point) if self.turn is None else self.turn
@@ -54,7 +54,7 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """What the handles move an object from: its pose when their set last changed, and what stays.
+    """The base of a set of handles: the pose when the set last changed, and the parts that stay.
 
     The pose is the one in which the handles are where they were then; they change it by no more
     than they have moved since. So a handle that is added, softened or removed changes nothing.
@@ -75,7 +75,7 @@ class Base:
 
     @property
     def at_rest(self) -> Base:
-        """The same anchors, from rest."""
+        """Return the same anchors, at rest."""
         return Base(anchors=self.anchors)
 
 

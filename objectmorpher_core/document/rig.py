@@ -1,4 +1,4 @@
-"""How an object's regions move: cut apart, glued together, rigid, frozen, stiffer than the rest."""
+"""The rig: regions of an object that are cut apart, glued together, rigid, frozen or stiffer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Seam:
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """What the artist said about how an object's regions move. Control points by index."""
+    """The artist's rig of an object's regions. Control points by index."""
 
     seams: tuple[Seam, ...] = ()
     bodies: tuple[I32, ...] = ()  # groups that move as one rigid body, disjoint

@@ -1,5 +1,5 @@
-"""What the artist sets about a photo's edit: where the background is filled in from, how moved
-objects join the photo, and what a learned refiner has made of it.
+"""Settings of a photo's edit: sources of the background, the joining of moved objects to the photo,
+and the result of a learned refiner.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ class Hint:
             raise ValueError(f"a hint's radius is {self.radius:g} px")
 
     def moved(self, dx: float, dy: float, scale: tuple[float, float] = (1.0, 1.0)) -> Hint:
-        """The same in px of a picture whose corner is at (-dx, -dy), `scale` across and down."""
+        """Return the same in px of a picture with its corner at (-dx, -dy), `scale` across, down.
+        """
         (a, b), (c, d) = self.source, self.to
         source = (a + dx) * scale[0], (b + dy) * scale[1]
         return Hint(source, ((c + dx) * scale[0], (d + dy) * scale[1]), self.radius * min(scale))

@@ -65,7 +65,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
 
 
 def smaller(placement: Placement, times: int) -> Placement:
-    """The same one where the photo is so much smaller."""
+    """Return the same of a photo that is smaller by this factor."""
     x, y = placement.move
     return replace(placement, move=(x / times, y / times))
 

@@ -18,7 +18,7 @@ class LiftError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is to be lifted: an object as the photo shows it."""
+    """The object that is to be lifted, as the photo shows it."""
 
     pixels: Pixels  # (H, W, 3) the photo
     camera: Camera
@@ -32,7 +32,7 @@ class Lifter(Protocol):
     name: str
 
     def missing(self) -> str | None:
-        """What has to be installed first, as one sentence; None when it can run."""
+        """Return what has to be installed first, as one sentence; None when it can run."""
         ...
 
     def lift(

@@ -1,4 +1,4 @@
-"""What was done to an object carried over to another shape of the same picture.
+"""The transfer of an object's edits to another shape of the same picture.
 
 A shape that is lifted anew, or made thicker, is seen at the same places of the photo: a handle
 takes hold of what is seen there now, on the same side, and is dragged as far. So does each region

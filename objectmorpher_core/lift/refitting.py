@@ -41,7 +41,7 @@ class Lifted:
 
 @dataclass(frozen=True, eq=False)
 class Background:
-    """What is behind a lifted object."""
+    """The background of a lifted object."""
 
     plate: Plate
     others: Mask  # (H, W) what other objects hide of it
@@ -64,7 +64,7 @@ def refit(
     progress: Progress = silent,
     seed: int = 0,
 ) -> Refitted:
-    """All that follows when the selection of a lifted object is refined to `scene.mask`.
+    """Refit an object when the selection of a lifted object is refined to `scene.mask`.
 
     Raises LiftError, InpaintError.
     """
@@ -80,7 +80,7 @@ def refit(
 
 
 def background_of(document: Document, k: int, inpaint: str) -> Background | None:
-    """What is behind object `k` and its copies; None before it is filled in."""
+    """Return the background of object `k` and its copies; None before it is filled in."""
     if document.plate is None:
         return None
     matte = document.objects[k].matte

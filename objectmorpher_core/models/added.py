@@ -24,7 +24,7 @@ NOTE = ".json"  # ending of the note beside a file
 
 @dataclass(frozen=True)
 class Kind:
-    """What a user's file can be."""
+    """A kind of file that a user can add."""
 
     id: str
     file: str  # name in the cache folder
@@ -42,7 +42,7 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Added:
-    """What the cache holds of a kind."""
+    """The cache's state of a kind."""
 
     kind: Kind
     path: Path  # where it is, or would be
@@ -65,7 +65,7 @@ def kind(id: str) -> Kind:
 
 
 def added(id: str) -> Added:
-    """What is there of kind `id`; the file is hashed once in a process."""
+    """Return the state of kind `id`; the file is hashed once in a process."""
     own = kind(id)
     at = folder() / own.file
     try:
@@ -121,7 +121,7 @@ def add(id: str, source: Path) -> Added:
 
 
 def remove(id: str) -> None:
-    """As if it had never been added. Raises ModelError."""
+    """Remove the file as if it had never been added. Raises ModelError."""
     at = folder() / kind(id).file
     try:
         at.with_suffix(NOTE).unlink(missing_ok=True)

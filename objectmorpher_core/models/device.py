@@ -25,7 +25,7 @@ def has_torch() -> bool:
 
 
 def devices() -> tuple[Device, ...]:
-    """What this machine has, the quickest first; the CPU is the last. Imports torch.
+    """Return this machine's devices, the quickest first and the CPU last. Imports torch.
 
     ROCm's GPUs are "cuda", too: that is how PyTorch names them. Raises ModelError where the
     environment asks for a device that is not there.

@@ -39,7 +39,7 @@ _verified: dict[tuple[str, int, int], bool] = {}  # (path, bytes, mtime ns) -> h
 
 @dataclass(frozen=True)
 class State:
-    """What the cache holds of a weight."""
+    """The cache's state of a weight."""
 
     weight: Weight
     path: Path  # where it is, or would be
@@ -60,12 +60,12 @@ def path(id: str) -> Path | None:
 
 
 def look(id: str | None = None) -> tuple[State, ...]:
-    """What the cache holds of weight `id`, or of all; a file is hashed once in a process."""
+    """Return the cache's state of weight `id`, or of all; a file is hashed once in a process."""
     return tuple(_state(known) for known in (weights() if id is None else (weight(id),)))
 
 
 def verify(id: str | None = None) -> tuple[State, ...]:
-    """What the cache holds of weight `id`, or of all; every file is hashed afresh."""
+    """Return the cache's state of weight `id`, or of all, with every file hashed afresh."""
     _verified.clear()
     return look(id)
 
@@ -92,7 +92,7 @@ def fetch(id: str, progress: Progress = silent) -> Path:
 
 
 def remove_weight(id: str) -> None:
-    """As if it had never been fetched. Raises ModelError."""
+    """Remove a weight as if it had never been fetched. Raises ModelError."""
     at = folder() / weight(id).file
     try:
         at.unlink(missing_ok=True)
@@ -120,7 +120,7 @@ def _state(known: Weight) -> State:
 
 
 def sha256_of(at: Path) -> str:
-    """Of a file, hexadecimal."""
+    """Return the SHA-256 of a file, hexadecimal."""
     digest = hashlib.sha256()
     with at.open("rb") as file:
         while block := file.read(BLOCK):

@@ -52,7 +52,7 @@ def not_installed(packages: Sequence[str]) -> str | None:
 
 @dataclass(frozen=True)
 class HubState:
-    """What is there of a model."""
+    """The state of a model."""
 
     model: HubModel
     path: Path  # the folder where it is, or would be
@@ -63,12 +63,12 @@ class HubState:
 
 
 def look_hub(id: str) -> HubState:
-    """What is there of model `id`, by its files' names and sizes. Raises ModelError."""
+    """Return the state of model `id` by its files' names and sizes. Raises ModelError."""
     return _state(hub_model(id), is_hashed=False)
 
 
 def verify_hub(id: str) -> HubState:
-    """The same, every file hashed. Raises ModelError."""
+    """Return the state of model `id` with every file hashed. Raises ModelError."""
     return _state(hub_model(id), is_hashed=True)
 
 
@@ -79,7 +79,7 @@ def place(id: str) -> Path | None:
 
 
 def files(id: str) -> tuple[Path, ...]:
-    """Where the files of model `id` are; none where it is not there whole."""
+    """Return the files of model `id`; none where it is incomplete."""
     known, at = locked(id), place(id)
     return tuple(at / name for name in known.files) if known and at else ()
 
@@ -191,7 +191,7 @@ def convert_folder(id: str, at: Path, progress: Progress = silent) -> HubState:
 
 
 def remove_hub(id: str) -> None:
-    """As if it had never been there; a folder of the user's is forgotten, not deleted.
+    """Remove a model; a folder of the user's is forgotten, not deleted.
 
     Which commit it was stays in the lock file. Raises ModelError.
     """
@@ -375,7 +375,7 @@ TOO_MUCH = (RecursionError, OverflowError)  # depth, and numbers beyond numbers
 
 @dataclass(frozen=True)
 class FileFacts:
-    """What a file has to be."""
+    """The required facts of a file."""
 
     size: int  # bytes
     sha256: str  # hexadecimal; empty where nobody has computed it: in the user's own folder
@@ -391,7 +391,7 @@ class Locked:
 
 
 def locked(id: str) -> Locked | None:
-    """What the lock file says of a model, if anything. Raises ModelError where it is damaged."""
+    """Return the lock file's entry of a model, if any. Raises ModelError where it is damaged."""
     return _read().get(id)
 
 

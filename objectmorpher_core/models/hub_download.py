@@ -182,7 +182,7 @@ def _fetch(place: Path, url: str, expected: dict[str, Any], get: Get) -> str:
 
 
 def bytes_in(folder: Path) -> int:
-    """Of all files below a folder; they may vanish while we look."""
+    """Return the bytes of all files below a folder, which may vanish meanwhile."""
     total = 0
     for inner, _, names in os.walk(folder):
         for name in names:

@@ -46,7 +46,7 @@ class Plan:
 
     @property
     def told(self) -> str:
-        """In words."""
+        """Return the plan in words."""
         return f"on {device.NAMES[self.device]} with {self.number}{TOLD[self.way]}"
 
     def takes(self, where: Device) -> int:

@@ -1,4 +1,4 @@
-"""The official networks of measures: where the user's files are, and whether they are those.
+"""The official networks of measures: the user's files, and their verification.
 
 No package that we may fetch from carries them. They are published under names that end in the first
 digits of their SHA-256, so that a file can be told from another.
@@ -24,7 +24,7 @@ _hashes: dict[tuple[str, int, int], str] = {}  # (path, bytes, mtime ns) -> sha2
 
 @dataclass(frozen=True)
 class TrunkState:
-    """What is there of a network."""
+    """The state of a network."""
 
     trunk: Trunk
     path: Path  # where it is, or would be
@@ -33,7 +33,7 @@ class TrunkState:
 
 
 def trunk_folder() -> Path:
-    """Where the files are looked for unless another folder is given."""
+    """Return the folder of the files unless another one is given."""
     return folder() / FOLDER
 
 
@@ -47,7 +47,7 @@ def find_file(names: tuple[str, ...], where: Path) -> Path | None:
 
 
 def look_trunk(id: str) -> TrunkState:
-    """What is there of network `id`; a file is hashed once in a process."""
+    """Return the state of network `id`; a file is hashed once in a process."""
     known = trunk(id)
     found = find_file(known.files, trunk_folder())
     if found is None:

@@ -20,7 +20,7 @@ class ModelError(RuntimeError):
 
 @dataclass(frozen=True)
 class Weight:
-    """One file of learned weights."""
+    """A file of learned weights."""
 
     id: str
     file: str  # name in the cache folder
@@ -48,7 +48,7 @@ class Trunk:
     purpose: str
 
     def hash_of(self, file: str) -> str:
-        """The first digits of the SHA-256 that the published name `file` tells."""
+        """Return the first digits of the SHA-256 in the published name `file`."""
         return file.rpartition("-")[2].partition(".")[0]
 
 
@@ -105,7 +105,7 @@ def mirrors() -> tuple[str, ...]:
 
 @cache
 def weights() -> tuple[Weight, ...]:
-    """All known weights, in the registry's order."""
+    """Return all known weights in the registry's order."""
     return tuple(Weight(**entry) for entry in _registry()["weight"])
 
 
@@ -119,7 +119,7 @@ def trunks() -> tuple[Trunk, ...]:
 
 @cache
 def hub_models() -> tuple[HubModel, ...]:
-    """All known models of several files, in the registry's order: of a family the best first."""
+    """Return all models of several files in the registry's order: the best of a family first."""
     return tuple(
         HubModel(**{**entry, "files": tuple(entry.get("files", ()))})
         for entry in _registry()["model"]
@@ -135,7 +135,7 @@ def model_sets() -> tuple[ModelSet, ...]:
 
 
 def families() -> tuple[str, ...]:
-    """Of the models of several files, in the registry's order."""
+    """Return the families of the models of several files, in the registry's order."""
     return tuple(dict.fromkeys(model.family for model in hub_models()))
 
 

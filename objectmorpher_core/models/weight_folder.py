@@ -82,13 +82,13 @@ def check_file(family: str, at: Path) -> None:
 
 
 def check_files(family: str, at: Path) -> None:
-    """As `check_folder`, of a folder that was added; beside one graph others may lie."""
+    """Check a folder that was added like `check_folder`; beside one graph others may lie."""
     if family not in ONE_GRAPH:
         check_folder(family, at)
 
 
 def pickled_pixelhacker(at: Path) -> dict[str, Path]:
-    """Of a folder as PixelHacker is published: names in a folder of ours, and files to take.
+    """Find PixelHacker in a folder as published: names in a folder of ours, and files to take.
 
     The fine-tuning that is used is Places2's, of scenes, if it is there. Raises ModelError.
     """

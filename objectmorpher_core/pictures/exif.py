@@ -17,7 +17,7 @@ PREFIX = b"Exif\0\0"  # what JPEG and some WebP files put before the block
 
 
 def orientation(block: bytes) -> int:
-    """How the stored rows lie, 1..8; 1 (upright) where the block does not say."""
+    """Return the orientation of the stored rows, 1..8; 1 (upright) where the block does not say."""
     try:
         value = _Walker(block).value(ORIENTATION)
     except (struct.error, ValueError):

@@ -51,7 +51,7 @@ def strip_rows(g, cut, dx, dy, strip, rows):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def rows_of(tilt, ex, ey, dx, dy, rows):
-    """The same of any strip, to be cut off to integers; start >= end where it is not touched.
+    """Return the rows of any strip, to be cut off to integers; start >= end for none.
 
     `ex`, `ey`: half the size of the ellipse's box; `dx`, `dy`: way to the strip's first pixel.
     """

@@ -1,4 +1,4 @@
-"""What the Gaussians of a layer add up to, pixel by pixel; step 4 of `reference`, compiled.
+"""Sums of the Gaussians of a layer, pixel by pixel; step 4 of `reference`, compiled.
 
 Each function takes one of them. `spans`: where the pixels that it touches begin in each of the
 tile's strips, and how many they are; `dx`, `dy`: the way from its centre to the first pixel.
@@ -116,7 +116,7 @@ def add(s, spans, g, dx0, dy0, layer, limits):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def add_all(s, spans, g, dx0, dy0, limits):
-    """The same where all belongs to one layer."""
+    """Add all Gaussians where they belong to one layer."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
@@ -135,7 +135,7 @@ def add_all(s, spans, g, dx0, dy0, limits):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def add_more(s, spans, g, limits):
-    """What is 0 for a part of the photo that is carried along as it was."""
+    """Add a Gaussian's sums beyond those of the photo carried along as it was, which are 0."""
     photo, unseen = g[p.PHOTO], (ONE - g[p.SEEN]) * g[p.PHOTO]
     magnified = max(g[p.MAGNIFIED] / limits.sharp - ONE, ZERO) * photo
     unmatted, solid = (ONE - g[p.MATTED]) * photo, (ONE - g[p.MATTED]) * g[p.SOLID] * photo
@@ -153,7 +153,7 @@ def add_more(s, spans, g, limits):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def add_body(s, spans, g):
-    """What shows its own colour."""
+    """Add a Gaussian that shows its own colour."""
     body = g[p.BODY]
     red, green, blue = body * g[p.RED], body * g[p.GREEN], body * g[p.BLUE]
     for at, count in spans:
@@ -169,7 +169,7 @@ def add_body(s, spans, g):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def multiply(s, spans, g):
-    """What shines through, for assets whose coverage is 1 - prod(1 - alpha)."""
+    """Multiply the light that shines through, for assets whose coverage is 1 - prod(1 - alpha)."""
     body, both = g[p.BODY], g[p.PHOTO] + g[p.BODY]
     for at, count in spans:
         for k in range(count):
@@ -202,7 +202,7 @@ def first_front(s, spans, g, dx0, dy0):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def next_front(s, spans, g, dx0, dy0, limits):
-    """The same among what the layers before have left, m.SHARE."""
+    """Find the next front within the rest that earlier layers have left, m.SHARE."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]

@@ -1,4 +1,4 @@
-"""What the photo shows at the pixels of a tile: step 5 of `reference`, compiled."""
+"""The photo at the pixels of a tile: step 5 of `reference`, compiled."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class Hit:
 def pick(
     drawable: Drawable, texture: TextureLevels, xy: tuple[float, float], reach: float = 0.0
 ) -> Hit | None:
-    """What is seen at `xy`, view px, or within `reach` px of it; None where that is nothing.
+    """Pick what is seen at `xy`, view px, or within `reach` px of it; None where that is nothing.
 
     The depth is that of the layer with which alpha, front to back, reaches a half.
     """

@@ -36,7 +36,7 @@ BEYOND = 1.3  # x half the photo: Jacobians are taken no farther out (Kerbl et a
 
 
 class RestSplats:
-    """One lifted object in the photo: all that does not depend on how it is moved."""
+    """A lifted object in the photo, with everything that does not depend on its motion."""
 
     def __init__(self, lifted: LiftedObject, camera: Camera) -> None:
         """`camera` is the photo's."""
@@ -60,7 +60,7 @@ class RestSplats:
         return bool(self.lifted.texture.visibility.any())
 
     def painted(self, colors: np.ndarray, has_edge: bool = True) -> RestSplats:
-        """The same object in plain `colors` (N, 3), with nothing of the photo on it.
+        """Return the same object in plain `colors` (N, 3), with nothing of the photo on it.
 
         Without what carries its soft edge if not `has_edge`.
         """
@@ -83,7 +83,7 @@ class RestSplats:
         return other
 
     def brightened(self) -> RestSplats:
-        """The same in its own colours brighter by 1.
+        """Return the same object in its own colours brighter by 1.
 
         What it shows of the photo is as it was: the difference between both says where that is.
         """
@@ -186,11 +186,11 @@ class PosedSplats:
         return len(self.rest)
 
     def painted(self, colors: np.ndarray, has_edge: bool = True) -> PosedSplats:
-        """The same in plain `colors` (N, 3), see `RestSplats.painted`."""
+        """Return the same object in plain `colors` (N, 3), see `RestSplats.painted`."""
         return replace(self, rest=self.rest.painted(colors, has_edge))
 
     def brightened(self) -> PosedSplats:
-        """The same in its own colours brighter by 1, see `RestSplats.brightened`."""
+        """Return the same object in its own colours brighter by 1, see `RestSplats.brightened`."""
         return replace(self, rest=self.rest.brightened())
 
     @property
@@ -200,7 +200,7 @@ class PosedSplats:
 
     @property
     def scale(self) -> float:
-        """How much the placement enlarges."""
+        """Return the factor by which the placement enlarges."""
         return float(np.cbrt(np.linalg.det(self.placement[:3, :3])))
 
     @property

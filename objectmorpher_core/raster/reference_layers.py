@@ -51,7 +51,7 @@ class Projected:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """One Gaussian at the pixels of its box."""
+    """A Gaussian at the pixels of its box."""
 
     window: tuple[slice, slice]
     alpha: F64  # (h, w)
@@ -171,13 +171,13 @@ class Composite:
         self.alpha[at] += through
 
     def picture(self) -> Picture3D:
-        """Of all layers so far."""
+        """Return the picture of all layers so far."""
         arrays = (self.color, self.alpha, self.depth, self.from_photo, self.shift)
         return Picture3D(*(a.astype(np.float32) for a in arrays))
 
 
 def smoothstep(value: np.ndarray, zero: float, one: float) -> np.ndarray:
-    """From 0 at `zero` to 1 at `one`, smoothly."""
+    """Rise smoothly from 0 at `zero` to 1 at `one`."""
     t = np.clip((value - zero) / (one - zero), 0, 1)
     return t * t * (3 - 2 * t)
 

@@ -20,7 +20,7 @@ LAYERS = 4  # of a pixel; all that is left belongs to the last one
 
 
 class Splatting(NamedTuple):
-    """How the Gaussians of an asset become a picture: they look right as they were made.
+    """The rule that turns an asset's Gaussians into a picture as they were made to look.
 
     A Gaussian's alpha on a pixel is min(most, weight (exp(-q/2) - tail)), and 0 below `least`.
     """
@@ -120,7 +120,7 @@ RULES = Rules()
 
 
 class Limits(NamedTuple):
-    """What the loops over a tile's pixels need of all that: a few numbers of 32 bits.
+    """The numbers, of 32 bits, that the loops over a tile's pixels need.
 
     They are handed on with each Gaussian, where all rules would take longer than its pixels.
     """

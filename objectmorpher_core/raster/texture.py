@@ -27,7 +27,7 @@ class TextureLevels:
 
     @cached_property
     def levels(self) -> tuple[F32, ...]:
-        """Each (h, w, 4), level l halved l times: views."""
+        """Return the levels, each (h, w, 4) and halved once more than the one before: views."""
         return tuple(
             self.texels[4 * first : 4 * (first + height * width)].reshape(height, width, 4)
             for height, width, first in self.shapes.tolist()

@@ -61,7 +61,7 @@ ROWS = ROOM + 24
 
 @numba.njit(nogil=True)
 def pixel_index(x, y, tall=TILE):
-    """Where the pixel in column x and row y of a tile so tall lies in a row of the memory."""
+    """Return the index, in a row of the memory, of column x and row y of a tile so tall."""
     return np.uint64(x // STRIP * (STRIP * tall) + y * STRIP + x % STRIP)
 
 
@@ -83,7 +83,7 @@ def number_pixels(s, step_x, step_y, pixels, tall=TILE):
 
 @numba.njit(nogil=True)
 def clear_tile(out, rgba, column, row, columns, rows):
-    """Nothing is seen on the tile at (column, row) of a picture: in `out` or in `rgba`."""
+    """Clear the tile at (column, row) of a picture: in `out` or in `rgba`."""
     for y in range(row, row + rows):
         for x in range(column, column + columns):
             if len(rgba) > 0:

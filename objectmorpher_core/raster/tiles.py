@@ -73,7 +73,7 @@ def draw(
 def draw_rgba(
     drawable: Drawable, texture: TextureLevels, box: tuple[int, int, int, int] | None = None
 ) -> np.ndarray:
-    """The same as (h, w, 4) u8, premultiplied: what a window shows, an eighth of the memory."""
+    """Draw (h, w, 4) u8, premultiplied, as a window shows it: an eighth of the memory."""
     left, top, right, bottom = box or (0, 0, drawable.camera.width, drawable.camera.height)
     rgba = np.empty((bottom - top, right - left), "<u4")
     _draw(drawable, texture, (left, top), _NO_OUT, rgba)

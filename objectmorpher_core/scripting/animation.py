@@ -31,7 +31,7 @@ TOLERANCE = 1e-3  # of a solve between two frames
 
 @dataclass(frozen=True)
 class Clip:
-    """What is to be seen, and for how long."""
+    """The subject and the length of a video."""
 
     motion: str = "morph"  # photo, edit and back; the object sways; turns; through key poses
     seconds: float = 4.0
@@ -93,7 +93,7 @@ def station_at(time: float, count: int) -> tuple[int, float]:
 
 
 def share_at(time: float) -> float:
-    """How far the edit has come at a `time` in [0, 1) of a morph: still, on, still, and back."""
+    """Return the share of the edit at a `time` in [0, 1) of a morph: still, on, still, and back."""
     way = 0.5 - HOLD
     forth = (time - HOLD) / way
     back = (time - HOLD - way - HOLD) / way

@@ -175,7 +175,7 @@ def provenance(result: Composite) -> str:
 
 
 def peak_memory_mb() -> float:
-    """Largest resident memory of this process so far, MB; 0 where the system does not tell."""
+    """Return the largest resident memory of this process so far, MB; 0 where it is unknown."""
     with contextlib.suppress(OSError):  # Linux; getrusage would count who started us, too
         found = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text("ascii"), re.M)
         if found:

@@ -89,7 +89,7 @@ def told_of(number: int, others: Others) -> Iterator[None]:
 
 
 def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
-    """Copies are told about shadow and light what their originals are, unless they say it."""
+    """Give copies their originals' shadow and light unless they have their own."""
     result: list[FurtherObject] = []
     for wanted in wishes:
         if wanted.duplicate is not None:
@@ -101,14 +101,14 @@ def with_inherited(wishes: tuple[FurtherObject, ...]) -> list[FurtherObject]:
 
 
 def prompt_of(script: EditScript) -> Prompt:
-    """What the script says about which object is meant."""
+    """Return the script's prompt for the object."""
     clicks = [Click(x, y) for x, y in script.click]
     clicks += [Click(x, y, is_foreground=False) for x, y in script.not_click]
     return Prompt(tuple(clicks), script.box, script.subject)
 
 
 def lift_settings(document: Document, script: EditScript) -> LiftSettings:
-    """What the script says about the object's shape. Raises ImageError."""
+    """Return the script's settings of the object's shape. Raises ImageError."""
     hidden = None
     if script.hidden is not None:
         hidden = read_mask(read_input(Path(script.hidden)), document.photo.size)
@@ -142,7 +142,7 @@ def with_settings(document: Document, k: int, script: EditScript) -> Document:
 
 
 def copied(document: Document, k: int, wanted: FurtherObject) -> Document:
-    """Object `k` as a copy of another; what it is not told is as it is there."""
+    """Return object `k` as a copy of another; options that it does not state are the original's."""
     assert wanted.duplicate is not None
     if document.objects[wanted.duplicate - 1].stays_in_front:
         raise ScriptError(f"object {wanted.duplicate} stays in front and cannot be copied")
@@ -372,7 +372,7 @@ def _distinct(document: Document, casting: frozenset[int]) -> list[Matte]:
 
 @dataclass(frozen=True)
 class Refining:
-    """How an edit is to be refined."""
+    """The options of a refinement."""
 
     backend: str
     seed: int = 0
@@ -382,7 +382,7 @@ class Refining:
 def coarse_edit(
     document: Document, progress: Progress = silent, puppets: dict[int, Puppet] | None = None
 ) -> CoarseEdit:
-    """What of the edit a refiner sees. Raises RefineError where nothing was edited."""
+    """Return the part of the edit for a refiner. Raises RefineError where nothing was edited."""
     bare = replace(document, refined=None)
     result = composite(bare, puppets, progress, keeps_weights=True)
     return refinement.cut_edit(document.photo.pixels, result)

@@ -44,7 +44,7 @@ class FillFrom:
 
 @dataclass(frozen=True)
 class EditScript:
-    """One edit. Every field is a long option of the command line (DESIGN section 6)."""
+    """An edit. Every field is a long option of the command line."""
 
     click: tuple[XY, ...] = ()  # px
     not_click: tuple[XY, ...] = ()
@@ -105,7 +105,7 @@ class FurtherObject:
 
 @dataclass(frozen=True)
 class Others:
-    """What a script says beside its own object."""
+    """The parts of a script beside its own object."""
 
     objects: tuple[FurtherObject, ...] = ()
     order: tuple[int, ...] = ()  # numbers of objects, back to front
@@ -116,7 +116,7 @@ ALONE = Others()
 
 @dataclass(frozen=True)
 class BatchItem:
-    """One edit of a batch: which photo, where to, and what."""
+    """One edit of a batch: its photo, its output, and its script."""
 
     script: EditScript
     photo: str | None = None
@@ -194,7 +194,7 @@ def beside(item: BatchItem, folder: Path) -> BatchItem:
 
 
 def files_of(script: EditScript) -> tuple[str | None, ...]:
-    """What an edit reads beside the photo."""
+    """Return the files that an edit reads beside the photo."""
     return script.mask, script.front_mask, script.hidden, script.splats
 
 

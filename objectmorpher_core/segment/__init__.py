@@ -33,7 +33,7 @@ UNSURE = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a segmenter takes a prompt to mean."""
+    """A segmenter's answer to a prompt."""
 
     mask: Mask  # (H, W)
     backend: str  # the segmenter's name
@@ -51,7 +51,7 @@ class Segmenter(Protocol):
         ...
 
     def encode(self, rgb: RGB, progress: Progress) -> Any:
-        """What is worth keeping of a photo (H, W, 3): plain, picklable, or None if nothing is."""
+        """Encode a photo (H, W, 3) for later prompts, as a picklable value, or None."""
         ...
 
     def segment(
@@ -64,7 +64,7 @@ class Segmenter(Protocol):
         ...
 
     def confidence(self, rgb: RGB, prompt: Prompt, embedding: Any) -> float | None:
-        """The overlap (IoU) of `segment`'s answer with what is meant that is to be expected.
+        """Return the expected overlap (IoU) of `segment`'s answer with the thing that is meant.
 
         In [0, 1]; None where the backend cannot tell. Cheap after `segment` of the same.
         """
@@ -76,7 +76,7 @@ class Quick(Protocol):
     """A segmenter that answers at a glance where its whole answer takes longer than a moment."""
 
     def glance(self, rgb: RGB, prompt: Prompt, embedding: Any, progress: Progress) -> Found:
-        """As `segment`, in a fraction of a second; not final where that can tell better."""
+        """Segment like `segment`, in a fraction of a second; not final where it can do better."""
         ...
 
 

@@ -36,7 +36,7 @@ SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Where a choice takes place."""
+    """The ground of a choice."""
 
     walk: Walk  # crosses from part to part of an object
     inside: Mask  # (h, w) cells in the box
@@ -46,7 +46,7 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """One object: cells (h, w), and the piece of the subject map (SIDE, SIDE) it is on, if any."""
+    """An object: cells (h, w), and the piece of the subject map (SIDE, SIDE) it is on, if any."""
 
     cells: Mask
     subject: F32 | None

@@ -1,4 +1,4 @@
-"""What an artist changed of a mask by hand, kept when a later click has the object found anew.
+"""The artist's manual corrections of a mask, kept when a later click has the object found anew.
 
 `EditObject.found` is what the prompt had given: where the mask differs from it, the artist decided.
 """

@@ -74,7 +74,7 @@ class DinoWalk:
         return self._found(rgb, prompt, embedding, progress, PhotoView.find)[0]
 
     def glance(self, rgb: RGB, prompt: Prompt, embedding: Tokens, progress: Progress) -> Found:
-        """The same, by what is encoded already; a closer look at a small thing is left out."""
+        """Segment by what is encoded already; a closer look at a small thing is left out."""
         mask, seen = self._found(rgb, prompt, embedding, progress, PhotoView.glance)
         return Found(mask, self.name, seen.sureness, seen.is_final)
 

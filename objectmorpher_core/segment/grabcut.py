@@ -38,7 +38,7 @@ class GrabCut:
         return None
 
     def encode(self, rgb: RGB, progress: Progress = silent) -> None:
-        """Nothing is worth keeping."""
+        """Return None: there is nothing worth keeping."""
         progress(1.0, "ready")
 
     def segment(
@@ -81,7 +81,7 @@ class GrabCut:
         return mask
 
     def confidence(self, rgb: RGB, prompt: Prompt, embedding: None = None) -> None:
-        """None: colours do not tell how sure they are."""
+        """Return None: colours do not show how sure they are."""
 
     def _walks_on(self, rgb: RGB, progress: Progress) -> tuple[Walk, Walk]:
         """The walk and the strict walk over a photo: the same for every click on it."""

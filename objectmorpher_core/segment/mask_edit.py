@@ -66,7 +66,7 @@ def without(selection: Selection | None, mask: Mask) -> Selection:
 
 
 def grow(selection: Selection, px: float) -> Selection:
-    """All that is at most `px` from what is selected: round at corners."""
+    """Select everything that is at most `px` from the selection: round at corners."""
     changed = selection.copy()
     window = box_around(selection, px + 1)
     if window is not None:
@@ -75,7 +75,7 @@ def grow(selection: Selection, px: float) -> Selection:
 
 
 def shrink(selection: Selection, px: float) -> Selection:
-    """All that is more than `px` from what is not selected."""
+    """Select everything that is more than `px` from the outside."""
     changed = selection.copy()
     window = box_around(selection, 1)
     if window is not None:
@@ -84,7 +84,7 @@ def shrink(selection: Selection, px: float) -> Selection:
 
 
 def smooth(selection: Selection, px: float) -> Selection:
-    """What most of its surroundings, `px` to each side, are: no more teeth, specks and slits."""
+    """Take the majority within `px` to each side: teeth, specks and slits disappear."""
     reach = round(min(max(px, 1.0), LARGEST_SMOOTHING))
     changed = selection.copy()
     window = box_around(selection, reach + 1)
@@ -129,7 +129,7 @@ def remove_islands(selection: Selection, share: float = ISLAND) -> Selection:
 
 
 def invert(selection: Selection) -> Selection:
-    """What was not selected."""
+    """Invert the selection."""
     return ~selection  # of u8 it is 255 - c
 
 
@@ -228,7 +228,7 @@ def _closed_in(outside: Mask, meant: Mask) -> Mask:
 
 
 class MaskPainting:
-    """One stroke. `shown` is changed in place: a large photo has no time for a copy each frame."""
+    """A stroke. `shown` is changed in place: a large photo has no time for a copy each frame."""
 
     def __init__(
         self, size: tuple[int, int], selection: Selection | None, brush: Brush, is_erasing: bool
@@ -258,5 +258,5 @@ class MaskPainting:
         self.touched.append(box)
 
     def selection(self) -> Selection:
-        """What is selected now (H, W); it must not be painted on after that."""
+        """Return the current selection (H, W); it must not be painted on after that."""
         return is_selected(self.shown) if self._is_bool else self.shown

@@ -1,4 +1,4 @@
-"""What every backend does alike: check the prompt, keep what it points at, fill holes."""
+"""The common part of every backend: check the prompt, keep what it points at, fill holes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SMALL_ISLAND = 0.02  # x area of the largest piece; smaller pieces that no click
 
 
 class SelectionError(ValueError):
-    """Nothing sensible can be selected. The message is one sentence for the user."""
+    """No sensible selection is possible. The message is one sentence for the user."""
 
 
 def check_prompt(rgb: RGB, prompt: Prompt) -> None:
@@ -138,7 +138,7 @@ def check_mask(mask: Mask) -> Mask:
 
 
 def at_level(prompt: Prompt, find: Callable[[Prompt], Mask]) -> Mask:
-    """What `find` makes of a prompt (H, W), kept within, or around, what it makes of the object.
+    """Return `find`'s answer to a prompt (H, W), kept within or around its answer for the object.
 
     A part that is a speck and a group that is everything say nothing: then it is the object.
     """

@@ -24,7 +24,7 @@ DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 
 @dataclass(frozen=True, eq=False)
 class SubjectMap:
-    """How much each place of a photo belongs to its subject."""
+    """The degree to which each place of a photo belongs to its subject."""
 
     salience: F32  # (320, 320) in [0, 1], the photo stretched to a square
 

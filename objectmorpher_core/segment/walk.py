@@ -23,7 +23,7 @@ LEVELS = 120  # outlines tried between the click's cell and all cells, growing b
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """One outline around a click."""
+    """An outline around a click."""
 
     mask: Mask  # (h, w) cells
     contrast: float  # mean d across its outline; the photo's border does not count

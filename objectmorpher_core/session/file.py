@@ -64,7 +64,7 @@ def encode_session(document: Document) -> bytes:
 
 
 def write_session(document: Document, file: IO[bytes], folder: Path | None = None) -> None:
-    """The same into an open file; where it is large, `folder` has room for as much again.
+    """Write a session into an open file; `folder` has room for as much again where it is large.
 
     Raises SessionError, OSError.
     """
@@ -114,7 +114,7 @@ def load_session(path: Path) -> Document:
 
 
 def read_session(file: IO[bytes]) -> Document:
-    """The same of a file that is open.
+    """Read a session from an open file.
 
     Only what its document names is unpacked, member by member (docs/formats.md).
     """

@@ -115,7 +115,7 @@ class Journal:
 
 
 def read_about(folder: Path) -> dict[str, Any]:
-    """What the journal says about its document. Raises SessionError."""
+    """Read the journal's summary of its document. Raises SessionError."""
     about = _head(folder).get("about")
     return about if isinstance(about, dict) else {}
 

@@ -50,7 +50,7 @@ class Npy:
 
 
 class Pieces:
-    """All that a file holds."""
+    """All members of a file."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
@@ -190,7 +190,7 @@ class Zip:
 
 
 class Budget:
-    """How much a session may unpack to: what it really holds hardly shrinks when it is packed.
+    """The budget of a session's unpacked bytes: real contents hardly shrink when they are packed.
 
     `file_size`: bytes of the session's file.
     """

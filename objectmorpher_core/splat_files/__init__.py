@@ -55,7 +55,7 @@ MESH_ENDINGS = (".glb", ".gltf", ".obj", ".stl", ".off")  # read only; a .ply ma
 
 
 def ending_of(path: Path) -> str:
-    """The ending that tells the format, lower case. Raises SplatFileError for an unknown one."""
+    """Return the ending that names the format, lower case. Raises SplatFileError."""
     name = path.name.lower()
     for ending in (*FORMATS, *MESH_ENDINGS):
         if name.endswith(ending):
@@ -75,7 +75,7 @@ def encode(gaussians: Gaussians, path: Path) -> bytes:
 
 
 def read(path: Path, count: int = COUNT, is_flipped: bool = False) -> Gaussians:
-    """All that the file holds, in our axes; a mesh is sampled to about `count` Gaussians.
+    """Read all Gaussians of the file in our axes; a mesh is sampled to about `count` of them.
 
     With `is_flipped` turned by 180 degrees about x: for a file that does not keep to its format's
     axes. Raises SplatFileError, one sentence that names the file.

@@ -1,4 +1,4 @@
-"""What a file may claim before it is believed, and what is made of values nobody can draw."""
+"""Limits on the claims of a file, and the treatment of values that cannot be drawn."""
 
 from __future__ import annotations
 

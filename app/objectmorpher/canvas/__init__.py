@@ -1,1 +1,1 @@
-"""What the canvas shows of a document: computed from it, remembered by identity, never saved."""
+"""The picture of a document on the canvas: computed, remembered by identity, never saved."""

@@ -1,4 +1,4 @@
-"""Where the view shows the edit and where the photo: the export's own rule, quick and coarse.
+"""The share of the edit and of the photo in each pixel of the view, by the export's rule, coarsely.
 
 The composite keeps the photo wherever nothing moved, so that an object that is bent at one end
 shows no seam at the other. The export decides that per pixel; the view by the Gaussians that are

@@ -1,4 +1,4 @@
-"""What is computed from the document and never saved; remembered by identity (ARCHITECTURE 1).
+"""Everything that is computed from the document and never saved, remembered by identity.
 
 The heavy modules of the core are imported when the first object is lifted, or by `import_core`.
 """
@@ -91,7 +91,7 @@ class Derived:
         return self._shares(lambda: float(mask.mean()), mask)
 
     def moved_mask(self, document: Document) -> Mask:
-        """Where the moved objects were in the photo, and nothing is left."""
+        """Return the mask of the places that moved objects have left empty in the photo."""
         from objectmorpher_core.compose.order import leaves_a_hole
 
         objects = document.objects
@@ -105,7 +105,7 @@ class Derived:
         return self._holes(build, document.photo, *masks)
 
     def plate(self, document: Document) -> Plate | None:
-        """What is seen behind the objects: the photo around those that are still there."""
+        """Return the background of the view: the photo around the objects that are still there."""
         from objectmorpher_core.compose.order import holes
         from objectmorpher_core.compose.plate.plate import plate_of_holes
         from objectmorpher_core.compose.plate.residue import shown_shares
@@ -186,7 +186,7 @@ class Derived:
         )
 
     def draft(self, document: Document, k: int) -> PosedSplats:
-        """The same for pictures that must be quick: of a large object fewer, wider ones."""
+        """Return a draft for quick pictures: a large object gets fewer, wider Gaussians."""
         thing = document.objects[k]
         puppet = self.shape(document.photo, thing).puppet
         if not puppet.has_draft:
@@ -239,7 +239,7 @@ class Derived:
         return edits.set_pose(document, k, solution.pose)
 
     def deformer(self, document: Document, k: int) -> Deformer:
-        """What solves for object `k`'s pose."""
+        """Return the solver of object `k`'s pose."""
         return self.shape(document.photo, document.objects[k]).puppet.deformer
 
     def held(self, document: Document, k: int, added: tuple[int, ...] = ()) -> Document:
@@ -247,7 +247,7 @@ class Derived:
         return hold_edits.hold(document, k, self.deformer(document, k), added)
 
     def anchors(self, document: Document, k: int) -> F64:
-        """Where the automatic anchors are seen: (A, 2) image px."""
+        """Return the automatic anchors in the view: (A, 2) image px."""
         thing = document.objects[k]
         deformer = self.shape(document.photo, thing).puppet.deformer
         index = deformer.anchors(thing.handles, thing.footing)
@@ -255,14 +255,14 @@ class Derived:
         return self.project(document, k, points[index])
 
     def control_places(self, document: Document, k: int) -> F64:
-        """Where the control points are now: (M, 3) world."""
+        """Return the control points in the current pose: (M, 3) world."""
         thing = document.objects[k]
         assert thing.lifted is not None
         points = thing.pose.points if thing.pose else thing.lifted.control_points
         return self.world(document, k, points)
 
     def control_points(self, document: Document, k: int) -> F64:
-        """Where the control points are seen: (M, 2) image px."""
+        """Return the control points in the view: (M, 2) image px."""
         return document.photo.camera.project(self.control_places(document, k))
 
     def links(self, document: Document, k: int, count: int) -> F64:
@@ -282,7 +282,7 @@ class Derived:
         return thing.lifted.world_points(points) @ motion[:3, :3].T + motion[:3, 3]
 
     def carried(self, document: Document, k: int, xy: np.ndarray) -> F64:
-        """Image px (N, 2) where object `k` now shows what the photo has at image px `xy` (N, 2).
+        """Return the image px (N, 2) at which object `k` shows what the photo shows at `xy` (N, 2).
 
         What is around each place tells how it moved: of the Gaussians that carry the photo there.
         """
@@ -303,7 +303,7 @@ class Derived:
         return document.photo.camera.project(self.world(document, k, points))
 
     def spot(self, document: Document, k: int, point: np.ndarray) -> Spot:
-        """Where an object-frame point (3,) is seen."""
+        """Return the place of an object-frame point (3,) in the view."""
         lifted = document.objects[k].lifted
         assert lifted is not None
         world = self.world(document, k, np.asarray(point))

@@ -1,4 +1,4 @@
-"""What stays in front of the edit, as the canvas shows it: the photo's pixels by their matte."""
+"""Things that stay in front of the edit, drawn from the photo's pixels by their matte."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _levels(matte: Matte) -> TextureLevels:
 
 
 def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | None:
-    """As the photo's own texture is looked up: linear between its pixels, single ones when near.
+    """Draw the photo's pixels as its texture is looked up: linearly, single ones when near.
 
     `levels` hold premultiplied colours, of which `strength` in [0, 1] is shown.
     None where nothing of it is on the canvas.
@@ -94,7 +94,7 @@ class RefinedView:
         self._kept: tuple[Refined, tuple[object, ...], Layer | None] | None = None
 
     def layers(self, document: Document, view: View, is_marked: bool = False) -> tuple[Layer, ...]:
-        """Px for px; none where the edit is not refined, or nothing of it is on the canvas.
+        """Return layers of the photo's own pixels; none where the edit is unrefined or out of view.
 
         `is_marked`: all of it is the network's, which a view tells by hatching.
         """

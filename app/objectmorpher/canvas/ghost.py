@@ -1,4 +1,4 @@
-"""Where an object was before the stroke in progress: its outline, to compare with."""
+"""The outline that an object had before the stroke in progress, to compare with."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ NEUTRAL = (1.0, 1.0, 1.0)
 
 
 def in_light(shown: Layer, look: Lit, place: tuple[float, ...]) -> Layer:
-    """What the export does, in its order; `place` is the `View.place` of the picture."""
+    """Light an object in the order of the export; `place` is the `View.place` of the picture."""
     from objectmorpher_core.compose.light.harmonize import lit_rgba
 
     left, top, zoom = place[:3]

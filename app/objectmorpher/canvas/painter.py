@@ -70,7 +70,7 @@ class Painter:
         return self._spread or DepthRange(0.0, 1.0, 1.0)
 
     def spread(self, document: Document) -> DepthRange:
-        """As it was measured last."""
+        """Return the last spread that was measured."""
         return self._spread or self.measure(document)
 
     def _colors(self, own: PosedObject, look: Shown, spread: DepthRange | None) -> F32:
@@ -119,7 +119,7 @@ BEYOND = 0.1  # x the range that the depth's colours reach past it, for what a d
 
 @dataclass(frozen=True, eq=False)
 class DepthRange:
-    """What the first and the last colour of the depth stand for."""
+    """The depths that the first and the last colour stand for."""
 
     near: float  # world units along z
     far: float
@@ -132,7 +132,7 @@ class DepthRange:
 
 
 def depth_range(depths: np.ndarray, diameter: float) -> DepthRange:
-    """For what is at these `depths` (N,)."""
+    """Return the range of these `depths` (N,)."""
     near, far = float(depths.min()), float(depths.max())
     more = BEYOND * (far - near) + 1e-6 * diameter
     return DepthRange(near - more, far + more, diameter)

@@ -1,4 +1,4 @@
-"""All of a lifted object that does not depend on its pose, and how it is made ready beforehand."""
+"""Everything about a lifted object that does not depend on its pose, and its preparation."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Surface:
 
 @dataclass(eq=False)
 class Shape:
-    """What poses, draws and picks the object, and the photo that it carries."""
+    """An object that can be posed, drawn and picked, with the photo that it carries."""
 
     puppet: Puppet
     texture: TextureLevels
@@ -59,7 +59,7 @@ class Shape:
         return build_surface(self.puppet.lifted)
 
     def with_rig(self, rig: Rig) -> Shape:
-        """The same object with another rig; what does not depend on it is kept."""
+        """Return the same object with another rig; whatever does not depend on it is kept."""
         other = Shape(self.puppet.with_rig(rig), self.texture)
         if "surface" in vars(self):
             other.surface = self.surface
@@ -87,7 +87,7 @@ def build_shape(camera: Camera, thing: EditObject) -> Shape:
 
 
 def build_ready_shape(camera: Camera, thing: EditObject) -> Shape:
-    """One that is rehearsed, too; some seconds, in a thread."""
+    """Build a shape and rehearse it; this takes some seconds and belongs in a thread."""
     shape = build_shape(camera, thing)
     shape.is_rehearsed = True
     try:
@@ -98,7 +98,7 @@ def build_ready_shape(camera: Camera, thing: EditObject) -> Shape:
 
 
 def rehearse_lift(matte: Matte, lifted: LiftedObject, camera: Camera) -> None:
-    """What a drag of a fresh lift compiles is on the disk then, for the process that will drag it.
+    """Compile the kernels of a drag onto the disk, for the process that will drag the fresh lift.
 
     Without the object's texture, which may take gigabytes: a little of it does.
     """

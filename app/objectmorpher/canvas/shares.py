@@ -21,7 +21,7 @@ LEAST = 0.02  # of a pixel that something new covers: with less it counts as unc
 
 @dataclass(frozen=True)
 class Shares:
-    """Where the changed pixels come from; these sum to 1, or are 0 where nothing changed."""
+    """Origins of the changed pixels; they sum to 1, or are 0 where nothing changed."""
 
     from_photo: float = 0.0
     from_lifter: float = 0.0

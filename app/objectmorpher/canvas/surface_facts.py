@@ -1,4 +1,4 @@
-"""What is known of a lifted object's surface at its control points and handles; remembered."""
+"""Facts about a lifted object's surface at its control points and handles; remembered."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AROUND = 12  # Gaussians whose normals make a handle's
 
 
 class SurfaceFacts:
-    """Each is computed when it is asked for first."""
+    """Facts about a surface, each computed when it is first asked for."""
 
     def __init__(self, derived: Derived) -> None:
         self._derived = derived

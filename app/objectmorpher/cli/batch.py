@@ -34,7 +34,7 @@ USUAL_ENDING = ".png"  # of edits of photos in formats that are only read
 
 @dataclass(frozen=True)
 class Task:
-    """One edit, and the script it stands in; `problem`: why it cannot be tried."""
+    """One edit and the script that holds it; `problem` is the reason why it cannot be tried."""
 
     script: Path
     item: BatchItem | None
@@ -42,7 +42,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """What its line begins with."""
+        """Return the name that begins its line."""
         out = None if self.item is None else self.item.out
         return str(self.script) if out is None else str(Path(out))
 

@@ -58,7 +58,7 @@ class Parser(argparse.ArgumentParser):
         return " " not in self.prog
 
     def parse_args(self, args: Sequence[str], namespace: Any = None) -> argparse.Namespace:  # type: ignore[override]
-        """Of a command line; an option that does not exist is told with the one that was meant."""
+        """Parse a command line; an unknown option is reported with the one probably meant."""
         options, rest = self.parse_known_args(list(args), namespace)
         if rest:
             parser = self._chosen(options)

@@ -1,4 +1,4 @@
-"""What the subcommands do. Every output is written at the end, all of them or none."""
+"""The work of the subcommands. All outputs are written at the end, or none of them."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def run_edit(options: argparse.Namespace) -> None:
 
 
 def edited_by(item: BatchItem, progress: Progress, needs_plate: bool = False) -> Edited:
-    """One edit of a batch, or the only one."""
+    """Carry out one edit of a batch, or the only one."""
     photo, script = Path(item.photo or ""), item.script
     mask = read_input(Path(script.mask)) if script.mask else None
     data = read_input(photo)
@@ -155,7 +155,7 @@ def run_info(options: argparse.Namespace) -> None:
 
 
 def describe(document: Document) -> dict[str, Any]:
-    """What a document holds, in plain values."""
+    """Describe the contents of a document in plain values."""
     width, height = document.photo.size
     objects = []
     for item in document.objects:

@@ -1,4 +1,4 @@
-"""What the command line asks of the window."""
+"""Options of the command line that concern the window."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ RENDERERS = ("auto", "gl", "tiles")
 
 @dataclass(frozen=True)
 class WindowOptions:
-    """How to open the window, and for tests: how long it lives and where its picture goes."""
+    """How to open the window; for tests also its lifetime and the file of its picture."""
 
     file: Path | None = None  # a photo or a session to open at once
     renderer: str = "auto"  # one of RENDERERS

@@ -70,7 +70,7 @@ def _absent(arguments: Sequence[str]) -> str | None:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """All subcommands and their options; those of the research package where it is installed."""
+    """Build the parser of all subcommands, those of an installed research package included."""
     parser = Parser(
         prog=PROGRAM,
         description="Open a photo, click an object, drag points on it in 3D, save the photo.",
@@ -107,7 +107,7 @@ def window_parser() -> argparse.ArgumentParser:
 
 
 def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
-    """What they say on this command line."""
+    """Parse the options of the window on this command line."""
     wrong = misspelt_command(arguments, COMMANDS)
     if wrong is not None:
         sys.stderr.write(f"{PROGRAM}: {wrong}\n")
@@ -116,7 +116,7 @@ def parse_window(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def window_options(options: argparse.Namespace) -> WindowOptions:
-    """What `parse_window` read, as the window takes it."""
+    """Return the parsed options in the form that the window takes."""
     from ..system.resources import resource
 
     file = options.file or (resource(SAMPLE) if options.is_sample else None)

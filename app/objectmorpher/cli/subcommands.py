@@ -26,7 +26,7 @@ class Subcommand:
 def add_subcommands(
     parser: argparse.ArgumentParser, dest: str, subcommands: Sequence[Subcommand]
 ) -> None:
-    """One of them must follow; of what was read `dest` is its name, and `run` what it does."""
+    """Add subcommands, one of which is required: `dest` receives its name, `run` its function."""
     words = parser.add_subparsers(dest=dest, required=True, parser_class=type(parser))
     for subcommand in subcommands:
         word = words.add_parser(subcommand.name, help=subcommand.help)

@@ -1,4 +1,4 @@
-"""What the subcommands say on the terminal: progress bars, and failures in one sentence."""
+"""Output of the subcommands on the terminal: progress bars, and failures in one sentence."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class UsageError(ValueError):
 
 
 def failure_sentence(error: BaseException) -> str:
-    """One line for the user: what failed, in the words of whoever noticed."""
+    """Return one line for the user that says what failed, in the words of the code that noticed."""
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):

@@ -50,7 +50,7 @@ def keys_of(editor: Editor, name: str) -> str:
 
 
 def take_next_step(editor: Editor) -> None:
-    """What the primary button does; where it asks for a click, one where the pointer is.
+    """Carry out the primary button's step; where it asks for a click, click at the pointer.
 
     Also before the candidate is marked: a slow machine, or a worker that ended, marks none.
     """
@@ -64,7 +64,7 @@ def take_next_step(editor: Editor) -> None:
 
 
 def next_step(editor: Editor) -> tuple[str, str | None]:
-    """What the primary button says, and the command behind it (None: it only says it)."""
+    """Return the primary button's text and its command (None where it is only a text)."""
     if editor.document is None:
         return t("Open a photo…"), "open"
     if editor.tasks.is_lifting:

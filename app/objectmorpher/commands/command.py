@@ -1,4 +1,4 @@
-"""One command, and the usual reasons why one cannot run."""
+"""A command, and the usual reasons why it cannot run."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def no_redo(editor: Editor) -> str | None:
 
 @dataclass(frozen=True)
 class Command:
-    """One thing the user can ask for.
+    """Something that the user can ask for.
 
     `why_not` is the sentence that a greyed-out button shows, or None where it can run.
     """
@@ -80,7 +80,7 @@ class Command:
 
 
 def asks_for(dialog: Dialog) -> Callable[[Editor], None]:
-    """What such a command does: the window shows a file dialog."""
+    """Return a command's action that opens a file dialog of the window."""
 
     def run(editor: Editor) -> None:
         editor.filing.wanted = dialog

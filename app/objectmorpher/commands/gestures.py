@@ -1,4 +1,4 @@
-"""What the pointer and the held keys do: for the table of shortcuts. English keys of texts."""
+"""Actions of the pointer and of held keys, for the table of shortcuts, as keys into the texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is shown, and from how near."""
+"""Commands that change what is shown, and from how near."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the whole object is."""
+"""Commands that place the whole object."""
 
 from __future__ import annotations
 

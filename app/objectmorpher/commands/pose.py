@@ -9,7 +9,7 @@ from .command import Command, no_handle, no_lift
 
 
 def no_handles(editor: Editor) -> str | None:
-    """Of what is done to all of them."""
+    """Return the reason why a command for all handles cannot run: there are none."""
     is_there = editor.object is not None and editor.object.handles
     return no_lift(editor) or (None if is_there else t("There is no handle yet"))
 

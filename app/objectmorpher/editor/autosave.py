@@ -39,7 +39,7 @@ LOCK = "lock"
 
 
 def recovery_root() -> Path:
-    """Where the editors' folders are; OBJECTMORPHER_DATA overrides the user's data folder."""
+    """Return the folder of the journals; OBJECTMORPHER_DATA overrides the user's data folder."""
     named = os.environ.get("OBJECTMORPHER_DATA")
     base = Path(named) if named else platformdirs.user_data_path("objectmorpher", appauthor=False)
     return base / "recovery"
@@ -47,7 +47,7 @@ def recovery_root() -> Path:
 
 @dataclass(frozen=True)
 class About:
-    """What a journal says about its document."""
+    """A journal's summary of its document."""
 
     name: str  # of the photo
     edited: str  # local time, ISO 8601

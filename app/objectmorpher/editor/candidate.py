@@ -1,4 +1,4 @@
-"""What a click under the pointer would select or correct, found while the pointer rests.
+"""A preview of the selection that a click at the resting pointer would make or correct.
 
 Where nothing is selected, that is what a click would select; inside a selection, what a right-click
 would take away; outside it, what a click would add.
@@ -259,14 +259,14 @@ class CloserLook:
         self._owed: _Glance | None = None
 
     def begin(self, question: Question, base: Selection | None, asked: Prompt) -> None:
-        """The step that was just made may be told better."""
+        """Begin looking for a better label of the step that was just made."""
         history = self._editor.history
         assert history is not None
         self._owed = _Glance(question, base, asked, self._editor.mask, history.cursor)
         self._ask(self._owed)
 
     def poll(self) -> bool:
-        """Once a frame: asks again, or shows the answer. Whether anything changed."""
+        """Ask again or show the answer, once a frame; return whether anything changed."""
         editor, owed = self._editor, self._owed
         if owed is None:
             return False

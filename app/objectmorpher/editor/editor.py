@@ -175,7 +175,7 @@ class Editor(EditorState):
         self._travel(self.history.redo, text)
 
     def travel(self, index: int) -> None:
-        """To the step at `index` of the history, back or forth."""
+        """Go to the step at `index` of the history, back or forth."""
         if self.hand.is_busy or self.history is None or index == self.history.cursor:
             return
         text = t("Back at: {label}", label=self.history.label(index))

@@ -1,4 +1,4 @@
-"""What can be exported, in which formats, and under which names. Plain values."""
+"""Export formats and the names of the exported files. Plain values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _KEYS = {
 
 
 class Motion(Enum):
-    """What a video shows, named as in `objectmorpher_core.scripting.animation.MOTIONS`."""
+    """Subjects of a video, named as in `objectmorpher_core.scripting.animation.MOTIONS`."""
 
     MORPH = "Photo to edit"
     SWAY = "Sway"

@@ -1,4 +1,4 @@
-"""What the editor tells: a sentence for the status line, and what is under the pointer."""
+"""Feedback of the editor: a sentence for the status line, and the thing under the pointer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Message:
-    """One sentence for the status line."""
+    """A sentence for the status line."""
 
     text: str
     is_error: bool = False
@@ -30,7 +30,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Hover:
-    """What is under the pointer."""
+    """The thing under the pointer."""
 
     handle: int | None = None
     surface: SurfacePoint | None = None

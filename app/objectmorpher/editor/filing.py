@@ -151,7 +151,7 @@ class Filing:
         self.wanted = self._after_save = None
 
     def save(self) -> None:
-        """Into the session's own file; asks for one where there is none yet."""
+        """Save into the session's own file; ask for one where there is none yet."""
         if self._editor.path is None:
             self.wanted = Dialog.SAVE
         else:

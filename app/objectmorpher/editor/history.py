@@ -47,7 +47,7 @@ class History:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """What was done, oldest first; the first is what undoing everything leaves."""
+        """Return the labels of all steps, oldest first; in the first everything is undone."""
         return tuple(step.label for step in self._steps)
 
     @property
@@ -91,12 +91,12 @@ class History:
 
     @property
     def undo_label(self) -> str | None:
-        """What `undo` would take back, or None."""
+        """Return the label of the step that `undo` would take back, or None."""
         return self._steps[self._cursor].label if self._cursor > 0 else None
 
     @property
     def redo_label(self) -> str | None:
-        """What `redo` would do again, or None."""
+        """Return the label of the step that `redo` would do again, or None."""
         following = self._cursor + 1
         return self._steps[following].label if following < len(self._steps) else None
 
@@ -112,18 +112,18 @@ class History:
 
     @property
     def count(self) -> int:
-        """How many steps there are, those that were undone too."""
+        """Return the number of steps, undone ones included."""
         return len(self._steps)
 
     def label(self, index: int) -> str:
-        """What was done in the step at `index`."""
+        """Return the label of the step at `index`."""
         return self._steps[index].label
 
     # Memory
 
     @property
     def old_bytes(self) -> int:
-        """What the steps hold beside what the shown document holds."""
+        """Return the bytes that the steps hold beyond those of the shown document."""
         return self._memory.bytes - self._memory.bytes_of(self.document)
 
     def _forget_oldest(self) -> None:
@@ -178,7 +178,7 @@ class _Memory:
                     self.bytes -= size
 
     def bytes_of(self, document: Document) -> int:
-        """What one of the documents holds, all by itself."""
+        """Return the bytes that one of the documents holds by itself."""
         blocks: dict[int, int] = {}
         for part in _parts(document):
             blocks |= self._blocks[id(part)]

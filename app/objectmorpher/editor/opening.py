@@ -23,7 +23,7 @@ class OpeningError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """What a file held."""
+    """The contents of an opened file."""
 
     document: Document
     is_session: bool

@@ -1,4 +1,4 @@
-"""What editors that crashed have left: a list, and opening or discarding what is in it."""
+"""Sessions left by editors that crashed: the list, and opening or discarding its entries."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Left:
 
 
 class Recovery:
-    """What there is to recover."""
+    """The sessions that can be recovered."""
 
     def __init__(
         self,

@@ -29,7 +29,7 @@ REFIT = "refit"  # kind of job
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What an answer is of; it is dropped where any of it is another one by now."""
+    """The request behind an answer, which is dropped when the request has changed since."""
 
     k: int
     mask: Mask
@@ -44,7 +44,7 @@ class Wanted:
 
 
 class Refits:
-    """What is asked of the worker, one object at a time, and its answer."""
+    """Refits that the worker makes, one object at a time, and their answers."""
 
     def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
         self._editor = editor

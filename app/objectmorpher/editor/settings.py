@@ -1,4 +1,4 @@
-"""What the user prefers, in a TOML file of the user's own."""
+"""The user's preferences, in a TOML file."""
 
 from __future__ import annotations
 

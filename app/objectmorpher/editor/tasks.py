@@ -1,4 +1,4 @@
-"""The editor's long steps: what is asked of the worker, and how its answers are taken in.
+"""The editor's long steps: requests to the worker, and the reception of its answers.
 
 An answer is dropped where the question does not stand any more, which `is` tells: the photo and
 the mask of a document never change, they are replaced.
@@ -52,7 +52,7 @@ Wanted = tuple[Mask | Hint | None, ...]  # what a background depends on: masks, 
 
 
 class Combine(Enum):
-    """What an answer is to the selection that is there."""
+    """How an answer is combined with the selection that is there."""
 
     ANEW = "anew"  # instead of it
     REFINED = "refined"  # the same, told better
@@ -62,7 +62,7 @@ class Combine(Enum):
 
 @dataclass(frozen=True)
 class Question:
-    """What is meant, and of which object."""
+    """A prompt, and the object that it is about."""
 
     prompt: Prompt
     label: str  # of the step
@@ -90,13 +90,13 @@ class Tasks:
 
     @property
     def pending(self) -> Prompt | None:
-        """What is being segmented now; shown at once, in the document when the mask is there."""
+        """Return the prompt that is being segmented; the document gets it with its mask."""
         question = self.question
         return question.prompt if question and question.k == self._editor.current else None
 
     @property
     def prompt(self) -> Prompt:
-        """What the user said about the current object, asked or answered."""
+        """Return the prompt about the current object, answered or not."""
         if self.pending is not None:
             return self.pending
         thing = self._editor.object
@@ -348,7 +348,7 @@ class Tasks:
                 self._no_plate = None
 
         def fail(error: JobError) -> None:
-            """Nothing else leads to a background: whatever it was, there is another try."""
+            """Handle a failed fill: there is no other way to a background, so offer another try."""
             retry = None if error.is_expected else self.fill_background
             editor.complain_of(replace(error, retry=retry))
 

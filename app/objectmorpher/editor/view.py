@@ -1,4 +1,4 @@
-"""What the user looks at: zoom, pan, tool and toggles. Neither saved nor undone.
+"""The state of the view: zoom, pan, tool and toggles. It is neither saved nor undone.
 
 Canvas px: the part of the window that shows the photo, x right, y down, from its left top corner,
 in framebuffer px. Image px: the photo's own.
@@ -18,7 +18,7 @@ from objectmorpher_core.base.camera import Camera
 
 
 class PoseMode(Enum):
-    """What dragging over the object does, in the order of the panel."""
+    """Effects of dragging over the object, in the order of the panel."""
 
     DRAG = "Drag"
     FREEZE = "Freeze"
@@ -65,7 +65,7 @@ USUAL_LEVEL = "object"  # what a click means, unless the artist says it
 
 
 class SelectMode(Enum):
-    """How the Select tool is told what is meant."""
+    """Ways to point at a thing with the Select tool."""
 
     CLICK = "Click"
     BOX = "Box"
@@ -73,7 +73,7 @@ class SelectMode(Enum):
 
 
 class Painted(Enum):
-    """What the Mask tool's brush paints."""
+    """Things that the Mask tool's brush paints."""
 
     SELECTION = "Selection"
     DEPTH = "Depth"
@@ -82,7 +82,7 @@ class Painted(Enum):
 
 @dataclass(eq=False)
 class Selecting:
-    """What the Select and the Mask tool are set to."""
+    """Settings of the Select and the Mask tool."""
 
     mode: SelectMode = SelectMode.CLICK
     level: str = USUAL_LEVEL  # of document.LEVELS: what a new click means
@@ -92,7 +92,7 @@ class Selecting:
 
 
 class Shown(Enum):
-    """What the canvas shows of the edit, in the order of the View menu."""
+    """Pictures of the edit on the canvas, in the order of the View menu."""
 
     COMPOSITE = "Composite"
     OBJECT = "Object only"
@@ -114,7 +114,7 @@ class Popup(Enum):
 
 @dataclass(frozen=True)
 class Orbit:
-    """From where the object is looked at, degrees; it is the object that turns."""
+    """The direction from which the object is looked at, degrees; it is the object that turns."""
 
     yaw: float = 0.0
     pitch: float = 0.0
@@ -125,7 +125,7 @@ class Orbit:
 
 
 class Composed(Enum):
-    """What a drag of the Compose tool does to the background that is shown alone."""
+    """Effects of a drag with the Compose tool on the background that is shown alone."""
 
     REPAIR = "Repair"
     TAKE = "Fill from"
@@ -133,7 +133,7 @@ class Composed(Enum):
 
 @dataclass(eq=False)
 class ComposeView:
-    """What the Compose tool shows."""
+    """The view of the Compose tool."""
 
     is_bare: bool = False  # the background alone, without the objects
     drag: Composed = Composed.REPAIR
@@ -174,7 +174,7 @@ class View:
 
     @property
     def place(self) -> tuple[float, ...]:
-        """What a picture on the canvas depends on: it is the same where this is."""
+        """Return everything that a picture on the canvas depends on."""
         return (self.left, self.top, self.zoom, self.width, self.height)
 
     def canvas_from_image(self, xy: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What lies on the GPU: arrays that stay, remembered by identity, and buffers that are refilled."""
+"""Arrays on the GPU, remembered by identity, and buffers that are refilled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .shaders import buffer_layout
 
 
 class Releasable(Protocol):
-    """An object that holds memory of the GPU until it is told to let go."""
+    """An object that holds GPU memory until it is released."""
 
     def release(self) -> Any: ...
 
@@ -104,7 +104,7 @@ class Instances:
         return self._stream.buffer
 
     def read(self) -> bytes:
-        """All rows, which waits for the GPU."""
+        """Read all rows, which waits for the GPU."""
         return self._stream.buffer.read(self.count * self.row_size)
 
     def draw(self, program: moderngl.Program) -> None:

@@ -31,7 +31,7 @@ TINT = 0.6  # opacity
 
 
 class LayerPass:
-    """One rectangle an object. Textures are replaced when the layer is not the last one."""
+    """Draws one rectangle per object. Textures are replaced when the layer is another one."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
@@ -41,14 +41,14 @@ class LayerPass:
         self._grain = GrainTextures(context)
 
     def draw(self, scene: Scene, view: View) -> None:
-        """Into the current viewport, which is the canvas."""
+        """Draw into the current viewport, which is the canvas."""
         between = tuple(item for item in scene.objects if isinstance(item, Layer))
         self._forget(scene.shades + scene.layers + between)
         for layer in scene.shades + scene.layers:
             self.draw_layer(layer, scene, view)
 
     def draw_layer(self, layer: Layer, scene: Scene, view: View) -> None:
-        """One of them, over what is there."""
+        """Draw one layer over what is there."""
         for unit, texture in self._textures(layer).items():
             texture.use(unit)
         is_over = layer.is_tint or layer.is_weighed

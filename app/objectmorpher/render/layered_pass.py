@@ -57,7 +57,7 @@ class LayeredPass:
         self, instances: Instances, splats: PosedSplats, texture: TextureLevels,
         cameras: tuple[Camera, Camera], picture: moderngl.Framebuffer,
     ) -> None:  # fmt: skip
-        """Into `picture`, colour and detail; `cameras`: the view's, whose size it has, the photo's.
+        """Draw into `picture`, colour and detail; `cameras` are the view's and the photo's.
 
         Its first row is the topmost.
         """
@@ -231,7 +231,7 @@ CELL = 16  # px, of which one texel says whether anything is left for the next l
 
 
 class LayerTargets:
-    """As large as a band of the picture: a canvas of any size needs no more memory.
+    """Targets as large as a band of the picture: a canvas of any size needs no more memory.
 
     232 bytes a pixel.
     """
@@ -342,7 +342,7 @@ class PhotoLevels:
 
     @property
     def uniforms(self) -> dict[str, object]:
-        """What the shader has to know of it."""
+        """Return the shader's uniforms."""
         sizes = [(level.shape[1], level.shape[0]) for level in self._levels[self._finest :]]
         all_sizes = sizes + sizes[-1:] * (MOST_LEVELS - len(sizes))
         return {"sizes": all_sizes, "levels": len(sizes), "finest": float(self._finest)}

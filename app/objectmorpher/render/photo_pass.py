@@ -16,7 +16,7 @@ _UNITS = {"photo": PHOTO, "plate": PLATE, "mask": MASK, "blend": BLEND}
 
 
 class PhotoPass:
-    """One rectangle over the whole canvas."""
+    """Draws one rectangle over the whole canvas."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._programs = Programs(context, "quad.vert", "photo.frag", _UNITS)
@@ -25,7 +25,7 @@ class PhotoPass:
         self._mask = PictureTexture(context)
 
     def draw(self, scene: Scene, view: View) -> None:
-        """Into the current viewport, which is the canvas."""
+        """Draw into the current viewport, which is the canvas."""
         self._photo.upload(scene.photo, zoom=view.zoom)
         self._plate.upload(scene.plate.pixels if scene.plate else None, zoom=view.zoom)
         self._mask.upload(scene.mask, scene.touched, view.zoom)
@@ -55,7 +55,7 @@ class PhotoPass:
 
 
 def hatch_uniforms(hatch: Hatch | None, view: View) -> dict[str, Any]:
-    """What shaders/hatch.glsl asks for."""
+    """Return the uniforms of shaders/hatch.glsl."""
     if hatch is None:
         return {"unit": view.scale}
     return {

@@ -52,7 +52,7 @@ class ProjectPass:
     def draw(
         self, splats: PosedSplats, camera: Camera, photo_camera: Camera, order: np.ndarray | None
     ) -> Instances:
-        """All Gaussians, or the rows `order` (M,) u32 in that order, without what layers need."""
+        """Draw all Gaussians, or the rows `order` (M,) u32 in that order, without layers."""
         count = len(splats) if order is None else len(order)
         instances = self._layered if order is None else self._plain
         output = instances.reserve(count)

@@ -143,7 +143,7 @@ class Renderer:
         return np.frombuffer(data, np.uint8).reshape(size[1], size[0], 3)[::-1]
 
     def read_pixel(self, left: int, bottom: int) -> tuple[int, int, int]:
-        """One of the window's pixels, u8."""
+        """Read one of the window's pixels, u8."""
         data = self._context.screen.read(viewport=(left, bottom, 1, 1), components=3, alignment=1)
         return data[0], data[1], data[2]
 

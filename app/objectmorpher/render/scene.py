@@ -1,4 +1,4 @@
-"""What is to be drawn: plain inputs. The renderer knows no editor, history or ImGui."""
+"""The input of the renderer, in plain values. It knows no editor, history or ImGui."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SplatObject:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """One picture of the canvas."""
+    """A picture of the canvas."""
 
     photo: Pixels
     surround: Colour

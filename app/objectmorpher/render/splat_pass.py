@@ -119,7 +119,7 @@ class CloudPass:
         self, instances: Instances, splats: PosedSplats, camera: Camera,
         picture: moderngl.Framebuffer,
     ) -> None:  # fmt: skip
-        """Into `picture`, its first row is the topmost."""
+        """Draw into `picture`, whose first row is the topmost."""
         picture.use()
         picture.clear()
         self._context.enable_only(moderngl.BLEND)

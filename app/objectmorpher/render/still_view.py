@@ -1,4 +1,4 @@
-"""What lies under the objects while the view stands still: the photo, and the edit's background."""
+"""The pictures under the objects of a still view: the photo, and the edit's background."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class KeptCanvas:
         self._color.write(pixels, viewport=viewport)
 
     def forget(self) -> None:
-        """Nothing is kept."""
+        """Forget everything."""
         if self.buffer is not None and self._color is not None:
             self.buffer.release()
             self._color.release()

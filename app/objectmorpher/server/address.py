@@ -28,7 +28,7 @@ class ServedError(ValueError):
 
 @dataclass(frozen=True)
 class Address:
-    """Of a server."""
+    """The address of a server."""
 
     host: str
     port: int
@@ -37,7 +37,7 @@ class Address:
 
     @staticmethod
     def of(text: str) -> Address:
-        """From `gpu.lan`, `gpu.lan:8717`, `http://...` or `https://...`; raises AddressError."""
+        """Parse `gpu.lan`, `gpu.lan:8717`, `http://...` or `https://...`; raises AddressError."""
         whole = text.strip()
         whole = whole if "://" in whole else f"http://{whole}"
         try:

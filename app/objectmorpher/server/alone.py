@@ -42,4 +42,4 @@ class Alone:
             self._turn.release()
 
     def close(self) -> None:
-        """Nothing was started."""
+        """Close; nothing was started."""

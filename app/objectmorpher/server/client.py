@@ -26,7 +26,7 @@ ROUNDS = 3  # of sending what is missing: the server may have dropped it meanwhi
 
 
 def hello(server: Server) -> dict[str, Any]:
-    """What the server tells of itself. Raises ServerLost."""
+    """Ask the server for its description. Raises ServerLost."""
     with _connection(server) as connection:
         connection.request("GET", _path(server, "hello"), headers=_headers(server))
         response = connection.getresponse()

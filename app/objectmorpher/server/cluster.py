@@ -47,7 +47,7 @@ ON_CPU = ("dino", "subject", "grabcut", "sam-onnx", "lama", "migan", "patchmatch
 
 @dataclass(frozen=True)
 class Plan:
-    """How the backends are spread."""
+    """The spread of the backends over processes."""
 
     address: str | None = None  # of a running cluster; None: one is started here
     stages: tuple[str, ...] = STAGES
@@ -251,7 +251,7 @@ STARTED, PROGRESS, DONE = "started", "progress", "done"  # what it tells
 
 
 class Replica:
-    """What Ray Serve starts, as often as the plan says."""
+    """The class that Ray Serve starts as often as the plan says."""
 
     def __init__(self) -> None:
         # One thread: job functions remember their last photo, and are not made for two at a time.

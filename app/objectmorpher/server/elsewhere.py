@@ -1,4 +1,4 @@
-"""Where a job runs: on the user's server, or here while that one is lost."""
+"""Jobs on the user's server, or on this computer while the server is lost."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Elsewhere:
         self._not_served: set[tuple[Server, str]] = set()  # with names of functions
 
     def placed(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """What the worker is to call for `function`."""
+        """Return the callable that the worker is to use for `function`."""
         server = self._chosen()
         if server is None or self.is_away(server):
             return function

@@ -1,4 +1,4 @@
-"""Whether a value that came over the wire is of the type that a function or a field declares."""
+"""A check that a value from the wire has the type that a function or a field declares."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ BEAT = 0.1  # s between two lines
 
 @dataclass(frozen=True)
 class Limits:
-    """How much one may ask for."""
+    """Limits on what one may ask for."""
 
     body: int = BODY_LIMIT
     blobs: int = BLOB_LIMIT
@@ -235,7 +235,7 @@ class Blobs:
                 self._size -= len(self._kept.popitem(last=False)[1])
 
     def found(self, names: Iterable[str]) -> dict[str, bytes]:
-        """Those of `names` that are here."""
+        """Return those of `names` that are stored here."""
         with self._lock:
             here = [name for name in names if name in self._kept]
             for name in here:

@@ -50,7 +50,7 @@ class HttpServer:
 
     @property
     def url(self) -> str:
-        """The same as a browser takes it."""
+        """Return the URL that a browser takes."""
         host, port = self.address
         return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
@@ -61,7 +61,7 @@ class HttpServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Listens no more; what still answers is told so by `is_closing`."""
+        """Stop listening; requests in progress see `is_closing`."""
         self.is_closing.set()
         if self._thread is not None:
             self._listener.shutdown()
@@ -98,7 +98,7 @@ class _Listener(ThreadingHTTPServer):
 
 
 class Refusal(Exception):
-    """What is answered instead: a status and one sentence, and what else a program is to know."""
+    """A refusal: a status, one sentence, and facts for a program."""
 
     def __init__(self, status: HTTPStatus, sentence: str, **more: Any) -> None:
         super().__init__(sentence)
@@ -106,7 +106,7 @@ class Refusal(Exception):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """One request. Subclasses have do_GET and the like, each of which calls `answer`."""
+    """The handler of one request. Subclasses have do_GET and so on, which call `answer`."""
 
     timeout = IDLE
     protocol_version = "HTTP/1.1"
@@ -132,7 +132,7 @@ class Handler(BaseHTTPRequestHandler):
             self.send_json(refusal.status, refusal.answer)
 
     def read_body(self, most: int) -> bytes:
-        """As many bytes as were announced, at most `most`. Raises Refusal."""
+        """Read as many bytes as were announced, at most `most`. Raises Refusal."""
         told = self.headers.get("Content-Length", "")
         if "Transfer-Encoding" in self.headers or not (told.isascii() and told.isdigit()):
             raise Refusal(HTTPStatus.LENGTH_REQUIRED, "how many bytes come must be said first")

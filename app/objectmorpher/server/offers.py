@@ -14,7 +14,7 @@ MOST_LETTERS = 48
 
 @dataclass(frozen=True)
 class Offer:
-    """What can be asked for of a stage."""
+    """The backends that can be asked for in a stage."""
 
     auto: str  # the backend that "auto" is; empty: none can run
     able: tuple[str, ...]
@@ -34,7 +34,7 @@ Offers = dict[str, Offer]  # by stage
 
 
 def look_at_offers() -> Offers:
-    """Of the machine that this runs on; may load PyTorch, to ask for a GPU."""
+    """Return the offers of this machine; may load PyTorch to ask for a GPU."""
     from objectmorpher_core import doctor
 
     found = by_stage(doctor.look_at_stages())
@@ -42,12 +42,12 @@ def look_at_offers() -> Offers:
 
 
 def told_offers(offers: Offers) -> dict[str, Any]:
-    """As JSON."""
+    """Return the offers as JSON."""
     return {stage: asdict(offer) for stage, offer in offers.items()}
 
 
 def read_offers(told: Any) -> Offers:
-    """What a server says that it can run; what is of another form is left out."""
+    """Read a server's offers; those of another form are left out."""
     if not isinstance(told, dict):
         return {}
     return {stage: _offer(told[stage]) for stage in STAGES if isinstance(told.get(stage), dict)}

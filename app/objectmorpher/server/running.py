@@ -1,4 +1,4 @@
-"""What runs a served function for the front: a process of its own, or a cluster."""
+"""Runners of a served function: a process of its own, or a cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is served: a fixed table of job functions, and of the types that they take and give.
+"""The fixed table of the served job functions, and of the types that they take and give.
 
 A name on the wire is looked up here and nowhere else. The arguments' shapes are compared before
 a function sees them: compiled kernels trust that a mask is as large as its photo.

@@ -33,7 +33,7 @@ def check_token(token: str) -> str:
 
 
 def is_same(a: str, b: str) -> bool:
-    """Compares in a time that tells nothing of where two tokens differ, nor of their lengths."""
+    """Compare two tokens in a time that reveals neither where they differ nor how long they are."""
     return hmac.compare_digest(*(hashlib.sha256(t.encode()).digest() for t in (a, b)))
 
 

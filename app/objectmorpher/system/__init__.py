@@ -1,1 +1,1 @@
-"""Where the program meets the system: its own files, logs, texts, first start."""
+"""The program and the system: its own files, logs, texts, first start."""

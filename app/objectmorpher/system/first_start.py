@@ -21,7 +21,7 @@ MARK = "compiled.txt"  # in the kernels' folder: the build that all were compile
 
 
 def needs_compiling(folder: Path, build: str) -> bool:
-    """Whether no kernels of this build lie in the folder, as far as is told there."""
+    """Return whether the folder is not known to hold all kernels of this build."""
     try:
         return (folder / MARK).read_text(encoding="ascii").strip() != build
     except (OSError, ValueError):
@@ -29,7 +29,7 @@ def needs_compiling(folder: Path, build: str) -> bool:
 
 
 def mark_compiled(folder: Path, build: str) -> None:
-    """All kernels of this build lie in the folder now. Raises OSError."""
+    """Note that all kernels of this build lie in the folder. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).write_text(build + "\n", encoding="ascii")
 

@@ -1,4 +1,4 @@
-"""What nobody needs any more goes back to the system, not only to this program's next needs."""
+"""Return freed memory to the system instead of keeping it for this program's next needs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 
 
 def set_aside() -> None:
-    """What is there now is of the program, and is not looked through for what nobody needs.
+    """Exempt everything that exists now from garbage collection.
 
     To be called once, when all modules are there: looking through their 85,000 objects takes longer
     than a frame, here and whenever Python does so by itself.

@@ -19,7 +19,7 @@ SIZE = 1_000_000  # bytes, after which a new file is begun; one old one is kept
 
 
 def log_path() -> Path:
-    """Where the log is."""
+    """Return the path of the log."""
     return settings_path().parent / NAME
 
 
@@ -69,7 +69,7 @@ class _QuietFile(RotatingFileHandler):
 
 
 def note_crashes(folder: Path) -> None:
-    """Where this process is ended by a fault of native code, what its threads did is noted.
+    """Note what the threads did when native code ends this process by a fault.
 
     In a file of its own: it stays open, and the log's is replaced when it is full. What an
     environment with PYTHONFAULTHANDLER asked for already is left as it is.
@@ -89,7 +89,7 @@ def note_crashes(folder: Path) -> None:
 
 
 def crash_folder() -> Path | None:
-    """Where this process notes crashes, for those that it starts; None if it does not."""
+    """Return the folder of this process's crash notes, for its children; None if there is none."""
     return next(iter(_noted), None)
 
 

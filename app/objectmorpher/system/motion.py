@@ -1,4 +1,4 @@
-"""Whether things may fade and blink: what the user says, else what the system's setting says."""
+"""Motion in the window: the user's preference, or else the system's setting."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WINDOWS_ANIMATIONS = 0x1042  # SPI_GETCLIENTAREAANIMATION
 
 
 class Motion:
-    """Of this program. One instance, `motion`."""
+    """The program's motion preference. There is one instance, `motion`."""
 
     def __init__(self) -> None:
         self._system_is_reduced = False

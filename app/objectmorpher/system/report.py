@@ -1,4 +1,4 @@
-"""What an artist sends when something went wrong: version, machine, log; no private names."""
+"""The report of an artist whose program failed: version, machine, log; no private names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST = 40_000  # characters of each file: its end is of interest
 
 
 def report(folder: Path) -> str:
-    """Of the log and the crashes that are kept in `folder`."""
+    """Build a report from the log and the crashes in `folder`."""
     lines = [
         f"objectmorpher {__version__}",
         f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",

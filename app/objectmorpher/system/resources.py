@@ -1,4 +1,4 @@
-"""Where the program's own files are: shaders, sample photos, fonts, the icon."""
+"""The program's own files: shaders, sample photos, fonts, the icon."""
 
 from __future__ import annotations
 

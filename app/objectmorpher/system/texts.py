@@ -63,6 +63,6 @@ def folder_of(path: Path) -> str:
 
 
 def sentence(text: str) -> str:
-    """With a capital: the library's reasons have none. A file's name stays as it is."""
+    """Return a library's reason as a sentence with a capital. A file's name stays as it is."""
     is_name = FILE_NAME.match(text) and text.split(" ", 1)[0] not in ARTICLES
     return text if is_name else text[:1].upper() + text[1:]

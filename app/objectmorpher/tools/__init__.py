@@ -1,1 +1,1 @@
-"""What the pointer does in each tool. No GL, no ImGui, no window: tests drive these directly."""
+"""Effects of the pointer in each tool. No GL, no ImGui, no window: tests drive them directly."""

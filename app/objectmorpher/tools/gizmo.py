@@ -1,4 +1,4 @@
-"""What the whole object is taken by, as the photo's own camera sees it; canvas px.
+"""The grips of the whole object as the photo's own camera sees them; canvas px.
 
 Three rings turn it about the axes of `Placement.turn`, R = Rz(roll) Rx(pitch) Ry(yaw): like the
 rings of a gimbal, the one for yaw is carried by pitch and roll, the one for pitch by roll. Each
@@ -64,7 +64,7 @@ class Ring:
 
     @property
     def openness(self) -> float:
-        """How round it is seen: 1 as a circle, 0 as a line."""
+        """Return how open a ring is seen: 1 as a circle, 0 as a line."""
         spread = np.linalg.svd(self._arms, compute_uv=False)
         return float(spread[1] / max(spread[0], 1e-12))
 
@@ -93,7 +93,7 @@ class Ring:
         return np.asarray(away <= 1e-9 * np.linalg.norm(self.centre) ** 2)
 
     def gap(self, xy: np.ndarray) -> float:
-        """How far from its front canvas px (2,) are, to a fraction of the space of its samples."""
+        """Return the distance of canvas px (2,) from its front, finer than the samples' spacing."""
         return float(self._front_gaps(xy)[1].min())
 
     def nearest(self, xy: np.ndarray) -> float:
@@ -155,7 +155,7 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class Gizmo:
-    """All that the object is taken by. It stays within reach, however large the object."""
+    """All grips of an object. They stay within reach, however large the object."""
 
     corners: F64  # (4, 2) left top, right top, right bottom, left bottom
     centre: F64  # (2,)

@@ -80,7 +80,7 @@ class PlaceTool:
         editor.commit(t("Move the horizon") if is_moved else "")
 
     def part_at(self, editor: Editor, pointer: Pointer) -> str | None:
-        """What a press would take: the object's middle, then what is drawn over it, then it."""
+        """Return the part that a press would take: the middle, then a grip, then the object."""
         shown = gizmo(editor)
         if shown is None:
             return None
@@ -285,12 +285,12 @@ def _turn(editor: Editor, first: Pointer) -> Change:
 
 
 def wrapped_radians(angle: float) -> float:
-    """The same direction in (-pi, pi]."""
+    """Return the same direction in (-pi, pi]."""
     return float(np.pi - (np.pi - angle) % (2 * np.pi))
 
 
 def wrapped(angle: float) -> float:
-    """The same direction in (-180, 180] degrees."""
+    """Return the same direction in (-180, 180] degrees."""
     return float(180.0 - (180.0 - angle) % 360.0)
 
 

@@ -36,7 +36,7 @@ class Button(Enum):
 
 
 class Shape(Enum):
-    """What the pointer looks like: it tells what a press would do."""
+    """Shapes of the pointer, which announce the effect of a press."""
 
     ARROW = "arrow"
     CROSS = "cross"
@@ -49,7 +49,7 @@ class Shape(Enum):
 
 @dataclass(frozen=True)
 class Pointer:
-    """Where the pointer is and what is held with it."""
+    """The pointer's place and the keys held with it."""
 
     x: float  # canvas px
     y: float
@@ -136,7 +136,7 @@ def one_axis(delta: np.ndarray, pointer: Pointer) -> np.ndarray:
 
 
 def ignore() -> Stroke:
-    """Nothing, until the button goes up."""
+    """Do nothing until the button goes up."""
     while (yield).is_down:
         pass
 

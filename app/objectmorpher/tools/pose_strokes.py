@@ -26,7 +26,7 @@ SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Where the dragged handles were when the stroke began."""
+    """The places of the dragged handles when the stroke began."""
 
     spots: dict[int, Spot]
     lines: dict[int, tuple[F64, F64]]  # place and normal (3,) each, world
@@ -164,7 +164,7 @@ UP = np.array([0.0, -1.0])  # px
 def along_line(
     camera: Camera, point: np.ndarray, direction: np.ndarray, delta: np.ndarray
 ) -> float:
-    """How far along a line a point goes when its picture is led by `delta` (2,) px.
+    """Return how far a point goes along a line when its picture is led by `delta` (2,) px.
 
     The line goes through `point` (3,) world, along the unit `direction` (3,). The point's picture
     goes where the led place is nearest to the line's picture. Of a line that points nearly at the

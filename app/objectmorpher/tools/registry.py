@@ -16,7 +16,7 @@ from .select_tool import SelectTool
 
 
 class Tool(Protocol):
-    """One tool. Stateless: everything that must last is in the Editor."""
+    """A tool. It is stateless: everything that must last is in the Editor."""
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         """A button went down on the canvas."""
@@ -27,7 +27,7 @@ class Tool(Protocol):
         ...
 
     def hint(self, editor: Editor) -> str:
-        """What click, drag and the modifier keys do here and now."""
+        """Return the effects of click, drag and the modifier keys here and now."""
         ...
 
 

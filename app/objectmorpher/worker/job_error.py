@@ -28,7 +28,7 @@ class JobError:
 
     @classmethod
     def of(cls, error: Exception, what: str) -> JobError:
-        """From an exception that is being handled; `what` failed."""
+        """Make it from an exception that is being handled; `what` failed."""
         name = type(error).__name__
         # Of others' kinds some are values' errors, too: numpy's of a singular matrix is one.
         is_ours = type(error).__module__.partition(".")[0] in OURS
@@ -40,11 +40,11 @@ class JobError:
         )  # fmt: skip
 
     def retried_by(self, again: Callable[[], None]) -> JobError:
-        """The same error, with `again` as its remedy if another try may help."""
+        """Return the same error with `again` as its remedy if another try may help."""
         return replace(self, retry=again) if self.may_pass else self
 
     def write_log(self, title: str) -> None:
-        """That what is called `title` failed: an error of the program's, unless it was expected."""
+        """Log the failure of `title`, as an error of the program's unless it was expected."""
         level = logging.INFO if self.is_expected else logging.ERROR
         log.log(level, "%s failed: %s\n%s", title, self.sentence, self.trace)
 

@@ -1,4 +1,4 @@
-"""What runs in the worker process: plain values in, plain values out.
+"""Job functions of the worker process: plain values in, plain values out.
 
 The heavy modules are imported inside, so that the window, which only names these functions,
 starts without them.
@@ -74,7 +74,7 @@ class PhotoMemory:
         self._reading: Reading | None = None
 
     def forget(self) -> None:
-        """Nothing is remembered."""
+        """Forget everything."""
         self._backend, self._segmenter, self._reading = "", None, None
 
     def reading(self, pixels: Pixels, backend: str, progress: Progress) -> Reading:
@@ -117,7 +117,7 @@ def forget_segmenter(progress: Progress) -> None:
 
 
 def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
-    """The mask of what the prompt means, by which backend, and how sure that is.
+    """Return the mask that the prompt means, the backend that found it, and its confidence.
 
     At a glance, where the backend can tell better by a `closer_look`.
     """
@@ -131,7 +131,7 @@ def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) 
 
 
 def closer_look(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
-    """As `segment`, whatever time it takes."""
+    """Segment like `segment`, however long it takes."""
     reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
@@ -205,7 +205,7 @@ def fit_object(
 
 
 def candidate(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found | str:
-    """As `segment`; where nothing can be selected, the sentence that says so."""
+    """Segment like `segment`; where nothing can be selected, return the sentence that says so."""
     from objectmorpher_core.segment import SelectionError
 
     try:
@@ -322,7 +322,7 @@ def take_shadow(
 
 
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
-    """What of the edit a network is to see."""
+    """Return the part of the edit that a network is to see."""
     from objectmorpher_core.scripting.runner import coarse_edit
 
     return coarse_edit(document, progress)
@@ -346,7 +346,7 @@ def write_session(document: Document, path: Path, progress: Progress) -> None:
 
 
 def look_at_stages(progress: Progress) -> tuple[Stage, ...]:
-    """What each stage's backends can do on this machine; may load PyTorch, to ask for a GPU."""
+    """Return what each stage's backends can do here; may load PyTorch to ask for a GPU."""
     from objectmorpher_core import doctor
 
     return doctor.look_at_stages()

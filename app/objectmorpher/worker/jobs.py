@@ -1,4 +1,4 @@
-"""One worker process for everything that takes longer than a frame (ARCHITECTURE section 5).
+"""One worker process for everything that takes longer than a frame.
 
 The window starts a job and goes on; `poll` delivers the answer on the main thread. A job function
 takes plain values and a keyword `progress`, and knows nothing of this module. Of one kind only the
@@ -92,7 +92,7 @@ class Worker:
 
 
 class Jobs(Executor):
-    """What runs, what waits, and the answers."""
+    """Running and waiting jobs, and their answers."""
 
     def __init__(self, warm: tuple[str, ...] = (), wake: Callable[[], None] = lambda: None) -> None:
         """`warm`: modules the worker imports at once. `wake` is called from another thread."""

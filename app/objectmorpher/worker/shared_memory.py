@@ -76,7 +76,7 @@ def shared(buffer: memoryview) -> Block | None:
 
 
 def send(pipe: Pipe, block: Block) -> None:
-    """To whoever calls `receive` on the other side."""
+    """Send it to the caller of `receive` on the other side."""
     assert sys.platform == "linux"
     with _socket(pipe) as line:
         socket.send_fds(line, [b"\0"], [block.descriptor])

@@ -15,6 +15,6 @@ STAGES = tuple(DOCTORS)
 
 
 def by_stage(looked_at: Iterable[Stage]) -> dict[str, Stage]:
-    """What the doctor found, by the names of STAGES."""
+    """Return the doctor's findings by the names of STAGES."""
     found = {stage.name: stage for stage in looked_at}
     return {stage: found[name] for stage, name in DOCTORS.items()}

@@ -1,4 +1,4 @@
-"""Defocus where an object has come nearer, or gone farther: as blurred as the photo is there.
+"""Defocus of an object that came nearer or went farther, matched to the photo's blur there.
 
 The photo tells it by its ground: in the row where the ground is as far away as the object is now,
 beside the object, edges are so and so wide; and likewise where the object was. The object brings
@@ -44,7 +44,7 @@ class Ground:
 
 
 class Focus:
-    """How blurred one photo is, place by place; measured once each."""
+    """The blur of one photo, place by place; each is measured once."""
 
     def __init__(self, photo: Pixels, covered: Mask) -> None:
         """`covered` (H, W): objects, which do not belong to the ground."""
@@ -57,7 +57,7 @@ class Focus:
         self._objects: dict[int, tuple[Matte, float | None]] = {}  # by its id
 
     def beside(self, row: float, left: float, right: float) -> float | None:
-        """Px, the photo's blur around a `row`, beside the columns left..right of an object.
+        """Return the photo's blur, px, around a `row`, beside the columns left..right of an object.
 
         None where it does not tell.
         """
@@ -101,7 +101,7 @@ def find_defocus(
     splats: PosedSplats, rest: PosedSplats, matte: Matte, ground: Ground, focus: Focus,
     camera: Camera,
 ) -> float:  # fmt: skip
-    """Px of the photo, standard deviation: how much a moved object is to be blurred.
+    """Return the blur that a moved object is to get: standard deviation, px of the photo.
 
     0 where it has kept its depth, where it is at least as blurred as the photo there, and where
     the photo does not tell. `rest`: its Gaussians as they were.
@@ -176,7 +176,7 @@ def _blur_there(
 
 
 def attenuation(blur: float, frequency: np.ndarray) -> np.ndarray:
-    """What a blur, px, leaves of the power at frequencies, per px."""
+    """Return the share of the power that a blur, px, leaves at frequencies, per px."""
     return np.exp(-((2 * np.pi * blur * frequency) ** 2))
 
 
@@ -196,7 +196,7 @@ def blurred(picture: F32, blur: float) -> F32:
 
 
 def blurred_rgba(rgba: U8, blur: float) -> U8:
-    """The same of a picture (h, w, 4) u8."""
+    """Blur a picture (h, w, 4) u8."""
     return (blurred(rgba.astype(np.float32), blur) + 0.5).astype(np.uint8)
 
 
@@ -222,7 +222,7 @@ class Edges:
     scale: int  # px of the picture per px of the one they were found in
 
     def typical(self) -> float | None:
-        """The blur that the sharper ones have; None of too few, or where it is too wide to tell."""
+        """Return the blur of the sharper edges; None where they are few, or too widely spread."""
         if len(self.blur) < max(ENOUGH / self.scale, FEWEST):
             return None
         blur = float(np.percentile(self.blur, SHARPER))
@@ -230,7 +230,7 @@ class Edges:
 
 
 def measure_blur(pixels: Pixels, asked: Mask) -> float | None:
-    """Px, standard deviation of the blur of a picture (h, w, 3) where it is `asked` (h, w).
+    """Measure the blur, standard deviation in px, of a picture (h, w, 3) at `asked` (h, w).
 
     None where too few edges tell.
     """

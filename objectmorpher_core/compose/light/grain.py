@@ -74,7 +74,7 @@ class Grain:
         return out
 
     def grained_rgba(self, rgba: U8, left: float, top: float, zoom: float) -> U8:
-        """The same of a picture (h, w, 4) u8 that has `zoom` px per px of the photo."""
+        """Add the grain to a picture (h, w, 4) u8 that has `zoom` px per px of the photo."""
         packed = np.ascontiguousarray(rgba).view("<u4")[..., 0]
         out = np.empty_like(packed)
         table, places = self.noise.deviation, self._places(packed.shape, left, top, zoom)
@@ -107,7 +107,7 @@ class Grain:
 
 
 def tile_level(zoom: float) -> int:
-    """How often the tile is halved where the photo is shown `zoom` times as large."""
+    """Return how often the tile is halved where the photo is shown `zoom` times as large."""
     return int(np.clip(np.rint(-np.log2(zoom)), 0, COARSEST))
 
 
@@ -173,7 +173,7 @@ def find_grain(
     splats: PosedSplats, texture: TextureLevels, noise: Noise, strength: float, camera: Camera,
     blur: float = 0.0,
 ) -> Grain | None:  # fmt: skip
-    """What a moved object lacks of the photo's noise, as the photo's `camera` sees it.
+    """Find the grain that a moved object lacks, as the photo's `camera` sees it.
 
     None where it lacks nothing. `strength` in [0, 1] of it is given. `blur`: px of the photo by
     which the object is put out of focus.
@@ -197,7 +197,7 @@ def find_grain(
 def sketch_grain(
     splats: PosedSplats, noise: Noise, strength: float, camera: Camera, blur: float = 0.0
 ) -> Grain | None:
-    """The same in a millisecond or two: as if all of it had moved by one affine map."""
+    """Estimate the grain in a millisecond or two, as if all of it had moved by one affine map."""
     few = sketched(splats)
     few = few[splats.rest.lifted.texture.visibility[few] > SOLID]
     few = few[splats.means[few, 2] > 0]

@@ -73,7 +73,7 @@ def light_map(document: Document) -> F32:
 
 
 def light_gain(light: F32, width: int, before: Silhouette, now: Silhouette) -> Gain:
-    """What the object's encoded colours are multiplied by at full strength.
+    """Return the factors of the object's encoded colours at full strength.
 
     `light` is the photo's `light_map`, `width` the photo's px; the object was at `before`.
     """
@@ -127,7 +127,7 @@ def lit(colour: F32, alpha: F32, gain: Gain) -> F32:
 
 
 def lit_rgba(rgba: U8, gain: Gain) -> U8:
-    """The same of a picture (h, w, 4) u8."""
+    """Light a picture (h, w, 4) u8."""
     if gain == NEUTRAL:
         return rgba
     steps = np.arange(256)[:, None] * np.array([*gain, 1.0]) + 0.5

@@ -33,7 +33,7 @@ CAST = 40_000  # Gaussians, of which a shadow is made
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """What is done to an object's colours, in this order, and the shadow that it throws."""
+    """The changes to an object's colours, in this order, and its shadow."""
 
     gain: Gain = NEUTRAL
     shade: Shade | None = None
@@ -46,7 +46,7 @@ NOTHING = Lit()
 
 
 def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
-    """What the object's Gaussians carry: straight colour and alpha on the matte's crop.
+    """Return the texture of the object's Gaussians: straight colour and alpha on its crop.
 
     Beside it lie the invented pictures of what was `lifted`, if there are any.
     """
@@ -65,7 +65,7 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
 
 
 class Lighting:
-    """Of one photo with its plate; what several objects share is computed once."""
+    """Lighting of one photo with its plate; what several objects share is computed once."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -83,7 +83,7 @@ class Lighting:
 
     @cached_property
     def focus(self) -> Focus:
-        """How blurred the photo is."""
+        """Return the blur of the photo."""
         return Focus(self._document.photo.pixels, plate_cover(self._document))
 
     def of(
@@ -95,7 +95,7 @@ class Lighting:
         texture: TextureLevels | None = None,
         is_sketch: bool = False,
     ) -> Lit:
-        """Of a moved object whose Gaussians are `splats` now and were at `rest`.
+        """Return the lighting of a moved object with Gaussians `splats` now and `rest` before.
 
         `horizon`: the photo's, px, where it is known. `is_sketch`: the shadow is a coarse one, in
         the time that a frame of a drag has.
@@ -154,7 +154,7 @@ def stand(
     shadow: Shadow | None = None,
     most: int = SKETCHED,
 ) -> Standing | None:
-    """How an object whose Gaussians are `splats` stands; None where none of it is solid.
+    """Return the stance of an object with the Gaussians `splats`; None where none of them is solid.
 
     The ground is as `shadow` and `horizon` say; of about `most` of the Gaussians.
     """
@@ -168,7 +168,7 @@ def stand(
 def ground_seen_from(
     lifted: LiftedObject, camera: Camera, horizon: float | None, shadow: Shadow
 ) -> float:
-    """From how many degrees above the ground the camera looks at an object on it."""
+    """Return the angle, degrees above the ground, at which the camera sees an object on it."""
     centre = lifted.centre
     normal = _normal_under(lifted, camera, horizon, shadow)
     sine = float(normal @ centre / np.linalg.norm(centre))

@@ -39,7 +39,7 @@ LEVELS = 256
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What a photo's grain is like."""
+    """The character of a photo's grain."""
 
     deviation: F32  # (LEVELS, 3) of a channel, in [0, 1], by that channel's own value
     tile: F32  # (BANDS, TILE, TILE, 3) of deviation 1 in all, and periodic
@@ -55,7 +55,7 @@ class Noise:
 
 
 def find_noise(pixels: Pixels) -> Noise | None:
-    """The grain of a photo (H, W, 3); None where it has none, or is too small to tell."""
+    """Find the grain of a photo (H, W, 3); None where it has none or is too small."""
     if min(pixels.shape[:2]) < BLOCK or len(blocks := _blocks(pixels)) < FEWEST:
         return None
     rest, means = _residuals(blocks)

@@ -37,7 +37,7 @@ NO_PHOTO = build_levels(np.zeros((1, 1, 3), np.float32), np.zeros((1, 1), np.flo
 
 @dataclass(frozen=True, eq=False)
 class Relit:
-    """What the picture of an object is multiplied by, as a small picture over the photo."""
+    """Factors for the picture of an object, as a small picture over the photo."""
 
     factor: F32  # (h, w) less 1: 0 changes nothing
     left: float  # photo px, its corner
@@ -55,7 +55,7 @@ class Relit:
         return out
 
     def lit_rgba(self, rgba: U8, left: float, top: float, zoom: float) -> U8:
-        """The same of a picture (h, w, 4) u8 that has `zoom` px per px of the photo."""
+        """Relight a picture (h, w, 4) u8 that has `zoom` px per px of the photo."""
         packed = np.ascontiguousarray(rgba).view(np.uint32)[..., 0]
         out = np.empty_like(packed)
         inputs = packed, *self._places(packed.shape, left, top, zoom), out

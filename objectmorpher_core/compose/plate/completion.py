@@ -1,4 +1,4 @@
-"""A picture's hole filled from coarse to fine by the patches around it.
+"""A fill of a picture's hole, from coarse to fine, by the patches around it.
 
 Each level of a pyramid alternates between looking for the nearest patches and letting them vote
 (`patch_search`). Beside colours the patches carry how rough the picture is, measured at full size

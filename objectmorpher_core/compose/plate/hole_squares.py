@@ -34,7 +34,7 @@ In the hole the picture is a smooth guess.
 
 @dataclass(frozen=True, eq=False)
 class Square:
-    """What is filled at once."""
+    """An area that is filled at once."""
 
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo; smaller than square at frames
     own: Mask  # (h, w) of the box: the hole that is filled here

@@ -1,4 +1,4 @@
-"""Fills holes by LaMa (Suvorov et al. 2021) or MI-GAN (Sargsyan et al. 2023), by onnxruntime.
+"""Fills of holes by LaMa (Suvorov et al. 2021) or MI-GAN (Sargsyan et al. 2023) in onnxruntime.
 
 What a file takes tells which export it is:
 
@@ -29,7 +29,7 @@ NAMES = {"lama": "LaMa", "migan": "MI-GAN"}
 
 
 class OnnxInpainter:
-    """One network, on the CPU; a fill is nothing but what the photo says."""
+    """A network on the CPU; its fill depends on nothing but the photo."""
 
     is_random = False
     context = SIDE  # px around a hole that it looks at where the photo has them

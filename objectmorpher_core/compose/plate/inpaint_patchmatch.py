@@ -50,7 +50,7 @@ class PatchMatchInpainter:
         progress: Progress,
         seed: int = 0,
     ) -> Pixels:
-        """As `inpaint`; the user has said from where, in px of `rgb`."""
+        """Fill like `inpaint`, from the sources that the user chose, in px of `rgb`."""
         if hole.all():
             raise InpaintError("the hole covers everything: there is nothing to fill it from")
         filled = rgb.copy()

@@ -138,7 +138,7 @@ def search(pictures, wanted, offered, barred, targets, sources, costs, rounds, r
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def vote(layers, sources, shares, hole, voted):
-    """Each pixel of the `hole` (h, w) becomes the mean of what the patches over it say.
+    """Set each pixel of the `hole` (h, w) to the mean of the patches over it.
 
     `voted` (h, w, C) is changed in place; the patch at (i, j) weighs `shares` (h, w).
     """

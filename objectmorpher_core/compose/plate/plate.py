@@ -36,7 +36,7 @@ STRIP = 256  # rows that are joined at a time: of 100 megapixels all at once tak
 
 
 def hole_margin(width: int, height: int) -> float:
-    """How far, in px, the hole in a photo of this size reaches past the object."""
+    """Return how far, px, the hole in a photo of this size reaches past the object."""
     return max(MIN_HOLE_MARGIN, HOLE_MARGIN * float(np.hypot(width, height)))
 
 
@@ -132,7 +132,7 @@ def _away(covered: Mask) -> F32:
 
 
 def fill_weight(away: F32, margin: float) -> F32:
-    """How much of the fill is shown `away` (h, w) px from what hides the background; in place."""
+    """Return the weight of the fill `away` (h, w) px from what hides the background, in place."""
     np.subtract(SEAM * margin, away, out=away)  # all that is as large as the photo
     away /= 0.6 * SEAM * margin
     return np.clip(away, 0, 1, out=away)

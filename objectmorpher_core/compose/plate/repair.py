@@ -46,7 +46,7 @@ class Patch:
 
 
 def patch_of(document: Document, coverage: F32, box: Box) -> Patch:
-    """What a repair has to know: `coverage` (H, W) is painted, nothing of it outside `box`."""
+    """Return a repair's input: `coverage` (H, W) is painted, nothing of it outside `box`."""
     assert document.plate is not None, "make the plate first"
     around = _with_context(box, document.photo.size)
     left, top, right, bottom = around
@@ -127,7 +127,7 @@ def restored(document: Document, patch: Patch) -> Plate:
 
 @dataclass(frozen=True, eq=False)
 class Uncovering:
-    """What of a photo (H, W, 3) objects hide now, and what they hid when its plate was made."""
+    """The parts of a photo (H, W, 3) that objects hide now, and hid when its plate was made."""
 
     pixels: Pixels
     plate: Plate

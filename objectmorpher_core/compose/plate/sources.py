@@ -1,4 +1,4 @@
-"""Where the parts of a fill may come from, besides what they look like."""
+"""Sources of a fill's parts, chosen by more than their look."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_HINTS = 23  # so many bits does a float32 hold exactly
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """Of one picture (h, w)."""
+    """The guide of one picture (h, w)."""
 
     unlikely: F32  # (h, w) squared levels of 255 that taking a pixel costs
     lines: tuple[Line, ...] = ()

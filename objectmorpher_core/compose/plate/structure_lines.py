@@ -66,7 +66,7 @@ def find_lines(rgb: F32, hole: Mask) -> tuple[Line, ...]:
 
 
 def draw_lines(lines: tuple[Line, ...], scale: tuple[float, float], hole: Mask) -> tuple[F32, F32]:
-    """What the hole (h, w) wants, and what is offered outside, both (h, w, 3).
+    """Return the lines that the hole (h, w) wants and those offered outside, both (h, w, 3).
 
     Channels 0 and 1 are a line's number and the signed px beside it; see `patch_search`. `scale`:
     px across and down per px of the lines.

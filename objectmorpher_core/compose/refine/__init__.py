@@ -23,7 +23,7 @@ class Refiner(Protocol):
     name: str
 
     def missing(self) -> str | None:
-        """What has to be installed or got first, as one sentence; None when it can run."""
+        """Return what has to be installed first, as one sentence; None when it can run."""
         ...
 
     def refine(

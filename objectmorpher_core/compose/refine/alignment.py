@@ -1,4 +1,4 @@
-"""Whether a refined picture lies where its input lay, and how to put it there.
+"""The registration of a refined picture to its input.
 
 Image editing networks shift and scale what they are given by some pixels. The two pictures are
 compared by the lengths of their gradients, normalised by those around, which light and colour
@@ -33,7 +33,7 @@ OUTLYING = 0.9  # quantile of the windows' distances that has to be small
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where the refined picture shows what is at p px of its input.
+    """The place in the refined picture of what is at p px of its input.
 
     That is centre + scale (p - centre) + shift.
     """

@@ -1,4 +1,4 @@
-"""What all refiners by diffusers' pipelines share: sizes, detail, progress, seeds, adapters."""
+"""The common part of refiners by diffusers' pipelines: sizes, detail, progress, seeds, adapters."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class DiffusionRefiner:
         return adapter_files((self.name, self.adapters))
 
     def folder(self) -> Path:
-        """Of the model that is used."""
+        """Return the folder of the model in use."""
         model = self.model()
         found = None if model is None else models.place(model.id)
         assert found is not None, "missing() was asked"

@@ -76,7 +76,7 @@ class KleinRefiner(DiffusionRefiner):
 
 
 def prompt_file(folder: Path) -> Path:
-    """Where the instruction's embedding is kept; another instruction or model has another file."""
+    """Return the file of the instruction's embedding, which depends on instruction and model."""
     config = folder / "text_encoder" / "config.json"
     kind = config.read_bytes() if config.exists() else folder.name.encode()
     told = hashlib.sha256(INSTRUCTION.encode() + kind).hexdigest()[:12]
@@ -128,5 +128,5 @@ def encode_instruction(folder: Path) -> Path:
 
 
 def layers_told(count: int) -> tuple[int, int, int]:
-    """Of `count` layers those that are read: 9, 18, 27 of the published encoder's 36."""
+    """Return the layers that are read of `count`: 9, 18, 27 of the published encoder's 36."""
     return count // 4, count // 2, 3 * count // 4

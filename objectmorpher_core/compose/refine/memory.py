@@ -68,7 +68,7 @@ def unreadable(folder: Path, names: tuple[str, ...]) -> str | None:
 
 
 def quantised(parts: tuple[str, ...]) -> Any:
-    """How diffusers is told to load the networks `parts` in four bits, worked with in bfloat16."""
+    """Return diffusers' settings for the networks `parts` in four bits, computed in bfloat16."""
     import torch
     from diffusers.quantizers.pipe_quant_config import PipelineQuantizationConfig
     from diffusers.quantizers.quantization_config import BitsAndBytesConfig

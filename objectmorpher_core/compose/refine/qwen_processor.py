@@ -17,7 +17,7 @@ class QwenProcessor:
 
     @classmethod
     def from_folder(cls, folder: Path) -> QwenProcessor:
-        """Of a pipeline's folder."""
+        """Load it from a pipeline's folder."""
         from transformers import AutoTokenizer
         from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import (
             Qwen2VLImageProcessorPil,

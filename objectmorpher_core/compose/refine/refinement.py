@@ -1,4 +1,4 @@
-"""The edit refined: a crop around it, the refiner, the checks, and what is kept (DESIGN section 5).
+"""The refined edit: a crop around it, the refiner, the checks, and the pixels that are kept.
 
 What the refiner gives back is put where its input lay or refused (`alignment`); the colours that it
 changed outside the footprint, where nothing was to change, tell its drift, which is taken out.
@@ -30,7 +30,7 @@ OUTLIERS = 0.2  # share of the pixels that differ most, which do not count
 
 @dataclass(frozen=True)
 class Drift:
-    """By which colours are off where nothing was to change: found = gain x meant + offset."""
+    """The colour drift of places that were to stay: found = gain x meant + offset."""
 
     gain: tuple[float, float, float]
     offset: tuple[float, float, float]  # of [0, 1]
@@ -46,7 +46,7 @@ NO_DRIFT = Drift((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
 
 @dataclass(frozen=True, eq=False)
 class CoarseEdit:
-    """What of an edit a refiner is to see: a crop around it, with context."""
+    """The part of an edit that a refiner sees: a crop around it, with context."""
 
     left: int  # px, crop's corner in the photo
     top: int
@@ -70,7 +70,7 @@ class Checked:
 
 
 def cut_edit(photo: Pixels, result: Composite) -> CoarseEdit:
-    """What of `result` is refined: a composite of `photo` (H, W, 3), unrefined, with its weights.
+    """Return the part of `result` that is refined: a composite of `photo` (H, W, 3), unrefined.
 
     Raises RefineError where nothing was edited.
     """
@@ -89,7 +89,7 @@ def cut_edit(photo: Pixels, result: Composite) -> CoarseEdit:
 def refine(
     edit: CoarseEdit, refiner: Refiner, progress: Progress, seed: int = 0, strength: float = 1.0
 ) -> Refined:
-    """What `refiner` makes of an edit. Raises RefineError: one sentence."""
+    """Refine an edit with `refiner`. Raises RefineError: one sentence."""
     original, rest = to_u8(edit.pixels), part(progress, 0.0, 0.95)
     made = refiner.refine(original, edit.coarse, edit.alpha, rest, seed)
     progress(0.95, "Checking that nothing has moved")
@@ -129,7 +129,7 @@ def check(made: RGB, coarse: RGB, alpha: F32) -> Checked:
 
 
 def measure_drift(found: F32, meant: F32, alpha: F32) -> Drift:
-    """How the colours of `found` (h, w, 3) are off those `meant`, where `alpha` is 0."""
+    """Measure how the colours of `found` (h, w, 3) drift from `meant` where `alpha` is 0."""
     is_still = alpha <= 0
     if is_still.sum() < LEAST_STILL:
         return NO_DRIFT

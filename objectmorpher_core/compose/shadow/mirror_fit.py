@@ -1,4 +1,4 @@
-"""How much of an object's mirror image the ground shows, and exactly where.
+"""A fit of the strength and the exact place of an object's mirror image on the ground.
 
 The ground's own texture is noise here. It is whitened, by scale and colour, as it is beside the
 reflection; then the mirror image that explains most of what is seen is searched by least squares
@@ -86,7 +86,7 @@ class _Scene:
     white: tuple[F32, ...]  # (3, 3) for each band
 
     def bands(self, image: F32) -> list[F32]:
-        """Of (h, w, 3), whitened; 0 where the ground is not seen."""
+        """Return the whitened bands of (h, w, 3); 0 where the ground is not seen."""
         bands, free = [], self.free
         for white in self.white:
             weight = np.maximum(cv2.GaussianBlur(free, (0, 0), WIDTH), 1e-3)
@@ -101,7 +101,7 @@ class _Scene:
         return np.concatenate([band.ravel() for band in self.bands(image)])
 
     def added(self, mirroring: Mirroring) -> tuple[F32, F32, F32]:
-        """What a share of 1 adds to the light (h, w, 3); its alpha, px below the line (h, w)."""
+        """Return the light (h, w, 3) that a share of 1 adds, its alpha, and px below the line."""
         laid = mirroring.laid(self.picture, self.corner, self.box, self.pitch)
         alpha, below = laid[..., 3], mirroring.below(self.box, self.pitch)
         added = np.asarray(laid[..., :3] - alpha[..., None] * self.smooth, np.float32)

@@ -68,7 +68,7 @@ class Mirroring:
         return np.exp(-np.maximum(below, 0) / np.float32(self.fade))
 
     def share(self, below: F32) -> F32:
-        """How much of the light is the mirror image's, so many photo px below the line."""
+        """Return the mirror image's share of the light, so many photo px below the line."""
         bends = knots(below, self.height) @ np.array(self.shares, np.float32)
         ends = np.clip((self.ends - below) / (SOFT * self.height), 0, 1)
         return np.asarray(self.faded(below) * bends * ends, np.float32)

@@ -1,4 +1,4 @@
-"""What an object mirrors on a table, wet ground or water in the photo, and the ground without it.
+"""Old reflections: an object's mirror image on a table or water, and the ground without it.
 
 Where the mirror image is known, it is taken off in linear light: the photo's own texture stays
 (promise 2). Only what that does not explain is invented.
@@ -24,7 +24,7 @@ BLURS = 4  # x the blur, that its kernel reaches
 
 @dataclass(frozen=True, eq=False)
 class TakingOff:
-    """What is known of a mirror image, on a grid over a box of the photo."""
+    """A mirror image on a grid over a box of the photo."""
 
     mirroring: Mirroring
     matte: Matte  # of what is mirrored
@@ -37,7 +37,7 @@ class TakingOff:
 
 @dataclass(frozen=True, eq=False)
 class OldReflection:
-    """Where the ground mirrors an object, and what of that can be taken off."""
+    """The place of a mirror image in the photo, and the part of it that can be taken off."""
 
     cover: F32  # (h, w) in [0, 1], 0 along its border
     left: float  # photo px, its corner

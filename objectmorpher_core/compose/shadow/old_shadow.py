@@ -44,7 +44,7 @@ THIRDS = np.full((1, 3), 1 / 3, np.float32)  # the mean of three colours, as cv2
 
 @dataclass(frozen=True, eq=False)
 class OldShadow:
-    """What an object takes of the ground's light, and the numbers of a shadow that is alike."""
+    """The ground's light that an object takes away, and the parameters of an equal shadow."""
 
     shadow: Shadow
     depth: F32  # (h, w) natural logarithm of the light that is missing, 0 along its border
@@ -164,7 +164,7 @@ def traceless_plate(
     seed: int = 0,
     hints: tuple[Hint, ...] = (),
 ) -> Plate:
-    """As `build_plate`, of the photo in full light: shadows are gone beside the objects, too.
+    """Build the plate of the photo in full light: shadows beside objects go as well.
 
     Reflections are taken off, too. There it is painted, as by hand: shown wherever something has
     moved. Where it is so dark that the photo shows little of the ground, and where that mirrors an

@@ -1,4 +1,4 @@
-"""What an object leaves on the ground in the photo: its shadow, and its reflection."""
+"""Old traces: the shadow and the reflection that an object leaves on the ground in the photo."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .shadow_fit import find_old_shadow
 
 @dataclass(frozen=True, eq=False)
 class OldTraces:
-    """Each where it is sure."""
+    """The traces that are sure."""
 
     shadow: OldShadow | None
     reflection: OldReflection | None
@@ -32,7 +32,7 @@ def find_old_traces(
     seen_from: float | None = None,
     margin: float = SURE,
 ) -> OldTraces:
-    """As `find_old_shadow` and `find_old_reflection`; what is a reflection is no shadow."""
+    """Find shadow and reflection; what is a reflection is no shadow."""
     height, width = others.shape
     reflection = find_old_reflection(pixels, matte, others)
     if reflection is not None:

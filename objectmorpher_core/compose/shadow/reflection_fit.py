@@ -67,7 +67,7 @@ class _Seen:
 def find_old_reflection(
     pixels: Pixels, matte: Matte, others: Mask | None = None
 ) -> OldReflection | None:
-    """What the photo `pixels` (H, W, 3) mirrors of what was cut out; None where none is sure.
+    """Find the reflection of the cut-out object in `pixels` (H, W, 3); None where none is sure.
 
     `others` (H, W): what else hides the ground.
     """

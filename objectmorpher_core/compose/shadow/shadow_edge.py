@@ -69,7 +69,7 @@ def _shrunk(picture: F32, scale: float) -> F32:
 
 
 def bounded(missing: F32, light: F32, usual: F32, pitch: float) -> F32:
-    """What is missing, at most until the ground is as light as it usually is.
+    """Return the missing light, bounded by the usual light of the ground.
 
     No shadow leaves more light than falls beside it.
     """

@@ -1,4 +1,4 @@
-"""Whether what was fitted to the photo is the object's shadow, or something else that is dark.
+"""Evidence that a fitted shadow is the object's, and not something else that is dark.
 
 A shadow begins where the object touches the ground, ends at an edge all around, takes light of
 all colours alike, is darker than what else is beside the object, and the photo is explained by it
@@ -56,7 +56,7 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Where it is asked for, and how it varies without a shadow."""
+    """The ground around an object, and its variation without a shadow."""
 
     index: np.ndarray  # (n,) of the cells
     weight: F64  # (n,)
@@ -94,7 +94,7 @@ def fitted(seen: Seen, found: Found) -> F32:
 
 
 def score(seen: Seen, ground: Ground, found: Found) -> float:
-    """How much speaks for it, against something else that is dark (see SURE); -inf: it is none."""
+    """Return the evidence for the shadow against other dark things (see SURE); -inf for none."""
     numbers = evidence(seen, ground, found)
     if numbers["tint"] > MOST_TINT:
         return -np.inf
@@ -102,7 +102,7 @@ def score(seen: Seen, ground: Ground, found: Found) -> float:
 
 
 def evidence(seen: Seen, ground: Ground, found: Found) -> dict[str, float]:
-    """What speaks for the shadow, by the names of WEIGHTS."""
+    """Return the evidence for the shadow by the names of WEIGHTS."""
     thrown = fitted(seen, found)
     lacking = (ground.everywhere @ found.ground).astype(np.float32) - seen.brightness
     unlike = seen.brightness - (ground.everywhere @ ground.alone).astype(np.float32)

@@ -33,7 +33,7 @@ class Flat:
 
     @property
     def above(self) -> float:
-        """How far above its base what one sees is still ground."""
+        """Return how far above its base the ground is still seen."""
         return float(np.inf)
 
     def thrown(self, shadow: Shadow) -> F32:
@@ -50,7 +50,7 @@ class Flat:
 
 
 def lie(alpha: F32) -> Flat:
-    """What has that silhouette (h, w), of which some must be solid, seen from above."""
+    """Return a lying object with that silhouette (h, w), some of it solid, seen from above."""
     solid = alpha > SOLID
     sides = [float(np.ptp(np.flatnonzero(solid.any(axis)))) + 1 for axis in (0, 1)]
     return Flat(alpha, min(sides))

@@ -42,7 +42,7 @@ class Sheet:
 
     @property
     def above(self) -> float:
-        """How far above its base what one sees is still ground."""
+        """Return how far above its base the ground is still seen."""
         return ABOVE * self.height
 
     def thrown(self, shadow: Shadow) -> F32:
@@ -57,7 +57,7 @@ class Sheet:
 
 
 def stand(alpha: F32, slope: float) -> Sheet:
-    """Where what has that silhouette (h, w) stands, on a ground seen at an angle of that sine.
+    """Return a standing object with that silhouette (h, w), its ground at an angle of that sine.
 
     Raises ValueError where it has none.
     """

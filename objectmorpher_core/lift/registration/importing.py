@@ -22,7 +22,7 @@ UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Where an object is put: a photo, and the mask of what it stands for."""
+    """The target of an import: a photo, and the mask that the object stands for."""
 
     pixels: Pixels  # (H, W, 3)
     camera: Camera

@@ -1,4 +1,4 @@
-"""Points of an object that a photo shows: pairs of details that look alike in two pictures.
+"""Matches between an object and a photo: pairs of details that look alike in two pictures.
 
 Outline and colours hardly tell a jar that is turned a little from one that is not; where the
 details of its surface have gone does. SIFT (Lowe 2004) describes them by the directions of their
@@ -39,7 +39,7 @@ class Matches:
         return len(self.points)
 
     def moved(self, matrix: F64) -> Matches:
-        """The same in another frame, to which `matrix` (4, 4) leads."""
+        """Return the same points in another frame, to which `matrix` (4, 4) leads."""
         points = self.points @ matrix[:3, :3].T + matrix[:3, 3]
         return Matches(frozen(points, np.float64), self.seen, self.size)
 
@@ -50,13 +50,13 @@ class Matches:
         return (camera.project(world) - self.seen) / (NEAR * self.size)
 
     def support(self, matrix: F64, camera: Camera) -> float:
-        """How many agree with a pose, the nearer, the more, x `reliable` beyond all: in [0, 1)."""
+        """Return the agreement of matches with a pose, beyond chance `reliable`, in [0, 1)."""
         gaps = self.gaps(matrix, camera)
         return float(np.maximum(1.0 - (gaps * gaps).sum(1), 0.0).sum() / self.reliable)
 
     @property
     def reliable(self) -> int:
-        """Of how many they are a share: a few more that agree with nothing, for few say little."""
+        """Return how many matches may agree by chance and therefore say little."""
         return len(self) + LEAST
 
     def pose(self, camera: Camera) -> F64 | None:
@@ -79,7 +79,7 @@ class Matches:
 
 
 def alike(one: tuple[Pixels, Mask], other: tuple[Pixels, Mask]) -> tuple[F64, F64]:
-    """Where (n, 2) px of one picture and of another, each with its object's mask, look alike."""
+    """Find the places (n, 2), px, that look alike in two pictures, each with its object's mask."""
     found = [_details(*picture) for picture in (one, other)]
     (at, own), (there, others) = found
     if len(own) < 2 or len(others) < 2:

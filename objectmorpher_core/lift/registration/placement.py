@@ -30,7 +30,7 @@ FOCALS = (0.75, 1.6)  # x the camera's: where a free focal length is looked for 
 
 @dataclass(frozen=True)
 class Level:
-    """How finely one round of the registration looks."""
+    """The fineness of one round of the registration."""
 
     size: int  # px, the view's side
     surfels: int
@@ -73,7 +73,7 @@ class Registration:
 
 @dataclass(frozen=True, eq=False)
 class Hints:
-    """What is known of the pose before."""
+    """Facts about the pose that are known beforehand."""
 
     is_focal_free: bool = False  # whether the camera's focal length is only a guess
     up: tuple[float, float, float] | None = None  # of the object; poses that tie: upright first
@@ -88,7 +88,7 @@ def register(
     progress: Progress = silent,
     seed: int = 0,
 ) -> Registration:
-    """Where `gaussians`, in any frame and at any scale, stand in the photo.
+    """Register `gaussians`, in any frame and at any scale, to the photo.
 
     Raises LiftError where the object or the mask is too small to tell.
     """

@@ -1,4 +1,4 @@
-"""What the photo shows of a registered object, and what of the cut-out the object misses."""
+"""The photo on a registered object, and the parts of the cut-out that the object misses."""
 
 from __future__ import annotations
 

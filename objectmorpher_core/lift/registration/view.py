@@ -34,7 +34,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What is to be matched: the mask in the photo, and the photo's camera."""
+    """The target of a match: the mask in the photo, and the photo's camera."""
 
     pixels: Pixels  # (H, W, 3)
     mask: Mask  # (H, W)
@@ -146,7 +146,7 @@ def sketched(surfels: Surfels, stance: Stance, view: View, photo: Camera) -> F32
 
 @dataclass(frozen=True)
 class Agreement:
-    """How well a sketch agrees with the view."""
+    """The agreement of a sketch with the view."""
 
     iou: float  # of the silhouettes
     colour_error: float  # RMS sRGB where they overlap, under the light that explains it best

@@ -64,7 +64,7 @@ class Body:
         return Body(silhouette, standing, middle, sides[0], sides[1])
 
     def nearer(self, height: F64) -> Body:
-        """With its parts moved towards the camera by `height` (h, w) px."""
+        """Return the body with its parts moved towards the camera by `height` (h, w) px."""
         return replace(self, middle=self.middle + height)
 
     def sample(self, xy: F64, side: float | F64) -> tuple[F64, F64]:
@@ -102,7 +102,7 @@ class Body:
 
     @cached_property
     def overlaps(self) -> Overlaps | None:
-        """What lies behind parts that are before others; None where none is."""
+        """Return what lies behind parts that are in front of others; None where there is none."""
         if self.cuts is None:
             return None
         outline = self.silhouette

@@ -1,4 +1,4 @@
-"""Where a surface is cut: a near part ends there, and what lies behind it goes on beneath."""
+"""Cuts in a surface: a near part ends there, and what lies behind it continues beneath."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Cuts:
 
 
 def find_cuts(front: F64, edge: F64, inside: Mask, cell: float, extent: float) -> Cuts | None:
-    """Where a front (h, w) px falls off beside likely edges (h, w); None where it does nowhere.
+    """Find where a front (h, w) px falls off beside likely edges (h, w); None for nowhere.
 
     Of a jump that is blurred over several cells the steepest place is the cut, as in edge
     detection (Canny 1986).

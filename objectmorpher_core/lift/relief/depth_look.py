@@ -1,4 +1,4 @@
-"""What an installed depth network sees of an object: a look at it and at what is around it."""
+"""A look by an installed depth network at an object and its surroundings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MARGIN = 0.35  # x the object's longer side: what of the photo around it is look
 
 
 def look(pixels: Pixels, mask: Mask) -> Seen | None:
-    """What the network sees where `mask` (H, W) of the photo is; None where none is installed.
+    """Look with the network at `mask` (H, W) of the photo; None where no network is installed.
 
     Raises LiftError where the network cannot look at that.
     """
@@ -81,7 +81,7 @@ def box_around(mask: Mask) -> tuple[int, int, int, int]:
 
 
 class Net(Protocol):
-    """What `DepthNet` and `DepthTorch` do."""
+    """The protocol of `DepthNet` and `DepthTorch`."""
 
     def inverse_depth(self, rgb: RGB) -> F32:
         """(h', w') of a picture (h, w, 3)."""

@@ -1,4 +1,4 @@
-"""A relief that follows the depth that a network sees in the photo.
+"""A relief that follows the depth which a network finds in the photo.
 
 A monocular network tells inverse depth, of which neither scale nor shift is known. Both are found
 so that the object bulges as much as its silhouette says: a plane is taken off either side first,
@@ -39,7 +39,7 @@ COARSE = 96  # cells on the longer side of the grid on which the membrane is spa
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a network sees of the object and of what is around it."""
+    """A network's depth of the object and its surroundings."""
 
     inverse: F32  # (h, w) relative inverse depth: larger is nearer, scale and shift unknown
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo that it covers
@@ -82,14 +82,14 @@ def follow(body: Body, seen: Seen, focal: float, thickness: float, hidden: Mask 
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """What a network sees, in the relief's units."""
+    """A network's depth in the relief's units."""
 
     inverse: F64  # (h, w) relative inverse depth, 1 amid the relief
     alike: float  # correlation of the two bulges
 
     @property
     def trust(self) -> float:
-        """In [0, 1]; 0 where it contradicts the silhouette."""
+        """Return the trust in it, in [0, 1]; 0 where it contradicts the silhouette."""
         return float(np.clip((self.alike - DOUBT[0]) / (DOUBT[1] - DOUBT[0]), 0, 1))
 
 

@@ -113,7 +113,7 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
 
 
 def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
-    """What is seen, over the cells of a silhouette; beyond what is seen as at its nearest pixel."""
+    """Return the sheets over the cells of a silhouette; beyond the look its nearest pixel holds."""
     crop, mask = seen.crop, seen.mask
     ways = rays(crop.tangents)
     distance = crop.away - seen.front.astype(np.float64)
@@ -154,7 +154,7 @@ def _is_round(facing: F64) -> F64:
 
 
 def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
-    """(h, w) px: `half`, but falling to 0 at the outline where the front turns away there.
+    """Return `half` (h, w) px, brought down to 0 at the outline where the front turns away there.
 
     A pixel is too wide to tell how. There it closes as the silhouette's body does, `inflated`,
     times as much as `half` is thicker than that farther in.

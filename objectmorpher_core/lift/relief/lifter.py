@@ -1,4 +1,4 @@
-"""A closed shape from the silhouette alone: no model, no download, half a second.
+"""The relief lifter: a closed shape from the silhouette, without a download, in half a second.
 
 Limbs are round and bodies are not balloons (`thickness`); what stands on the ground is turned as
 its feet tell, and boxes and cylinders are recognised (`standing`). The front lies on the photo's

@@ -1,4 +1,4 @@
-"""Whether an object looks the same left and right: its mirror axis in the picture."""
+"""The left-right symmetry of an object: its mirror axis in the picture."""
 
 from __future__ import annotations
 

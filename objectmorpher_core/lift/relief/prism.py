@@ -1,4 +1,4 @@
-"""Upright prisms, found in a silhouette: boxes and cylinders that stand on the ground.
+"""Upright prisms in a silhouette: boxes and cylinders that stand on the ground.
 
 Where the outline rises straight from both ends of its contact with the ground, the contact is the
 front of a box or a cylinder, and the plan of that front is known from a single photo. How far the
@@ -80,7 +80,7 @@ class Sides:
         return self.start[:, None] + self.lean[:, None] * (y - self.row)
 
     def horizon(self, camera: Camera) -> float | None:
-        """px: plumb lines meet at the nadir, which is a right angle from the horizon.
+        """Return the horizon, px: plumb lines meet at the nadir, a right angle away from it.
 
         None where they do not tell: parallel sides, or a camera that looks down too steeply.
         """
@@ -220,7 +220,7 @@ class Plan:
         return self.camera.focal / length, rise / length
 
     def is_seen(self, y: F64) -> bool:
-        """Whether the ground in rows `y` (n,) px is so far below the horizon that it tells."""
+        """Return whether the ground in rows `y` (n,) px is far enough below the horizon."""
         return bool(y.min() - self.horizon >= LEAST_BELOW * self.camera.height)
 
     def facing(self, y: F64) -> F64:

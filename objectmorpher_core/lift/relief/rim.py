@@ -29,7 +29,7 @@ class RimLine:
 
 
 def rim_lines(inside: Mask) -> list[RimLine]:
-    """All outlines of cells (h, w) that are long enough to have a shape."""
+    """Return all outlines of cells (h, w) that are long enough to have a shape."""
     found, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     lines = []
     for ring in found:

@@ -47,7 +47,7 @@ class Settling:
         return total / np.maximum(self._gathered(np.ones(field.shape), width), 1e-9)
 
     def multiple(self, field: F64, of: F64, width: float) -> F64:
-        """How many times `of` (h, w) `field` (h, w) is around each cell, by least squares."""
+        """Return the least-squares factor of `field` (h, w) over `of` (h, w) around each cell."""
         square = np.maximum(self._gathered(of**2, width), 1e-9)
         return self._gathered(field * of, width) / square
 

@@ -1,4 +1,4 @@
-"""What the shape network sees of an object: how far its front and back are, and where it ends.
+"""A look by the shape network at an object: the distance of its front and back, and its end.
 
 The network is ours (`training.train_shape`) and comes with the program; DINOv2, whose tokens it
 reads, is fetched. Without that there is no look, and the silhouette alone tells the shape.
@@ -48,7 +48,7 @@ class SeenShape:
 
     @staticmethod
     def of(raw: F32, mask: Mask, crop: Crop) -> SeenShape:
-        """Of what the network says, (9, s, s); see `training.shape_net`."""
+        """Read the network's output, (9, s, s); see `training.shape_net`."""
         normal = raw[3:6] / np.maximum(np.linalg.norm(raw[3:6], axis=0), 1e-6)
         return SeenShape(
             crop, mask, raw[0] - raw[0][mask].mean(), raw[1], np.maximum(raw[1], raw[2]),
@@ -58,7 +58,7 @@ class SeenShape:
 
 
 def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
-    """What is seen where `mask` (H, W) of a photo is.
+    """Look at `mask` (H, W) of a photo.
 
     None where the network cannot run, or the object is too thin for its pixels.
     """
@@ -68,7 +68,7 @@ def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
 
 
 def missing() -> str | None:
-    """What the look needs and is not here, as one sentence."""
+    """Return what the look needs and does not find here, as one sentence."""
     if models.path(shipped.TOKENS) is None:
         return f"the model {shipped.TOKENS} is not here: `objectmorpher models get`"
     return None if shipped.is_shipped() else "the shape network is missing from this installation"
@@ -81,7 +81,7 @@ class ShapeNet:
         self._session: Any = open_session(data)
 
     def look(self, planes: F32, tokens: F32, mask: Mask, crop: Crop) -> SeenShape:
-        """Of planes (7, s, s) and tokens (g, g, c) of a crop."""
+        """Look at planes (7, s, s) and tokens (g, g, c) of a crop."""
         wanted = {"planes": planes[None], "tokens": tokens.transpose(2, 0, 1)[None]}
         found = self._session.run(None, {k: np.ascontiguousarray(v) for k, v in wanted.items()})
         return SeenShape.of(np.asarray(found[0][0], np.float32), mask, crop)

@@ -27,7 +27,7 @@ TOUCHING = 0.03  # x extent: how far above its lower hull an outline still touch
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """Where the object is, coarsely, and how far its outline is."""
+    """The object's coarse place, and the distance of its outline."""
 
     inside: Mask  # (h, w) the outermost ring is outside
     cell: float  # px of the photo per cell
@@ -38,7 +38,7 @@ class Silhouette:
 
     @staticmethod
     def of(mask: Mask) -> Silhouette:
-        """Of `mask` (H, W), with at least one pixel."""
+        """Build it from `mask` (H, W), which has at least one pixel."""
         extension = frame_extension(mask)
         whole = extended_mask(mask, extension)
         rows, columns = np.flatnonzero(whole.any(1)), np.flatnonzero(whole.any(0))

@@ -1,4 +1,4 @@
-"""How an object stands on the ground: which way it is turned, and whether it is an upright prism.
+"""The stance of an object on the ground: the way it is turned, and whether it is an upright prism.
 
 Where an object touches the ground follows from its silhouette alone: the lower convex hull, as far
 as the outline lies on it, or bridges the gap between two feet that are about level. Seen from
@@ -47,7 +47,7 @@ FLAT = Standing(np.array([0.0, 0.0, 1.0]))
 
 
 def stand(silhouette: Silhouette, camera: Camera, horizon: float | None) -> Standing:
-    """How the object stands on level ground; FLAT where it is not seen to.
+    """Return the object's stance on level ground; FLAT where none is seen.
 
     `horizon`: the row of the photo it lies in, px. None: unknown, and guessed.
     """

@@ -1,4 +1,4 @@
-"""How thick an object is, from its silhouette's medial structure: limbs are round.
+"""An object's thickness by the medial structure of its silhouette: limbs are round.
 
 Every largest disc that fits into the silhouette is a cross-section of a ball (the medial axis
 transform, Blum 1967): the union of those balls is round wherever the silhouette is a limb. A disc
@@ -82,12 +82,12 @@ class Thickness:
         )
 
     def mixed(self, half: F64, share: F64) -> Thickness:
-        """As thick as `half` (h, w) px, up to the outline, where `share` (h, w) is 1."""
+        """Return a thickness of `half` (h, w) px up to the outline, where `share` (h, w) is 1."""
         square = self.square + share * ((half / FULLNESS) ** 2 - self.square)
         return Thickness(square, self.crease * (1 - share), self.cuts)
 
     def towards(self, half: F64, share: F64) -> Thickness:
-        """As thick as `half` (h, w) px where `share` (h, w) is 1; it leaves a rim as steeply."""
+        """Return a thickness of `half` (h, w) px where `share` (h, w) is 1, as steep at a rim."""
         wanted = (half / FULLNESS + self.crease) ** 2 - self.crease**2
         return Thickness(self.square + share * (wanted - self.square), self.crease, self.cuts)
 

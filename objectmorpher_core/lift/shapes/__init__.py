@@ -1,4 +1,4 @@
-"""What an object is: explicit shapes fitted to what a photo shows of it, and chosen among.
+"""Explicit shapes, fitted to an object in a photo and chosen by evidence.
 
 Analysis by synthesis: a flat sheet, a box, and a round thing (a surface of revolution, a ring
 or an ellipsoid) are each drawn as the camera would see them, and their numbers found for which

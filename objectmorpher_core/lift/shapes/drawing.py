@@ -35,7 +35,7 @@ class Grid:
 
 
 class Drawn(NamedTuple):
-    """What the rays of a grid meet; where they meet nothing, 0 and -1."""
+    """The hits of a grid's rays; 0 and -1 where they meet nothing."""
 
     near: F64  # (h, w) inverse depth along the axis, of the nearest surface
     far: F64  # (h, w) of the farthest

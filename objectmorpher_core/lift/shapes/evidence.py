@@ -1,4 +1,4 @@
-"""What a photo tells about a shape: outline, and the network's depth and normals, on a coarse grid.
+"""A photo's evidence for a shape: outline, and the network's depth and normals, on a coarse grid.
 
 A shape is drawn on the same rays and compared: how far its outline strays, and how far its front
 and its normals are from what the network sees, over what they are expected to be off.
@@ -33,7 +33,7 @@ LEAST_CELLS = 12  # that are compared
 
 
 class Misfit(NamedTuple):
-    """How far a shape is from the evidence; each is 1 where it is as far as is expected."""
+    """The distances of a shape from the evidence; each is 1 where it is as large as expected."""
 
     outline: float
     depth: float
@@ -42,7 +42,7 @@ class Misfit(NamedTuple):
 
     @property
     def total(self) -> float:
-        """What the fits minimise."""
+        """Return the sum that the fits minimise."""
         return 2.0 * self.outline + self.depth + self.normal + 0.3 * self.thick
 
 
@@ -72,7 +72,7 @@ class Evidence:
 
     @staticmethod
     def of(seen: SeenShape) -> Evidence:
-        """Of an object of which the network sees something."""
+        """Gather the evidence of an object of which the network sees something."""
         mask, crop = seen.mask, seen.crop
         side = len(mask)
         own = slice(STRIDE // 2, None, STRIDE)
@@ -98,7 +98,7 @@ class Evidence:
         )  # fmt: skip
 
     def within(self, mask: Mask) -> Evidence:
-        """The same of a part of the object alone, `mask` (h, w)."""
+        """Return the evidence of a part of the object alone, `mask` (h, w)."""
         inside, outside = (
             cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5) for side in (mask, ~mask)
         )
@@ -114,7 +114,7 @@ class Evidence:
         return replace(self, mask=mask, sure=self.sure & mask, outside=away, fine=fine)
 
     def core(self) -> Evidence:
-        """The same without what is thin and sticks out far: handles, stalks, limbs."""
+        """Return the evidence without thin parts that stick out far: handles, stalks, limbs."""
         radius = int(round(THIN * float(self.outside[self.mask].max()) / STRIDE))
         if radius < 1:
             return self
@@ -157,7 +157,7 @@ class Evidence:
         return np.column_stack([x, y, self.depth[self.sure]])
 
     def misfit(self, mesh: Mesh) -> Misfit:
-        """Of a mesh in camera axes, crop units; its scale does not count."""
+        """Return the misfit of a mesh in camera axes, crop units; its scale does not count."""
         if mesh.vertices[:, 2].min() <= 1e-3:
             return FAR
         seen = drawn(mesh, self.grid)

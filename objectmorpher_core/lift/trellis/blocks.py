@@ -142,7 +142,7 @@ class CrossAttention(_Heads):
 
 
 class FeedForward(nn.Module):
-    """Each token by itself."""
+    """A feed-forward network on each token by itself."""
 
     def __init__(self, channels: int, hidden: int) -> None:
         super().__init__()
@@ -171,7 +171,7 @@ class Block(nn.Module):
 
 
 class FlowBlock(nn.Module):
-    """The same with a context, each step shifted and scaled as the time says (Peebles & Xie)."""
+    """A block with a context, shifted and scaled by the step's time (Peebles & Xie)."""
 
     def __init__(self, form: StructureFlowConfig) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""From where each cell is seen in the picture to the camera that sees it so, in closed form.
+"""The camera, in closed form, from the place of each cell in the picture.
 
 The direct linear transform (Hartley & Zisserman, 2nd ed., 4.4 and 7.1), then an RQ decomposition.
 """
@@ -20,7 +20,7 @@ LEAST = 6  # points that tell a camera
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a picture shows an object."""
+    """The view of an object in a picture."""
 
     intrinsic: F64  # (3, 3), of a picture whose side is 1, x right and y down
     camera_from_object: F64  # (3, 4) rotation and translation

@@ -19,7 +19,7 @@ ONLY = {"pe_mode": "ape", "share_mod": False, "attn_mode": "swin", "norm_type": 
 
 @dataclass(frozen=True, kw_only=True)
 class Transformer:
-    """What the transformers of all parts share."""
+    """The common settings of all parts' transformers."""
 
     model_channels: int
     num_blocks: int
@@ -66,7 +66,7 @@ class LatentFlowConfig(StructureFlowConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class ViewLatentFlowConfig(LatentFlowConfig):
-    """The same, which also gets what the picture shows at each cell's place in it (CUPID)."""
+    """The settings of a flow that also sees the picture at each cell's place in it (CUPID)."""
 
     cond_latent_channels: int
     visual_input_channels: int = 3
@@ -76,13 +76,13 @@ class ViewLatentFlowConfig(LatentFlowConfig):
 
     @property
     def all_channels(self) -> int:
-        """Of what goes in."""
+        """Return the number of all input channels."""
         return self.in_channels + self.cond_latent_channels + sum(self.visual_feat_channels)
 
 
 @dataclass(frozen=True, kw_only=True)
 class StructureDecoderConfig:
-    """From the first flow's latents to occupied cells."""
+    """The decoder from the first flow's latents to occupied cells."""
 
     out_channels: int
     latent_channels: int
@@ -106,7 +106,7 @@ class WindowedConfig(Transformer):
 
 @dataclass(frozen=True, kw_only=True)
 class Activations:
-    """How a decoder's numbers become Gaussians; names as published."""
+    """The activations that turn a decoder's numbers into Gaussians; names as published."""
 
     lr: dict[str, float]  # factor of each quantity
     perturb_offset: bool
@@ -130,7 +130,7 @@ class GaussianDecoderConfig(WindowedConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """How a flow is followed from noise to what it makes."""
+    """The sampling of a flow from noise to its result."""
 
     steps: int
     guidance: float  # how much more than the picture alone says
@@ -140,7 +140,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """What `pipeline.json` says."""
+    """The contents of `pipeline.json`."""
 
     parts: dict[str, str]  # role -> path below the folder, without ending
     structure: Sampling
@@ -228,7 +228,7 @@ def sampling(found: Any) -> Sampling:
 
 
 def pipeline(folder: Path) -> Pipeline:
-    """What the model in `folder` consists of. Raises LiftError."""
+    """Read the parts of the model in `folder`. Raises LiftError."""
     args = read_json(folder / "pipeline.json").get("args", {})
     try:
         norm = args["slat_normalization"]
@@ -241,7 +241,7 @@ def pipeline(folder: Path) -> Pipeline:
 
 
 def part_path(folder: Path, where: str, shared: Path | None = None) -> Path:
-    """Where a part lies, without its ending: in `folder`, or, a relative's, in `shared`.
+    """Return a part's path without its ending: in `folder`, or, a relative's, in `shared`.
 
     Published pipelines name the parts of another model as owner/name/path. Raises LiftError for a
     path that leaves the folder.
@@ -273,7 +273,7 @@ def weights_folder(id: str) -> Path:
 
 
 def missing(*ids: str) -> str | None:
-    """What has to be installed before the models `ids` can run, as one sentence."""
+    """Return what has to be installed before the models `ids` can run, as one sentence."""
     if reason := models.not_installed(PACKAGES):
         return reason
     for id in ids:

@@ -1,4 +1,4 @@
-"""From a picture to Gaussians: both flows and the decoders, one part in memory after another."""
+"""The generator of Gaussians from a picture: both flows and decoders, one in memory at a time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LATENT, DECODER = "slat_flow_model", "slat_decoder_gs"
 
 @dataclass(frozen=True)
 class Folders:
-    """Where the weights lie."""
+    """The folders of the weights."""
 
     model: Path
     encoder: Path
@@ -41,7 +41,7 @@ class Folders:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Where an object is."""
+    """The place of an object."""
 
     voxels: Voxels
     view: View | None = None  # how the picture shows it, of a generator that says so
@@ -49,7 +49,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Made(Placed):
-    """What a generator makes of a picture."""
+    """The output of a generator for a picture."""
 
     gaussians: Gaussians = field(kw_only=True)  # in the cube of side 1 round the origin, z up
 
@@ -108,7 +108,7 @@ class Generator:
 
     @property
     def dtype(self) -> torch.dtype:
-        """Of transformers and convolutions."""
+        """Return the precision of transformers and convolutions."""
         return getattr(torch, self.plan.number)
 
     def part(self, role: str) -> Any:
@@ -202,7 +202,7 @@ class Generator:
 
 
 def unseen(seen: Tensor) -> Tensor:
-    """(1, 1, D) what a flow is told in place of `seen` (1, M, D) where no picture is shown.
+    """Return the (1, 1, D) that a flow gets in place of `seen` (1, M, D) where no picture is shown.
 
     The networks were trained with M tokens of zeros. Attention to tokens that are all the same is
     attention to one of them: the same answer, without the work on the others.
@@ -240,7 +240,7 @@ def times(how: Sampling) -> np.ndarray:
 def sample(
     velocity: Velocity, noise: Tensor, how: Sampling, progress: Progress, note: str
 ) -> Tensor:
-    """What the flow makes of `noise`. `progress` is told before each step, and may cancel."""
+    """Follow the flow from `noise`. `progress` is called before each step, and may cancel."""
     x = noise
     moments = times(how)
     for i, (now, then) in enumerate(pairwise(moments)):

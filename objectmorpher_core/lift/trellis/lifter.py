@@ -93,7 +93,7 @@ class TrellisLifter:
 def placed(
     gaussians: Gaussians, target: Target, hints: Hints, progress: Progress, seed: int
 ) -> Proposal:
-    """Where the object stands in the photo; near the pose that is hinted at if it fits there."""
+    """Return the object's place in the photo, near the hinted pose if it fits there."""
     if hints.start is not None:
         progress(0.0, "Fitting the object")
         registrar = Registrar(gaussians, target, seed)
@@ -114,6 +114,6 @@ def example_sampling(generator: Generator) -> tuple[Sampling, Sampling]:
 
 
 def need() -> Need:
-    """What it asks of memory."""
+    """Return the memory that it needs."""
     numbers = ("float16",)  # as published
     return Need(PARAMETERS, WORK, parts=True, numbers=numbers, is_slow_on_cpu=True)

@@ -32,7 +32,7 @@ PICKLES = (".pt", ".pth", ".bin", ".ckpt", ".pkl")
 
 @dataclass(frozen=True)
 class Kind:
-    """What a published class name stands for."""
+    """The meaning of a published class name."""
 
     config: type[Any]
     part: Callable[[Any], Part]

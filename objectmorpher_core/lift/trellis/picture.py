@@ -1,4 +1,4 @@
-"""How a generator sees an object: alone on black in a square, and DINOv2's tokens of that."""
+"""A generator's picture of an object: alone on black in a square, with DINOv2's tokens."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Voxels:
 
     @staticmethod
     def of(occupied: Tensor) -> Voxels:
-        """Of a grid (R, R, R) bool."""
+        """Return the occupied cells of a grid (R, R, R) bool."""
         return Voxels(torch.nonzero(occupied), occupied.shape[0])
 
     def __len__(self) -> int:
@@ -54,7 +54,7 @@ class Voxels:
 
     @cached_property
     def neighbours(self) -> tuple[Pairs, ...]:
-        """For each of the 27 OFFSETS the pairs of cells that are so far apart."""
+        """Return, for each of the 27 OFFSETS, the pairs of cells that lie so far apart."""
         side, device = self.resolution + 2, self.cells.device  # a border, so that none is outside
         strides = torch.tensor([side * side, side, 1], device=device)
         code = ((self.cells + 1) * strides).sum(1)

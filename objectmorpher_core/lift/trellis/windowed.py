@@ -68,7 +68,7 @@ class GaussianDecoder(Windowed):
         )
 
     def gaussians(self, raw: Tensor, voxels: Voxels) -> Gaussians:
-        """Of one item's output (N, D), in the cube of side 1 around the origin, z up."""
+        """Return the Gaussians of an output (N, D), in the unit cube around the origin, z up."""
         how = self.activations
         sizes = [width * how.num_gaussians for width in QUANTITIES.values()]
         parts = zip(QUANTITIES, raw.float().split(sizes, dim=1), strict=True)

@@ -19,7 +19,7 @@ WRONG = (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowEr
 
 
 def read_told(at: Path) -> Any:
-    """What a JSON file of our version says. Raises one of WRONG."""
+    """Read a JSON file of our version. Raises one of WRONG."""
     if at.is_symlink() or at.stat().st_size > WORKER_FILE:
         raise ValueError("it is no small file")
     told = json.loads(at.read_text(encoding="utf-8"))

@@ -91,7 +91,7 @@ class ExternalLifter:
 
 
 class Seen:
-    """How a worker says that its object is seen."""
+    """A worker's report of the view of its object."""
 
     def __init__(self, world_from_object: F64, camera: Camera) -> None:
         self.world_from_object, self.camera = world_from_object, camera
@@ -117,7 +117,7 @@ class Seen:
 
 
 def write_job(folder: Path, subject: Subject, count: int, seed: int) -> None:
-    """What the worker gets."""
+    """Write the worker's input."""
     rgb = to_u8(subject.pixels)
     alpha = np.zeros(subject.mask.shape, np.uint8)
     matte, (height, width) = subject.matte, subject.mask.shape

@@ -1,4 +1,4 @@
-"""Programs of the user's own that lift: a TOML file each, in a folder of the user's.
+"""The user's own programs that lift: a TOML file each, in a folder of the user's.
 
 `OBJECTMORPHER_WORKERS` names another folder than `workers` beside the settings. A file says
 
@@ -64,13 +64,13 @@ class Worker:
         return self.is_free or _accepted().get(self.name) == self.licence
 
     def missing(self) -> str | None:
-        """One sentence where the command is not there, or its licence is not accepted."""
+        """Return a sentence where the command is missing, or its licence is not accepted."""
         if shutil.which(self.command[0]) is None:
             return f"the command of the worker {self.name} is not there: {self.command[0]}"
         return None if self.is_accepted else self.asks()
 
     def asks(self) -> str:
-        """What has to be accepted, where, and how: one sentence."""
+        """Return a sentence on the licence that has to be accepted, where, and how."""
         why = "is not for every use" if self.licence_kind != "gated" else "has its own terms"
         read = f", read it at {self.page}," if self.page else ""
         return (
@@ -80,14 +80,14 @@ class Worker:
 
 
 def workers_folder() -> Path:
-    """Where the files of workers lie."""
+    """Return the folder of the workers' files."""
     if named := os.environ.get(FOLDER):
         return Path(named)
     return Path(platformdirs.user_config_dir("objectmorpher", appauthor=False)) / "workers"
 
 
 def worker_names() -> tuple[str, ...]:
-    """Of all files in the folder, damaged ones too; files and folders with a worker.toml count."""
+    """Return the names of all files in the folder, damaged ones and those in subfolders too."""
     return tuple(sorted(_files()))
 
 
@@ -116,7 +116,7 @@ def accept_licence(name: str, accepted: str) -> None:
 
 
 def forget_licence(name: str) -> None:
-    """As if it had never been accepted. Raises LiftError."""
+    """Forget that the licence was accepted. Raises LiftError."""
     _keep({known: told for known, told in _accepted().items() if known != name})
 
 

@@ -49,7 +49,7 @@ class _Heard:
             self.error = " ".join(str(told["error"]).split())[:TOLD]
 
     def err(self, line: str) -> None:
-        """A line of stderr: the last one tells most."""
+        """Take a line of stderr; the last one says most."""
         self.last = " ".join(line.split())[:TOLD] or self.last
 
 

@@ -1,1 +1,1 @@
-"""From a hard mask to a soft cut-out: the outline, alpha, and the colours of the object itself."""
+"""Soft cut-outs from a hard mask: the outline, alpha, and the object's own colours."""

@@ -23,7 +23,7 @@ WIDTH = 5  # px: how far two pixels of one window are apart at most, and back
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What is expected of alpha before the picture is looked at."""
+    """The expected alpha before the picture is looked at."""
 
     alpha: F32  # (h, w) where a pixel is known, this is its alpha
     weight: F32  # (h, w) how much that counts for an unknown pixel: 1 is about as much as colour

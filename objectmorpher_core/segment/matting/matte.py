@@ -1,4 +1,4 @@
-"""From a hard mask to a soft cut-out: alpha and the object's own colours at its edge.
+"""A soft cut-out from a hard mask: alpha, and the object's own colours at its edge.
 
 About the mask's edge each pixel may be a mixture of a colour of the object and one of the
 background: alpha says how much of it is the object (`soft_edge`), and the object's colour is what
@@ -34,7 +34,7 @@ def band_width(width: int, height: int) -> float:
 
 
 def frame_extension(mask: Mask) -> tuple[int, int, int, int]:
-    """How far, in px, an object that leaves the photo is continued: top, bottom, left, right.
+    """Return how far, px, an object that leaves the photo is continued: top, bottom, left, right.
 
     Turned or moved, such an object would show its cut edge. Mirrored at the frame it goes on for
     a tenth of its size; those pixels are invented, and counted so.

@@ -40,7 +40,7 @@ class Unmixed:
 
 
 def unmixed(pixels: Pixels, alpha: F32) -> Unmixed:
-    """Of a photo's crop (h, w, 3) in which the object covers `alpha` (h, w)."""
+    """Unmix a photo's crop (h, w, 3) in which the object covers `alpha` (h, w)."""
     half = _half_colours(_Size(halved_pixels(pixels), halved(alpha)))
     foreground = np.empty((*alpha.shape, 3), np.float32)
     mixed: dict[int, tuple[np.ndarray, np.ndarray, F32]] = {}

@@ -27,7 +27,7 @@ DIAGONAL = 0.79  # pi / 4: px of an outline for each step of its staircase, all 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a prompt means, at the size of the reduced photo."""
+    """The answer to a prompt, at the size of the reduced photo."""
 
     mask: Mask  # (h, w)
     others: tuple[Region, ...]  # what else might be meant; the best has the score 1
@@ -115,7 +115,7 @@ def _agreement(pieces: Pieces, mask: Mask) -> float:
 
 
 def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:
-    """What a first click means, its pieces decided anew by what is like them."""
+    """Answer a first click by votes: its pieces are decided anew by similar ones."""
     known = said(ground.pieces, prompt, True)
     voted = relabel(ground.pieces, choice.pieces, known) & ground.inside(prompt)
     return replace(choice, pieces=voted)

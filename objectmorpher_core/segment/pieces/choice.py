@@ -136,7 +136,7 @@ class Correction:
 
 
 def choose(ground: Ground, prompt: Prompt) -> Choice:
-    """What the prompt means before its further clicks: by the first, its box, or the subject."""
+    """Choose by the first click, the box or the subject, before further clicks."""
     inside = ground.inside(prompt)
     first = next((c for c in prompt.clicks if c.is_foreground), None)
     if prompt.is_subject:
@@ -405,7 +405,7 @@ OFF_CENTRE = 0.05  # least that counts for being in the middle
 
 
 def centred(pieces: Pieces, mask: Mask, click: Click) -> float:
-    """How near a click is to the middle of pieces (n,): its depth in them over the greatest."""
+    """Return how central a click is in pieces (n,): its depth in them over the greatest depth."""
     deep = depth(pieces.paint_sparsely(mask))
     column, row = (c // 2 for c in pieces.pixel(click.x, click.y))
     near = deep[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]

@@ -1,4 +1,4 @@
-"""What a click on a wrong place of a mask changes: the piece that belongs to it, and no more.
+"""Corrections by a click on a wrong place of a mask: the piece there changes, and no more.
 
 Pieces of the photo say it where the click is deep in what it may mean. Where it lies less than two
 pieces deep in that, it is decided anew in finer pieces of a window around, in which a walk goes as
@@ -46,7 +46,7 @@ RIM = 4  # px of the reduced photo: what comes so near to a window's side is cut
 
 @dataclass(frozen=True, eq=False)
 class Wrong:
-    """What a click says is wrong about a mask."""
+    """The fault of a mask that a click points out."""
 
     mask: Mask  # (h, w)
     others: tuple[Region, ...] = ()  # what the object would be by the other things it may mean
@@ -73,7 +73,7 @@ class _Window:
 
 
 def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
-    """What the prompt's last click says is wrong about a mask (h, w).
+    """Return the fault of a mask (h, w) that the prompt's last click points out.
 
     `image` (h, w, 3): the reduced photo. The click contradicts the mask.
     """

@@ -1,4 +1,4 @@
-"""What pieces of a photo are like, and what runs along their borders."""
+"""Features of a photo's pieces, and of their borders."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Likeness:
 
 
 def border_lines(labels: np.ndarray, lab: F32) -> BorderLine:
-    """Those of labels (h, w) from 0, over a picture (h, w, 3)."""
+    """Return the border lines of labels (h, w) from 0, over a picture (h, w, 3)."""
     count = int(labels.max()) + 1
     keys, steps = [], []
     for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):

@@ -1,4 +1,4 @@
-"""What is asked of a graph of pieces many times a click, compiled.
+"""Compiled queries of a graph of pieces, made many times a click.
 
 A graph is a symmetric sparse matrix of links, `indptr` (n + 1,), `indices` (m,) and `data` (m,) as
 scipy lays it out by rows; nothing is linked with itself.

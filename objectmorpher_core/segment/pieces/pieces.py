@@ -153,7 +153,7 @@ class Pieces:
         return mask[self._sparse]
 
     def share(self, mask: Mask) -> float:
-        """Of the photo, in [0, 1]."""
+        """Return the share of the photo, in [0, 1]."""
         return float(self.area[mask].sum() / self.area.sum())
 
     # Regions
@@ -224,7 +224,7 @@ class Pieces:
         counts = allowed[self.left] & allowed[self.right] & (first < last)
 
         def total(values: F64) -> F64:
-            """Of the borders that each region's outline runs along."""
+            """Return the sum over the borders along each region's outline."""
             size = len(order) + 1
             begins = np.bincount(first[counts], values[counts], size)
             ends = np.bincount(last[counts], values[counts], size)

@@ -1,4 +1,4 @@
-"""Pieces decided anew by what is like them: votes of pieces nearby of like colour and kind.
+"""Votes: pieces decided anew by nearby pieces of like colour and kind.
 
 An answer is right in most of its pieces. Each piece is told by the others how likely it is in the
 object, those counting most that are like it in colour (CIELAB), token and place: a joint bilateral

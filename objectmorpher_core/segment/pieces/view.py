@@ -40,7 +40,7 @@ Encode = Callable[[RGB, Progress], F32]  # picture -> (h, w, d) tokens
 
 @dataclass(frozen=True, eq=False)
 class Tokens:
-    """What a photo is made of, patch by patch and piece by piece."""
+    """Tokens of a photo, patch by patch and piece by piece."""
 
     tokens: F32  # (h, w, 64) unit length
     salience: F32 | None  # (320, 320) in [0, 1]; None without the subject network's weights
@@ -64,7 +64,7 @@ class View:
         self._choices: dict[Prompt, Choice] = {}
 
     def answer(self, prompt: Prompt, whole: Mask | None, progress: Progress) -> Answer:
-        """To a prompt; one that was answered before its last click is only told better.
+        """Answer a prompt; one that was answered before its last click is only improved.
 
         `whole` (H, W): what its first click means at the level "object", where it has another.
         """
@@ -84,7 +84,7 @@ class View:
         return answer
 
     def choice(self, prompt: Prompt) -> Choice:
-        """What a prompt means that has one positive click at most."""
+        """Answer a prompt that has one positive click at most."""
         if prompt not in self._choices:
             choice = choose(self.ground, prompt)
             if self._is_close and prompt.level == "object":  # few tokens: colours must tell
@@ -122,7 +122,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a prompt was found to mean."""
+    """The meaning that was found for a prompt."""
 
     mask: Mask  # (H, W)
     sureness: float  # in [0, 1]
@@ -140,11 +140,11 @@ class PhotoView:
         self._found: dict[Prompt, Seen] = {}
 
     def find(self, prompt: Prompt, progress: Progress) -> Seen:
-        """What a prompt means; what was found before at once."""
+        """Answer a prompt; an answer that was found before returns at once."""
         return self._seen(prompt, False, progress)
 
     def glance(self, prompt: Prompt, progress: Progress) -> Seen:
-        """The same, as far as what is encoded already tells: in a fraction of a second."""
+        """Answer a prompt as far as encoded tokens allow, in a fraction of a second."""
         return self._seen(prompt, True, progress)
 
     def _seen(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:

@@ -1,4 +1,4 @@
-"""How a photo, or a crop of it, lies in the square picture that a SAM sees.
+"""The place of a photo, or of a crop of it, in the square picture that a SAM sees.
 
 SAM (Kirillov et al. 2023) keeps the proportions and leaves the square's right or bottom empty; SAM
 2 and 3 (Ravi et al. 2024) stretch. Masks come back as a small square of logits in the same frame.

@@ -1,4 +1,4 @@
-"""What every SAM does: a picture encoded once, and masks decoded from it for each prompt."""
+"""The common part of every SAM: a picture encoded once, and masks decoded for each prompt."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Masks:
-    """What a prompt may mean."""
+    """The candidates for a prompt."""
 
     logits: F32  # (k, low, low), positive inside
     scores: F32  # (k,) overlap (IoU) with the right mask that the network expects
 
 
 class SamNetwork(Protocol):
-    """One model. Opening it is costly, so that happens at the first picture."""
+    """A model. Opening it is costly, so that happens at the first picture."""
 
     side: int  # px of the square that it sees
     low: int  # px of the square of logits

@@ -26,7 +26,7 @@ MOST_POINTS = 6  # that EfficientSAM looks at, a box's corners among them
 
 
 class SamOnnx:
-    """One model, on the CPU."""
+    """A model on the CPU."""
 
     def __init__(self, model: HubModel) -> None:
         """Raises ModelError: one sentence."""

@@ -31,7 +31,7 @@ WORK = {
 
 
 class SamTorch:
-    """One model, on the device that the plan says."""
+    """A model on the device of the plan."""
 
     def __init__(self, model: HubModel) -> None:
         """Reads config.json only. Raises ModelError."""

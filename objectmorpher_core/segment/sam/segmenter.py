@@ -42,7 +42,7 @@ SMALLEST = {"sam": "sam-vit-base", "sam2": "sam2.1-tiny", "sam3": "sam3", "sam-o
 
 @dataclass(frozen=True, eq=False)
 class SamPhoto:
-    """What is worth keeping of a photo."""
+    """The encodings of a photo that are worth keeping."""
 
     encoded: Encoded
     salience: F32 | None  # (320, 320) in [0, 1]; None without the subject network's weights
@@ -131,7 +131,7 @@ class Sam:
         return mask
 
     def confidence(self, rgb: RGB, prompt: Prompt, embedding: SamPhoto | None = None) -> float:
-        """What the network tells of the overlap of `segment`'s mask with what is meant."""
+        """Return the network's estimate of the overlap of `segment`'s mask with what is meant."""
         told = self._told
         if (
             told is None

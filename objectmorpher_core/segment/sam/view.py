@@ -26,7 +26,7 @@ UNSURE = 0.8  # px of logits each side of their outline within which the photo's
 
 @dataclass(frozen=True, eq=False)
 class Encoded:
-    """What a SAM has made of a photo or of a crop."""
+    """A SAM's encoding of a photo or of a crop."""
 
     model: str  # its id
     frame: Frame
@@ -35,14 +35,14 @@ class Encoded:
 
 @dataclass(frozen=True, eq=False)
 class SamAnswer:
-    """What a prompt means."""
+    """The answer to a prompt."""
 
     logits: F32  # (low, low)
     score: float  # overlap (IoU) with what is meant that the network expects
 
 
 class SamView:
-    """One encoding, and prompts on it."""
+    """One encoding, and the prompts on it."""
 
     def __init__(self, network: SamNetwork, encoded: Encoded) -> None:
         self._network, self.encoded = network, encoded
@@ -53,7 +53,7 @@ class SamView:
         return self.encoded.frame
 
     def answer(self, prompt: Prompt, before: F32 | None = None) -> SamAnswer:
-        """To a prompt with clicks or a box, in px of the photo.
+        """Answer a prompt with clicks or a box, in px of the photo.
 
         `before` (low, low): logits of what is meant, where another look has found it already.
         """

@@ -32,7 +32,7 @@ class MeshFolder:
         return path.read_bytes()
 
     def find(self, name: str) -> Path:
-        """Where the file lies. Raises SplatFileError."""
+        """Return the path of the file. Raises SplatFileError."""
         name = str(name).strip()
         is_outside = "://" in name
         for candidate in () if is_outside else (name, unquote(name), PureWindowsPath(name).name):

@@ -1,4 +1,4 @@
-"""Whether a .gltf or .glb file can be believed, before a loader allocates what it declares."""
+"""A check of a .gltf or .glb file before a loader allocates what it declares."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ SAME = 1e-6  # x extent: corners nearer than this are one
 
 
 def oriented(surface: Surface) -> tuple[Surface, Mask]:
-    """The surface with every closed part facing outwards, and (T,) whether a part is closed.
+    """Return the surface with every closed part facing outwards, and (T,) whether a part is closed.
 
     A part is closed where each edge has one triangle on either side, turned the same way: then
     the sign of its volume tells outside. Nothing is known of the others.

@@ -12,7 +12,7 @@ from ...base.arrays import F32, F64, I32, U8, Mask
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What the triangles of one material show, before their tint."""
+    """The look of one material's triangles, before their tint."""
 
     texture: Texture | None
     cutoff: float | None  # alpha from which a spot is there at all; None: alpha is opacity

@@ -74,7 +74,7 @@ def centred(gaussians: Gaussians) -> Gaussians:
 
 
 def thinnest_last(gaussians: Gaussians) -> Gaussians:
-    """The same Gaussians, their axes in the order of their lengths, local +z the thinnest."""
+    """Return the same Gaussians with axes in the order of their lengths, local +z the thinnest."""
     order = np.argsort(-gaussians.scales, axis=1, kind="stable")
     if (order == [0, 1, 2]).all():
         return gaussians
@@ -87,7 +87,7 @@ def thinnest_last(gaussians: Gaussians) -> Gaussians:
 
 
 def facing_outwards(gaussians: Gaussians) -> Gaussians:
-    """The same Gaussians, local +z pointing to the side that is nearer to the outside."""
+    """Return the same Gaussians with local +z towards the nearer outside."""
     out = sides(gaussians.means.astype(np.float64), gaussians.normals.astype(np.float64))
     inward = out.behind < out.before
     w, x, y, z = gaussians.quats.T

@@ -32,7 +32,7 @@ Table = dict[str, np.ndarray]  # columns (rows,) by name
 
 @dataclass(frozen=True)
 class Element:
-    """One table of the file."""
+    """A table of the file."""
 
     name: str
     count: int
@@ -49,7 +49,7 @@ class Element:
 
 @dataclass(frozen=True)
 class PlyHeader:
-    """What the text at the beginning of the file declares."""
+    """The declarations in the text at the beginning of the file."""
 
     kind: str  # one of KINDS
     elements: tuple[Element, ...]

@@ -27,7 +27,7 @@ NORMALS = ("nx", "ny", "nz")
 
 
 def read_points(stream: IO[bytes], header: PlyHeader, size: int) -> Gaussians:
-    """One splat a point of an open .ply file of `size` bytes. Raises SplatFileError."""
+    """Read one splat per point of an open .ply file of `size` bytes. Raises SplatFileError."""
     vertex = header.element("vertex")
     if vertex is None or not {"x", "y", "z"} <= set(vertex.names):
         raise SplatFileError("the .ply file holds no points: x, y or z is missing")

@@ -1,4 +1,4 @@
-"""How an .spz file holds its columns: header, gzip (versions 1 to 3) or zstandard streams (4).
+"""The container of an .spz file's columns: header, gzip (versions 1 to 3) or zstandard streams (4).
 
 No more is unpacked than the header's count of Gaussians needs, and that count is believed only
 as far as a file of this size can hold it.

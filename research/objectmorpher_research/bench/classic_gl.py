@@ -114,7 +114,7 @@ class ClassicViewer:
         return np.argsort(self._means[:, 2])
 
     def draw(self) -> None:
-        """One frame, into `picture`; its first row is the topmost."""
+        """Draw one frame into `picture`, whose first row is the topmost."""
         self._order.write(np.ascontiguousarray(self.sort()[::-1], np.int32))
         self._buffer.use()
         self._buffer.clear()

@@ -50,7 +50,7 @@ def _row(mode: str, nodes: int, gaussians: int, repeats: int) -> dict[str, Any]:
     drag, pose = cycle([*there, *reversed(there)]), deformer.rest()
 
     def frame() -> None:
-        """One frame of a drag that goes to and fro."""
+        """Compute one frame of a drag that goes to and fro."""
         nonlocal pose
         pose = deformer.solve(next(drag), start=pose, seconds=frame_seconds).pose
 

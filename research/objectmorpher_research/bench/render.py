@@ -24,7 +24,7 @@ from .timing import Effort, Timing, measure
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured."""
+    """The settings of the benchmark."""
 
     counts: tuple[int, ...]  # Gaussians of the clouds
     lifted: int  # Gaussians of the lift
@@ -39,7 +39,7 @@ QUICK = Plan((2_000,), 1_000, (256,), 256, (200, 96), Effort(0.0, 3, 3))
 
 
 def bench_render(is_quick: bool) -> tuple[list[Row], str | None]:
-    """All rows, and the name of what OpenGL is drawn with."""
+    """Return all rows, and the name of the OpenGL renderer."""
     plan = QUICK if is_quick else FULL
     rows: list[Row] = []
     with gl.drawing() as drawer:

@@ -1,4 +1,4 @@
-"""What `bench render` draws: a plain cloud, and a lifted object that carries its photo."""
+"""Scenes of `bench render`: a plain cloud, and a lifted object that carries its photo."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Scene:
         return self.puppet.posed(self.poses[frame % len(self.poses)], Placement())
 
     def posed_gaussians(self) -> Gaussians:
-        """Those of the first frame, for renderers that know no skinning."""
+        """Return the Gaussians of the first frame, for renderers that know no skinning."""
         return self.puppet.posed_gaussians(self.poses[0], Placement())
 
     def row(self, renderer: str, frame: Timing, sort: Timing | None, **parts: Timing) -> Row:
@@ -78,7 +78,7 @@ class Scene:
         }
 
     def sized(self, size: int) -> Scene:
-        """The same view on size x size px."""
+        """Return the same view on size x size px."""
         photo = self.puppet.camera
         return replace(self, camera=photo.windowed(0, 0, size, size, size / photo.width))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Effort:
-    """How often something is measured: until both `least` and `seconds` are reached, or `most`."""
+    """The effort of a measurement: until both `least` and `seconds` are reached, or `most`."""
 
     seconds: float
     least: int
@@ -29,7 +29,7 @@ class Timing:
     least: float
 
     def less(self, part: Timing) -> Timing:
-        """What is left of it without a part of it."""
+        """Return the rest of it without a part of it."""
         return Timing(
             max(self.first - part.first, 0.0),
             max(self.median - part.median, 0.0),
@@ -66,7 +66,7 @@ def ms(value: Any) -> float:
 
 
 def cpu_name() -> str:
-    """The processor's name as the system tells it."""
+    """Return the processor's name."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             return next(x.split(":", 1)[1].strip() for x in file if x.startswith("model name"))

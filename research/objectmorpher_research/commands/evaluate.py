@@ -89,7 +89,7 @@ def _run_metrics(options: argparse.Namespace) -> None:
 
 
 def table(results: Results) -> str:
-    """For the terminal: a line for each measure, a column for each region."""
+    """Return a table for the terminal: a line for each measure, a column for each region."""
     regions = tuple(dict.fromkeys(score.region for score in results.scores))
     cells = {(score.metric, score.region): cell(score.estimate, FORMAT) for score in results.scores}
     count = f"{results.pairs} pair{'s' if results.pairs > 1 else ''}"
@@ -104,7 +104,7 @@ def table(results: Results) -> str:
 
 
 def as_json(results: Results) -> dict[str, Any]:
-    """The same as plain numbers; infinite ones are "inf", what is not there is null."""
+    """Return plain numbers for JSON; infinite ones are "inf", missing ones null."""
     return {
         "pairs": results.pairs,
         "scores": [

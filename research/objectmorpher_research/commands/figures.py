@@ -22,7 +22,7 @@ def cell(found: Estimate, format: str) -> str:
 
 
 def number(value: float | None) -> Number:
-    """For JSON, which has only finite ones."""
+    """Return a number for JSON, which has only finite ones."""
     if value is None or math.isnan(value):
         return None
     return value if math.isfinite(value) else "inf"

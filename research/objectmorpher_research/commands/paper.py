@@ -76,7 +76,7 @@ def run_paper(options: argparse.Namespace) -> None:
 
 
 def as_text(table: Table) -> str:
-    """For the terminal: a line for each method, and below it what is to be known of the figures."""
+    """Return text for the terminal: a line for each method, and notes on the figures below."""
     from ..evaluation.paper.table import COLUMNS, NOTHING
 
     paper = [["method", "n", *PAPERS, "RI", "MT"]]
@@ -116,7 +116,7 @@ def interaction(latency: Estimate | None) -> str:
 
 
 def as_json(table: Table) -> dict[str, Any]:
-    """The same as plain numbers; what is not there is null, infinite is "inf"."""
+    """Return plain numbers for JSON; missing ones are null, infinite ones "inf"."""
     return {
         "subjects": table.subjects,
         "methods": [

@@ -121,7 +121,7 @@ def run_results(options: argparse.Namespace) -> None:
 
 
 def as_text(found: Figures) -> str:
-    """For the terminal."""
+    """Return text for the terminal."""
     from ..study.design import CRITERIA
 
     lines = [f"{found.participants} took part, {found.counted} count"]
@@ -139,7 +139,7 @@ def as_text(found: Figures) -> str:
 
 
 def as_json(found: Figures) -> dict[str, Any]:
-    """The same as plain numbers; what does not exist is null."""
+    """Return plain numbers for JSON; missing ones are null."""
     return {
         "participants": found.participants,
         "counted": found.counted,

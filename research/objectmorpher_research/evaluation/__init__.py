@@ -1,1 +1,1 @@
-"""How good a result is: the measures of `objectmorpher evaluate` (docs/evaluation.md)."""
+"""The measures of `objectmorpher evaluate` (docs/evaluation.md)."""

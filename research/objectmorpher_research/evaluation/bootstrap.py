@@ -1,4 +1,4 @@
-"""How sure a mean over pictures is: percentile bootstrap (Efron & Tibshirani 1993, chapter 13)."""
+"""Confidence intervals by the percentile bootstrap (Efron & Tibshirani 1993, chapter 13)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What the evaluation tells where it cannot go on."""
+"""The errors of an evaluation."""
 
 
 class EvaluationError(ValueError):
-    """What cannot be measured; one sentence for the user."""
+    """A measurement is impossible; one sentence for the user."""

@@ -45,7 +45,7 @@ class Lacking:
 
 @dataclass(frozen=True)
 class Results:
-    """Of one comparison."""
+    """The results of one comparison."""
 
     pairs: int
     scores: tuple[Score, ...]
@@ -55,7 +55,7 @@ class Results:
 
 @dataclass(frozen=True)
 class Choices:
-    """What to measure, and how."""
+    """The choice of measures and their settings."""
 
     metrics: tuple[str, ...] = ()  # names of METRICS; none: USUAL
     weights: Path | None = None  # folder with the official networks' files
@@ -145,7 +145,7 @@ USUAL = tuple(name for name in METRICS if name not in ("sifid-64", "sifid-768"))
 
 @dataclass(frozen=True)
 class Taken:
-    """What the measures need of one pair."""
+    """The input of the measures from one pair."""
 
     name: str
     values: Mapping[tuple[str, str], float]  # by measure and region
@@ -190,7 +190,7 @@ class Opened:
         return {name: first.setdefault(features, name) for name, features in self._sets.items()}
 
     def take(self, pair: Pair) -> Taken:
-        """All of one pair. Raises EvaluationError."""
+        """Take all measures of one pair. Raises EvaluationError."""
         a, b, mask = pair.read()
         regions = _regions(mask)
         values: dict[tuple[str, str], float] = {}
@@ -204,7 +204,7 @@ class Opened:
         return Taken(pair.name, values, {n: (self._sets[n](a), self._sets[n](b)) for n in leaders})
 
     def results(self, taken: Sequence[Taken]) -> Results:
-        """Of all pairs, whoever took them, in their order."""
+        """Combine the results of all pairs in their order, whoever took them."""
         values: dict[tuple[str, str], dict[str, float]] = {}
         for one in taken:
             for key, value in one.values.items():
@@ -223,7 +223,7 @@ class Opened:
 
 
 def measure(pairs: Sequence[Pair], choices: Choices, progress: Progress = silent) -> Results:
-    """All chosen measures of all pairs. Raises EvaluationError: one sentence.
+    """Take all chosen measures of all pairs. Raises EvaluationError: one sentence.
 
     A region that holds nothing in some picture is left out of the mean there. A measure whose
     network is not here is told among the lacking; if it is asked for by its name, that is an error.

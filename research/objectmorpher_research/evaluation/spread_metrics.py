@@ -19,7 +19,7 @@ from .pairs import Pair
 def measure_spread(
     pairs: Sequence[Pair], choices: Choices, address: str, progress: Progress
 ) -> Results:
-    """As `measure`, on the cluster at `address`. Raises EvaluationError and SpreadError."""
+    """Measure like `measure`, on the cluster at `address`. Raises EvaluationError, SpreadError."""
     opened = Opened(choices, len(pairs))
     jobs = [_job(k, pair, choices, len(pairs)) for k, pair in enumerate(pairs)]
     taken: dict[int, Taken] = {}
@@ -40,7 +40,7 @@ def _job(number: int, pair: Pair, choices: Choices, pairs: int) -> Job:
 
 
 def take_there(job: Job) -> dict[str, Any]:
-    """In a worker: one pair. Raises EvaluationError."""
+    """Take one pair in a worker. Raises EvaluationError."""
     a, b, mask = (None if name is None else Path(name) for name in job["files"])
     assert a is not None and b is not None
     opened = _opened(tuple(job["metrics"]), job["weights"], job["is_lenient"], job["pairs"])

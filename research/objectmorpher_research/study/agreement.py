@@ -1,4 +1,4 @@
-"""How far people agree: Krippendorff's alpha for ordered categories.
+"""Agreement of people: Krippendorff's alpha for ordered categories.
 
     alpha = 1 - D_o / D_e,  of coincidences o_ck = sum over units of (pairs c, k in it) / (m_u - 1)
     delta^2_ck = (sum of n_g for g = c..k - (n_c + n_k) / 2)^2

@@ -22,7 +22,7 @@ LEAST, MOST = 1, 5  # of a rating
 
 @dataclass(frozen=True)
 class Item:
-    """One page: a result to be rated, or a check that says what to answer."""
+    """A page: a result to be rated, or a check that says what to answer."""
 
     subject: str  # the subject whose photo stands beside it
     method: str = ""  # of a result

@@ -1,4 +1,4 @@
-"""What a study's answers say: who counts, means by method, how far people agree."""
+"""Figures of a study's answers: who counts, means by method, and agreement."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RULES = (
 
 @dataclass(frozen=True)
 class MethodFigures:
-    """Of one method."""
+    """The figures of one method."""
 
     method: str
     ratings: int  # how many results were rated, by all together
@@ -34,7 +34,7 @@ class MethodFigures:
 
 @dataclass(frozen=True)
 class Figures:
-    """Of a study."""
+    """The figures of a study."""
 
     participants: int  # who began
     excluded: Mapping[int, str]  # by number: the rule that excludes

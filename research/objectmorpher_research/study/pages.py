@@ -1,4 +1,4 @@
-"""What the page is told, and what it may say: plain values in, plain values out, no HTTP."""
+"""Messages from and to the study's page: plain values in, plain values out, no HTTP."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ If you reload the page, it goes on where you were."""  # noqa: E501
 
 
 class QuestionError(Exception):
-    """What the page asks makes no sense here; one sentence."""
+    """The page asks for something that makes no sense here; one sentence."""
 
 
 class Pages:
-    """One study, for one server."""
+    """A study, for one server."""
 
     def __init__(
         self, store: StudyStore, subjects: Sequence[Subject], consent: str = CONSENT
@@ -40,7 +40,7 @@ class Pages:
         self._consent = consent
 
     def about(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """What everyone may know."""
+        """Return the facts that everyone may know."""
         count = sum(len(methods) for methods in self._store.study.methods.values())
         minutes = max(1, round((count + self._store.study.checks) * SECONDS / 60))
         return {
@@ -56,7 +56,7 @@ class Pages:
         return {"key": key, "study": self._store.study.id, **self._state(person)}
 
     def state(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """Where a participant is. Raises QuestionError."""
+        """Return the state of a participant. Raises QuestionError."""
         person = self._store.find(_key(said))
         if person is None:
             raise QuestionError("there is no such participant")

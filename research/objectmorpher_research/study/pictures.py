@@ -1,4 +1,4 @@
-"""The pictures that participants see: by names that tell nothing, all of a subject at one size."""
+"""The participants' pictures, under names that reveal nothing, all of a subject at one size."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Pictures:
         return self._sizes[subject]
 
     def photo_width(self, subject: str) -> int:
-        """Width of the photo itself, px, in which guidance is told."""
+        """Return the width of the photo itself, px, which guidance refers to."""
         return self._widths[subject]
 
     def name_original(self, subject: str) -> str:

@@ -36,7 +36,7 @@ MOST_SECONDS = 3600.0  # of one page
 
 @dataclass(frozen=True)
 class Study:
-    """What is asked of everyone."""
+    """The settings that hold for everyone."""
 
     methods: Mapping[str, tuple[str, ...]]  # by subject: the methods whose results are rated
     seed: int = 0
@@ -46,7 +46,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Answer:
-    """Of one page."""
+    """The answer to one page."""
 
     ratings: tuple[int, ...]  # by CRITERIA
     seconds: float  # that the page was in view
@@ -55,7 +55,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Participant:
-    """One person, as far as the file tells."""
+    """A person, as far as the file knows."""
 
     number: int  # from 1
     key_hash: str
@@ -161,7 +161,7 @@ def read_study(folder: Path) -> Study:
 
 
 def read_participants(folder: Path) -> tuple[Participant, ...]:
-    """All of a study's people, by number. Raises EvaluationError for a file that is none."""
+    """Read all of a study's people, by number. Raises EvaluationError for a file that is none."""
     found = []
     for path in sorted((folder / PEOPLE).glob("*.json")):
         try:

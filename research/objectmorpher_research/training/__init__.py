@@ -1,1 +1,1 @@
-"""How the product's own networks are made: needs torch and scikit-image; nothing else uses it."""
+"""The training of the product's own networks, with torch and scikit-image."""

@@ -128,7 +128,7 @@ def _mirrored(arrays: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.
 
 
 def batch_of(arrays: dict[str, np.ndarray], rng: np.random.Generator | None = None) -> Batch:
-    """Of packed samples. With `rng` for training: of one phase, and with masks a little wrong."""
+    """Return a batch of packed samples; with `rng`, for training, masks are slightly wrong."""
     import torch
 
     count = len(arrays["mask"])

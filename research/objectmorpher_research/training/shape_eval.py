@@ -1,4 +1,4 @@
-"""How far predicted surfaces are from true ones, beside those of the relief without a network."""
+"""The errors of predicted surfaces, beside those of the relief without a network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from objectmorpher_core.lift.relief.silhouette import Silhouette
 
 
 class Surfaces(NamedTuple):
-    """In any unit."""
+    """Surfaces in any unit."""
 
     front: F64  # (s, s) towards the camera
     thickness: F64  # (s, s)
@@ -48,27 +48,27 @@ def aligned(found: F64, true: F64) -> F64:
 
 
 def relief(mask: Mask, tangents: F32, is_standing: bool = True) -> Body:
-    """What the relief lifter makes of a mask (s, s) alone, seen by the crop's camera."""
+    """Return the relief lifter's surfaces of a mask (s, s) alone, seen by the crop's camera."""
     settings = LiftSettings(is_standing=is_standing)
     return Body.of(Silhouette.of(mask), camera_of(tangents, len(mask)), settings)
 
 
 def learned(mask: Mask, tangents: F32, raw: F32) -> Body:
-    """What it makes of that and of what the network says, (9, s, s)."""
+    """Return the lifter's surfaces with the network's output, (9, s, s)."""
     side = len(mask)
     seen = SeenShape.of(raw, mask, Crop(0, 0, side, tangents))
     return fused(relief(mask, tangents), seen, camera_of(tangents, side), 1.0, 1.0)
 
 
 def camera_of(tangents: F32, side: int) -> Camera:
-    """Of a photo that is the crop."""
+    """Return the camera of a photo that is the crop."""
     focal = side / float(tangents[2])
     centre = [0.5 * side - float(tangents[k]) * focal for k in (0, 1)]
     return Camera(focal, centre[0], centre[1], side, side)
 
 
 def true_surfaces(front: F32, depth: F32, tangents: F32) -> Surfaces:
-    """Of a sample's (s, s), towards the camera's plane, px of the crop."""
+    """Return the true surfaces of a sample (s, s), towards the camera's plane, px of the crop."""
     side = len(front)
     forward = side * rays(tangents, side)[..., 2]
     away = Crop(0, 0, side, tangents).away

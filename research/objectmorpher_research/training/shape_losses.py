@@ -1,4 +1,4 @@
-"""How wrong a prediction of `shape_net` is."""
+"""The loss of a prediction of `shape_net`."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ SAVED = 120.0  # s between two checkpoints
 
 @dataclass(frozen=True)
 class Plan:
-    """What to train; the same plan gives the same weights, but for rounding."""
+    """A plan of training; the same plan gives the same weights, but for rounding."""
 
     samples: int = 8192
     passes: float = 4.0  # over all samples
@@ -136,7 +136,7 @@ class _State:
 
     @staticmethod
     def resumed(folder: Path, plan: Plan, start: dict[str, Tensor] | None = None) -> _State:
-        """As it was saved last, with the same plan; where it was not, as at the start."""
+        """Resume from the last save of the same plan, or start anew."""
         state = _State(folder / plan.file, plan, start)
         kept = torch.load(state.file, weights_only=True) if state.file.exists() else None
         if kept is not None and kept["plan"] == json.dumps(asdict(plan)):
@@ -146,7 +146,7 @@ class _State:
         return state
 
     def learn(self, batch: Batch) -> None:
-        """One step."""
+        """Take one step."""
         self.net.train()
         for group in self.optimiser.param_groups:
             group["lr"] = self.plan.rate * _schedule(self.step / self.plan.steps)

@@ -1,4 +1,4 @@
-"""What is behind the objects, and how they are joined to it."""
+"""Intentions that concern the background and the way in which objects join it."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Composing:
 
     @property
     def trouble(self) -> str | None:
-        """What is said in place of the background; None where it is there."""
+        """Return the sentence that stands in for the background; None where it is there."""
         editor = self._editor
         if editor.jobs.is_busy(PLATE):
             return t("The background is being filled in…")
@@ -224,7 +224,7 @@ class Composing:
         self._stroke = None
 
     def end_stroke(self) -> None:
-        """What was painted is filled in anew, or is the photo's again: one step."""
+        """Fill in what was painted, or restore the photo there, as one step."""
         from objectmorpher_core.compose.plate.repair import patch_of, restored
 
         editor, stroke, self._stroke = self._editor, self._stroke, None
@@ -287,7 +287,7 @@ class Composing:
             self._ask_repair()
 
     def painted_layer(self) -> Layer | None:
-        """What is painted and not filled in yet, as a tint over the canvas."""
+        """Return the painted area that is not filled in yet, as a tint over the canvas."""
         view = self._editor.view
         strokes = [s for s in (self._stroke, *self._waiting) if s is not None]
         if not strokes:
@@ -329,7 +329,7 @@ class Composing:
         self._preview(lambda document, _: edits.set_feather(document, feather))
 
     def ground(self, shadow: Shadow) -> float:
-        """From how many degrees above the ground one looks at the current object on it."""
+        """Return the angle, degrees above the ground, at which the camera sees the object."""
         editor = self._editor
         assert editor.document is not None
         return _seen_from(editor.document, editor.current, shadow)
@@ -414,7 +414,7 @@ class Composing:
         return offer
 
     def choose_refiner(self, name: str) -> None:
-        """One of `compose.REFINERS`."""
+        """Choose one of `compose.REFINERS`."""
         item = self._item
         if item is not None and name != self.refiner:
             is_wanted = name == "harmonise"
@@ -423,7 +423,7 @@ class Composing:
 
     @property
     def refiner(self) -> str:
-        """What the document says; not a preview, so that no field vanishes while it is dragged."""
+        """Return the document's refiner; never a preview, so that no field vanishes in a drag."""
         editor = self._editor
         if editor.committed is None or self._item is None:
             return "none"

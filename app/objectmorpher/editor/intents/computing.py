@@ -1,4 +1,4 @@
-"""Where long jobs run: on this computer, or on a server of the user's."""
+"""The place where long jobs run: this computer, or the user's server."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Computing:
 
     @property
     def token(self) -> str:
-        """By which the server knows the user; "" where there is none."""
+        """Return the token by which the server knows the user; "" where there is none."""
         if self._token is None:
             self._token = _stored_token()
         return self._token
@@ -74,12 +74,12 @@ class Computing:
 
     @property
     def reached(self) -> Server | None:
-        """The same, while it is not lost."""
+        """Return the server unless it is lost."""
         server = self.server
         return None if server is None or self._elsewhere.is_away(server) else server
 
     def ask_offers(self, done: Callable[[Offers], None]) -> None:
-        """What the server can run; a server that does not answer is lost."""
+        """Ask the server for its backends; a server that does not answer counts as lost."""
         from ...server.client import hello
         from ...server.offers import read_offers
 

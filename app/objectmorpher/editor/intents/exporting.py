@@ -140,7 +140,7 @@ class Exporting:
         self._change(replace(self._draft, seconds=seconds))
 
     def set_name(self, name: str) -> None:
-        """As typed; an ending chooses the format."""
+        """Take a name as it was typed; an ending chooses the format."""
         draft = replace(self._draft, name=name)
         format = format_of(name.strip())
         if format is not None and format in FORMATS[draft.what]:
@@ -217,7 +217,7 @@ class Exporting:
 
     @property
     def label(self) -> str:
-        """What the button says: what will be written."""
+        """Return the button's text, which says what will be written."""
         name = self.path.name if self._draft.name.strip() else ""
         return (
             t("Replace {name}", name=name) if self.is_replacing else t("Export {name}", name=name)

@@ -33,7 +33,7 @@ class Hinting:
 
     @property
     def shown(self) -> tuple[Hint, ...]:
-        """All that hold, or will as soon as the background is there."""
+        """Return all hints that hold now or will hold once the background is there."""
         document = self._editor.document
         if document is None:
             return ()
@@ -82,7 +82,7 @@ class Hinting:
         return False
 
     def remove_all(self) -> None:
-        """Where the background is taken from is nobody's business any more."""
+        """Remove all hints about the source of the background."""
         if self.shown:
             self._ask((), t("Clear fill sources"))
 

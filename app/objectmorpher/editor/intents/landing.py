@@ -1,4 +1,4 @@
-"""Where a press on the canvas lands in the photo, while the canvas shows the edit.
+"""The place in the photo that a press on the canvas means while the canvas shows the edit.
 
 What is seen is what is meant. On the current object, wherever it was moved, a press lands where
 that piece of it is in the photo. On another object that was moved it lands on that object.
@@ -24,14 +24,14 @@ OF_THE_PHOTO = (ToolName.SELECT, ToolName.MASK)  # tools that work on the photo 
 
 
 class Of(Enum):
-    """What of the edited picture is no object's."""
+    """Parts of the edited picture that belong to no object."""
 
     PHOTO = "photo"
     BACKGROUND = "background"  # filled in where an object was
 
 
 class Landing:
-    """From canvas px to what is meant by them."""
+    """A map from canvas px to the place that they mean."""
 
     def __init__(self, editor: EditorState, objects: Objects) -> None:
         self._editor = editor
@@ -69,7 +69,7 @@ class Landing:
         return None
 
     def owner_at(self, canvas_xy: np.ndarray) -> int | Of | None:
-        """What canvas px (2,) of the edit belong to: an object, by its index, or `Of`.
+        """Return the owner of canvas px (2,) of the edit: an object's index, or `Of`.
 
         None beside the photo, and where something else than the edit is shown.
         """
@@ -98,7 +98,7 @@ class Landing:
         return self._editor.view.image_from_canvas(canvas_xy) if found is None else found
 
     def begin(self, canvas_xy: np.ndarray) -> F64:
-        """The same where a stroke begins, which is on the object or on the photo all along."""
+        """Return the landing of a stroke's beginning, which stays on the object or on the photo."""
         found = self._on_current(canvas_xy)
         plain = self._editor.view.image_from_canvas(canvas_xy)
         self._is_carried = found is not None
@@ -106,7 +106,7 @@ class Landing:
         return plain + self._offset
 
     def go_on(self, canvas_xy: np.ndarray) -> F64:
-        """The same as the stroke goes on; beside the object as far from it as at its edge."""
+        """Return the landing of a stroke's next point; off the object it keeps its distance."""
         plain = self._editor.view.image_from_canvas(canvas_xy)
         if self._is_carried and (found := self._on_current(canvas_xy)) is not None:
             self._offset = found - plain

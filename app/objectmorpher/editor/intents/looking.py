@@ -23,7 +23,7 @@ NEAREST = 0.9  # object diameters, from the camera to its centre
 
 
 class Looking:
-    """What the canvas shows while the Look tool walks around an object."""
+    """The canvas while the Look tool walks around an object."""
 
     def __init__(self, editor: EditorState, landing: Landing) -> None:
         self._editor = editor
@@ -33,14 +33,14 @@ class Looking:
 
     @property
     def orbit(self) -> Orbit | None:
-        """From where the object alone is shown; None where the photo's view is shown."""
+        """Return the direction from which the object alone is shown; None in the photo's view."""
         view = self._editor.view
         is_there = view.tool is ToolName.LOOK and self._editor.is_lifted
         return view.orbit if is_there else None
 
     @property
     def document(self) -> Document | None:
-        """What the canvas shows: the edit, or its object alone, turned and in the middle."""
+        """Return the document on the canvas: the edit, or its object alone, turned and centred."""
         editor, orbit = self._editor, self.orbit
         document, k = editor.document, editor.current
         if document is None or orbit is None:
@@ -53,7 +53,7 @@ class Looking:
 
     @property
     def badge(self) -> str:
-        """What is said over the canvas where that is not plain: it is the photo, or the edit.
+        """Return the canvas's badge, where it is not plain whether the photo or the edit is shown.
 
         Without a word, and with the last one, the canvas shows the edited picture.
         """

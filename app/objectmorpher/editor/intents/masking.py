@@ -58,7 +58,7 @@ class Masking:
 
     @property
     def shown(self) -> Selection | None:
-        """What is selected, with the stroke in progress: changed in place while it lasts."""
+        """Return the selection with the stroke in progress, which changes it in place."""
         if self.painting is not None:
             return self.painting.shown
         return self._editor.object.selection if self._editor.object else None
@@ -97,13 +97,13 @@ class Masking:
             self._last = document.photo, xy
 
     def finish_stroke(self, label: str) -> None:
-        """What was painted is one step."""
+        """Turn what was painted into one step."""
         painting, self.painting = self.painting, None
         if painting is not None and painting.touched:
             self._apply(label, painting.selection())
 
     def drop_stroke(self) -> None:
-        """As if nothing had been painted."""
+        """Drop the stroke as if nothing had been painted."""
         self.painting = None
 
     # Changes of the whole
@@ -133,7 +133,7 @@ class Masking:
         self._enqueue(Change(t("Remove islands"), mask_edit.remove_islands))
 
     def invert(self) -> None:
-        """What was not selected is. No click had asked for that: there is no prompt any more."""
+        """Invert the selection. No click asked for the result, so its prompt is dropped."""
         selection = self.shown
         if selection is not None:
             self._apply(t("Invert selection"), mask_edit.invert(selection), Prompt())

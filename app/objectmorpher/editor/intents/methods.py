@@ -39,7 +39,7 @@ NOT_FOR_CLICKS = ("subject",)  # segmenters
 
 @dataclass(frozen=True)
 class Method:
-    """One backend of a stage."""
+    """A backend of a stage."""
 
     name: str
     why_not: str | None = None  # why it cannot run here: one sentence
@@ -71,7 +71,7 @@ class Methods:
         return self._is_told
 
     def of(self, stage: str) -> tuple[Method, ...]:
-        """All of a stage, "auto" first; until it was looked at all seem able to run."""
+        """Return all backends of a stage, "auto" first; before a check all seem able to run."""
         self._look()
         offer, found = self._offer(stage), self._stages.get(stage)
         why_not = self._absent(stage)
@@ -171,7 +171,7 @@ STAGE = "lift"
 
 @dataclass(frozen=True)
 class WorkerState:
-    """What is there of a worker."""
+    """The state of a worker."""
 
     name: str
     worker: Worker | None  # None: its file is of no use
@@ -180,7 +180,7 @@ class WorkerState:
 
 
 class Workers:
-    """What the window offers about them."""
+    """Workers as the window offers them."""
 
     def __init__(self, editor: EditorState, methods: Methods) -> None:
         self._editor = editor

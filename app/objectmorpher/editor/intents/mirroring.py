@@ -59,7 +59,7 @@ class Mirroring:
         return plane is not None and bool(np.isfinite(plane.gap))
 
     def outline(self) -> F64:
-        """Where the plane meets the posed object's front: (N, 2) image px along it."""
+        """Return the line (N, 2), image px, in which the plane meets the posed object's front."""
         editor, plane = self._editor, self.plane
         document, thing = editor.document, editor.object
         if plane is None or document is None or thing is None or thing.lifted is None:

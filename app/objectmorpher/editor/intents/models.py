@@ -36,7 +36,7 @@ SELECTING = ("dinov2-vits14", "u2netp")  # what the Select tool does better with
 
 @dataclass(frozen=True)
 class Names:
-    """What a model is called for people, and what it is good for."""
+    """A model's name for people, and its purpose."""
 
     name: str
     gain: str
@@ -49,7 +49,7 @@ NAMES = {
 
 
 class Models:
-    """What the window offers about models."""
+    """Models as the window offers them."""
 
     def __init__(
         self, editor: EditorState, methods: Methods, shaping: Shaping, tasks: Tasks
@@ -161,7 +161,7 @@ class Models:
 
     @property
     def has_depth(self) -> bool:
-        """Whether a depth model tells the relief of what is lifted, where that is wanted."""
+        """Return whether a depth model shapes the relief of lifted objects, where wanted."""
         return any(own.kind.id == DEPTH and own.state == "ok" for own in self.added)
 
     @property
@@ -226,7 +226,7 @@ def _offers() -> tuple[Offer, ...]:
 
 
 def names_of(id: str) -> Names:
-    """For people."""
+    """Return the names for people."""
     return NAMES.get(id) or Names(id, models.weight(id).purpose)
 
 
@@ -242,7 +242,7 @@ NO_TORCH = ("sam-onnx", "lama", "migan", "depth-graph")  # families that run wit
 
 
 class HubModels:
-    """What the window offers about them, family by family."""
+    """Models of several files as the window offers them, family by family."""
 
     def __init__(self, editor: EditorState, own: Models) -> None:
         self._editor = editor
@@ -254,7 +254,7 @@ class HubModels:
 
     @property
     def families(self) -> tuple[str, ...]:
-        """In the registry's order."""
+        """Return the families in the registry's order."""
         return tuple(dict.fromkeys(state.model.family for state in self.states))
 
     def of(self, family: str) -> tuple[HubState, ...]:

@@ -46,7 +46,7 @@ class Objects:
         self.take(k)
 
     def take_up(self, k: int) -> None:
-        """As `choose`, for object `k` that was clicked where it is now."""
+        """Choose object `k`, which was clicked at its current place."""
         editor = self._editor
         self.take(k)
         if editor.object is not None:
@@ -54,7 +54,7 @@ class Objects:
                          name=editor.object.name))  # fmt: skip
 
     def take(self, k: int) -> Callable[[], None]:
-        """As `choose`, for a stroke in progress; what is returned takes it back."""
+        """Choose an object for a stroke in progress; the result takes the choice back."""
         editor = self._editor
         before, selected = editor.current, self._posing.selected
 
@@ -206,7 +206,7 @@ class Objects:
         return back_to_front(objects, {k: None if k in fronts else posed(k) for k in there})
 
     def listed(self) -> list[int]:
-        """All that are selected, as a list shows them: what is in front first."""
+        """Return all selected objects in a list's order: the front one first."""
         document = self._editor.document
         objects = document.objects if document else ()
         order = [k for k in self.order() if k < len(objects)]

@@ -109,7 +109,7 @@ class Placing:
 
     @property
     def ground(self) -> Ground | None:
-        """What the object is to stand on; None where it need not, or cannot."""
+        """Return the ground for the object to stand on; None where it need not or cannot stand."""
         return self._find_ground()[0] if self.is_grounded else None
 
     @property

@@ -54,7 +54,7 @@ class Posing:
         return editor.derived.surface_at(editor.document, editor.current, editor.view, canvas_xy)
 
     def positions(self) -> F64:
-        """Where the handles' targets are seen: (H, 2) image px."""
+        """Return the handles' targets in the view: (H, 2) image px."""
         editor = self._editor
         if editor.document is None or editor.object is None or not editor.object.handles:
             return np.empty((0, 2))
@@ -62,7 +62,7 @@ class Posing:
         return editor.derived.project(editor.document, editor.current, targets)
 
     def spot(self, handle: int) -> Spot:
-        """Where a handle's target is seen, and how far away."""
+        """Return the place of a handle's target in the view, and its distance."""
         editor = self._editor
         assert editor.document is not None
         assert editor.object is not None
@@ -297,7 +297,7 @@ class Posing:
     # Steps
 
     def finish(self, label: str) -> None:
-        """What is previewed becomes one step."""
+        """Turn the preview into one step."""
         self.settle()
         self._editor.commit(label)
 
@@ -344,7 +344,7 @@ class Posing:
         editor.apply(label, editor.derived.solved(changed, k, None))
 
     def set_stays(self, stays: Stays) -> None:
-        """What of the object stays where it is by itself; it is shown as before."""
+        """Set the part of the object that stays by itself; the picture stays as it is."""
         editor, k = self._editor, self._editor.current
         if editor.document is not None and editor.is_lifted:
             deformer = editor.derived.deformer(editor.document, k)
@@ -372,7 +372,7 @@ SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
 
 @dataclass(frozen=True)
 class Numbers:
-    """One handle."""
+    """The numbers of one handle."""
 
     x: float  # image px
     y: float
@@ -385,7 +385,7 @@ class Numbers:
 
 
 class HandleNumbers:
-    """Of the handle that was selected last. A change is previewed; `finish` makes it a step."""
+    """The numbers of the handle selected last, a preview until `finish` makes them a step."""
 
     def __init__(self, editor: EditorState, posing: Posing) -> None:
         self._editor = editor

@@ -36,7 +36,7 @@ class Refining:
 
     @property
     def refined(self) -> Refined | None:
-        """What is shown now."""
+        """Return the refinement that is shown now."""
         document = self._editor.document
         return None if document is None else document.refined
 

@@ -1,4 +1,4 @@
-"""What the artist says about regions of the object: frozen, stiff, rigid, cut, glued."""
+"""The artist's marks on regions of the object: frozen, stiff, rigid, cut, glued."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Rigging:
         return Rig() if thing is None else thing.rig
 
     def regions(self) -> tuple[Region, ...]:
-        """All that was said, in the order of the panel."""
+        """Return all marks in the order of the panel."""
         rig, found = self.rig, []
         if rig.held is not None:
             found.append(Region(PoseMode.FREEZE, rig.held))
@@ -176,7 +176,7 @@ class Rigging:
         self._set(t("Remove region"), rig)
 
     def set_rigidity(self, rigidity: Rigidity) -> None:
-        """What the whole object is made of."""
+        """Set the material of the whole object."""
         from objectmorpher_core.deform.rigidity import with_rigidity
 
         editor = self._editor

@@ -27,7 +27,7 @@ SAME_PLACE = 5.0  # points: a click this near to the last one asks for more or l
 
 
 class Selection:
-    """The current object's mask, and what was said to get it.
+    """The current object's mask and the prompt that led to it.
 
     A selection that a prompt made is told better by each further click; what was changed of it by
     hand meanwhile stays, see `edits.answer_prompt`. One that was made by hand alone (a line, a
@@ -53,23 +53,23 @@ class Selection:
 
     @property
     def pending(self) -> Prompt | None:
-        """What is being segmented now; shown at once, in the document when the mask is there."""
+        """Return the prompt that is being segmented; the document gets it with its mask."""
         return self._tasks.pending
 
     @property
     def prompt(self) -> Prompt:
-        """What the user said about the current object, asked or answered."""
+        """Return the prompt about the current object, answered or not."""
         return self._tasks.prompt
 
     @property
     def share(self) -> float:
-        """How much of the photo is selected, in [0, 1]."""
+        """Return the selected share of the photo, in [0, 1]."""
         mask = self._editor.mask
         return 0.0 if mask is None else self._editor.derived.share(mask)
 
     @property
     def confidence(self) -> float | None:
-        """How much what is selected is expected to overlap with what is meant (IoU), in [0, 1].
+        """Return the expected overlap (IoU) of the selection with the thing meant, in [0, 1].
 
         None where nobody can tell: it was changed by hand, put together, or is an older step.
         """
@@ -78,7 +78,7 @@ class Selection:
 
     @property
     def level(self) -> str:
-        """How much around a click is meant: the selection's own, or a new one's."""
+        """Return the level of detail of clicks: that of the selection, or of the next one."""
         prompt = self.prompt
         return prompt.level if prompt.clicks else self._editor.view.selecting.level
 
@@ -112,7 +112,7 @@ class Selection:
         self._ask(Prompt(box=box), _label(combine), combine)
 
     def set_outline(self, outline: np.ndarray, combine: Combine = Combine.ANEW) -> None:
-        """All that is inside a closed line (N, 2) image px."""
+        """Select everything inside a closed line (N, 2), image px."""
         editor = self._editor
         if editor.document is None or editor.photo_size is None:
             return
@@ -127,7 +127,7 @@ class Selection:
         self._ask(Prompt(is_subject=True), t("Select subject"), Combine.ANEW)
 
     def set_level(self, level: str) -> None:
-        """How much around a click is meant: of this selection, or of the next one."""
+        """Set the level of detail of clicks, for this selection or for the next one."""
         prompt = self.prompt
         if not prompt.clicks:
             self._editor.view.selecting.level = level
@@ -135,7 +135,7 @@ class Selection:
             self._ask(replace(prompt, level=level), _LEVEL_LABELS[level]())
 
     def clear(self) -> None:
-        """Nothing is selected of the current object."""
+        """Clear the current object's selection."""
         editor = self._editor
         editor.jobs.cancel(SELECT)
         if editor.document is not None and editor.mask is not None:

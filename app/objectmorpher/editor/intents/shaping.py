@@ -60,7 +60,7 @@ class Fitting:
 
 
 class Shaping:
-    """What is said about a shape, and what comes of it."""
+    """The artist's words about a shape, and their effect."""
 
     def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
         self._editor = editor
@@ -85,7 +85,7 @@ class Shaping:
 
     @property
     def recognised_as(self) -> str | None:
-        """Of `document.KINDS`, what the lift took the object for; None where it did not look."""
+        """Return the kind, of `document.KINDS`, that the lift recognised; None where none."""
         thing = self._editor.object
         return thing.lifted.kind or None if thing is not None and thing.lifted else None
 
@@ -108,7 +108,7 @@ class Shaping:
 
     @property
     def trust(self) -> float:
-        """In the shape network, as it is or as it is dragged."""
+        """Return the trust in the shape network, as it is or as it is being dragged."""
         return self.settings.trust if self._trust is None else self._trust
 
     def preview_trust(self, trust: float) -> None:
@@ -164,7 +164,7 @@ class Shaping:
         self._stroke.move_to(float(x), float(y))
 
     def end_stroke(self) -> None:
-        """What was painted is a word about the shape."""
+        """Turn what was painted into a hint about the shape."""
         stroke, document = self._stroke, self._editor.document
         if stroke is None or document is None:
             return
@@ -179,11 +179,11 @@ class Shaping:
         self.drop_stroke()
 
     def drop_stroke(self) -> None:
-        """As if nothing had been painted."""
+        """Drop the stroke as if nothing had been painted."""
         self._stroke = None
 
     def clear_painted(self) -> None:
-        """What was painted with the brush that is chosen is gone."""
+        """Clear everything painted with the chosen brush."""
         if self._editor.view.selecting.painted is Painted.HIDDEN:
             self.say(t("Clear hidden parts"), hidden=None)
         else:
@@ -209,7 +209,7 @@ class Shaping:
         return now & ~covered if self._is_inverse else now | covered
 
     def painted_layer(self) -> Layer | None:
-        """What is painted about the shape, as a tint over the canvas."""
+        """Return the painted hints about the shape, as a tint over the canvas."""
         editor, document = self._editor, self._editor.document
         painted = editor.view.selecting.painted
         if document is None or painted is Painted.SELECTION:

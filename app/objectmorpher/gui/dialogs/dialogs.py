@@ -53,7 +53,7 @@ class Dialogs:
         return self._native is not None or self._chooser.is_open
 
     def draw(self, editor: Editor) -> None:
-        """Once a frame, after the panels."""
+        """Draw the open dialog; once a frame, after the panels."""
         wanted = editor.filing.wanted
         if wanted is not None and not self.is_open:
             editor.filing.wanted = None

@@ -1,4 +1,4 @@
-"""What to export, how, and where to; the button says what will be written."""
+"""The export dialog: what, how, and where to; its button says what will be written."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ VERBS = {
 
 
 class FileChooser:
-    """One dialog at a time."""
+    """The file dialogs, of which one is open at a time."""
 
     def __init__(self) -> None:
         self.is_open = False

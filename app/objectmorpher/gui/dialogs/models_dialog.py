@@ -203,7 +203,7 @@ def _draw_state(editor: Editor, state: State) -> None:
 
 
 def draw_offer(editor: Editor) -> None:
-    """Where the user selects: a model that would help and is not there."""
+    """Draw an offer beside the selection: a model that would help and is not installed."""
     models = editor.models
     weight = models.offered
     if weight is None or models.downloading is not None:
@@ -277,7 +277,7 @@ STAGES = {
 
 
 def draw_hub_rows(editor: Editor) -> None:
-    """All families, by what they are for."""
+    """Draw all families, ordered by their purpose."""
     before = ""
     for family in editor.models.hub.families:
         if family in NAMES:
@@ -368,7 +368,7 @@ SIDE = 20.0 + BUTTON + 16.0
 
 
 def draw_worker_rows(editor: Editor) -> None:
-    """All that there are; nothing where there is none."""
+    """Draw a row per worker; nothing where there is none."""
     states = editor.models.workers.states
     if states:
         gap(12)

@@ -1,4 +1,4 @@
-"""For the Compose tool: the brush, and that the background is shown alone."""
+"""The Compose tool's drawings: the brush, and a note that the background is shown alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BARB = 10.0  # points, of an arrow
 
 
 def draw_compose(canvas: Canvas) -> None:
-    """What the Compose tool shows over the photo."""
+    """Draw the Compose tool's brush and note over the photo."""
     editor = canvas.editor
     if (offer := editor.composing.offer) is not None:
         for outline in editor.derived.contours(offer.outlined):

@@ -1,4 +1,4 @@
-"""What the view's colours mean: a small panel in the canvas's corner."""
+"""The legend of the view's colours: a small panel in the canvas's corner."""
 
 from __future__ import annotations
 

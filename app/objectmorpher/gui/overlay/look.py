@@ -1,4 +1,4 @@
-"""For the Look tool, and for pixels that are looked at closely, in every tool."""
+"""Drawings of the Look tool, and of pixels seen closely in every tool."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAINTEST = 0.4  # x that, where the grid begins to show
 
 
 def draw_look(canvas: Canvas) -> None:
-    """That the object is seen from elsewhere."""
+    """Draw the note that the object is seen from elsewhere."""
     editor, rect = canvas.editor, canvas.rect
     orbit = editor.looking.orbit
     if orbit is not None:

@@ -1,4 +1,4 @@
-"""What the whole object is taken by: frame, rings, arrow, and the ground's horizon."""
+"""The gizmo of the whole object: frame, rings, arrow, and the ground's horizon."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TRUST = {"fine": "#70A020", "look closely": "#E0A030", "guesswork": "#E05040"}
 
 
 def draw_frame(canvas: Canvas) -> None:
-    """For the Place tool."""
+    """Draw the Place tool's frame."""
     editor = canvas.editor
     shown = gizmo(editor)
     if shown is None:

@@ -26,7 +26,7 @@ COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the i
 
 
 def draw_pose(canvas: Canvas) -> None:
-    """For the Pose tool."""
+    """Draw the Pose tool's handles."""
     editor = canvas.editor
     document, thing = editor.document, editor.object
     if document is None or thing is None or thing.lifted is None:

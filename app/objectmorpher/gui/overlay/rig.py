@@ -36,7 +36,7 @@ def draw_regions(canvas: Canvas) -> None:
 
 
 def draw_brush(canvas: Canvas) -> None:
-    """What the stroke in progress marks, and the brush itself."""
+    """Draw the marks of the stroke in progress, and the brush itself."""
     editor = canvas.editor
     mode, rigging = editor.view.pose.mode, editor.rigging
     if mode in HATCHES and len(rigging.painted):

@@ -15,7 +15,7 @@ DOT = 1.4  # points, their radius
 
 
 def draw_selection(canvas: Canvas) -> None:
-    """For the Select tool."""
+    """Draw the Select tool's selection and clicks."""
     editor = canvas.editor
     draw_edge(canvas)
     candidate, share = fades.shown("candidate", editor.candidates.shown)
@@ -97,7 +97,7 @@ def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
 
 
 def draw_mask(canvas: Canvas) -> None:
-    """For the Mask tool. During a stroke the veil alone shows the edge: it is there at once.
+    """Draw the Mask tool's brush. During a stroke only the veil shows the edge, at once.
 
     Over an edit, which has no veil, a band shows where the brush went.
     """

@@ -1,1 +1,1 @@
-"""Each tool's part of the inspector; drawing only, what they change are the editor's methods."""
+"""Each tool's part of the inspector. They only draw; changes are calls of the editor's methods."""

@@ -22,7 +22,7 @@ def draw_radius(editor: Editor) -> None:
 
 
 def draw_brush_fields(editor: Editor) -> None:
-    """How large it is, and how hard its edge."""
+    """Draw the fields of the brush's size and hardness."""
     draw_radius(editor)
     number = Number(t("Hardness"), "%.0f %%", 0.5, 10.0, 80.0, 0.0, 100.0)
     change = number_field(number, 100 * editor.view.brush.hardness)

@@ -1,4 +1,4 @@
-"""What the Select and the Mask tool share: the selection's edge, and its file."""
+"""The parts shared by the Select and the Mask tool: the selection's edge, and its file."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _hint(name: str) -> str:
 
 
 def draw_refinement_note(editor: Editor) -> None:
-    """What a changed selection means for what is lifted."""
+    """Draw the note on what a changed selection means for the lifted object."""
     if editor.object is not None and editor.is_lifted:
         note(t("{name} is in 3D already. Change its outline whenever you like: its shape follows, "
                "and its pose and place stay.", name=editor.object.name))  # fmt: skip

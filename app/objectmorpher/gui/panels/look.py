@@ -34,7 +34,7 @@ ZOOMS = (("fit", "Fit"), ("actual", "100 %"), ("double", "200 %"), ("pixels", "8
 
 
 def draw_look(editor: Editor) -> None:
-    """In the inspector."""
+    """Draw the Look tool's part of the inspector."""
     draw_shape(editor)
     heading(t("View"))
     for shown in Shown:

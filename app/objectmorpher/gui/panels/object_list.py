@@ -50,7 +50,7 @@ _is_dragged = False  # the mouse has taken up a row; also after Esc, until it le
 
 
 def draw_objects(editor: Editor) -> None:
-    """In the inspector."""
+    """Draw the list of objects in the inspector."""
     shown = editor.objects.listed()
     _draw_title(editor, has_buttons=bool(shown))
     if not shown:

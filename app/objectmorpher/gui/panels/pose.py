@@ -115,7 +115,7 @@ _revealed: list[int | None] = [None]  # the handle that the list was scrolled to
 
 
 def draw_handles(editor: Editor) -> None:
-    """All of them; a click selects one, with Shift or Ctrl one more."""
+    """Draw the list of handles; a click selects one, with Shift or Ctrl one more."""
     heading(t("Handles"))
     thing = editor.object
     if thing is None or not thing.handles:
@@ -171,7 +171,7 @@ def _draw_row(editor: Editor, h: int) -> None:
 
 
 def draw_numbers(editor: Editor) -> None:
-    """Of the handle that was selected last."""
+    """Draw the numbers of the handle selected last."""
     numbers = editor.handle_numbers.read()
     if numbers is None:
         return
@@ -264,7 +264,7 @@ def draw_modes(editor: Editor) -> None:
 
 
 def draw_regions(editor: Editor) -> None:
-    """What was painted, with a button to take each back."""
+    """Draw the painted regions, each with a button that takes it back."""
     regions = editor.rigging.regions()
     if not regions:
         return

@@ -1,4 +1,4 @@
-"""What comes or goes gradually does so within 120 ms; the window stays awake no longer for it."""
+"""Gradual changes, over within 120 ms; they keep the window awake no longer than that."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Fades:
-    """Of things by what they are called. One instance, `fades`."""
+    """Fades of things by their names. There is one instance, `fades`."""
 
     def __init__(self) -> None:
         self._now = self._before = 0.0  # s, of this frame and the last one
@@ -31,7 +31,7 @@ class Fades:
         return bool(self._moving)
 
     def shown(self, name: str, thing: T | None) -> tuple[T | None, float]:
-        """What to draw, and how opaque in [0, 1]: `thing`, or what was there and is going."""
+        """Return the thing to draw, `thing` or the one fading out, and its opacity in [0, 1]."""
         before, share, since = self._kept.get(name, (None, 0.0, self._now))
         is_coming = thing is not None
         if is_coming and thing is not before:

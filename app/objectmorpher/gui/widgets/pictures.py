@@ -23,7 +23,7 @@ class Pictures:
         self._renderer, self._textures = renderer, {}
 
     def texture(self, pixels: np.ndarray) -> imgui.ImTextureRef:
-        """What ImGui draws `pixels` (h, w, 3) u8 by."""
+        """Return ImGui's texture of `pixels` (h, w, 3) u8."""
         assert self._renderer is not None, "the window says which renderer"
         found = self._textures.pop(id(pixels), None)
         if found is None:

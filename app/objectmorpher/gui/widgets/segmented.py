@@ -18,7 +18,7 @@ INSET = 2.0  # points between the row's edge and the chosen part
 
 @dataclass(frozen=True)
 class Choice(Generic[T]):
-    """One of them. `why_not` greys it out and is its tooltip."""
+    """One of several values. `why_not` greys it out and is its tooltip."""
 
     value: T
     label: str
@@ -28,7 +28,7 @@ class Choice(Generic[T]):
 
 
 def segmented(name: str, choices: Sequence[Choice[T]], chosen: T) -> T:
-    """As wide as there is room; the value that is chosen now."""
+    """Draw values side by side, as wide as there is room, and return the chosen one."""
     start = imgui.get_cursor_screen_pos()
     across = imgui.get_content_region_avail().x
     height, part = theme.pt(FIELD), across / len(choices)

@@ -26,7 +26,7 @@ FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it en
 
 
 class Kind(Enum):
-    """How much a button asks for attention."""
+    """How much attention a button asks for."""
 
     PRIMARY = "primary"
     PRIMARY_SMALL = "primary, as high as the others"
@@ -50,7 +50,7 @@ def bold_text(size: float = 0.0) -> Iterator[None]:
 
 
 def tooltip(text: str) -> None:
-    """For the last item, shown after a moment; over greyed-out items too.
+    """Show a tooltip over the last item after a moment, also where the item is greyed out.
 
     Where the keyboard has come to the item, it is shown at once, beside the item.
     """
@@ -152,7 +152,7 @@ def shortened(text: str, room: float) -> str:
 
 
 def fitted(name: str, room: float) -> str:
-    """As much of a file's name as has room (window units); its ending tells most, so it stays."""
+    """Shorten a file's name to fit (window units); its ending says most, so it stays."""
     if imgui.calc_text_size(name).x <= room:
         return name
     for kept in range(len(name) - 2, 1, -1):
@@ -163,7 +163,7 @@ def fitted(name: str, room: float) -> str:
 
 
 def shown_path(path: Path) -> str:
-    """As it is read: what is in the user's home folder begins with ~."""
+    """Return a path for people: the user's home folder is written as ~."""
     home = Path.home()
     return str(Path("~", path.relative_to(home))) if path.is_relative_to(home) else str(path)
 
@@ -216,7 +216,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Change:
-    """What a field did in this frame."""
+    """What happened to a field in this frame."""
 
     value: float
     is_changed: bool = False
@@ -310,7 +310,7 @@ def fill_row(
 
 
 def text_top(start: ImVec2, height: float) -> float:
-    """Where a line of the current font is in the middle of a row; screen units."""
+    """Return the top of a line of text centred in a row; screen units."""
     return start.y + (height - imgui.get_font_size()) / 2
 
 

@@ -39,7 +39,7 @@ class Crosshair:
             self.hide()
 
     def move(self, editor: Editor, dx: float, dy: float) -> None:
-        """By so many canvas px; at the edge of the canvas the photo gives way."""
+        """Move by so many canvas px; at the edge of the canvas the photo scrolls."""
         view, photo = editor.view, editor.photo_size
         if photo is None:
             return
@@ -63,7 +63,7 @@ class Crosshair:
         return editor.view.width / 2, editor.view.height / 2
 
     def pointer(self, button: Button | None = None) -> Pointer:
-        """As the tools see it, held down."""
+        """Return a pressed pointer as the tools see it."""
         assert self._xy is not None
         return Pointer(*self._xy, button=button, is_down=True)
 

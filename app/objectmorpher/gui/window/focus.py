@@ -31,7 +31,7 @@ class Focus:
         io.config_nav_cursor_visible_always = self.is_on and not has_popup
 
     def check(self, editor: Editor) -> None:
-        """Once a frame: a panel that is gone gives the keys back to the photo."""
+        """Return the keys to the photo where their panel is gone; once a frame."""
         self._age += 1
         if self.is_on and self._age > 2 and self._pane not in self._panes(editor):
             self.leave()

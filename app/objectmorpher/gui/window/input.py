@@ -1,4 +1,4 @@
-"""From ImGui's mouse and keys, and the keys' own crosshair, to pointers, strokes, commands."""
+"""Input: mouse, keys and the keyboard's crosshair become pointers, strokes and commands."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STRIDES = {(): STRIDE, ("Shift",): FAR, ("Alt",): 0.0}  # points of the crosshai
 
 
 class Input:
-    """One frame's input to the editor; remembers only what the pointer looks like."""
+    """One frame's input to the editor; it remembers only the shape of the pointer."""
 
     def __init__(self, shortcuts: Shortcuts) -> None:
         self._shortcuts = shortcuts

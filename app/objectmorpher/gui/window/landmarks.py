@@ -1,4 +1,4 @@
-"""Where the window's buttons and fields are, by what they say: for tests and tours.
+"""The places of the window's buttons and fields by their texts, for tests and tours.
 
 So are the photo, the handles on it and the rings: what is drawn there cannot be found otherwise.
 
@@ -40,7 +40,7 @@ def mark_on_canvas(label: str, low: ImVec2, high: ImVec2) -> None:
 
 
 def clean(label: str) -> str:
-    """What a user reads of it: no icon (they are in the private use area), no id."""
+    """Return a text as a user reads it: without icons (private use area) and ids."""
     text = label.partition("##")[0]
     return "".join(c for c in text if not "\ue000" <= c <= "\uf8ff").strip()
 

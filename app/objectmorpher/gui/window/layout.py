@@ -1,4 +1,4 @@
-"""Where the window's parts are."""
+"""The places of the window's parts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def has_panel(width: float, wanted: bool | None) -> bool:
 
 
 def lay_out(width: float, height: float, has_photo: bool, has_panel: bool = True) -> Layout:
-    """For a window of that size, window units. Folded up, the panel is a strip with a button."""
+    """Lay out a window of that size, window units. A folded panel is a strip with a button."""
     menu, status = theme.pt(MENU), theme.pt(STATUS)
     strip = theme.pt(STRIP) if has_photo else 0.0
     inspector = theme.pt(INSPECTOR if has_panel else FOLDED) if has_photo else 0.0

@@ -1,4 +1,4 @@
-"""From the editor to what the renderer draws."""
+"""The scene that the renderer draws, built from the editor."""
 
 from __future__ import annotations
 

@@ -377,14 +377,14 @@ _IMGUI_CURSORS = {
 
 
 class Title:
-    """As it was written last."""
+    """The window's title as it was last set."""
 
     def __init__(self) -> None:
         self._text = ""
         self._changed: tuple[Document | None, int] = (None, 0)  # px that a document changes
 
     def changed(self, editor: Editor, is_quiet: bool) -> str | None:
-        """Once a frame: the new one, or None; `is_quiet`: nothing has happened for a moment."""
+        """Return the new size, or None, once a frame; `is_quiet`: nothing has happened lately."""
         if is_quiet and editor.preview is None and editor.committed is not self._changed[0]:
             document = editor.committed
             count = 0 if document is None else count_changed(document, editor.cache)
@@ -418,7 +418,7 @@ LEAST_STEP = 1e-4  # s between two frames; ImGui asks for more than none
 
 
 class WindowSize:
-    """As GLFW told of it last.
+    """The window's size as GLFW last reported it.
 
     ImGui's own backend asks for it in every frame, and X answers when it has shown the last one:
     what could be computed meanwhile is not.

@@ -49,7 +49,7 @@ class PixelHacker(nn.Module):
 
 
 def read_config(folder: Path) -> dict[str, Any]:
-    """What the U-Net beside a config.json is like; the published one's, where there is none.
+    """Read the U-Net's config.json; the published values where there is none.
 
     Raises ModelError.
     """
@@ -157,7 +157,7 @@ def recurrence(queries: Tensor, keys: Tensor, values: Tensor, gates: Tensor) -> 
 
 
 def chunked(queries: Tensor, keys: Tensor, values: Tensor, gates: Tensor) -> Tensor:
-    """The same as `recurrence`, chunk by chunk. float32.
+    """Compute `recurrence` chunk by chunk. float32.
 
     Every exponent is of a difference of cumulative gates that is at most 0, so that nothing
     overflows however closed a gate is.
@@ -227,7 +227,7 @@ class GatedLinearAttention(nn.Module):
         self.g_norm_swish_gate = NormGate(channels // heads)
 
     def forward(self, hidden_states: Tensor, **_unused: object) -> Tensor:
-        """As the attention that it stands for, which could also be given a context or a mask."""
+        """Attend like the attention that it replaces, which may also take a context or a mask."""
 
         def by_head(x: Tensor) -> Tensor:  # (B, H, T, K)
             return x.unflatten(2, (self.heads, -1)).transpose(1, 2)

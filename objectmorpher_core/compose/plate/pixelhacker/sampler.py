@@ -1,4 +1,4 @@
-"""From noise to a picture: DDIM steps (Song et al. 2020), guided towards what is to be filled in.
+"""The sampler: DDIM steps (Song et al. 2020) from noise to a picture, guided by the masked photo.
 
 Settings and order are those of the published pipeline, but for where the noise starts from: there
 it is the photo with what the hole hides, which would shine through; here its hole is smooth.

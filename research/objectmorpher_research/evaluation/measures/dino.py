@@ -28,20 +28,20 @@ def missing() -> str | None:
 
 
 class Dino:
-    """The measures; what the network tells of the last two pictures is kept between them."""
+    """The measures; the network's output for the last two pictures is kept between them."""
 
     def __init__(self) -> None:
         self._seen: list[tuple[RGB, F64]] = []
 
     def perceptual(self, a: RGB, b: RGB, regions: Sequence[Region]) -> tuple[float, ...]:
-        """In [0, 2]: 1 - the cosine of the two tokens at a place, its mean over the places."""
+        """Return a distance in [0, 2]: 1 - the cosine of the tokens at a place, averaged."""
         check_pair(a, b)
         x, y = (_unit(self.tokens(rgb)) for rgb in (a, b))
         apart = np.maximum(0, 1 - (x * y).sum(-1))
         return tuple(weighted_mean(apart, region) for region in regions)
 
     def identity(self, a: RGB, b: RGB, regions: Sequence[Region]) -> tuple[float, ...]:
-        """In [-1, 1]: the cosine of the regions' mean tokens: alike wherever the thing is in them.
+        """Return the cosine, in [-1, 1], of the regions' mean tokens, wherever the thing is.
 
         Of tokens of unit length; the class token is not used: it has drifted in these weights.
         """

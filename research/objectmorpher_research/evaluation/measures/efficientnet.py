@@ -50,7 +50,7 @@ BLOCKS = (
 
 
 def shapes() -> Shapes:
-    """Of the state dict up to the last features; the classifier is left out."""
+    """Return the shapes of the state dict up to the last features, without the classifier."""
     found: dict[str, tuple[int, ...]] = {}
 
     def convolution(name: str, norm: str, *shape: int) -> None:

@@ -26,7 +26,7 @@ def psnr(a: RGB, b: RGB, regions: Sequence[Region]) -> tuple[float, ...]:
 
 
 def ssim(a: RGB, b: RGB, regions: Sequence[Region]) -> tuple[float, ...]:
-    """In [-1, 1] per region: the mean of `ssim_map` where the window lies inside the picture."""
+    """Return SSIM in [-1, 1] per region: the mean of `ssim_map` where the window fits."""
     inner = ssim_map(a, b)[HALF:-HALF, HALF:-HALF]
     cropped = (r if r is None else r[HALF:-HALF, HALF:-HALF] for r in regions)
     return tuple(weighted_mean(inner, region) for region in cropped)

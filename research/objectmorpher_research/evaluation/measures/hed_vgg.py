@@ -76,7 +76,7 @@ class HedVgg:
 
 
 def vgg_graph(arrays: Mapping[str, F32]) -> bytes:
-    """An ONNX file of the convolutions in Keras's file, told after each block.
+    """Return an ONNX file of the convolutions in Keras's file, with an output after each block.
 
     The pooling keeps a last odd row and column, as HED's does. Raises EvaluationError.
     """

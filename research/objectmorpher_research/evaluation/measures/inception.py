@@ -115,7 +115,7 @@ PARTS = {64: STEM, 192: STEM, 768: {**STEM, **MIDDLE}, DEEPEST: {**STEM, **MIDDL
 
 
 def shapes(channels: int) -> Shapes:
-    """Of the state dict up to where there are so many channels: 64, 192, 768 or 2048."""
+    """Return the shapes of the state dict up to so many channels: 64, 192, 768 or 2048."""
     found: dict[str, tuple[int, ...]] = {}
     for name, conv in PARTS[channels].items():
         found[f"{name}.conv.weight"] = (conv.after, conv.before, *conv.size)

@@ -1,4 +1,4 @@
-"""What is measured on Inception: features of FID and KID, and SIFID (Shaham et al., SinGAN, arXiv
+"""Measures on Inception: features of FID and KID, and SIFID (Shaham et al., SinGAN, arXiv
 1905.01164): the Fréchet distance of the features at all places of one picture and of another.
 """
 

@@ -23,7 +23,7 @@ SUBSETS, SUBSET_SIZE = 100, 1000  # the usual ones; a subset is never larger tha
 
 @dataclass(frozen=True)
 class Subsets:
-    """How KID is averaged."""
+    """The averaging of KID."""
 
     count: int = SUBSETS
     size: int = SUBSET_SIZE

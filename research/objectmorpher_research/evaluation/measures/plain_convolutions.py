@@ -1,5 +1,5 @@
 """The convolutions of AlexNet (Krizhevsky, arXiv 1404.5997) and VGG16 (Simonyan & Zisserman, arXiv
-1409.1556), with the names of torchvision's state dicts, and what they tell after some rectifiers.
+1409.1556), with the names of torchvision's state dicts, and their outputs after some rectifiers.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ VGG_LAYERS = (
 
 
 def shapes(layers: Sequence[Layer]) -> Shapes:
-    """Of the state dict."""
+    """Return the shapes of the state dict."""
     found: dict[str, tuple[int, ...]] = {}
     for layer in layers:
         before, after = layer.channels
@@ -55,7 +55,7 @@ def shapes(layers: Sequence[Layer]) -> Shapes:
 
 
 def features(layers: Sequence[Layer], tensors: Tensors, pixels: Any) -> list[Any]:
-    """[(n, channels, h, w)] of the told layers, for (n, 3, H, W)."""
+    """Return [(n, channels, h, w)] of the named layers, for (n, 3, H, W)."""
     from torch.nn.functional import conv2d, max_pool2d, relu
 
     found, x = [], pixels

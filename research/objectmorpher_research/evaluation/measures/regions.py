@@ -1,4 +1,4 @@
-"""Where in a picture a measure is taken: everywhere, inside a mask, outside it."""
+"""Regions of a picture in which a measure is taken: everywhere, inside a mask, outside it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was recorded while a method edited a photo -> how soon it answers, how long it computes.
+"""The log of a method editing a photo, and from it how soon it answers and how long it computes.
 
 The paper's RI, real-time interaction, is whether one sees at once what a click or a drag does; its
 MT, model inference time, how long the computing takes. Neither is typed in here: both are read from
@@ -38,7 +38,7 @@ COMPUTING = ("segment", "lift", "graph", "deform", "inpaint", "render", "refine"
 
 @dataclass(frozen=True)
 class Event:
-    """One line."""
+    """One line of the log."""
 
     t: float  # s
     kind: str
@@ -47,7 +47,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a log tells of one edit."""
+    """A log's record of one edit."""
 
     latencies: tuple[float, ...]  # s, of each input until it is answered; inf: never
     computing: float | None  # s; None: it is not told
@@ -61,7 +61,7 @@ class Recorded:
 
 
 def read_recorded(path: Path) -> Recorded:
-    """From a .jsonl log, or from our own report. Raises EvaluationError: one sentence."""
+    """Read a .jsonl log or our own report. Raises EvaluationError: one sentence."""
     text = _text_of(path)
     try:
         return of_events(_events(text)) if path.suffix == ".jsonl" else _of_report(text)
@@ -70,7 +70,7 @@ def read_recorded(path: Path) -> Recorded:
 
 
 def read_frames(path: Path) -> tuple[float, ...]:
-    """Latencies of the drags in a window's frame log, s. Raises EvaluationError: one sentence.
+    """Read the latencies of drags in a window's frame log, s. Raises EvaluationError.
 
     A pointer's move is taken to have come just after the frame before had looked for events: no
     latency is told too small, and each up to a frame too large.

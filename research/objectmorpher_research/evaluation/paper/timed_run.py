@@ -1,4 +1,4 @@
-"""Our own method on a subject, with a log of what it takes: the stages, and a drag made again.
+"""Our own method on a subject, with a log of its stages and of a drag made again.
 
 The time of the edit is all of it, with reading the photo and without writing the result, whatever
 else the stages in it are. After the edit its handles and its placement are taken back and dragged
@@ -34,7 +34,7 @@ BUDGET = 0.01  # s of solving a move, as in the editor
 
 @dataclass(frozen=True, eq=False)
 class Timed:
-    """What our method makes of a subject."""
+    """Our method's result for a subject."""
 
     picture: Picture
     events: tuple[Event, ...]

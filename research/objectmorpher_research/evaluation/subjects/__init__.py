@@ -1,1 +1,1 @@
-"""What methods are compared on: photos with an edit of each, of our folders or a benchmark's."""
+"""The subjects of a comparison: photos with an edit of each, in our folders or a benchmark's."""

@@ -29,7 +29,7 @@ IMAGE, META = "original_image.png", "meta_data.pkl"
 
 
 def subjects(folder: Path) -> tuple[Subject, ...]:
-    """All samples below the folder; none where it is no such folder. Raises EvaluationError."""
+    """Return all samples below the folder, if it is such a folder. Raises EvaluationError."""
     found = []
     for depth in ("*", "*/*"):
         for meta in sorted(folder.glob(f"{depth}/{META}")):

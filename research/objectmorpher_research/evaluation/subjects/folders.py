@@ -31,7 +31,7 @@ DRAGGED = "dragged_image"  # in DragBench's results
 
 
 def read_subjects(folder: Path, methods: Mapping[str, Path] | None = None) -> tuple[Subject, ...]:
-    """All subjects of a folder, by name, with what lies in the folders of `methods`.
+    """Read all subjects of a folder, by name, with the results in the folders of `methods`.
 
     Raises EvaluationError: one sentence.
     """
@@ -51,7 +51,7 @@ def read_subjects(folder: Path, methods: Mapping[str, Path] | None = None) -> tu
 
 
 def own_subjects(folder: Path) -> tuple[Subject, ...]:
-    """Those of our own layout; none where the folder has another one."""
+    """Read the subjects of our own layout; none where the folder has another one."""
     found = []
     for where in sorted(path for path in folder.iterdir() if path.is_dir()):
         image = picture_called(where / IMAGE)

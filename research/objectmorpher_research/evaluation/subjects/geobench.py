@@ -30,7 +30,7 @@ NUMBERS = 9
 
 
 def subjects(folder: Path) -> tuple[Subject, ...]:
-    """All edits of the annotations; none where there are no such. Raises EvaluationError."""
+    """Return all edits of the annotations, if there are any. Raises EvaluationError."""
     path = folder / ANNOTATIONS
     if not path.is_file():
         return ()

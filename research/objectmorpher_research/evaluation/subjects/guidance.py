@@ -1,4 +1,4 @@
-"""What an edit is meant to do: as arrows over the photo, as words, and as our own edit script."""
+"""The guidance of an edit: as arrows over the photo, as words, and as our own edit script."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TEXT = "text"  # key of guidance.json beside those of an edit script
 
 @dataclass(frozen=True)
 class Guidance:
-    """One edit that is asked of every method."""
+    """An edit that is asked of every method."""
 
     arrows: tuple[Arrow, ...] = ()
     words: str = ""
@@ -35,12 +35,12 @@ class Guidance:
 
     @property
     def is_shown(self) -> bool:
-        """Whether a person can tell from it what is wanted."""
+        """Return whether it shows a person what is wanted."""
         return bool(self.arrows or self.words or self.picture)
 
 
 def read_guidance(path: Path) -> Guidance:
-    """From a JSON file: an edit script, whose files are beside it, and perhaps a "text".
+    """Read a JSON file: an edit script, whose files are beside it, and perhaps a "text".
 
     Raises EvaluationError: one sentence.
     """
@@ -57,7 +57,7 @@ def read_guidance(path: Path) -> Guidance:
 
 
 def from_item(item: BatchItem, text: str = "") -> Guidance:
-    """Of an edit script; without a `text` its placement is told in words."""
+    """Read an edit script; without a `text` its placement is put into words."""
     words = text or " ".join(words_of(script) for script in _scripts(item))
     arrows = tuple(arrow for script in _scripts(item) for arrow in arrows_of(script))
     return Guidance(arrows, words.strip(), item=item, reason="")
@@ -74,7 +74,7 @@ def arrows_of(script: EditScript) -> tuple[Arrow, ...]:
 
 
 def words_of(script: EditScript) -> str:
-    """How the whole object is to be placed, for someone who looks at the photo."""
+    """Return the placement of the whole object in words for someone who looks at the photo."""
     if script.remove:
         return "Remove the object."
     told = []

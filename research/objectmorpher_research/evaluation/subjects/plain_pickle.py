@@ -81,7 +81,7 @@ class _Refused(Exception):
 
 
 def read_plain(data: bytes) -> Any:
-    """What the pickle describes: dicts, lists, tuples, texts, bytes, numbers, numpy arrays.
+    """Read the pickle's plain values: dicts, lists, tuples, texts, bytes, numbers, numpy arrays.
 
     Raises EvaluationError: one sentence, without anything of the file having been carried out.
     """

@@ -1,4 +1,4 @@
-"""One photo with one edit of it, and what methods made of them."""
+"""A photo with an edit of it, and the methods' results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .guidance import Guidance
 
 @dataclass(frozen=True)
 class Result:
-    """What a method made of a subject."""
+    """A method's result for a subject."""
 
     picture: Path
     log: Path | None = None  # .jsonl, or our report's .json
@@ -20,7 +20,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Subject:
-    """One photo and one edit of it."""
+    """A photo and an edit of it."""
 
     name: str  # may hold slashes
     image: Path

@@ -24,7 +24,7 @@ STILL = 0.75  # px, a point that moves less is a pin
 
 @dataclass(frozen=True, eq=False)
 class Guidance:
-    """What every method is told: points of the thing and where they must be seen.
+    """The guidance of every method: points of the thing and where they must be seen.
 
     Of a thing that moves as a whole also how, as one would type it: in degrees, as a factor.
     """
@@ -99,7 +99,7 @@ LYING = {"plank": 12.0, "banana": -15.0, "bottle": 8.0}  # degrees of roll, of s
 
 
 def wanted_cases(seed: int = 0, is_quick: bool = False) -> tuple[Wanted, ...]:
-    """All cases that are made, the same for the same seed; 63, or 11 of them."""
+    """Return all cases of a seed: 63, or 11 of them."""
     result, number = [], 0
     for category, things in PLAN.items():
         for k, (thing, amount) in enumerate(things):
@@ -113,7 +113,7 @@ def wanted_cases(seed: int = 0, is_quick: bool = False) -> tuple[Wanted, ...]:
 
 
 def setting_of(solid: str, is_first: bool, seed: int) -> Setting:
-    """One of a solid's two photos."""
+    """Return one of a solid's two photos."""
     key = [seed, sum(map(ord, solid)), int(is_first)]
     rng = np.random.default_rng(key)
     surface = ("marble", *SURFACES)[int(rng.integers(1 + len(SURFACES)))]

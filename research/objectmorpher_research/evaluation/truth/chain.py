@@ -64,7 +64,7 @@ class Way:
 
 
 class Chain:
-    """One photo's object in the product; what several edits and ways share is made once."""
+    """A photo's object in the product; work that several edits and methods share is done once."""
 
     def __init__(self, photo: RGB, mask: Mask, camera: Camera, seed: int = 0) -> None:
         self._photo, self._mask, self._camera, self._seed = photo, mask, camera, seed
@@ -204,7 +204,7 @@ def _placed(puppet: Puppet, points: F64, guidance: Guidance) -> Placement:
 
 
 def unpainted(lifted: LiftedObject) -> LiftedObject:
-    """The same with nothing of the photo on its Gaussians but their own colours.
+    """Return the same with nothing of the photo on its Gaussians but their own colours.
 
     Edged kinds leave it to the photo to cover what the photo shows: without it there is nothing.
     """

@@ -1,4 +1,4 @@
-"""What the solids look like, and the photos that they stand before.
+"""The solids' materials, and the photos behind them.
 
 The surface photos are ones that the shape network's training has not seen; of the backgrounds it
 has seen pieces, but for the flower (docs/evaluation-figures.md).

@@ -17,7 +17,7 @@ from .outcome import Outcome
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What all methods of a case share: the case, the mask's cut-out, the plate, the chain."""
+    """The input that all methods of a case share: case, cut-out of the mask, plate, chain."""
 
     case: Case
     matte: Matte
@@ -27,7 +27,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Method:
-    """One way to make an edit."""
+    """A method of making an edit."""
 
     name: str
     told: str  # what it is, for the report

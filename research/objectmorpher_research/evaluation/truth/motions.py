@@ -16,7 +16,7 @@ IN_PLANE = ("scale", "bend in", "stretch")
 
 @dataclass(frozen=True)
 class Rigid:
-    """What a user says of the whole thing: scaled and turned about its middle, then moved."""
+    """A user's placement of the whole thing: scaled and turned about its middle, then moved."""
 
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)  # degrees: yaw, pitch, roll
     scale: float = 1.0
@@ -34,7 +34,7 @@ class Motion:
 
     @property
     def rigid(self) -> Rigid | None:
-        """What it is as a motion of the whole thing; None where it deforms."""
+        """Return it as a motion of the whole thing; None where it deforms."""
         if self.category == "turn":
             return Rigid(turn=(self.amount, 0.0, 0.0))
         if self.category == "tilt":
@@ -123,7 +123,7 @@ def _raised(motion: Motion, body: Body) -> F64:
 
 
 def grips(motion: Motion, body: Body) -> tuple[F64, int]:
-    """Where to take hold (n, 3), world, and how many more points stay where they are.
+    """Return the grips (n, 3), world, and how many more points stay in place.
 
     What is seen there in the picture is meant. Points in a line would not tell whether the thing
     rolls about it: a bend and a twist are held at both edges.

@@ -1,4 +1,4 @@
-"""What a method makes of a case."""
+"""A method's outcome for a case."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ SAMPLES = 3  # by as many in a pixel: odd, so that one is in its middle
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What every sample meets; SAMPLES to a pixel each way."""
+    """The hits of every sample; SAMPLES to a pixel each way."""
 
     face: I32  # (h, w), -1: nothing
     corners: F64  # (h, w, 3) weights of the face's corners, right in perspective

@@ -1,4 +1,4 @@
-"""One HTML file with the tables and the pictures of a run; it needs nothing beside it."""
+"""A report: one HTML file with the tables and the pictures of a run, complete in itself."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Of what is in the photo."""
+        """Return the name of the thing in the photo."""
         return self.wanted[0].setting.solid if self.wanted else STEREO
 
     @property
@@ -93,7 +93,7 @@ def run(
 def jobs_of(
     folder: Path, methods: Mapping[str, Method], seed: int = 0, is_quick: bool = False
 ) -> list[Job]:
-    """One for each photo; they may be done in any order, and on several machines."""
+    """Return a job for each photo; they may be done in any order, and on several machines."""
     found = wanted_cases(seed, is_quick)
     by_photo = sorted(found, key=lambda w: (repr(w.setting), w.number))
     jobs = [
@@ -104,7 +104,7 @@ def jobs_of(
 
 
 def run_photo(job: Job) -> list[Row]:
-    """All methods on the cases of one photo; only what is not in the folder is computed."""
+    """Run all methods on the cases of one photo; what is in the folder is not computed again."""
     network = dino.Dino() if dino.missing() is None else None
     chain: Chain | None = None
     rows: list[Row] = []

@@ -1,4 +1,4 @@
-"""How near an outcome is to the truth."""
+"""The distance of an outcome from the truth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FIGURES = ("psnr", "ssim", "dinov2", "iou", "reach", "outside", "changed")
 
 @dataclass(frozen=True)
 class Score:
-    """Of one outcome."""
+    """The scores of one outcome."""
 
     psnr: float  # dB, inside the region
     ssim: float  # inside
@@ -33,7 +33,7 @@ class Score:
 
 
 def score(case: Case, outcome: Outcome, network: Dino | None) -> Score:
-    """All figures."""
+    """Return all figures."""
     window = _window(case.region)
     inside, outer = case.region[window], case.region < 0.5
     a, b = outcome.pixels[window], _cut(case)

@@ -1,4 +1,4 @@
-"""Where a solid stands in a made photo: its side, material, lamp, background and camera."""
+"""The setting of a solid in a made photo: its side, material, lamp, background and camera."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Stage:
         self._normals = self.solid.normals(self.solid.vertices)  # at rest, its own frame
 
     def body(self, limb: str = "") -> Body:
-        """Where it stands."""
+        """Return the placed body."""
 
         def placed(points: F64) -> F64:
             return points @ self._turn.T + self._centre

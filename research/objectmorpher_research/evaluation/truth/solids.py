@@ -100,7 +100,7 @@ class Builder:
         self._turned(profile, np.diag(half).astype(float), np.array(at, float))
 
     def capsule(self, start: Point, end: Point, first: float, last: float | None = None) -> None:
-        """From `start` to `end`, with a radius at either."""
+        """Add a capsule from `start` to `end`, with a radius at either end."""
         a, b = np.array(start, float), np.array(end, float)
         last = first if last is None else last
         length = float(np.linalg.norm(b - a))

@@ -52,7 +52,7 @@ def read_pair() -> StereoPair:
 
 
 def stereo_case() -> Case:
-    """As the right camera would see it with the left one's middle. Raises EvaluationError."""
+    """Return the right camera's view with the left one's middle. Raises EvaluationError."""
     pair = read_pair()
     mask, disparity = pair.mask, pair.disparity
     height, width = mask.shape

@@ -64,7 +64,7 @@ def _value(row: Row, figure: str) -> float:
 
 
 def as_text(table: Table, figure: str) -> str:
-    """One figure for the terminal: a line for each method, a column for each category."""
+    """Return a table of a figure for the terminal: methods in lines, categories in columns."""
     width = max(12, *(len(c) + 2 for c in table.categories))
     head = f"{figure:<14}" + "".join(f"{c:>{width}}" for c in table.categories)
     lines = [head]

@@ -52,12 +52,12 @@ def with_adapter(transformer: nn.Module, model: EditModel, rank: int, seed: int)
 
 
 def parameters(transformer: nn.Module) -> dict[str, nn.Parameter]:
-    """What is trained, by name."""
+    """Return the trained parameters by name."""
     return {name: p for name, p in transformer.named_parameters() if p.requires_grad}
 
 
 def groups(transformer: nn.Module, rate: float, ratio: float) -> list[dict[str, Any]]:
-    """For an optimiser: A at `rate`, B at `ratio` times that."""
+    """Return an optimiser's groups: A at `rate`, B at `ratio` times that."""
     own = parameters(transformer)
     first = [p for name, p in own.items() if SECOND not in name]
     second = [p for name, p in own.items() if SECOND in name]

@@ -24,7 +24,7 @@ TOLD = "objectmorpher"  # key of what the file says besides
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What changes while it trains."""
+    """The state of a training."""
 
     parameters: dict[str, nn.Parameter]
     optimiser: optim.Optimizer
@@ -47,7 +47,7 @@ class State:
         write_all({folder / FILE: save(held, metadata={TOLD: told})})
 
     def load(self, folder: Path, plan: dict[str, Any]) -> int:
-        """How many steps were done; 0 where there is no checkpoint.
+        """Load a checkpoint and return the steps that were done; 0 where there is none.
 
         Raises TrainingError where it is damaged, or another plan's.
         """

@@ -1,4 +1,4 @@
-"""What the training asks of an image-editing model, and what is kept of a triplet for it."""
+"""The protocol of an image-editing model in training, and the stored form of a triplet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What encoders make of each triplet, computed once and kept: latents and embeddings on the disk.
+"""Encoders' outputs for each triplet, computed once and kept: latents and embeddings on the disk.
 
 A file's name is a hash of everything that it depends on: the triplet's own bytes, the encoders, the
 instruction, the size. So nothing is ever out of date, and trainings may share a folder.
@@ -33,7 +33,7 @@ GRIDS, SAID = "grids", ("embedding", "mask")
 
 @dataclass(frozen=True)
 class Encoding:
-    """How triplets are encoded."""
+    """The encoding of triplets."""
 
     model: EditModel
     weights: Path  # the pipeline's folder
@@ -70,7 +70,7 @@ class LatentsCache:
         self._common = encoding.fingerprint()
 
     def file(self, triplet: Stored) -> Path:
-        """Where a triplet's are, or will be."""
+        """Return the file of a triplet's encodings."""
         name = hashlib.sha256((self._common + triplet.content).encode()).hexdigest()[:32]
         return self._folder / f"{name}{ENDING}"
 

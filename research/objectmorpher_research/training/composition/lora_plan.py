@@ -1,4 +1,4 @@
-"""What to train, and how (paper 4.1): the same plan of the same triplets gives the same losses."""
+"""The plan of a training (paper 4.1): the same plan of the same triplets gives the same losses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NUMBERS = ("auto", "bfloat16", "float32")
 
 @dataclass(frozen=True)
 class LoraPlan:
-    """The paper's figures are the defaults; those it does not tell are marked."""
+    """A plan with the paper's figures as defaults; those that it does not give are marked."""
 
     model: str = "qwen"  # of edit_models.BACKENDS
     side: int = 1024  # px: pictures have about the square of it
@@ -53,7 +53,7 @@ class LoraPlan:
 def parted(
     triplets: tuple[Stored, ...], plan: LoraPlan
 ) -> tuple[tuple[Stored, ...], tuple[Stored, ...]]:
-    """Those to train on and those held out: by their content, so that more of them change little.
+    """Split triplets for training from those held out, by content, stable when some are added.
 
     Raises TrainingError where none is left.
     """

@@ -1,4 +1,4 @@
-"""How long a step takes and how much memory, at the published size, with random weights."""
+"""Time and memory of a step at the published size, with random weights."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SPREAD = 0.02  # of the random weights
 
 @dataclass(frozen=True)
 class Measured:
-    """One process's figures."""
+    """The figures of one process."""
 
     device: str  # its name
     number: str

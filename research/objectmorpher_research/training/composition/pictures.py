@@ -1,4 +1,4 @@
-"""Where one of a pair's pictures is: a file, half of one, a video's frame, a table's row.
+"""The location of a pair's picture: a file, half of one, a video's frame, a table's row.
 
 A `Picture` is a few words, so that a list of a hundred thousand pairs goes to any machine; the
 pixels are read where the pair is worked on.
@@ -26,7 +26,7 @@ IMAGE = "image"  # Subjects200K's column
 
 @dataclass(frozen=True)
 class Picture:
-    """Where a picture is."""
+    """The location of a picture."""
 
     path: str
     kind: Literal["file", "frame", "row"] = "file"

@@ -1,4 +1,4 @@
-"""From where it is known how an object that was lifted out of B stands in A.
+"""Sources of the pose of an object that was lifted out of B and stands in A.
 
 A source tells a motion, the world of A from the world of B (`camera.py`: each is its camera's own
 frame); the registration improves it. A source that tells none has every turn searched. `own` only
@@ -54,7 +54,7 @@ class PoseSource(Protocol):
         ...
 
     def motion(self, two: Two, progress: Progress, seed: int = 0) -> F64 | None:
-        """(4, 4) similarity, the world of A from the world of B; None where it cannot tell.
+        """Return the (4, 4) similarity from the world of B to that of A; None where it is unknown.
 
         Raises LiftError.
         """
@@ -82,7 +82,7 @@ def load(name: str) -> PoseSource:
 
 
 class OwnPoses:
-    """Nothing is known before: the registration looks for the pose."""
+    """No pose is known beforehand: the registration looks for it."""
 
     name = "own"
 
@@ -94,7 +94,7 @@ class OwnPoses:
 
 
 class CupidPoses:
-    """CUPID makes the object of each picture, and tells how each shows it."""
+    """CUPID makes the object of each picture, and with it the pose in each."""
 
     name = "cupid"
 

@@ -44,7 +44,7 @@ class Shard:
 
     @property
     def name(self) -> str:
-        """Of its folder."""
+        """Return its folder's name."""
         return f"shard-{self.number:05d}"
 
 
@@ -107,7 +107,7 @@ def write_shard(
 
 
 def finish(out: Path, shards: tuple[Shard, ...]) -> dict[str, Any]:
-    """What was made, when all shards are there; left-overs of killed processes go.
+    """Join the shards when all are there; left-overs of killed processes are removed.
 
     Raises TrainingError where one is missing.
     """

@@ -40,7 +40,7 @@ class Pair:
 
     @property
     def turned_round(self) -> Pair:
-        """The same two the other way."""
+        """Return the same two in the other order."""
         return replace(
             self, name=f"{self.name}-back", b=self.a, a=self.b, mask_b=self.mask_a,
             mask_a=self.mask_b,
@@ -49,7 +49,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Looking:
-    """How a source is read."""
+    """The reading of a source."""
 
     layout: str = "auto"  # of LAYOUTS
     both_ways: bool = True  # each pair also with its pictures exchanged
@@ -66,7 +66,7 @@ class Looking:
 
 
 def find_pairs(source: Path, how: Looking | None = None) -> tuple[Pair, ...]:
-    """All pairs of a file or a folder, in an order that depends on nothing but the names.
+    """Find all pairs of a file or a folder, in an order that depends on nothing but the names.
 
     Raises TrainingError where there is none.
     """

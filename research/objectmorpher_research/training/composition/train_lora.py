@@ -43,7 +43,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Course:
-    """How long, and what is done on the way; may change when it goes on."""
+    """The length of a training and its intermediate work; it may change on resumption."""
 
     steps: int = 2000
     saved: int = 50  # steps between two checkpoints

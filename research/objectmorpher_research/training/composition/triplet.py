@@ -53,7 +53,7 @@ class Rejected(ValueError):
 
 @dataclass(frozen=True)
 class Limits:
-    """What a triplet has to be."""
+    """The requirements on a triplet."""
 
     least_area: float = 0.01  # x the picture, of the object in each
     most_area: float = 0.7
@@ -68,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class How:
-    """How triplets are made."""
+    """The making of triplets."""
 
     segmenter: str = "auto"
     lifter: str = "auto"
@@ -90,14 +90,14 @@ class How:
 
 
 def how_from(told: dict[str, Any]) -> How:
-    """One out of `asdict(how)`."""
+    """Build one from `asdict(how)`."""
     values: dict[str, Any] = {**told, "limits": Limits(**told["limits"])}
     return How(**values)
 
 
 @dataclass(frozen=True, eq=False)
 class Triplet:
-    """What is trained on."""
+    """A triplet to train on."""
 
     b: RGB  # (H', W', 3)
     coarse: RGB  # (H, W, 3)
@@ -107,7 +107,7 @@ class Triplet:
 
 
 def make_triplet(pair: Pair, how: How, progress: Progress = silent) -> Triplet:
-    """The same pair gives the same triplet. Raises Rejected."""
+    """Make a triplet; the same pair gives the same one. Raises Rejected."""
     start, facts = time.perf_counter(), {"item": pair.item, "limits": how.limits.facts()}
     if pair.problem:
         raise Rejected(pair.problem, facts)
@@ -191,7 +191,7 @@ def _segmenter(name: str) -> segment.Segmenter:
 
 
 def registered(two: Two, how: How, progress: Progress = silent) -> tuple[tuple[Proposal, ...], str]:
-    """Where the object may stand in A, and whether it looks the same there in another pose.
+    """Return where the object may stand in A, and whether it looks the same there in another pose.
 
     A pose that is known comes as it is, and as the registration would have it. Raises LiftError.
     """

@@ -22,7 +22,7 @@ class Stored:
     folder: Path
 
     def file(self, picture: str) -> Path:
-        """Of one of PICTURES."""
+        """Return the file of one of PICTURES."""
         return self.folder / f"{self.name}.{picture}.png"
 
     def read(self) -> tuple[RGB, RGB, RGB]:
@@ -52,7 +52,7 @@ class Stored:
 
 
 def triplets_in(folder: Path) -> tuple[Stored, ...]:
-    """All that were made, in the order of shards and pairs. Raises TrainingError."""
+    """Return all triplets in the order of shards and pairs. Raises TrainingError."""
     if not (folder / PLAN).is_file():
         raise TrainingError(f"{folder} holds no triplets: make some by `objectmorpher train pairs`")
     found = [

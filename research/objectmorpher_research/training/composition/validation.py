@@ -1,4 +1,4 @@
-"""What the model makes of the triplets that are held out: B, coarse edit, made, A side by side."""
+"""The model's output for held-out triplets: B, coarse edit, output, A side by side."""
 
 from __future__ import annotations
 

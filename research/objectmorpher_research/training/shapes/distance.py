@@ -150,7 +150,7 @@ def _joined(a, b, soft):
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def distance(px, py, pz, solid, is_filled):
-    """To the object, and the part that is nearest; `is_filled`: cavities are not cut away."""
+    """Return the distance to the object, and the nearest part; `is_filled` keeps cavities uncut."""
     kinds, frames, numbers, joins, softness, cavities, balls, parts, bounds, outlines, warp = solid
     x, y, z = px, py, pz
     slow = 1.0
@@ -259,7 +259,7 @@ def _facing(n, d):
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def shade(x, y, z, way, solid, steps, sharp):
-    """How much of a lamp in the direction `way` reaches a place, in [0, 1]; soft-edged."""
+    """Return the share of a lamp in the direction `way` that reaches a place, in [0, 1]."""
     light, t = 1.0, 0.02
     for _ in range(steps):
         s, _ = distance(x + t * way[0], y + t * way[1], z + t * way[2], solid, False)

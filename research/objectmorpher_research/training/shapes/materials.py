@@ -1,4 +1,4 @@
-"""What made-up objects look like: photographs, prints, grain and plain colours, dull to shiny."""
+"""Materials of made-up objects: photographs, prints, grain and plain colours, dull to shiny."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SMALLEST_CROP = 90  # px of a photograph
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """Of a part; lengths are radii of the object's ball."""
+    """The material of a part; lengths are radii of the object's ball."""
 
     kind: int
     colours: F64  # (3, 3) in [0, 1], linear

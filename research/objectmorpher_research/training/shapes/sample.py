@@ -1,4 +1,4 @@
-"""One made-up photo of a made-up object, and the whole truth about its shape.
+"""A made-up photo of a made-up object, and the whole truth about its shape.
 
 Its units are those of `lift.crop`, in which the network sees a photo.
 """
@@ -69,7 +69,7 @@ class _Scene(NamedTuple):
 
 
 def make_sample(seed: int, side: int = SIDE, families: tuple[str, ...] | None = None) -> Sample:
-    """The same for the same numbers; `families`: names of those to choose from."""
+    """Make the sample of these numbers; `families` are the names of those to choose from."""
     for attempt in range(50):
         rng = np.random.default_rng([seed, attempt])
         names = families or tuple(FAMILIES)

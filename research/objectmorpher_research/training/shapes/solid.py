@@ -22,7 +22,7 @@ THINNEST = 0.006  # x the object's ball, half of a sheet: rays find it
 
 
 class Solid(NamedTuple):
-    """What the kernels of `distance` take; lengths in radii of the object's ball."""
+    """The input of the kernels of `distance`; lengths in radii of the object's ball."""
 
     kinds: np.ndarray  # (n,) of primitives
     frames: F64  # (n, 3, 4) object -> the primitive's own frame
@@ -38,7 +38,7 @@ class Solid(NamedTuple):
 
 
 class How(TypedDict, total=False):
-    """How a primitive is joined to those before it; cut, cavity, keep: at most one."""
+    """The joining of a primitive to those before it; cut, cavity, keep: at most one."""
 
     soft: float
     cut: bool

@@ -1,4 +1,4 @@
-"""One made-up object photographed several times: the camera goes around it, the scene changes."""
+"""A made-up object photographed several times: the camera goes around it, the scene changes."""
 
 from __future__ import annotations
 

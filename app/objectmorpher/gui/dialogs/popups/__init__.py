@@ -34,7 +34,7 @@ class Popups:
         }
 
     def draw(self, editor: Editor) -> None:
-        """Once a frame, over the panels."""
+        """Draw the open popup; once a frame, over the panels."""
         popup = editor.view.popup
         if popup is None:
             self._shortcuts.recording = None

@@ -1,4 +1,4 @@
-"""What this program is, and where its parts come from."""
+"""The About popup: this program, and the sources of its parts."""
 
 from __future__ import annotations
 

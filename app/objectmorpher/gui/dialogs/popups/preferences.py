@@ -1,4 +1,4 @@
-"""What the user prefers."""
+"""The preferences popup."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ STARS = int(imgui.InputTextFlags_.password)
 
 
 class ComputeFields:
-    """What is being typed, until it is left or Enter is pressed."""
+    """Text that is being typed, until the field is left or Enter is pressed."""
 
     def __init__(self) -> None:
         self._address: str | None = None  # None: as the settings say

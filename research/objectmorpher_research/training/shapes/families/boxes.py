@@ -16,7 +16,7 @@ BODY, FRONT, KNOB, MORE, GLASS = range(5)
 
 
 def boxes(rng: Rng) -> Builder:
-    """One of them, with its details."""
+    """Make a box with its details."""
     kinds = (
         _carton,
         _books,

@@ -66,7 +66,7 @@ def _windows(rng: Rng, built: Builder, middle: F64, half: F64, rows: int, column
 
 
 def house(rng: Rng, built: Builder) -> None:
-    """With a roof of some kind, windows, a chimney, a wing."""
+    """Make a house with a roof of some kind, windows, a chimney, a wing."""
     half = vec(0.8, 0.4, 0.5) * np.exp(rng.normal(0, 0.2, 3))
     middle = vec(0, half[1], 0)
     built.part(BODY)

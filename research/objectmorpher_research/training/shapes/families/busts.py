@@ -13,7 +13,7 @@ SKIN, HAIR, CLOTH, EYE, MORE = range(5)
 
 
 def busts(rng: Rng) -> Builder:
-    """One bust, head or hand; it looks along +z."""
+    """Make a bust, head or hand that looks along +z."""
     built = Builder()
     kind = rng.random()
     if kind < 0.25:

@@ -16,7 +16,7 @@ BODY, MORE, THIRD = range(3)
 
 
 def extrusions(rng: Rng) -> Builder:
-    """One of them, standing, leaning or lying."""
+    """Make an extrusion that stands, leans or lies."""
     kinds = (
         letter,
         letter,

@@ -30,7 +30,7 @@ class _Body(NamedTuple):
 
 
 def figures(rng: Rng) -> Builder:
-    """One figure, sometimes with a thing in its hand."""
+    """Make a figure, sometimes with a thing in its hand."""
     is_toy, is_stiff = chance(rng, 0.35), chance(rng, 0.2)
     body = _Body(
         vary(rng, 0.42),

@@ -11,13 +11,13 @@ GREEN, SKIN, MIDDLE, MORE = range(4)
 
 
 def fruit(rng: Rng, built: Builder) -> None:
-    """One fruit, or a bunch."""
+    """Make a fruit, or a bunch."""
     kinds = (_apple, _pear, _banana, _pumpkin, _grapes, _cherries, _pineapple, _slice, _strawberry)
     pick(rng, kinds)(rng, built)
 
 
 def vegetable(rng: Rng, built: Builder) -> None:
-    """One vegetable."""
+    """Make a vegetable."""
     kinds = (_carrot, _aubergine, _pepper, _tomatoes, _cabbage, _onion, _pod, _maize)
     pick(rng, kinds)(rng, built)
 

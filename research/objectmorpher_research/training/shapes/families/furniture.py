@@ -15,7 +15,7 @@ WOOD, SOFT, METAL, MORE = range(4)
 
 
 def furniture(rng: Rng) -> Builder:
-    """One piece."""
+    """Make a piece of furniture."""
     kinds = (
         _chair,
         _chair,

@@ -1,4 +1,4 @@
-"""What vessels have in common: hollow bodies, ears, saucers."""
+"""Common parts of vessels: hollow bodies, ears, saucers."""
 
 from __future__ import annotations
 

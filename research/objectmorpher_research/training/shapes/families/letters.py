@@ -77,7 +77,7 @@ def draw(
 
 
 def letter(rng: Rng, built: Builder, turn: F64) -> None:
-    """One letter or digit with straight, bevelled or round strokes; or O, C, D, P."""
+    """Make a letter or digit with straight, bevelled or round strokes; or O, C, D, P."""
     half, bevel = depth(rng)
     built.part(BODY)
     if chance(rng, 0.3):

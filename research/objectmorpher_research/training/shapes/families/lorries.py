@@ -84,7 +84,7 @@ def _load(rng: Rng, built: Builder, middle: F64, size: F64) -> None:
 
 
 def bus(rng: Rng, built: Builder) -> None:
-    """With one or two storeys."""
+    """Make a bus with one or two storeys."""
     wheel, wide, long = span(rng, 0.13, 0.18), span(rng, 0.28, 0.36), span(rng, 0.8, 1.4)
     storeys = pick(rng, (1, 1, 1, 2))
     high = 0.6 * span(rng, 0.9, 1.2) * (1 + 0.7 * (storeys - 1))

@@ -9,7 +9,7 @@ from .making import Rng, chance, span
 
 
 def superquadrics(rng: Rng) -> Builder:
-    """One to five that run into one another."""
+    """Make one to five superquadrics that run into one another."""
     built = Builder()
     soft = span(rng, 0, 0.3) if chance(rng, 0.6) else 0.0
     middles: list[np.ndarray] = []

@@ -1,4 +1,4 @@
-"""What the kinds of objects share: choices, outlines, tubes and limbs with a joint."""
+"""Common parts of all families: choices, outlines, tubes and limbs with a joint."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def pick(rng: Rng, choices: Sequence[T]) -> T:
-    """One of them, all as likely."""
+    """Pick one of them, all as likely."""
     return choices[int(rng.integers(len(choices)))]
 
 

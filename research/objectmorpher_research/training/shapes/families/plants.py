@@ -1,4 +1,4 @@
-"""What grows: flowers, potted plants, leaves, mushrooms, cacti, trees."""
+"""Plants: flowers, potted plants, leaves, mushrooms, cacti, trees."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GREEN, PETAL, MIDDLE, POT, MORE = range(5)
 
 
 def plants(rng: Rng) -> Builder:
-    """One of them."""
+    """Make a plant."""
     kinds = (
         _flower,
         _flower,

@@ -1,4 +1,4 @@
-"""What has a hole or is bent: rings, tubes, chains, tyres, wreaths, knots, springs, frames."""
+"""Things with a hole or a bend: rings, tubes, chains, tyres, wreaths, knots, springs, frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BODY, MORE, THIRD = range(3)
 
 
 def rings(rng: Rng) -> Builder:
-    """One of them, lying, standing or hanging."""
+    """Make one that lies, stands or hangs."""
     kinds = (
         _torus,
         _torus,

@@ -1,4 +1,4 @@
-"""What is thin or sewn: cloth, flags, paper, open books, umbrellas, pillows, hats, shoes, bags."""
+"""Thin or sewn things: cloth, flags, paper, open books, umbrellas, pillows, hats, shoes, bags."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ CLOTH, MORE, METAL, THIRD = range(4)
 
 
 def sheets(rng: Rng) -> Builder:
-    """One of them."""
+    """Make a sheet."""
     kinds = (
         _cloth,
         _cloth,

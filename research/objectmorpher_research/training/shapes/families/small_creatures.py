@@ -13,7 +13,7 @@ SKIN, OTHER, EYES, HORN = 0, 1, 2, 3
 
 
 def bird(rng: Rng) -> Builder:
-    """From ducks to storks; wings folded or spread."""
+    """Make a bird, from ducks to storks; wings folded or spread."""
     built = Builder()
     long, fat = 1.0, span(rng, 0.28, 0.45)
     leg = pick(rng, (0.05, 0.3, 0.35, 0.9)) * span(rng, 0.8, 1.2)
@@ -111,7 +111,7 @@ def _bird_leg(rng: Rng, built: Builder, middle: F64, fat: float, sign: int) -> N
 
 
 def fish(rng: Rng) -> Builder:
-    """From eels to discs, sharks and dolphins; bent a little as if they swam."""
+    """Make a fish, from eels to discs, sharks and dolphins; bent a little as if it swam."""
     built = Builder()
     high, wide = span(rng, 0.14, 0.5), span(rng, 0.1, 0.24)
     wag = rng.normal(0, 0.12)

@@ -15,7 +15,7 @@ STEEL, GRIP, MORE = range(3)
 
 
 def tool(rng: Rng, built: Builder, turn: F64) -> None:
-    """One tool in the plane of x and y of `turn`, its handle below."""
+    """Make a tool in the plane of x and y of `turn`, its handle below."""
     kinds = (
         _hammer,
         _spanner,

@@ -16,7 +16,7 @@ BODY, GLASS, TYRE, METAL, MORE, SEAT = range(6)
 
 
 def vehicles(rng: Rng) -> Builder:
-    """One that drives along +x, or flies or swims."""
+    """Make a vehicle that drives along +x, or flies or swims."""
     kinds = (
         _car,
         _car,

@@ -1,4 +1,4 @@
-"""What is turned about an axis: cups, bottles, bowls, lamps, pots, plates, candles, chessmen."""
+"""Things turned about an axis: cups, bottles, bowls, lamps, pots, plates, candles, chessmen."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BODY, LID, INSIDE, MORE = range(4)
 
 
 def lathe(rng: Rng) -> Builder:
-    """One vessel or turned thing."""
+    """Make a vessel or turned thing."""
     kinds = (
         _cup,
         _cup,
