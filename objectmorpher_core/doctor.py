@@ -28,7 +28,7 @@ PACKAGES = (
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageReport:
     """One stage of the work."""
 
     name: str
@@ -75,7 +75,7 @@ def look_at_machine() -> Machine:
     )  # fmt: skip
 
 
-def look_at_stages() -> tuple[Stage, ...]:
+def look_at_stages() -> tuple[StageReport, ...]:
     """Return each stage, in the order of the work."""
     stages = (
         (_selecting(), segment.BACKENDS), (_lifting(), lift.BACKENDS),
@@ -85,7 +85,7 @@ def look_at_stages() -> tuple[Stage, ...]:
     return tuple(able)
 
 
-def _able(stage: Stage, table: Iterable[str]) -> tuple[str, ...]:
+def _able(stage: StageReport, table: Iterable[str]) -> tuple[str, ...]:
     absent = dict(stage.others)
     return (*(name for name in table if name not in absent), *(name for name, _ in stage.also))
 
@@ -116,14 +116,14 @@ def _has_gpu() -> bool:
         return False
 
 
-def _selecting() -> Stage:
+def _selecting() -> StageReport:
     absent = backends.absent(segment.BACKENDS)
     chosen = segment.load("auto")
     uses, names = chosen.name, [name for name, _ in absent]
     if uses == "grabcut":
         why = "it goes by colour alone, and needs no model"
         better = "`objectmorpher models get`: a click is then a whole object"
-        return Stage("select", uses, why, absent, better)
+        return StageReport("select", uses, why, absent, better)
     if uses == "dino":
         slow = [name for name in segment.BACKENDS if "sam" in name and name not in names]
         told = f"{', '.join(slow)} would take minutes a photo" if slow else "no SAM is"
@@ -132,19 +132,19 @@ def _selecting() -> Stage:
             better = f"`{models.EXTRA}`, then {better}"
         if "subject" in names:
             better = "`objectmorpher models get u2netp`"
-        return Stage("select", uses, why, absent, better)
+        return StageReport("select", uses, why, absent, better)
     model = getattr(chosen, "model", lambda: None)()
     told = f"{model.id} is here" if model is not None else "it is here"
     better = "`objectmorpher models get u2netp`, for the subject" if "subject" in names else ""
-    return Stage("select", uses, told, absent, better)
+    return StageReport("select", uses, told, absent, better)
 
 
-def _lifting() -> Stage:
+def _lifting() -> StageReport:
     absent = backends.absent(lift.BACKENDS)
     lifter = lift.load("auto")
     name = getattr(lifter, "name", next(n for n in lift.BACKENDS if n not in dict(absent)))
     if name != "relief":
-        return Stage("lift", name, "it is here", absent)
+        return StageReport("lift", name, "it is here", absent)
     has_shape = models.path("dinov2-vits14") is not None and models.shipped.is_shipped()
     depth = depth_look.installed()
     has_depth = depth is not None
@@ -166,7 +166,7 @@ def _lifting() -> Stage:
     workers = _workers()
     absent += tuple((n, told) for n, told, is_there in workers if not is_there)
     also = tuple((n, told) for n, told, is_there in workers if is_there)
-    return Stage("lift", name, f"from {' and '.join(parts)}", absent, better, also)
+    return StageReport("lift", name, f"from {' and '.join(parts)}", absent, better, also)
 
 
 def _workers() -> list[tuple[str, str, bool]]:
@@ -184,24 +184,24 @@ def _workers() -> list[tuple[str, str, bool]]:
     return found
 
 
-def _filling() -> Stage:
+def _filling() -> StageReport:
     absent = backends.absent(compose.BACKENDS)
     chosen = compose.load("auto").name
     if chosen != "patchmatch":
         better = ""
         if chosen in ("lama", "migan") and _has_gpu():
             better = "`objectmorpher models get pixelhacker`, for this GPU"
-        return Stage(
+        return StageReport(
             "background", chosen, "the first of its stage that can run here", absent, better
         )
     why = "it copies from the photo, and needs no model"
     if "pixelhacker" not in dict(absent):
         why += "; pixelhacker would take minutes without a GPU"
     better = "to invent what the photo does not show: `objectmorpher models get lama`, or migan"
-    return Stage("background", chosen, why, absent, better)
+    return StageReport("background", chosen, why, absent, better)
 
 
-def _harmonising() -> Stage:
+def _harmonising() -> StageReport:
     absent = backends.absent(refine.BACKENDS)
     others = [name for name in compose.REFINERS if name != "none"]
     others += [name for name in refine.BACKENDS if name not in dict(absent)]
@@ -213,4 +213,4 @@ def _harmonising() -> Stage:
     if better and not _has_gpu():  # hours a picture without one
         better = f"a GPU of 12 GB, here or in a server (docs/serve.md): {better}"
     why = f"unless it is asked for by its name: {', '.join(others)}"
-    return Stage("refine", "none", why, absent, better)
+    return StageReport("refine", "none", why, absent, better)

@@ -61,7 +61,7 @@ class Card:
 
 
 @dataclass(frozen=True)
-class Step:
+class SetStep:
     """One of a set's models on a card."""
 
     model: HubModel
@@ -71,12 +71,12 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Offer:
+class SetOffer:
     """A set on a card."""
 
     set: ModelSet
     card: Card
-    steps: tuple[Step, ...]
+    steps: tuple[SetStep, ...]
     missing: int  # bytes that are still to be downloaded
 
     @property
@@ -115,13 +115,13 @@ def this_card() -> Card:
         return Card(0, host)
 
 
-def offers(card: Card | None = None) -> tuple[Offer, ...]:
+def offers(card: Card | None = None) -> tuple[SetOffer, ...]:
     """All sets on a card; None: this machine's."""
     here = card or this_card()
     return tuple(offer(each, here) for each in models.model_sets())
 
 
-def offer(wanted: ModelSet, card: Card) -> Offer:
+def offer(wanted: ModelSet, card: Card) -> SetOffer:
     """A set on a card, with what takes the place of models that do not fit it."""
     steps = []
     for id in wanted.models:
@@ -134,10 +134,10 @@ def offer(wanted: ModelSet, card: Card) -> Offer:
         steps.append(step)
     there = {step.model.id for step in steps if models.place(step.model.id) is not None}
     missing = sum(step.model.size for step in steps if step.model.id not in there)
-    return Offer(wanted, card, tuple(steps), missing)
+    return SetOffer(wanted, card, tuple(steps), missing)
 
 
-def get_set(chosen: Offer, progress: Progress = silent, accepted: str = "") -> None:
+def get_set(chosen: SetOffer, progress: Progress = silent, accepted: str = "") -> None:
     """Downloads all that is missing of a set, one after the other.
 
     Raises ModelError: one sentence, before anything starts where the disk is too small.
@@ -184,19 +184,19 @@ def need_of(model: HubModel) -> Needs | None:
     )
 
 
-def _step(id: str, card: Card) -> Step:
+def _step(id: str, card: Card) -> SetStep:
     model = models.hub_model(id)
     need = need_of(model)
     if need is None:
-        return Step(model, None)
+        return SetStep(model, None)
     try:
         plan = Ledger(card).plan(Model(id, id, need, lambda plan: plan))
     except ModelError as error:
-        return Step(model, None, str(error))
+        return SetStep(model, None, str(error))
     moved = 0
     if plan.way != "whole" and isinstance(need, PipelineNeed) and not plan.keeps:
         moved = plan.host * (STEPS if plan.way == "layers" else 1)
-    return Step(model, plan, "", 1e12 * OPERATIONS.get(id, 0.0) / SPEED + moved / BUS)
+    return SetStep(model, plan, "", 1e12 * OPERATIONS.get(id, 0.0) / SPEED + moved / BUS)
 
 
 def _beside(wanted: ModelSet, id: str) -> str:

@@ -35,12 +35,12 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
-from .lift.registration.importing import Scene, Source, place_import, register_file
+from .lift.registration.importing import ImportTarget, Source, place_import, register_file
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner
 from .scripting.report import Stopwatch, build_report
-from .scripting.runner import Refining, has_left, prompt_of, with_plate, with_refinement
+from .scripting.runner import RefineOptions, has_left, prompt_of, with_plate, with_refinement
 from .scripting.script import ALONE, EditScript, FurtherObject, Others, ScriptError
 from .segment import Found, Segmenter
 from .segment.mask_edit import is_selected
@@ -105,7 +105,7 @@ def lift_mask(
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
     matte = cut_out(pixels, mask)
-    subject = lift.Subject(pixels, camera, is_selected(mask), matte)
+    subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
     return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
 
 
@@ -262,7 +262,7 @@ def continue_script(
             document = edits.harmonised(document, k).with_backend("refine", "harmonise")
     if refiner is not None and any(item.is_moved for item in document.objects):
         with stopwatch.stage("refine"):
-            how = Refining(refiner, script.seed, script.refine_strength)
+            how = RefineOptions(refiner, script.seed, script.refine_strength)
             document = with_refinement(document, how, part(progress, 0.85, 0.95), run.puppets)
     edited = _finished(document, run.puppets, run.energies, progress, stopwatch)
     notes = (*notes, *runner.guesses(document, run.puppets))
@@ -387,7 +387,7 @@ def _lift(document: Document, k: int, script: EditScript, progress: Progress) ->
         )
         return edits.set_lifted(document, k, *made, settings)
     is_free = script.fov is None and not photo.picture.focal_35mm
-    scene = Scene(photo.pixels, photo.camera, mask, is_free)
+    scene = ImportTarget(photo.pixels, photo.camera, mask, is_free)
     source = Source(Path(script.splats), script.gaussians or COUNT, script.flip)
     found = register_file(source, scene, part(progress, 0.0, 0.8), script.seed)
     best = found.registration.best

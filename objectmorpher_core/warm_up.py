@@ -115,14 +115,14 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
 
 def _register(document: Document, thing: EditObject) -> None:
     """The object as if it came out of a file: looked for in every way it can stand, and refined."""
-    from .lift.registration.importing import Scene, place_import
+    from .lift.registration.importing import ImportTarget, place_import
     from .lift.registration.placement import Registrar
     from .lift.registration.search import search
     from .lift.registration.sketch import even_surfels, own_frame
 
     assert thing.lifted is not None and thing.mask is not None
     photo, gaussians = document.photo, thing.lifted.body
-    scene = Scene(photo.pixels, photo.camera, thing.mask)
+    scene = ImportTarget(photo.pixels, photo.camera, thing.mask)
     target, frame = scene.target, own_frame(gaussians)
     (few,) = even_surfels(gaussians, frame, (FEW_SURFELS,))
     search(few, target.view(FEW_PIXELS), target, (photo.camera.focal,), silent)

@@ -6,7 +6,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64, Mask
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.compose.shadow.shadow import Standing, ground_normal
+from objectmorpher_core.compose.shadow.shadow import StandingObject, ground_normal
 from objectmorpher_core.compose.silhouette import Silhouette, fine_grid
 from objectmorpher_core.document.settings import Shadow
 from objectmorpher_core.raster import tiles
@@ -44,8 +44,8 @@ def upright(mask: Mask, camera: Camera, ground: float, across: int = 60) -> F64:
     return rays * ((foot @ facing) / (rays @ facing))[:, None]
 
 
-def standing(mask: Mask, camera: Camera, ground: float = 20.0) -> Standing:
+def standing(mask: Mask, camera: Camera, ground: float = 20.0) -> StandingObject:
     """Such a board."""
     rows = np.flatnonzero(mask.any(1))
     normal = ground_normal(camera, None, Shadow(ground=ground), float(rows[-1]))
-    return Standing(upright(mask, camera, ground), normal, camera)
+    return StandingObject(upright(mask, camera, ground), normal, camera)

@@ -13,7 +13,7 @@ from panels import BLUE, RED, Dots, Lines, Panel, draw_figure, posed
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import Deformer
-from objectmorpher_core.deform.graph import LINK_RADIUS, Graph
+from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph
 from objectmorpher_core.deform.skinning import Skinned
 from objectmorpher_core.document.model import DeformSettings, Handle
 
@@ -40,7 +40,7 @@ class Dragged:
     panel: Panel
 
 
-def false_links(gap: Gap, graph: Graph) -> np.ndarray:
+def false_links(gap: Gap, graph: ControlGraph) -> np.ndarray:
     """(E, 2) control points of two parts, though the surface between them is long.
 
     Longer than the paper's own limit for a link, 0.3 diameters.

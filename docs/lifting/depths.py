@@ -11,17 +11,17 @@ from turning import AT, CAMERA, SHARE, SIDE, Shot, over_plate
 
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.relief import shape_look
-from objectmorpher_core.lift.relief.body import Body
+from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.shapes import completed, recognised
-from objectmorpher_research.training.shape_eval import Score, Surfaces, score, surfaces_of
+from objectmorpher_research.training.shape_eval import ShapeError, Surfaces, score, surfaces_of
 
 YAWS = range(0, 360, 45)  # degrees, from the side that the page's photo shows
 WAYS = ("network", "relief", "inflation", "flat")
 
 
-def depth_scores(meshes: Path) -> dict[str, dict[str, Score]]:
+def depth_scores(meshes: Path) -> dict[str, dict[str, ShapeError]]:
     """Of each solid the means over its views, by way."""
     found = {}
     for name in SOLIDS:
@@ -31,13 +31,13 @@ def depth_scores(meshes: Path) -> dict[str, dict[str, Score]]:
     return found
 
 
-def _scores(solid: Solid) -> dict[str, Score]:
+def _scores(solid: Solid) -> dict[str, ShapeError]:
     depth = CAMERA.focal / (SHARE * SIDE)
     view = mesh_view.draw(solid, solid.vertices + CAMERA.unproject(AT, depth), CAMERA)
     mask = (view.alpha > 0.5) & np.isfinite(view.depth)
     pixels = np.clip(over_plate(Shot(view.color, view.alpha)) * 255 + 0.5, 0, 255).astype(np.uint8)
-    outline = Silhouette.of(mask)
-    standing = Body.of(outline, CAMERA, LiftSettings())
+    outline = ReliefSilhouette.of(mask)
+    standing = ReliefBody.of(outline, CAMERA, LiftSettings())
     seen = shape_look.look(pixels, mask, CAMERA)
     assert seen is not None, "the network's weights are here"
     network = fused(standing, seen, CAMERA, 1.0, 1.0)
@@ -46,7 +46,7 @@ def _scores(solid: Solid) -> dict[str, Score]:
     bodies = {
         "network": network,
         "relief": standing,
-        "inflation": Body.of(outline, CAMERA, LiftSettings(is_standing=False)),
+        "inflation": ReliefBody.of(outline, CAMERA, LiftSettings(is_standing=False)),
     }
     ways = {way: surfaces_of(body, mask) for way, body in bodies.items()}
     flat = np.full(mask.shape, float(ways["inflation"].thickness[mask].mean()))
@@ -57,5 +57,5 @@ def _scores(solid: Solid) -> dict[str, Score]:
     return {way: score(surfaces, true, mask) for way, surfaces in ways.items()}
 
 
-def _mean(scores: list[Score]) -> Score:
-    return Score(*np.mean(scores, 0))
+def _mean(scores: list[ShapeError]) -> ShapeError:
+    return ShapeError(*np.mean(scores, 0))

@@ -25,12 +25,12 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
 )
-from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.relief.body import Body
-from objectmorpher_core.lift.relief.depth_prior import Seen
+from objectmorpher_core.lift import LiftSubject
+from objectmorpher_core.lift.relief.body import ReliefBody
+from objectmorpher_core.lift.relief.depth_prior import NetworkDepth
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.mirror import MirrorAxis
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.standing import FLAT
 from objectmorpher_core.lift.relief.thickness import Thickness
 from objectmorpher_core.pipeline import lift_mask
@@ -53,8 +53,8 @@ def results() -> list[Result]:
     alone = LiftSettings(uses_depth=False, trust=0)
     matte, lifted = lift_mask(pair.left, camera, pair.mask, settings=alone)
     _, learned = lift_mask(pair.left, camera, pair.mask, settings=replace(alone, trust=1.0))
-    seen = Seen(_filled(pair.disparity), (0, 0, width, height))
-    subject = Subject(pair.left, camera, pair.mask, matte)
+    seen = NetworkDepth(_filled(pair.disparity), (0, 0, width, height))
+    subject = LiftSubject(pair.left, camera, pair.mask, matte)
     _, inflated = lift_mask(
         pair.left, camera, pair.mask, settings=replace(alone, is_standing=False)
     )
@@ -80,14 +80,14 @@ def results() -> list[Result]:
 
 
 def _slab(
-    silhouette: Silhouette, camera: Camera, settings: LiftSettings, axis: MirrorAxis | None
-) -> Body:
+    silhouette: ReliefSilhouette, camera: Camera, settings: LiftSettings, axis: MirrorAxis | None
+) -> ReliefBody:
     """As thick everywhere as the relief is on average, and facing the camera."""
     inflated = Thickness.of(silhouette)
     half, _ = inflated.sample(silhouette.cells[silhouette.inside], silhouette.cell)
     even = np.full(silhouette.shape, float(half.mean()))
     side = inflated.mixed(even, np.ones(silhouette.shape))
-    return Body(silhouette, FLAT, np.zeros(silhouette.shape), side, side)
+    return ReliefBody(silhouette, FLAT, np.zeros(silhouette.shape), side, side)
 
 
 def _filled(disparity: F64) -> F32:

@@ -11,7 +11,7 @@ from objectmorpher_research.training import shape_eval
 
 FAR = ("turn 20", "turn 35")  # of which every solid is told
 TOLD = ("network", "relief", "card", "affine")  # likewise
-Depths = dict[str, dict[str, shape_eval.Score]]
+Depths = dict[str, dict[str, shape_eval.ShapeError]]
 
 HEAD = """# Lifting, measured
 
@@ -109,12 +109,12 @@ earlier run, in which the pictures took over from a stretch of 2.2 on.
 ## What a turn is to be believed
 
 A sign beside the gizmo and a report give the *risk* of a turn: the share of what is seen that the
-photo did not show, and four times how far the rest is expected to be off; half of it for what was recognised
-as a plain shape. Its numbers were chosen on box, mug, duck and ring: there it ranks 1 - IoU of
-twenty turns with a Spearman coefficient of 0.82, and PSNR with 0.74. On ball, brick, bunny,
+photo did not show, and four times how far the rest is expected to be off; half of it for what was
+recognised as a plain shape. Its numbers were chosen on box, mug, duck and ring: there it ranks 1 -
+IoU of twenty turns with a Spearman coefficient of 0.82, and PSNR with 0.74. On ball, brick, bunny,
 figure, robot and teddy, on which nothing was chosen, it is 0.62 and 0.62 of thirty turns; SSIM it
-ranks with 0.35 only. Below 0.25 the sign is *fine*, from 0.5 on *guesswork*. What one
-part of an object hides of another counts as invented although it may stay hidden.
+ranks with 0.35 only. Below 0.25 the sign is *fine*, from 0.5 on *guesswork*. What one part of an
+object hides of another counts as invented although it may stay hidden.
 
 `python docs/lifting/sheet.py` turns sixteen photos and measures them.
 """

@@ -28,8 +28,8 @@ from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.compose.composite import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import DeformSettings, LiftSettings, Matte, Placement, Pose
-from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.relief.depth_prior import Seen
+from objectmorpher_core.lift import LiftSubject
+from objectmorpher_core.lift.relief.depth_prior import NetworkDepth
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster.texture import TextureLevels
@@ -193,8 +193,8 @@ def measured(scene: Scene) -> dict[tuple[str, str], tuple[Shot, Score]]:
     """What each way predicts of each edit."""
     matte, lifted = lift_mask(scene.pixels, CAMERA, scene.mask, settings=ALONE)
     _, learned = lift_mask(scene.pixels, CAMERA, scene.mask, settings=SEEN)
-    seen = Seen((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
-    subject = Subject(scene.pixels, CAMERA, scene.mask, matte)
+    seen = NetworkDepth((37 * scene.inverse - 5).astype(np.float32), (0, 0, SIDE, SIDE))
+    subject = LiftSubject(scene.pixels, CAMERA, scene.mask, matte)
     deep = ReliefLifter(lambda pixels, mask: seen).lift(subject, LiftSettings(trust=0), silent)
     _, inflated = lift_mask(scene.pixels, CAMERA, scene.mask, settings=INFLATED)
     lifts = {"network": learned, "relief": lifted, "inflation": inflated, "depth": deep}

@@ -15,14 +15,14 @@ import numpy as np
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import GAUSSIANS, LiftSettings, Matte
-from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.registration.placement import Hints, Registrar, Registration, register
 from objectmorpher_core.lift.registration.view import Target
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_research.training.composition.made_pairs import FAMILIES, turn_of
 from objectmorpher_research.training.composition.pose_sources import Two, carried, matched
 from objectmorpher_research.training.composition.triplet import drawn_in
-from objectmorpher_research.training.shapes.views import View, make_views
+from objectmorpher_research.training.shapes.views import TrainingView, make_views
 
 SEED, COUNT = 7, 12
 SIDE = 320  # px
@@ -77,12 +77,14 @@ def main(count: int) -> None:
     (Path(__file__).parent / "pairs.md").write_text(page, "utf-8")
 
 
-def _measured(b: View, a: View) -> tuple[int, Row, Row, float]:
+def _measured(b: TrainingView, a: TrainingView) -> tuple[int, Row, Row, float]:
     """How many matches, the registration without them and with them, seconds of the second."""
     camera, nothing = Camera.from_fov(SIDE, SIDE), np.zeros((1, 1, 4), np.float32)
     matte, lifted = lift_mask(b.rgb, camera, b.mask, "auto", LiftSettings(GAUSSIANS))
     blank = Matte(0, 0, nothing[..., 3], nothing[..., :3])
-    two = Two(Subject(b.rgb, camera, b.mask, matte), Subject(a.rgb, camera, a.mask, blank), lifted)
+    two = Two(
+        LiftSubject(b.rgb, camera, b.mask, matte), LiftSubject(a.rgb, camera, a.mask, blank), lifted
+    )
     target, start = Target(a.rgb, a.mask, camera), carried(two) @ lifted.world_from_object
     blind = register(lifted.body, target, Hints(start=start))
     begun = time.process_time()

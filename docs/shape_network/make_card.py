@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from objectmorpher_core.lift.crop import Crop, planes_of
-from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeNet
+from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
 from objectmorpher_core.models import shipped
 from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
@@ -169,7 +169,7 @@ def _curve(curve: list[dict[str, float]], steps: int) -> str:
 
 def _draw_samples(path: Path) -> None:
     """Photo; front, true and found; normals, true and found; edges found. Two samples in a row."""
-    net, tokens = ShapeNet(shipped.shape_network()), dino_tokens.shared()
+    net, tokens = ShapeModel(shipped.shape_network()), dino_tokens.shared()
     rows = []
     for seed in UNSEEN:
         sample = make_sample(seed)

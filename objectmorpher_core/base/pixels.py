@@ -9,7 +9,7 @@ import numpy as np
 from .arrays import F32, Pixels
 
 
-class Samples(Protocol):
+class PixelSource(Protocol):
     """The stored pixels of a picture file (H, W, 1..4): an array, or a source of rows like one."""
 
     @property

@@ -38,7 +38,7 @@ class Silhouette:
 
 
 @dataclass(frozen=True)
-class Grid:
+class SilhouetteGrid:
     """A window on what the photo's camera sees, about an object."""
 
     left: float  # photo px, its corner; may be beside the photo
@@ -84,12 +84,12 @@ def sketched(splats: PosedSplats, most: int = SKETCHED) -> np.ndarray:
     return solid[:: max(len(solid) // most, 1)]
 
 
-def fine_grid(splats: PosedSplats, camera: Camera) -> Grid | None:
+def fine_grid(splats: PosedSplats, camera: Camera) -> SilhouetteGrid | None:
     """About all of an object; None where it is not seen."""
     return _grid(_box(splats, camera, splats.means), FINE, 1.0)
 
 
-def sketch_grid(splats: PosedSplats, few: np.ndarray, camera: Camera) -> Grid | None:
+def sketch_grid(splats: PosedSplats, few: np.ndarray, camera: Camera) -> SilhouetteGrid | None:
     """About the Gaussians `few`, with a few of them in each cell."""
     box = _box(splats, camera, splats.means[few])
     if box is None:
@@ -98,13 +98,15 @@ def sketch_grid(splats: PosedSplats, few: np.ndarray, camera: Camera) -> Grid | 
     return _grid(box, COARSE, float(np.sqrt(PER_CELL * (right - left) * (bottom - top) / len(few))))
 
 
-def _grid(box: Corners | None, most: int, least: float) -> Grid | None:
+def _grid(box: Corners | None, most: int, least: float) -> SilhouetteGrid | None:
     """Of at most `most` px, none smaller than `least` px of the photo, nor than one."""
     if box is None:
         return None
     (left, top), (right, bottom) = box
     pitch = max((right - left) / most, (bottom - top) / most, least, 1.0)
-    return Grid(left, top, pitch, _cells(right - left, pitch), _cells(bottom - top, pitch))
+    return SilhouetteGrid(
+        left, top, pitch, _cells(right - left, pitch), _cells(bottom - top, pitch)
+    )
 
 
 def _cells(length: float, pitch: float) -> int:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from ..base.arrays import F64, I32, Sparse
 from .anderson import Anderson, solve_small
 from .bodies import Bodies, Pivot
-from .constraints import Constraints, HeldResponse, Patch, Targets, followed
+from .constraints import Constraints, HeldResponse, StiffnessPatch, Targets, followed
 from .links import Links, in_single
 from .prestress import full_prestress, least_prestress
 from .response import build_response, product
@@ -216,7 +216,7 @@ class ArapSolver:
         members = self._bodies.members
         return csr_array(members.T @ matrix @ members)
 
-    def _patch(self, grounds: np.ndarray) -> Patch:
+    def _patch(self, grounds: np.ndarray) -> StiffnessPatch:
         """The Laplacian of the weights that were added, less the ties to the ground."""
         base, data = self.weights, self._links.weights.data
         changed = np.flatnonzero(data != base.data)
@@ -229,7 +229,7 @@ class ArapSolver:
         np.fill_diagonal(matrix, matrix.diagonal() - matrix.sum(1))
         tied = np.searchsorted(nodes, grounds)
         matrix[tied, tied] -= self._typical
-        return Patch(nodes, matrix)
+        return StiffnessPatch(nodes, matrix)
 
 
 @dataclass(frozen=True, eq=False)

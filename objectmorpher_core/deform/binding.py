@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import F64, I32, frozen
 from ..base.kernel_files import numba
 from ..base.threads import FAST, LEAST_ROWS, in_threads
-from .graph import Graph
+from .graph import ControlGraph
 
 LANES = 64  # points that are skinned together
 NEIGHBOURS = 4  # control points that move a Gaussian, paper 3.2.2
@@ -52,7 +52,10 @@ class Binding:
 
 
 def bind(
-    points: np.ndarray, control_points: np.ndarray, graph: Graph, normals: np.ndarray | None = None
+    points: np.ndarray,
+    control_points: np.ndarray,
+    graph: ControlGraph,
+    normals: np.ndarray | None = None,
 ) -> Binding:
     """Bind points (N, 3) or (3,) to their K = 4 nearest control points of (M, 3).
 

@@ -120,7 +120,7 @@ class Targets:
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
+class StiffnessPatch:
     """Stiffness that is added to (or, the ground's, taken from) a few unknowns."""
 
     nodes: np.ndarray  # (P,) unknowns
@@ -130,7 +130,9 @@ class Patch:
 class HeldResponse:
     """K^-1 with a patch and constraints: one thin product more than K^-1 alone."""
 
-    def __init__(self, response: Response, patch: Patch, rows: Sparse, compliance: F64) -> None:
+    def __init__(
+        self, response: Response, patch: StiffnessPatch, rows: Sparse, compliance: F64
+    ) -> None:
         """`rows` (H, n) of the constraints, `compliance` (H,) what each gives to a unit force.
 
         Unknowns p with (K + E D E^T) p + C^T f = b and C p - S f = t. With B = [E^T; C] and

@@ -23,10 +23,10 @@ from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
 from .faithful_skinning import skin_faithful
-from .graph import Graph, build_graph
-from .hold import Frozen, Grasp, Hold, Start, other_sides, stiffened
+from .graph import ControlGraph, build_graph
+from .hold import Frozen, Grasp, HandleRows, Start, other_sides, stiffened
 from .skinning import Motion, Skin, Skinned, skin
-from .surface_links import Surface
+from .surface_links import SolidSurface
 
 FAITHFUL_ITERATIONS = 3  # paper 3.2.2
 ITERATIONS = 400  # at most; the solve ends earlier when nothing moves
@@ -79,8 +79,8 @@ class Deformer:
         self.rig = rig or Rig()
         self.points = lifted.control_points.astype(np.float64)
         self.diameter = lifted.diameter
-        self._solid = Surface(lifted.body.means, lifted.body.normals)
-        self.graph: Graph = build_graph(self.points, settings, self._solid, self.rig.seams)
+        self._solid = SolidSurface(lifted.body.means, lifted.body.normals)
+        self.graph: ControlGraph = build_graph(self.points, settings, self._solid, self.rig.seams)
         self._means = frozen(lifted.gaussians.means, np.float64)
         self.binding = bind(self._means, self.points, self.graph, lifted.gaussians.normals)
         self._last_anchors: tuple[int, I32] | None = None  # those of a single handle
@@ -378,7 +378,7 @@ class Deformer:
                 ends = other_sides(points, self._solid, self.graph.mean_spacing, self.diameter)
                 hands = stiffened(self.points, self._solver.weights, points, ends, self.diameter)
             grasp = self._grasp(handles, points)
-            self._hold = Hold.of(handles, grasp, self.points, start)
+            self._hold = HandleRows.of(handles, grasp, self.points, start)
             self._solver.constrain(self._hold.constraints, hands)
             if start.pose is not None:
                 self._solver.aim(self._hold.targets(start.handles))

@@ -15,11 +15,13 @@ from ..base.kernel_files import numba
 from ..base.rotations import quats_from_matrices
 from ..base.threads import FAST, LEAST_ROWS, in_threads
 from .binding import Binding
-from .graph import Graph
+from .graph import ControlGraph
 from .skinning import Motion, Skinned
 
 
-def skin_faithful(points: np.ndarray, binding: Binding, motion: Motion, graph: Graph) -> Skinned:
+def skin_faithful(
+    points: np.ndarray, binding: Binding, motion: Motion, graph: ControlGraph
+) -> Skinned:
     """Rest points (N, 3) under paper Eq. 5; `linear` is a rotation times one scale.
 
     The signs of the quaternions are aligned before the mean. A control point's scale is the mean
@@ -35,7 +37,7 @@ def skin_faithful(points: np.ndarray, binding: Binding, motion: Motion, graph: G
     return Skinned(moved, linear)
 
 
-def _nodes(motion: Motion, graph: Graph) -> F64:
+def _nodes(motion: Motion, graph: ControlGraph) -> F64:
     """(M, 20) of each control point R - I, p' - p, p, its quaternion and its stretch."""
     count = len(motion.points)
     turns = (motion.rotations - np.eye(3)).reshape(count, 9)
@@ -45,7 +47,7 @@ def _nodes(motion: Motion, graph: Graph) -> F64:
     return frozen(np.hstack([turns, motion.points - rest, rest, quats, stretch]))
 
 
-def stretches(motion: Motion, graph: Graph) -> F64:
+def stretches(motion: Motion, graph: ControlGraph) -> F64:
     """(M,) mean ratio of the lengths of each control point's links, posed to rest; 1 without."""
     weights = graph.weights
     result = np.empty(len(motion.points))

@@ -16,8 +16,8 @@ from .surface_links import (
     CHUNK,
     TINY,
     Cells,
-    Edges,
-    Surface,
+    PointPairs,
+    SolidSurface,
     find_struts,
     weigh_struts,
     without_gaps,
@@ -33,7 +33,7 @@ USUAL = DeformSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Graph:
+class ControlGraph:
     """Links between control points, and distances along the surface."""
 
     weights: csr_array  # (M, M) symmetric, sorted, no diagonal and no stored zeros
@@ -60,9 +60,9 @@ class Graph:
 def build_graph(
     points: np.ndarray,
     settings: DeformSettings = USUAL,
-    surface: Surface | None = None,
+    surface: SolidSurface | None = None,
     seams: tuple[Seam, ...] = (),
-) -> Graph:
+) -> ControlGraph:
     """Build the paper's graph on control points (M, 3), object frame.
 
     An auxiliary graph joins points closer than twice the mean spacing; shortest paths on it are
@@ -86,10 +86,10 @@ def build_graph(
     centre = points.mean(0, dtype=np.float64)
     p = points - centre  # far from the origin digits would be lost
     spacing = _mean_spacing(p)
-    edges = Edges.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
+    edges = PointPairs.within(p, AUXILIARY_RADIUS * spacing, TINY * spacing)
     solid = cells = None
     if surface is not None and len(surface.means) and not settings.is_faithful:
-        solid = Surface(surface.means - centre, surface.normals)
+        solid = SolidSurface(surface.means - centre, surface.normals)
         edges, cells = without_gaps(edges, p, spacing, solid)
     edges = _sewn(edges, p, spacing, seams)
     auxiliary = edges.matrix(len(p), edges.lengths)
@@ -101,7 +101,7 @@ def build_graph(
     links, neighbours = _along(auxiliary, radius, spacing)
     missing = edges.where(edges.lengths > radius)
     if settings.links == "euclidean":
-        links, missing = Edges.within(p, radius, TINY * spacing), edges
+        links, missing = PointPairs.within(p, radius, TINY * spacing), edges
     links = links.and_also(missing, len(p)) if len(missing) else links
     links = links.where(~_is_cut(links, len(p), seams))
     weights = _weights(links, len(p), spacing, settings)
@@ -112,10 +112,10 @@ def build_graph(
         weights = _braced(weights, struts.where(is_within & ~_is_cut(struts, len(p), seams)))
     if cells is not None:
         cells = replace(cells, points=cells.points + centre)
-    return Graph(weights, auxiliary, neighbours, components.astype(np.int32), spacing, cells)
+    return ControlGraph(weights, auxiliary, neighbours, components.astype(np.int32), spacing, cells)
 
 
-def _braced(weights: csr_array, struts: Edges) -> csr_array:
+def _braced(weights: csr_array, struts: PointPairs) -> csr_array:
     """`weights` (M, M), and where a strut is the larger of its own and the link's."""
     if len(struts) == 0:
         return weights
@@ -123,7 +123,7 @@ def _braced(weights: csr_array, struts: Edges) -> csr_array:
     return csr_array(weights.maximum(struts.matrix(len(degree), weigh_struts(struts, degree))))
 
 
-def _weights(links: Edges, count: int, spacing: float, settings: DeformSettings) -> csr_array:
+def _weights(links: PointPairs, count: int, spacing: float, settings: DeformSettings) -> csr_array:
     """(M, M) exp(-g^2 / 2 s^2) of the links between `count` control points."""
     falloff = FALLOFF * settings.stiffness * spacing
     if settings.is_faithful and len(links):
@@ -172,7 +172,7 @@ def _diameter(points: F64) -> float:
     return float(np.sqrt(largest))
 
 
-def _sewn(edges: Edges, points: F64, spacing: float, seams: tuple[Seam, ...]) -> Edges:
+def _sewn(edges: PointPairs, points: F64, spacing: float, seams: tuple[Seam, ...]) -> PointPairs:
     """The auxiliary edges with those of glue, and without those that are cut."""
     for seam in seams:
         if not (seam.is_glued and len(seam.first) and len(seam.second)):
@@ -182,11 +182,11 @@ def _sewn(edges: Edges, points: F64, spacing: float, seams: tuple[Seam, ...]) ->
         back = first[KDTree(points[first]).query(points[second])[1]]
         a, b = np.concatenate([first, second]), np.concatenate([there, back])
         a, b = np.minimum(a, b)[a != b], np.maximum(a, b)[a != b]
-        edges = edges.and_also(Edges(a, b, np.full(len(a), spacing)), len(points))
+        edges = edges.and_also(PointPairs(a, b, np.full(len(a), spacing)), len(points))
     return edges.where(~_is_cut(edges, len(points), seams))
 
 
-def _is_cut(edges: Edges, count: int, seams: tuple[Seam, ...]) -> Mask:
+def _is_cut(edges: PointPairs, count: int, seams: tuple[Seam, ...]) -> Mask:
     """(E,) whether an edge on `count` control points crosses a cut."""
     crosses = np.zeros(len(edges), bool)
     for seam in seams:
@@ -198,14 +198,14 @@ def _is_cut(edges: Edges, count: int, seams: tuple[Seam, ...]) -> Mask:
     return crosses
 
 
-def _along(auxiliary: csr_array, radius: float, spacing: float) -> tuple[Edges, I32]:
+def _along(auxiliary: csr_array, radius: float, spacing: float) -> tuple[PointPairs, I32]:
     """Pairs within `radius` along the surface, and each control point's nearest (M, 16)."""
     parts = connected_components(auxiliary, directed=False)[1]
     count = len(parts)
     wanted = np.minimum(np.bincount(parts)[parts], NEIGHBOURS)
     neighbours = np.empty((count, min(NEIGHBOURS, count)), np.int32)
     limit = usual = max(radius, REACH * FALLOFF * spacing)
-    found: list[Edges] = []
+    found: list[PointPairs] = []
     rows = np.arange(count)
     while len(rows):
         for start in range(0, len(rows), CHUNK):
@@ -214,12 +214,12 @@ def _along(auxiliary: csr_array, radius: float, spacing: float) -> tuple[Edges, 
             neighbours[own] = _nearest(distances, neighbours.shape[1])
             if limit == usual:
                 i, j = np.nonzero((distances <= radius) & (np.arange(count) > own[:, None]))
-                found.append(Edges(own[i], j, distances[i, j]))
+                found.append(PointPairs(own[i], j, distances[i, j]))
         # On a thin limb sixteen neighbours are far: once more for those who miss some.
         rows = np.flatnonzero((neighbours >= 0).sum(1) < wanted)
         limit *= 2
     first, second = (np.concatenate([getattr(e, k) for e in found]) for k in ("first", "second"))
-    return Edges(first, second, np.concatenate([e.lengths for e in found])), neighbours
+    return PointPairs(first, second, np.concatenate([e.lengths for e in found])), neighbours
 
 
 def _nearest(distances: F64, count: int) -> I32:

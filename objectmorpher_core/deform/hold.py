@@ -13,7 +13,7 @@ from ..document.model import Handle, Pose
 from ..document.rig import Rig
 from .binding import Binding
 from .constraints import Constraints, Targets
-from .surface_links import Surface, thickness
+from .surface_links import SolidSurface, thickness
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class HandleRows:
     """The rows of a set of handles. They depend on where the handles begin only."""
 
     constraints: Constraints
@@ -62,7 +62,7 @@ class Hold:
     turned: F64  # (T, 3, 3) rotations of the turned control points at the start
 
     @classmethod
-    def of(cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, start: Start) -> Hold:
+    def of(cls, handles: tuple[Handle, ...], grasp: Grasp, points: F64, start: Start) -> HandleRows:
         """`points` (M, 3) control points at rest; anchors stay, if no handle is on them.
 
         A handle is the surface point that the artist clicked. One that is turned too takes the
@@ -139,7 +139,7 @@ DEEPEST = 0.6  # x diameter, that a hand reaches through
 SHARED = 0.5  # x distance to the next handle: over this much two hands let go towards the middle
 
 
-def other_sides(handles: F64, surface: Surface, spacing: float, diameter: float) -> F64:
+def other_sides(handles: F64, surface: SolidSurface, spacing: float, diameter: float) -> F64:
     """(H, 3) where the body ends behind surface points (H, 3); themselves where none is met.
 
     `spacing` is the control points' mean one; all in the object frame.

@@ -43,7 +43,7 @@ TINY = 1e-9  # x mean spacing: coincident points; to scipy 0 is no edge
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class SolidSurface:
     """The solid Gaussians between the control points."""
 
     means: np.ndarray  # (N, 3) object frame
@@ -86,7 +86,7 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class PointPairs:
     """Pairs of points, each pair once, with the smaller number first."""
 
     first: np.ndarray  # (E,)
@@ -97,33 +97,33 @@ class Edges:
         return len(self.first)
 
     @staticmethod
-    def within(points: F64, radius: float, shortest: float) -> Edges:
+    def within(points: F64, radius: float, shortest: float) -> PointPairs:
         """Return all pairs of points (N, 3) within `radius`; no length is below `shortest`."""
         # On a grid many pairs are just at the radius: rounding must not decide about them.
         tree = KDTree(points, balanced_tree=False, compact_nodes=False)
         first, second = tree.query_pairs(radius * (1 + 1e-9), output_type="ndarray").T.copy()
         gaps = points.take(second, 0) - points.take(first, 0)
         lengths = np.sqrt(np.einsum("ij,ij->i", gaps, gaps))
-        return Edges(first, second, np.maximum(lengths, shortest))
+        return PointPairs(first, second, np.maximum(lengths, shortest))
 
-    def where(self, kept: np.ndarray) -> Edges:
+    def where(self, kept: np.ndarray) -> PointPairs:
         """Return the edges named by `kept`, a list of numbers or a mask."""
-        return Edges(self.first[kept], self.second[kept], self.lengths[kept])
+        return PointPairs(self.first[kept], self.second[kept], self.lengths[kept])
 
-    def and_also(self, others: Edges, count: int) -> Edges:
+    def and_also(self, others: PointPairs, count: int) -> PointPairs:
         """The edges of both, on `count` points; where both have one, the shorter."""
         first = np.concatenate([self.first, others.first])
         second = np.concatenate([self.second, others.second])
         lengths = np.concatenate([self.lengths, others.lengths])
-        return Edges(first, second, lengths).shortest(count)
+        return PointPairs(first, second, lengths).shortest(count)
 
-    def shortest(self, count: int) -> Edges:
+    def shortest(self, count: int) -> PointPairs:
         """Return the shortest of several edges between two of `count` points."""
         keys = self.first.astype(np.int64) * count + self.second
         keys, place = np.unique(keys, return_inverse=True)
         lengths = np.full(len(keys), np.inf)
         np.minimum.at(lengths, place, self.lengths)
-        return Edges(keys // count, keys % count, lengths)
+        return PointPairs(keys // count, keys % count, lengths)
 
     def matrix(self, count: int, values: F64) -> csr_array:
         """(count, count) symmetric, of the edges' `values` (E,)."""
@@ -143,7 +143,7 @@ class _Attitude:
     between: F64  # of the normals with each other
 
     @staticmethod
-    def of(edges: Edges, points: F64, normals: F64) -> _Attitude:
+    def of(edges: PointPairs, points: F64, normals: F64) -> _Attitude:
         """`points` and `normals` (N, 3)."""
         along = points.take(edges.second, 0) - points.take(edges.first, 0)
         along /= edges.lengths[:, None]
@@ -154,8 +154,8 @@ class _Attitude:
 
 
 def without_gaps(
-    edges: Edges, points: F64, spacing: float, surface: Surface
-) -> tuple[Edges, Cells | None]:
+    edges: PointPairs, points: F64, spacing: float, surface: SolidSurface
+) -> tuple[PointPairs, Cells | None]:
     """Return the `edges` between control points (M, 3) that do not bridge a gap, and the cells.
 
     There are no cells where no gap is in question. `spacing` is the control points' mean one. An
@@ -187,20 +187,20 @@ def without_gaps(
 class _Sheet:
     """The Gaussians as cells around the control points."""
 
-    cells: Edges  # of neighbouring cells, as long as the way between their control points
+    cells: PointPairs  # of neighbouring cells, as long as the way between their control points
     counts: np.ndarray  # (M,) Gaussians of each cell
     has_gap: Mask  # (M,) whether another surface faces the cell or its surroundings
     owned: Cells
 
     @staticmethod
-    def of(points: F64, normals: F64, spacing: float, surface: Surface) -> _Sheet:
+    def of(points: F64, normals: F64, spacing: float, surface: SolidSurface) -> _Sheet:
         """Build the links of control points (M, 3) with `normals` (M, 3), `spacing` apart."""
         count = len(points)
         grain = GRAIN * spacing * min(1.0, np.sqrt(count / EVEN_COUNT))
         x, n = _thinned(points, normals, grain, surface)
         sixth = KDTree(x).query(x[:: max(1, len(x) // 1000)], k=min(7, len(x)))[0][:, -1]
         radius = min(max(JOIN * grain, SPARSE_JOIN * np.median(sixth)), WIDEST_JOIN * spacing)
-        near = Edges.within(x, radius, TINY * spacing)
+        near = PointPairs.within(x, radius, TINY * spacing)
         is_across, is_near_gap = _gaps(near, x, n)
         joined = near.where(~is_across)
         upper = csr_array((joined.lengths, (joined.first, joined.second)), shape=(len(x),) * 2)
@@ -209,7 +209,7 @@ class _Sheet:
         )
         a, b = owners[joined.first], owners[joined.second]
         lengths = distances[joined.first] + joined.lengths + distances[joined.second]
-        between = Edges(np.minimum(a, b), np.maximum(a, b), lengths).where((a != b) & (a >= 0))
+        between = PointPairs(np.minimum(a, b), np.maximum(a, b), lengths).where((a != b) & (a >= 0))
         is_owned = owners >= 0
         counts = np.bincount(owners[is_owned], minlength=count)
         gaps = np.bincount(owners[is_owned & is_near_gap], minlength=count)
@@ -217,7 +217,7 @@ class _Sheet:
         return _Sheet(between.shortest(count), counts, gaps > 0, owned)
 
 
-def _thinned(points: F64, normals: F64, grain: float, surface: Surface) -> tuple[F64, F64]:
+def _thinned(points: F64, normals: F64, grain: float, surface: SolidSurface) -> tuple[F64, F64]:
     """Positions and normals (K, 3): control points, and Gaussians between, a `grain` apart."""
     x = np.concatenate([points, surface.means])
     n = np.concatenate([normals, surface.normals])
@@ -226,7 +226,7 @@ def _thinned(points: F64, normals: F64, grain: float, surface: Surface) -> tuple
     return x[kept], n[kept]
 
 
-def _gaps(near: Edges, x: F64, n: F64) -> tuple[Mask, Mask]:
+def _gaps(near: PointPairs, x: F64, n: F64) -> tuple[Mask, Mask]:
     """Which pairs (E,) of near Gaussians face each other, and which Gaussians (K,) are near such.
 
     The sides of a crease face each other, too, and are joined by the Gaussians close to it: what
@@ -247,7 +247,7 @@ def _gaps(near: Edges, x: F64, n: F64) -> tuple[Mask, Mask]:
     return is_facing | is_touching, is_near_gap
 
 
-def _is_detour(edges: Edges, ways: csr_array) -> Mask:
+def _is_detour(edges: PointPairs, ways: csr_array) -> Mask:
     """(E,) whether the way between the ends on the graph `ways` (M, M) is much longer."""
     detour = np.ones(len(edges), bool)
     if not len(edges):
@@ -261,7 +261,7 @@ def _is_detour(edges: Edges, ways: csr_array) -> Mask:
     return detour
 
 
-def _still_needed(edges: Edges, is_false: Mask, ways: csr_array) -> list[int]:
+def _still_needed(edges: PointPairs, is_false: Mask, ways: csr_array) -> list[int]:
     """Numbers of the false edges without which a part of the graph `ways` would fall apart.
 
     The shortest that do (Kruskal 1956): a narrow neck, say, all of whose edges look false.
@@ -294,7 +294,7 @@ EXIT = 0.3  # cosine of its normal and the way in, from which the way leaves the
 ROOM = 1.0  # x mean spacing, that a strut may be longer than the body is thick
 
 
-def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> Edges:
+def find_struts(points: F64, spacing: float, reach: float, surface: SolidSurface) -> PointPairs:
     """Pairs of control points (M, 3) on opposite sides of a limb, at most `reach` apart.
 
     A strut ends where the body does: one from the far side of a finger through the next finger,
@@ -318,10 +318,12 @@ def find_struts(points: F64, spacing: float, reach: float, surface: Surface) -> 
     depths = thickness(points[asked], normals[asked], spacing, radius, surface)
     limits[asked] = depths + ROOM * spacing
     is_flesh = lengths <= np.minimum(limits[i], limits[j])
-    return Edges(i[is_flesh], j[is_flesh], lengths[is_flesh])
+    return PointPairs(i[is_flesh], j[is_flesh], lengths[is_flesh])
 
 
-def thickness(points: F64, normals: F64, spacing: float, radius: float, surface: Surface) -> F64:
+def thickness(
+    points: F64, normals: F64, spacing: float, radius: float, surface: SolidSurface
+) -> F64:
     """Return the body's thickness (M,) under surface points (M, 3), measured against their normals.
 
     The first of some points on the way in at which a surface faces outwards; 0 where there is none
@@ -334,7 +336,7 @@ def thickness(points: F64, normals: F64, spacing: float, radius: float, surface:
     return thickness
 
 
-def weigh_struts(struts: Edges, degree: F64) -> F64:
+def weigh_struts(struts: PointPairs, degree: F64) -> F64:
     """Weights (E,) of the struts; `degree` (M,) is the sum of each control point's links."""
     counts = np.bincount(np.concatenate([struts.first, struts.second]), minlength=len(degree))
     crowd = np.sqrt(counts[struts.first] * counts[struts.second])

@@ -75,7 +75,7 @@ def _foot(points: np.ndarray, down: np.ndarray) -> F64:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class HeldPoint:
     """A placed object, held by one of its points."""
 
     placement: Placement

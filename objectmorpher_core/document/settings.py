@@ -27,8 +27,7 @@ class Hint:
             raise ValueError(f"a hint's radius is {self.radius:g} px")
 
     def moved(self, dx: float, dy: float, scale: tuple[float, float] = (1.0, 1.0)) -> Hint:
-        """Return the same in px of a picture with its corner at (-dx, -dy), `scale` across, down.
-        """
+        """Return the hint in px of a picture at (-dx, -dy) that is `scale` times as fine."""
         (a, b), (c, d) = self.source, self.to
         source = (a + dx) * scale[0], (b + dy) * scale[1]
         return Hint(source, ((c + dx) * scale[0], (d + dy) * scale[1]), self.radius * min(scale))

@@ -17,7 +17,7 @@ class LiftError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class LiftSubject:
     """The object that is to be lifted, as the photo shows it."""
 
     pixels: Pixels  # (H, W, 3) the photo
@@ -36,7 +36,7 @@ class Lifter(Protocol):
         ...
 
     def lift(
-        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
         """About `settings.count` Gaussians of the subject, with its control points.
 

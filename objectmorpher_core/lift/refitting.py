@@ -20,10 +20,10 @@ from ..compose.plate.repair import Uncovering, refitted_plate
 from ..document.model import Document, LiftedObject, LiftSettings, Matte, Plate
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
-from . import Subject, load
+from . import LiftSubject, load
 from .refit import refitted_shape
 from .registration.imported import rematted
-from .registration.importing import Scene
+from .registration.importing import ImportTarget
 from .relief.spreading import BRIM
 
 BLEND = 2.0  # x band: over so much the old cut-out goes over into the new one
@@ -59,7 +59,7 @@ class Refitted:
 
 def refit(
     was: Lifted,
-    scene: Scene,
+    scene: ImportTarget,
     behind: Background | None,
     progress: Progress = silent,
     seed: int = 0,
@@ -94,7 +94,7 @@ def _covered(matte: Matte, size: tuple[int, ...]) -> Mask:
 
 
 def refit_object(
-    was: Lifted, scene: Scene, progress: Progress = silent, seed: int = 0
+    was: Lifted, scene: ImportTarget, progress: Progress = silent, seed: int = 0
 ) -> tuple[Matte, LiftedObject]:
     """Cut-out and shape of `scene.mask`, a refined selection of what was lifted.
 
@@ -111,7 +111,7 @@ def refit_object(
         shown = rematted(lifted, matte, camera, seed)
         return matte, replace(shown, backend=lifted.backend)
     lifter = load("relief")  # the only one that knows a middle sheet
-    subject = Subject(scene.pixels, camera, is_selected(scene.mask), matte)
+    subject = LiftSubject(scene.pixels, camera, is_selected(scene.mask), matte)
     fresh = lifter.lift(subject, was.shape, part(progress, 0.3, 1.0), seed)
     spacing = lifted.spacing * lifted.scale * camera.focal / float(lifted.centre[2])
     reach = band_width(camera.width, camera.height) + BRIM * spacing

@@ -8,7 +8,7 @@ folder of the user's (`hub.py`).
 
 from . import shipped
 from .added import KINDS, Added, add, added, remove
-from .fetch import OFFLINE, State, fetch, folder, look, path, remove_weight, verify
+from .fetch import OFFLINE, CacheState, fetch, folder, look, path, remove_weight, verify
 from .hub import (
     EXTRA,
     HubState,
@@ -47,11 +47,11 @@ __all__ = [
     "KINDS",
     "OFFLINE",
     "Added",
+    "CacheState",
     "HubModel",
     "HubState",
     "ModelError",
     "ModelSet",
-    "State",
     "Trunk",
     "TrunkState",
     "Weight",

@@ -23,7 +23,7 @@ NOTE = ".json"  # ending of the note beside a file
 
 
 @dataclass(frozen=True)
-class Kind:
+class AddedKind:
     """A kind of file that a user can add."""
 
     id: str
@@ -33,7 +33,7 @@ class Kind:
 
 
 KINDS = (
-    Kind(
+    AddedKind(
         "depth", "depth.onnx", "the depth of a lifted object's front, where the outline tells none",
         "an ONNX export of Depth-Anything-V2-Small (Apache-2.0)",
     ),
@@ -44,7 +44,7 @@ KINDS = (
 class Added:
     """The cache's state of a kind."""
 
-    kind: Kind
+    kind: AddedKind
     path: Path  # where it is, or would be
     state: Literal["ok", "missing", "damaged"]
     name: str = ""  # of the user's file
@@ -55,7 +55,7 @@ class Added:
 _looked: dict[tuple[str, int, int, str], bool] = {}  # path, bytes, mtime ns, hash -> it is right
 
 
-def kind(id: str) -> Kind:
+def kind(id: str) -> AddedKind:
     """The kind called `id`; raises ModelError with the known names."""
     for known in KINDS:
         if known.id == id:

@@ -38,7 +38,7 @@ _verified: dict[tuple[str, int, int], bool] = {}  # (path, bytes, mtime ns) -> h
 
 
 @dataclass(frozen=True)
-class State:
+class CacheState:
     """The cache's state of a weight."""
 
     weight: Weight
@@ -59,12 +59,12 @@ def path(id: str) -> Path | None:
     return state.path if state.state == "ok" else None
 
 
-def look(id: str | None = None) -> tuple[State, ...]:
+def look(id: str | None = None) -> tuple[CacheState, ...]:
     """Return the cache's state of weight `id`, or of all; a file is hashed once in a process."""
     return tuple(_state(known) for known in (weights() if id is None else (weight(id),)))
 
 
-def verify(id: str | None = None) -> tuple[State, ...]:
+def verify(id: str | None = None) -> tuple[CacheState, ...]:
     """Return the cache's state of weight `id`, or of all, with every file hashed afresh."""
     _verified.clear()
     return look(id)
@@ -106,17 +106,17 @@ def check_online(id: str) -> None:
         raise ModelError(f"{id} is not here, and {OFFLINE} says to download nothing")
 
 
-def _state(known: Weight) -> State:
+def _state(known: Weight) -> CacheState:
     """What the cache holds of `known`; a hash is computed once per file and process."""
     at = folder() / known.file
     try:
         found = at.stat()
     except OSError:
-        return State(known, at, "missing")
+        return CacheState(known, at, "missing")
     key = (str(at), found.st_size, found.st_mtime_ns)
     if key not in _verified:
         _verified[key] = found.st_size == known.size and sha256_of(at) == known.sha256
-    return State(known, at, "ok" if _verified[key] else "damaged")
+    return CacheState(known, at, "ok" if _verified[key] else "damaged")
 
 
 def sha256_of(at: Path) -> str:

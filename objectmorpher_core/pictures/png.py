@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import cv2
 import numpy as np
 
-from ..base.pixels import Samples
+from ..base.pixels import PixelSource
 from ..base.threads import core_count
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -50,7 +50,7 @@ def read_16_bit(data: bytes) -> np.ndarray:
     return cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
 
 
-def encode(samples: Samples, icc: bytes | None, exif: bytes | None) -> bytes:
+def encode(samples: PixelSource, icc: bytes | None, exif: bytes | None) -> bytes:
     """PNG file of samples (H, W, 1..4) u8 or u16: grey, grey + alpha, RGB or RGBA.
 
     The rows are filtered and deflated in strips, on all cores. For photos run lengths deflate

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 from PIL.TiffTags import LONG, SHORT, UNDEFINED
 
-from ..base.pixels import Samples
+from ..base.pixels import PixelSource
 
 if TYPE_CHECKING:
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
@@ -94,7 +94,7 @@ def _unpremultiplied(samples: np.ndarray) -> np.ndarray:
     return np.concatenate([colours.astype(np.uint16), samples[..., -1:]], axis=2)
 
 
-def encode(samples: Samples, icc: bytes | None, exif: bytes | None) -> bytes:
+def encode(samples: PixelSource, icc: bytes | None, exif: bytes | None) -> bytes:
     """Little-endian, deflated TIFF file of samples (H, W, 1..4) u8 or u16."""
     height, width, channels = samples.shape
     rows = max(1, STRIP_BYTES // (width * channels * samples.dtype.itemsize))

@@ -35,7 +35,15 @@ import numpy as np
 from ..base.arrays import F64
 from ..base.camera import Camera
 from .posed import PosedSplats, projection_jacobians, view_limits
-from .reference_layers import MEDIAN, Composite, Picture3D, Projected, Samples, Sums, smoothstep
+from .reference_layers import (
+    MEDIAN,
+    GaussianSamples,
+    Picture3D,
+    Projected,
+    ReferenceComposite,
+    Sums,
+    smoothstep,
+)
 from .rules import LAYERS, RULES, Splatting
 from .texture import TextureLevels
 
@@ -145,7 +153,7 @@ def _cosines(normals: F64, motion: F64, means: F64) -> F64:
     return -(moved * means).sum(1) / np.maximum(lengths, 1e-30)
 
 
-def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> Samples | None:
+def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> GaussianSamples | None:
     """Gaussian `i` on the pixels that it may touch, None where there are none."""
     kind = splats.rest.splatting
     x0, y0 = np.floor(p.centre[i] - p.extent[i]).astype(int).clip(0, (camera.width, camera.height))
@@ -163,7 +171,7 @@ def _sampled(p: Projected, i: int, splats: PosedSplats, camera: Camera) -> Sampl
     depth = p.depth[i] + p.slope[i, 0] * dx + p.slope[i, 1] * dy
     shift = p.shift[i] + np.stack([dx, dy], -1) @ p.shift_slope[i].T
     window = (slice(y0, y1), slice(x0, x1))
-    return Samples(window, alpha, np.where(alpha[..., None] > 0, gradient, 0), depth, shift)
+    return GaussianSamples(window, alpha, np.where(alpha[..., None] > 0, gradient, 0), depth, shift)
 
 
 def render(
@@ -175,7 +183,7 @@ def render(
     there = [(i, s) for i, s in enumerate(samples) if s is not None]
     if not splats.is_layered:
         return _composite_one_by_one(p, there, camera)
-    out = Composite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
+    out = ReferenceComposite(texture, camera, photo_camera, splats.rest.splatting.is_surface)
     fronts: list[_Front] = []
     for layer in range(LAYERS):
         shares = {i: _remaining(p, i, s, fronts, splats) for i, s in there}
@@ -194,7 +202,7 @@ def render(
 
 
 def _composite_one_by_one(
-    p: Projected, there: list[tuple[int, Samples]], camera: Camera
+    p: Projected, there: list[tuple[int, GaussianSamples]], camera: Camera
 ) -> Picture3D:
     """Step 3. The depth is that of the sample with which alpha reaches a half, else the mean."""
     shape = (camera.height, camera.width)
@@ -225,7 +233,7 @@ class _Front:
 
 
 def _find_front(
-    p: Projected, there: list[tuple[int, Samples]], shares: dict[int, F64], camera: Camera
+    p: Projected, there: list[tuple[int, GaussianSamples]], shares: dict[int, F64], camera: Camera
 ) -> _Front:
     """The nearest samples of those that are left: `shares` of each, (h, w) of its box."""
     shape = (camera.height, camera.width)
@@ -240,7 +248,9 @@ def _find_front(
     return _Front(depth, shift, is_photo)
 
 
-def _membership(p: Projected, i: int, s: Samples, front: _Front, splats: PosedSplats) -> F64:
+def _membership(
+    p: Projected, i: int, s: GaussianSamples, front: _Front, splats: PosedSplats
+) -> F64:
     """(h, w) of a box: how much of a sample belongs to the layer of `front`."""
     depth, shift = front.depth[s.window], front.shift[s.window]
     there = np.isfinite(depth)
@@ -251,7 +261,9 @@ def _membership(p: Projected, i: int, s: Samples, front: _Front, splats: PosedSp
     return smoothstep(away**2, RULES.fade**2, 1.0)
 
 
-def _remaining(p: Projected, i: int, s: Samples, fronts: list[_Front], splats: PosedSplats) -> F64:
+def _remaining(
+    p: Projected, i: int, s: GaussianSamples, fronts: list[_Front], splats: PosedSplats
+) -> F64:
     """(h, w) of a box: the share of a sample that belongs to none of the layers so far."""
     left = np.ones(s.alpha.shape)
     for front in fronts:

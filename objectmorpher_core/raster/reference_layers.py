@@ -50,7 +50,7 @@ class Projected:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class GaussianSamples:
     """A Gaussian at the pixels of its box."""
 
     window: tuple[slice, slice]
@@ -79,7 +79,7 @@ class Sums:
         self.seen = np.zeros((height, width))
         self.color = np.zeros((height, width, 3))
 
-    def add(self, p: Projected, i: int, s: Samples, member: F64) -> None:
+    def add(self, p: Projected, i: int, s: GaussianSamples, member: F64) -> None:
         """Adds a Gaussian's samples; `member` (h, w) is how much of them belongs here."""
         at, alpha = s.window, member * s.alpha
         gradient = member[..., None] * s.gradient
@@ -102,7 +102,7 @@ class Sums:
         self.color[at] += body[..., None] * p.color[i]
 
 
-class Composite:
+class ReferenceComposite:
     """Layers over one another, front to back (steps 5 to 7)."""
 
     def __init__(

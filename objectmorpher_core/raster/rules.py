@@ -119,7 +119,7 @@ class Rules(NamedTuple):
 RULES = Rules()
 
 
-class Limits(NamedTuple):
+class PixelLimits(NamedTuple):
     """The numbers, of 32 bits, that the loops over a tile's pixels need.
 
     They are handed on with each Gaussian, where all rules would take longer than its pixels.
@@ -142,7 +142,7 @@ class Limits(NamedTuple):
 def limits_of(rules, kind, gap, texture_gap):
     """`gap` world units, `texture_gap` px of the photo."""
     end = rules.fade * rules.fade
-    return Limits(
+    return PixelLimits(
         np.float32(kind.tail), np.float32(kind.most), np.float32(kind.least),
         np.float32(rules.least_front), np.float32(rules.sharp), np.float32(1.0 / (gap * gap)),
         np.float32(1.0 / (texture_gap * texture_gap)), np.float32(end),

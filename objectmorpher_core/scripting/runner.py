@@ -371,7 +371,7 @@ def _distinct(document: Document, casting: frozenset[int]) -> list[Matte]:
 
 
 @dataclass(frozen=True)
-class Refining:
+class RefineOptions:
     """The options of a refinement."""
 
     backend: str
@@ -389,7 +389,7 @@ def coarse_edit(
 
 
 def with_refinement(
-    document: Document, how: Refining, progress: Progress, puppets: dict[int, Puppet]
+    document: Document, how: RefineOptions, progress: Progress, puppets: dict[int, Puppet]
 ) -> Document:
     """`document` refined. Raises RefineError or ModelError."""
     refiner = refine.load(how.backend)

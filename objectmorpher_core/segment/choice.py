@@ -35,7 +35,7 @@ SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class ChoiceGround:
     """The ground of a choice."""
 
     walk: Walk  # crosses from part to part of an object
@@ -72,7 +72,7 @@ def guess(
     unwanted = [_cell(c, rgb, walk) for c in prompt.clicks if not c.is_foreground]
     for cell in wanted:
         inside[cell] = True
-    ground = Ground(walk, inside, salience, least)
+    ground = ChoiceGround(walk, inside, salience, least)
     choices = [_around_click(ground, cell) for cell in wanted]
     if prompt.is_subject:
         choices += _subjects(ground)
@@ -146,7 +146,7 @@ def _group(walk: Walk, cell: tuple[int, int], whole: Mask) -> Mask:
     return group
 
 
-def _subjects(ground: Ground) -> list[Choice]:
+def _subjects(ground: ChoiceGround) -> list[Choice]:
     """The photo's subject: what hangs together with the inmost cell of each of its pieces."""
     if ground.salience is None or ground.salience.max() <= 0.5:
         raise SelectionError("no subject stands out in this photo: click the object")
@@ -166,7 +166,7 @@ def _subjects(ground: Ground) -> list[Choice]:
     return choices
 
 
-def _around_click(ground: Ground, cell: tuple[int, int]) -> Choice:
+def _around_click(ground: ChoiceGround, cell: tuple[int, int]) -> Choice:
     """The whole object that `cell` (row, column) is a part of."""
     walk, inside = ground.walk, ground.inside
     masks = [r.mask & inside for r in walk.regions(walk.spread(walk.only(cell)), cell)]
@@ -186,7 +186,7 @@ def _around_click(ground: Ground, cell: tuple[int, int]) -> Choice:
     return Choice(best.mask, subject)
 
 
-def _in_box(ground: Ground, strict: Walk) -> Choice:
+def _in_box(ground: ChoiceGround, strict: Walk) -> Choice:
     """The object that a box encloses: it reaches the box's sides and does not go beyond them."""
     inside = ground.inside
     if not inside.any():

@@ -20,11 +20,11 @@ from .dino_tokens import PATCH, WEIGHT, shared
 from .matting.edges import rehearse
 from .pieces.features import main_directions
 from .pieces.pieces import Pieces
-from .pieces.view import PhotoView, Seen, Tokens
+from .pieces.view import PhotoView, PromptAnswer, Tokens
 from .selection import SelectionError, check_mask, check_prompt, free_mask, is_bounded
 from .subject import SubjectNet
 
-Look = Callable[[PhotoView, Prompt, Progress], Seen]
+Look = Callable[[PhotoView, Prompt, Progress], PromptAnswer]
 
 PATCHES = 1850  # of a photo: about 700 x 520 px, any aspect
 TILE_PATCHES = 900  # of a tile of a large photo
@@ -84,7 +84,7 @@ class DinoWalk:
 
     def _found(
         self, rgb: RGB, prompt: Prompt, embedding: Tokens | None, progress: Progress, look: Look
-    ) -> tuple[Mask, Seen]:
+    ) -> tuple[Mask, PromptAnswer]:
         check_prompt(rgb, prompt)
         if embedding is None:
             embedding = self.encode(rgb, part(progress, 0.0, 0.7))

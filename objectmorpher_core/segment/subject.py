@@ -58,7 +58,7 @@ class SubjectNet:
         return np.ascontiguousarray(first[0][0, 0], np.float32)
 
 
-class Subject:
+class SubjectSegmenter:
     """Segmenter: the salient subject; clicks and a box restrict and correct it."""
 
     name = "subject"

@@ -29,8 +29,8 @@ from ..base.quoting import named, shown
 from ..document.model import SELECTED, Document, EditObject, Photo
 from ..document.settings import LEAST_FEATHER, MOST_FEATHER
 from ..pictures.image import ImageError, encode_picture, read_picture
-from .tree import ArrayError, Reader, SessionError, Writer, read_npy
-from .zip import Member, Npy, Pieces, Zip, digest, scratch_file, write_zip
+from .tree import ArrayError, SessionError, TreeReader, TreeWriter, read_npy
+from .zip import FilePieces, Member, Npy, Zip, digest, scratch_file, write_zip
 
 __all__ = [
     "SessionError", "decode_session", "encode_session", "load_session", "read_session",
@@ -49,7 +49,7 @@ def save_session(document: Document, path: Path) -> None:
     try:
         with scratch_file(path.parent) as file:
             write_session(document, file, path.parent)
-            write_all({path: Pieces(file)})
+            write_all({path: FilePieces(file)})
     except OutputError:
         raise
     except OSError as error:
@@ -75,7 +75,7 @@ def write_session(document: Document, file: IO[bytes], folder: Path | None = Non
     ending = PurePosixPath(photo.name).suffix.lower()
     source = f"photo/photo{ending if ending.isascii() and ending[1:].isalnum() else ''}"
     members[source] = photo.source or encode_picture(photo.picture, "png")
-    writer = Writer(skipped=(Photo,))
+    writer = TreeWriter(skipped=(Photo,))
     tree = writer.tree(document, "")
     tree["photo"] = {
         "name": photo.name,
@@ -88,7 +88,7 @@ def write_session(document: Document, file: IO[bytes], folder: Path | None = Non
             members[f"objects/{k}/gaussians.ply"] = encode_ply(item.lifted.gaussians)
     with scratch_file(folder) as arrays:
         write_zip(arrays, {f"{path}.npy": Npy(a) for path, a in writer.arrays.items()})
-        members[ARRAYS] = Pieces(arrays)
+        members[ARRAYS] = FilePieces(arrays)
         head = {
             "format": FORMAT,
             "version": VERSION,
@@ -204,7 +204,7 @@ def build_document(
 
     Raises SessionError where the parts do not fit each other.
     """
-    reader = Reader(members, arrays)
+    reader = TreeReader(members, arrays)
     if not isinstance(tree, dict):
         raise SessionError("the session's document.json is damaged: document is missing")
     objects = tree.get("objects")
@@ -248,7 +248,7 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
-def _photo(tree: object, members: Mapping[str, bytes], reader: Reader) -> Photo:
+def _photo(tree: object, members: Mapping[str, bytes], reader: TreeReader) -> Photo:
     """The photo, its picture decoded from the original file's bytes, and no larger than it says."""
     name = tree.get("source") if isinstance(tree, dict) else None
     if not isinstance(tree, dict) or not isinstance(name, str) or name not in members:

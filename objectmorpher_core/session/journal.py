@@ -28,7 +28,7 @@ from ..base.limits import SESSION_UNPACKED as MAX_BYTES
 from ..document.model import Document, Photo
 from ..pictures.image import MAX_PIXELS, Picture, encode_picture
 from .file import build_document
-from .tree import ArrayError, SessionError, Writer, read_npy
+from .tree import ArrayError, SessionError, TreeWriter, read_npy
 
 FORMAT = "objectmorpher recovery"
 VERSION = 1
@@ -41,7 +41,7 @@ DIGEST = 64  # characters of a SHA-256
 
 
 @dataclass
-class _Collector(Writer):
+class _Collector(TreeWriter):
     """Leaves every array as it is."""
 
     def _array(self, array: np.ndarray, path: str) -> dict[str, str]:

@@ -32,7 +32,7 @@ class SessionError(ValueError):
 
 
 @dataclass
-class Writer:
+class TreeWriter:
     """Turns values into JSON values, and collects the arrays on the way."""
 
     skipped: tuple[type, ...] = ()  # dataclasses that the caller writes
@@ -78,7 +78,7 @@ class Writer:
 
 
 @dataclass
-class Reader:
+class TreeReader:
     """Builds values of a given type from JSON values. Raises SessionError."""
 
     members: Mapping[str, bytes]  # the PNG files by member name

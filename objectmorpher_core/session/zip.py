@@ -49,7 +49,7 @@ class Npy:
             yield plain[start : start + PIECE]
 
 
-class Pieces:
+class FilePieces:
     """All members of a file."""
 
     def __init__(self, file: IO[bytes]) -> None:
@@ -64,7 +64,7 @@ class Pieces:
             yield piece
 
 
-Member: TypeAlias = bytes | Npy | Pieces
+Member: TypeAlias = bytes | Npy | FilePieces
 
 
 @contextmanager

@@ -28,15 +28,23 @@ from .splats.splat import decode_splat, encode_splat
 from .splats.spz import decode_spz, encode_spz
 
 __all__ = [
-    "COUNT", "FORMATS", "MESH_ENDINGS", "SPLAT_ENDINGS", "Format", "SplatFileError",
-    "encode", "ending_of", "read", "read_object",
+    "COUNT",
+    "FORMATS",
+    "MESH_ENDINGS",
+    "SPLAT_ENDINGS",
+    "SplatFileError",
+    "SplatFormat",
+    "encode",
+    "ending_of",
+    "read",
+    "read_object",
 ]  # fmt: skip
 
 COUNT = 20_000  # Gaussians that a mesh is sampled to
 
 
 @dataclass(frozen=True)
-class Format:
+class SplatFormat:
     """A format of Gaussians: its bytes to Gaussians in our axes and back."""
 
     name: str
@@ -45,10 +53,10 @@ class Format:
 
 
 FORMATS = {  # the longer ending first
-    ".compressed.ply": Format("compressed 3DGS .ply", decode_compressed, encode_compressed),
-    ".ply": Format("3DGS .ply", decode_ply, encode_ply),
-    ".splat": Format(".splat", decode_splat, encode_splat),
-    ".spz": Format(".spz", decode_spz, encode_spz),
+    ".compressed.ply": SplatFormat("compressed 3DGS .ply", decode_compressed, encode_compressed),
+    ".ply": SplatFormat("3DGS .ply", decode_ply, encode_ply),
+    ".splat": SplatFormat(".splat", decode_splat, encode_splat),
+    ".spz": SplatFormat(".spz", decode_spz, encode_spz),
 }
 SPLAT_ENDINGS = tuple(FORMATS)
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".stl", ".off")  # read only; a .ply may be one, too

@@ -21,7 +21,7 @@ from hands import PATIENCE
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
-from objectmorpher.editor.view import ToolName, View
+from objectmorpher.editor.view import ToolName, ViewState
 from objectmorpher_core.document.model import Document, Placement
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def editor(shared_editor: Editor, photo_path: Path) -> Editor:
     """An editor with the made photo open; the worker is shared, it takes seconds to start."""
     shared_editor.close_document()
     wait_until(shared_editor, lambda: shared_editor.jobs.is_idle)
-    shared_editor.view = View()  # nothing of it stays from the test before
+    shared_editor.view = ViewState()  # nothing of it stays from the test before
     shared_editor.view.resize(*CANVAS)
     open_file(shared_editor, photo_path)
     assert shared_editor.message is None, shared_editor.message

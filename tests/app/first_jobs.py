@@ -15,7 +15,7 @@ import trimesh
 
 from objectmorpher.canvas.shape import build_shape, rehearse
 from objectmorpher.worker import job_functions
-from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.deform.puppet import Puppet
@@ -28,7 +28,7 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
 )
-from objectmorpher_core.lift.registration.importing import Scene
+from objectmorpher_core.lift.registration.importing import ImportTarget
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.splat_files import encode
 from tests.core.lift import registered
@@ -51,7 +51,7 @@ def import_everything(folder: Path) -> None:
         ("box.glb", np.uint8, False),
     ):
         pixels = scene.pixels.astype(depth)
-        place = Scene(pixels, scene.camera, scene.mask, is_free)
+        place = ImportTarget(pixels, scene.camera, scene.mask, is_free)
         found, matte, lifted = job_functions.import_object(folder / name, place, 0, silent)
         camera = found.registration.best.camera
         get_ready(camera, matte, lifted)
@@ -74,9 +74,9 @@ def lift_and_repair() -> None:
         )  # fmt: skip
         for selection, shape in ((mask, LiftSettings(COUNT)), (feather(mask, 4), said)):
             cut = Cut(pixels, camera, selection)
-            matte, lifted = job_functions.lift(cut, Choice("auto"), shape, silent)
+            matte, lifted = job_functions.lift(cut, BackendChoice("auto"), shape, silent)
         get_ready(camera, matte, lifted)
-        job_functions.inpaint(pixels, mask, Choice("auto"), silent)
+        job_functions.inpaint(pixels, mask, BackendChoice("auto"), silent)
         pose_in_all_ways(lifted, camera)
 
 

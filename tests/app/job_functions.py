@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from objectmorpher.editor.export_plan import Plan
+from objectmorpher.editor.export_plan import ExportPlan
 from objectmorpher_core.base.files import OutputError
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.edits import EditError
@@ -64,7 +64,7 @@ def save_when_there_is_room(document: Document, path: Path, progress: Progress) 
     write_when_there_is_room(path, progress)
 
 
-def export_when_there_is_room(document: Document, plan: Plan, progress: Progress) -> None:
+def export_when_there_is_room(document: Document, plan: ExportPlan, progress: Progress) -> None:
     write_when_there_is_room(plan.path, progress)
 
 

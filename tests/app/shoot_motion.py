@@ -17,7 +17,7 @@ import numpy as np
 from objectmorpher.cli.options import WindowOptions
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.feedback import Message
+from objectmorpher.editor.feedback import StatusMessage
 from objectmorpher.editor.view import Popup, ToolName
 from objectmorpher.gui.window.glfw_window import open_window
 from objectmorpher.gui.window.window import Window
@@ -38,7 +38,7 @@ def hide_popup(editor: Editor) -> None:
 
 
 def say(editor: Editor) -> None:
-    editor.message = Message("Something has happened")
+    editor.message = StatusMessage("Something has happened")
 
 
 def fall_silent(editor: Editor) -> None:

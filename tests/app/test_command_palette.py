@@ -11,7 +11,7 @@ from hands import opened
 from objectmorpher.commands import COMMANDS
 from objectmorpher.commands.settings import SETTINGS
 from objectmorpher.editor.editor import Editor
-from objectmorpher.gui.dialogs.popups.palette import Palette
+from objectmorpher.gui.dialogs.popups.palette import CommandPalette
 from objectmorpher.system.help_pages import FIRST, ORDER, Kind, blocks_of, pages
 
 ROOT = Path(__file__).parents[2]
@@ -48,7 +48,7 @@ def test_the_settings_it_names_are_those_of_the_panels() -> None:
 
 
 def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Editor) -> None:
-    palette = Palette()
+    palette = CommandPalette()
 
     def first(typed: str) -> tuple[str, str]:
         palette._typed = typed

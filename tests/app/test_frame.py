@@ -17,7 +17,7 @@ from objectmorpher.canvas.layers import Layers
 from objectmorpher.canvas.lights import Lights
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.posing import EXPECT
-from objectmorpher.editor.view import Shown, ToolName, View
+from objectmorpher.editor.view import Shown, ToolName, ViewState
 from objectmorpher.tools.pointer import Button, Pointer
 from objectmorpher.tools.pose_tool import PoseTool
 from objectmorpher_core.deform.arap import ArapSolver
@@ -49,7 +49,7 @@ def calls(document: Document, cache: Cache, shown: Shown) -> tuple[Counter[str],
         if event == "call" and frame.f_code in PARTS:
             order.append(PARTS[frame.f_code])
 
-    view = View()
+    view = ViewState()
     view.resize((360, 280), 1.0, document.photo.size)
     sys.setprofile(note)
     try:
@@ -72,7 +72,7 @@ def test_each_part_of_an_object_is_computed_once(pair: Document, shown: Shown) -
 
 
 def test_shadows_and_pictures_are_those_of_the_objects_of_the_frame(pair: Document) -> None:
-    cache, view = Cache(), View()
+    cache, view = Cache(), ViewState()
     cache.frame_time = np.inf
     view.resize((360, 280), 1.0, pair.photo.size)
     frame = build_frame(pair, view, cache)

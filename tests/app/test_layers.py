@@ -10,10 +10,10 @@ import pytest
 from conftest import PATIENCE, wait_for_jobs
 from objectmorpher.canvas.blend import CELL
 from objectmorpher.canvas.frame import build_frame
-from objectmorpher.canvas.layer import Layer
+from objectmorpher.canvas.layer import CanvasLayer
 from objectmorpher.canvas.layers import FRAME
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import Shown, View
+from objectmorpher.editor.view import Shown, ViewState
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 
@@ -72,7 +72,7 @@ def test_a_draft_covers_what_the_exact_picture_covers(editor: Editor, moved: Doc
     wait_for_jobs(editor)
 
 
-def _on_canvas(layer: Layer, view: View) -> np.ndarray:
+def _on_canvas(layer: CanvasLayer, view: ViewState) -> np.ndarray:
     """(h, w, 4) of the canvas."""
     canvas = np.zeros((view.height, view.width, 4))
     x0, y0, x1, y1 = map(int, layer.box)

@@ -12,7 +12,7 @@ import pytest
 from conftest import PATIENCE
 from hands import ROOT
 from objectmorpher.editor.settings import AUTO, read_settings
-from objectmorpher.system.motion import FULL, REDUCED, Motion
+from objectmorpher.system.motion import FULL, REDUCED, MotionPreference
 from tests.tree import PYTHONPATH
 
 
@@ -25,7 +25,7 @@ def test_the_system_is_asked_and_the_user_overrules_it(
     asked.write_text(f"#!/bin/sh\n[ $3 = enable-animations ] && echo {answer}\n")
     asked.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    motion = Motion()
+    motion = MotionPreference()
     motion.ask_system()
     assert motion.is_reduced(AUTO) is is_reduced
     assert motion.is_reduced(REDUCED)
@@ -34,7 +34,7 @@ def test_the_system_is_asked_and_the_user_overrules_it(
 
 def test_a_system_that_does_not_tell_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    motion = Motion()
+    motion = MotionPreference()
     motion.ask_system()
     assert not motion.is_reduced(AUTO) or not sys.platform.startswith("linux")
 

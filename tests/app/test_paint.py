@@ -12,7 +12,7 @@ from objectmorpher.canvas.painter import shown_now
 from objectmorpher.canvas.shares import count_changed
 from objectmorpher.canvas.shares import shares as shares_of
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import Shown, ToolName, View
+from objectmorpher.editor.view import Shown, ToolName, ViewState
 from objectmorpher_core.base.rotations import matrix_from_vector
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.document import edits
@@ -102,7 +102,7 @@ def test_an_unchanged_object_is_painted_once(editor: Editor, ball: Document, sho
 
 def painted(cache: Cache, document: Document, shown: Shown) -> PosedSplats:
     """The document's object as a view shows it."""
-    own = build_frame(document, View(), cache, shown, "gl").objects[-1]
+    own = build_frame(document, ViewState(), cache, shown, "gl").objects[-1]
     assert isinstance(own, FrameObject)
     return own.splats
 
@@ -164,7 +164,7 @@ def test_the_number_of_changed_pixels_is_about_that_of_the_export(
 
 
 def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:
-    view = View(tool=ToolName.POSE, shown=Shown.STRAIN)
+    view = ViewState(tool=ToolName.POSE, shown=Shown.STRAIN)
     assert shown_now(None, view) is Shown.COMPOSITE
     assert shown_now(editor.document, view) is Shown.COMPOSITE
     assert shown_now(ball, view) is Shown.STRAIN
@@ -172,7 +172,7 @@ def test_a_view_waits_for_an_object(editor: Editor, ball: Document) -> None:
 
 @pytest.mark.parametrize("tool", [ToolName.SELECT, ToolName.MASK])
 def test_selecting_shows_the_photo_whatever_the_view(ball: Document, tool: ToolName) -> None:
-    assert shown_now(ball, View(tool=tool, shown=Shown.STRAIN)) is Shown.COMPOSITE
+    assert shown_now(ball, ViewState(tool=tool, shown=Shown.STRAIN)) is Shown.COMPOSITE
 
 
 def _sphere(count: int) -> np.ndarray:

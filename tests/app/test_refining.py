@@ -19,7 +19,7 @@ from objectmorpher_core.compose.refine.refinement import CoarseEdit
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.document.settings import Refined
-from objectmorpher_core.scripting.runner import Refining as How
+from objectmorpher_core.scripting.runner import RefineOptions as How
 
 
 class Asked:

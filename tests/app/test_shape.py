@@ -10,20 +10,20 @@ import numpy as np
 from conftest import open_file, wait_for_jobs
 from objectmorpher.canvas.derived import MOST_SHAPES
 from objectmorpher.canvas.frame import Cache, build_frame
-from objectmorpher.canvas.shape import Shape, build_shape, rehearse
+from objectmorpher.canvas.shape import CanvasShape, build_shape, rehearse
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import View
+from objectmorpher.editor.view import ViewState
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import DeformSettings, Document
 from objectmorpher_core.session.file import save_session
 
 
-def _shape(editor: Editor) -> Shape:
+def _shape(editor: Editor) -> CanvasShape:
     assert editor.document is not None and editor.object is not None
     return editor.derived.shape(editor.document.photo, editor.object)
 
 
-def _has_deformer(shape: Shape) -> bool:
+def _has_deformer(shape: CanvasShape) -> bool:
     return vars(shape.puppet)["_deformer"] is not None
 
 
@@ -56,8 +56,8 @@ def test_what_many_objects_need_is_remembered_of_all_of_them(ball: Document) -> 
         for k in range(MOST_SHAPES + 6)
     )
     document, shape = replace(ball, objects=many), build_shape(ball.photo.camera, thing)
-    made = [(one, Shape(shape.puppet, shape.texture)) for one in many]
-    cache, view = Cache(), View()
+    made = [(one, CanvasShape(shape.puppet, shape.texture)) for one in many]
+    cache, view = Cache(), ViewState()
     derived = cache.derived
     derived.adopt(made)
     for _ in range(2):

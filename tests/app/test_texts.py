@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from objectmorpher.editor import view
-from objectmorpher.editor.export_plan import Motion, What
+from objectmorpher.editor.export_plan import VideoMotion, What
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.system.texts import languages, t, use_language
 from tests.tree import over
@@ -30,7 +30,7 @@ SHOWING = {
 }  # fmt: skip
 TABLES = ("Command", "Number", "Segment")  # constructors whose first argument is an English text
 TABLE_FILES = ("commands/gestures.py", "commands/settings.py")  # literals that are all texts
-ENUMS = (view.ToolName, view.Composed, view.Shown, view.Popup, Dialog, What, Motion)
+ENUMS = (view.ToolName, view.Composed, view.Shown, view.Popup, Dialog, What, VideoMotion)
 
 
 def calls(path: Path) -> Iterator[ast.Call]:

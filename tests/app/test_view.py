@@ -7,7 +7,7 @@ import pytest
 
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.view import MARGIN, Shown, View
+from objectmorpher.editor.view import MARGIN, Shown, ViewState
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
 
@@ -15,34 +15,34 @@ PHOTO = (600, 400)
 
 
 @pytest.fixture
-def view() -> View:
-    view = View()
+def view() -> ViewState:
+    view = ViewState()
     view.resize((1000, 700), 1.0, PHOTO)
     view.fit(PHOTO)
     return view
 
 
-def test_a_fitted_photo_is_centred_with_its_margin(view: View) -> None:
+def test_a_fitted_photo_is_centred_with_its_margin(view: ViewState) -> None:
     low = view.canvas_from_image(np.array([0, 0]))
     high = view.canvas_from_image(np.array(PHOTO))
     np.testing.assert_allclose(low + high, (1000, 700))
     assert min(*low) == pytest.approx(MARGIN)
 
 
-def test_zooming_keeps_the_point_under_the_pointer(view: View) -> None:
+def test_zooming_keeps_the_point_under_the_pointer(view: ViewState) -> None:
     pointer = (420.0, 333.0)
     before = view.image_from_canvas(pointer)
     view.set_zoom(3.7, pointer, PHOTO)
     np.testing.assert_allclose(view.image_from_canvas(pointer), before)
 
 
-def test_there_and_back_is_the_same(view: View) -> None:
+def test_there_and_back_is_the_same(view: ViewState) -> None:
     view.set_zoom(2.3, (100, 100), PHOTO)
     xy = np.random.default_rng(0).uniform(0, 500, (20, 2))
     np.testing.assert_allclose(view.image_from_canvas(view.canvas_from_image(xy)), xy)
 
 
-def test_the_view_camera_agrees_with_the_canvas(view: View) -> None:
+def test_the_view_camera_agrees_with_the_canvas(view: ViewState) -> None:
     view.set_zoom(1.9, (10, 20), PHOTO)
     camera = Camera.from_fov(*PHOTO)
     points = np.array([[0.1, 0.2, 2.0], [-0.3, 0.1, 1.5]])
@@ -53,7 +53,7 @@ def test_the_view_camera_agrees_with_the_canvas(view: View) -> None:
     assert (part.width, part.height) == (100, 140)
 
 
-def test_panning_never_loses_the_photo(view: View) -> None:
+def test_panning_never_loses_the_photo(view: ViewState) -> None:
     view.pan(1e6, -1e6, PHOTO)
     low = view.canvas_from_image(np.array([0, 0]))
     high = view.canvas_from_image(np.array(PHOTO))
@@ -61,13 +61,13 @@ def test_panning_never_loses_the_photo(view: View) -> None:
     assert high[1] > 0
 
 
-def test_a_fitted_photo_stays_fitted_when_the_window_grows(view: View) -> None:
+def test_a_fitted_photo_stays_fitted_when_the_window_grows(view: ViewState) -> None:
     view.resize((1400, 900), 1.0, PHOTO)
     low = view.canvas_from_image(np.array([0, 0]))
     assert min(*low) == pytest.approx(MARGIN)
 
 
-def test_a_zoomed_photo_keeps_its_zoom_when_the_window_grows(view: View) -> None:
+def test_a_zoomed_photo_keeps_its_zoom_when_the_window_grows(view: ViewState) -> None:
     view.set_zoom(5.0, (500, 350), PHOTO)
     middle = view.image_from_canvas((500, 350))
     view.resize((1400, 900), 1.0, PHOTO)

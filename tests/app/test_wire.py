@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from objectmorpher.worker import shared_memory, wire
-from objectmorpher.worker.wire import KEPT, LARGE, Reader, Writer
+from objectmorpher.worker.wire import KEPT, LARGE, PipeReader, PipeWriter
 from objectmorpher_core.base.arrays import frozen
 
 
@@ -24,7 +24,7 @@ class Line:
 
     def __init__(self) -> None:
         self._ends = Pipe()
-        self._writer, self._reader = Writer(self._ends[0]), Reader(self._ends[1])
+        self._writer, self._reader = PipeWriter(self._ends[0]), PipeReader(self._ends[1])
 
     def sent(self, message: Any) -> Any:
         """What arrives; it is written beside the reading, for a pipe holds little."""
@@ -157,7 +157,7 @@ def test_what_is_remembered_has_a_limit_in_bytes(
 
 def test_who_remembers_nothing_is_heard_all_the_same() -> None:
     ends = Pipe()
-    writer, reader = Writer(ends[0], kept=0), Reader(ends[1])
+    writer, reader = PipeWriter(ends[0], kept=0), PipeReader(ends[1])
     for k in range(3):
         thread = threading.Thread(target=writer.write, args=([large(k), large(k)],))
         thread.start()

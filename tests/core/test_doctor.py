@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from objectmorpher_core import doctor
-from objectmorpher_core.doctor import Stage
+from objectmorpher_core.doctor import StageReport
 from objectmorpher_core.models import device
 
 
@@ -18,7 +18,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OBJECTMORPHER_WORKERS", str(tmp_path / "workers"))
 
 
-def stages() -> dict[str, Stage]:
+def stages() -> dict[str, StageReport]:
     return {stage.name: stage for stage in doctor.look_at_stages()}
 
 

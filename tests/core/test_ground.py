@@ -12,7 +12,7 @@ from objectmorpher_core.base.rotations import turn_matrix, turn_of
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.document.placement import (
     GroundError,
-    Hold,
+    HeldPoint,
     centre_of,
     ground_under,
     turned,
@@ -34,10 +34,10 @@ def _points(scene: shapes.Scene) -> np.ndarray:
     return scene.lifted.world_points(scene.lifted.body.means)
 
 
-def _hold(scene: shapes.Scene, horizon: float) -> Hold:
+def _hold(scene: shapes.Scene, horizon: float) -> HeldPoint:
     ground = ground_under(_points(scene), scene.camera, horizon)
     contact = ground.lowest(_points(scene))
-    return Hold(Placement(), scene.lifted, scene.camera, contact, ground)
+    return HeldPoint(Placement(), scene.lifted, scene.camera, contact, ground)
 
 
 @horizons
@@ -111,7 +111,7 @@ def test_a_point_that_is_held_goes_where_it_is_taken(scene, away):
     placement = Placement((7.0, 3.0), 0.4, (30.0, 10.0, -20.0), 1.3)
     matrix = placement.matrix(scene.lifted, scene.camera)
     rest = _points(scene)[17]
-    hold = Hold(placement, scene.lifted, scene.camera, matrix[:3, :3] @ rest + matrix[:3, 3])
+    hold = HeldPoint(placement, scene.lifted, scene.camera, matrix[:3, :3] @ rest + matrix[:3, 3])
     later = hold.moved(np.array([21.0, -13.0]), away)
     seen = scene.puppet.picture_of(scene.lifted.object_points(rest), None, later)
     np.testing.assert_allclose(seen, hold.xy + [21.0, -13.0], atol=PLANE)

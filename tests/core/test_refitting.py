@@ -16,7 +16,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.lift.refitting import Lifted, background_of, refit
-from objectmorpher_core.lift.registration.importing import Scene
+from objectmorpher_core.lift.registration.importing import ImportTarget
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from objectmorpher_core.segment.mask_edit import grow
@@ -77,7 +77,7 @@ def _refitted(document: Document, mask: np.ndarray) -> Document:
     changed = edits.change_mask(document, 0, mask)
     item, photo = changed.objects[0], changed.photo
     was = Lifted(item.shaped, item.matte, item.lifted, item.shape)
-    scene = Scene(photo.pixels, photo.camera, item.selection)
+    scene = ImportTarget(photo.pixels, photo.camera, item.selection)
     answer = refit(was, scene, background_of(changed, 0, "telea"))
     return edits.refit(changed, 0, answer.matte, answer.lifted, answer.plate)
 

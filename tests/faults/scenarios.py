@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher.editor.export_plan import Plan, What
+from objectmorpher.editor.export_plan import ExportPlan, What
 from objectmorpher.editor.settings import Settings, read_settings, write_settings
 from objectmorpher.server.tokens import TokenError, read_token, write_token
 from objectmorpher.worker.export_functions import write_export
@@ -175,7 +175,7 @@ def _file_state(at: Path, old: bytes, new: bytes) -> str:
 def _export(what: What, name: str) -> Scenario:
     """An export over an existing file of the user's."""
     old = b"what was there before " * 1000
-    plan = Plan(what, Path(name))
+    plan = ExportPlan(what, Path(name))
 
     def act(at: Path) -> None:
         write_export(photo(), replace(plan, path=at / name), silent)
@@ -230,7 +230,7 @@ def _layers() -> Scenario:
         return NEW if len(files) >= 2 else OLD if not files else MIXED
 
     def act(at: Path) -> None:
-        write_export(photo(), Plan(What.LAYERS, at / "l"), silent)
+        write_export(photo(), ExportPlan(What.LAYERS, at / "l"), silent)
 
     return Scenario(
         "layers", lambda at: None, act, state, frozenset({"*"}), between=frozenset({MIXED})

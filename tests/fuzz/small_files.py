@@ -16,7 +16,7 @@ from objectmorpher.editor.settings import Settings, read_settings, write_setting
 from objectmorpher.server.message import MessageError, decode, encode
 from objectmorpher.server.table import table, types
 from objectmorpher.server.tokens import TokenError, check_token, read_token
-from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Click, LiftSettings, Plate, Prompt
 from objectmorpher_core.lift import LiftError
@@ -177,9 +177,10 @@ def message_seeds() -> list[bytes]:
     mask, camera = photo[..., 0] > 100, Camera.from_fov(30, 20)
     prompt = Prompt((Click(1.5, 2.0), Click(3.0, 1.0, False)), (0.0, 0.0, 9.0, 9.0), level="part")
     asked = [
-        (photo, prompt, Choice("auto", 7)),
-        (Cut(photo, camera, mask), Choice("auto", 7), LiftSettings(hidden=mask, horizon=3.5)),
-        (photo, mask, Choice("auto", 7), 3), Plate(0, 0, photo, mask, "patchmatch"),
+        (photo, prompt, BackendChoice("auto", 7)),
+        (Cut(photo, camera, mask), BackendChoice("auto", 7),
+         LiftSettings(hidden=mask, horizon=3.5)),
+        (photo, mask, BackendChoice("auto", 7), 3), Plate(0, 0, photo, mask, "patchmatch"),
         [1, (2.5, "ä", None, True), photo.astype(np.float32)],
     ]  # fmt: skip
     return [encode(value, types()).body for value in asked]

@@ -17,7 +17,7 @@ from objectmorpher_core.base.arrays import F32, F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document
 
-from ..editor.view import View
+from ..editor.view import ViewState
 from .layer import PosedObject
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ REACH = 1.2  # x the spacing of the Gaussians, how far around itself each one co
 
 
 def build_blend(
-    document: Document, moved: Iterable[tuple[PosedObject, Lit]], view: View, touched: F32
+    document: Document, moved: Iterable[tuple[PosedObject, Lit]], view: ViewState, touched: F32
 ) -> F32:
     """(h, w) in [0, 1] on a grid over the canvas: 1 shows the edit, 0 the photo.
 
@@ -60,7 +60,9 @@ def build_blend(
     return np.maximum(blend, touched)
 
 
-def _distance(splats: PosedSplats, world: F64, camera: Camera, view: View, has_left: bool) -> F32:
+def _distance(
+    splats: PosedSplats, world: F64, camera: Camera, view: ViewState, has_left: bool
+) -> F32:
     """(h, w) photo px from each cell to what moved, on the canvas or a little beside it."""
     from objectmorpher_core.compose import composite
 

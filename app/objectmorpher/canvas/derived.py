@@ -26,9 +26,9 @@ from objectmorpher_core.document.model import (
     Pose,
 )
 
-from ..editor.view import View
+from ..editor.view import ViewState
 from .memo import Memo
-from .shape import Shape, Shapes, build_shape
+from .shape import CanvasShape, Shapes, build_shape
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -78,7 +78,7 @@ class Derived:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
         self._drafts: dict[int, Memo] = {}
-        self._latest: tuple[LiftedObject | None, DeformSettings, Shape] | None = None
+        self._latest: tuple[LiftedObject | None, DeformSettings, CanvasShape] | None = None
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
@@ -146,13 +146,13 @@ class Derived:
         """A mask's outlines, each (N, 2) image px."""
         return self._contours(lambda: _outlines(mask), mask)
 
-    def shape(self, photo: Photo, thing: EditObject) -> Shape:
+    def shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
         """Solver, poser and texture; a fraction of a second the first time."""
         return self._shapes(
             lambda: self._build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
         )
 
-    def _build_shape(self, photo: Photo, thing: EditObject) -> Shape:
+    def _build_shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
         """Of a rig that changed, only what depends on it."""
         similar = self._latest
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
@@ -168,7 +168,7 @@ class Derived:
         for thing, shape in shapes:
             self.remember(thing, shape)
 
-    def remember(self, thing: EditObject, shape: Shape) -> None:
+    def remember(self, thing: EditObject, shape: CanvasShape) -> None:
         """Takes over an object's shape that was made in a thread."""
         self._shapes(lambda: shape, thing.lifted, thing.deform, thing.rig)
         self._latest = (thing.lifted, thing.deform, shape)
@@ -208,7 +208,7 @@ class Derived:
         is_solid = splats.rest.lifted.texture.solidity > 0.5
         return splats.skinned.points[is_solid if is_solid.any() else slice(None)]
 
-    def drawable_of(self, k: int, splats: PosedSplats, camera: Camera, view: View) -> Drawable:
+    def drawable_of(self, k: int, splats: PosedSplats, camera: Camera, view: ViewState) -> Drawable:
         """Object `k`'s Gaussians `splats` on the canvas; `camera` is the photo's."""
         from objectmorpher_core.raster import tiles
 
@@ -332,7 +332,7 @@ class Derived:
     # The picture
 
     def surface_at(
-        self, document: Document, k: int, view: View, xy: np.ndarray
+        self, document: Document, k: int, view: ViewState, xy: np.ndarray
     ) -> SurfacePoint | None:
         """The surface of object `k` at canvas px `xy` or close beside it; None where it is not."""
         thing = document.objects[k]

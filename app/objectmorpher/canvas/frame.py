@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.document.model import Document, Plate
 
-from ..editor.view import Shown, View
+from ..editor.view import Shown, ViewState
 from .blend import CELL, build_blend
 from .derived import Derived
 from .fronts import Fronts, RefinedView
-from .layer import FrameObject, Layer, Part, PosedObject, is_front
+from .layer import CanvasLayer, FrameObject, ObjectPart, PosedObject, is_front
 from .layers import FRAME, Layers
 from .lights import Lights
 from .memo import Memo
@@ -72,21 +72,21 @@ class Frame:
     """One picture of the canvas; over the photo, or alone where the view is bare."""
 
     # Back to front; what stays in front of the edit is a picture already.
-    objects: tuple[FrameObject | Layer, ...]
+    objects: tuple[FrameObject | CanvasLayer, ...]
     plate: Plate | None = None  # behind the objects
-    shades: tuple[Layer, ...] = ()  # their shadows
-    refined: tuple[Layer, ...] = ()  # the refinement, over them all
+    shades: tuple[CanvasLayer, ...] = ()  # their shadows
+    refined: tuple[CanvasLayer, ...] = ()  # the refinement, over them all
     blend: F32 | None = None  # (h, w) over the canvas: 1 shows the edit, 0 the photo
 
     @property
-    def layers(self) -> tuple[Layer, ...]:
+    def layers(self) -> tuple[CanvasLayer, ...]:
         """The pictures of the objects, back to front, where the processor has drawn them."""
-        pictures = [own if isinstance(own, Layer) else own.layer for own in self.objects]
+        pictures = [own if isinstance(own, CanvasLayer) else own.layer for own in self.objects]
         return tuple(layer for layer in pictures if layer is not None)
 
 
 def build_frame(
-    document: Document, view: View, cache: Cache, shown: Shown = Shown.COMPOSITE,
+    document: Document, view: ViewState, cache: Cache, shown: Shown = Shown.COMPOSITE,
     renderer: str = "tiles",
 ) -> Frame:  # fmt: skip
     """Compute all that the canvas shows of a document.
@@ -141,19 +141,21 @@ def drawn_order(document: Document, shown: Shown, posed: Callable[[int], PosedSp
     return back_to_front(objects, there)
 
 
-def _parts(document: Document, shown: Shown, posed: Callable[[int], PosedSplats]) -> list[Part]:
+def _parts(
+    document: Document, shown: Shown, posed: Callable[[int], PosedSplats]
+) -> list[ObjectPart]:
     """What a view is put together from, back to front."""
     order = drawn_order(document, shown, posed)
     if shown is Shown.OBJECT:
-        return [Part(k, Shown.COMPOSITE) for k in order]
+        return [ObjectPart(k, Shown.COMPOSITE) for k in order]
     if shown is not Shown.STRAIN:
-        return [Part(k, shown) for k in order]
+        return [ObjectPart(k, shown) for k in order]
     parts, drawn = [], drawn_order(document, Shown.COMPOSITE, posed)
     for k in order:  # the tint right over its object, so that nearer ones cover both
         if k in drawn:
-            parts.append(Part(k, Shown.COMPOSITE))
-        parts.append(Part(k, Shown.STRAIN))
-    return parts + [Part(k, Shown.COMPOSITE) for k in drawn if is_front(document, k)]
+            parts.append(ObjectPart(k, Shown.COMPOSITE))
+        parts.append(ObjectPart(k, Shown.STRAIN))
+    return parts + [ObjectPart(k, Shown.COMPOSITE) for k in drawn if is_front(document, k)]
 
 
 def _posed(document: Document, k: int, derived: Derived) -> PosedObject:
@@ -176,7 +178,7 @@ def _lit(
     return {k: cache.lights.of(document, there[k], is_hurried) for k in sorted(there)}
 
 
-def _front(document: Document, k: int, view: View, cache: Cache) -> Layer | None:
+def _front(document: Document, k: int, view: ViewState, cache: Cache) -> CanvasLayer | None:
     return cache.fronts.layer(document.objects[k], view)
 
 
@@ -188,19 +190,22 @@ def _painted(
 
 
 def _drawn(
-    document: Document, objects: tuple[FrameObject | Layer, ...], view: View, cache: Cache
-) -> tuple[FrameObject | Layer, ...]:
+    document: Document,
+    objects: tuple[FrameObject | CanvasLayer, ...],
+    view: ViewState,
+    cache: Cache,
+) -> tuple[FrameObject | CanvasLayer, ...]:
     """The objects with their pictures, in the time that a frame has."""
     missing = [own for own in objects if isinstance(own, FrameObject)]
     layers = cache.layers.draw(missing, document.photo.camera, view, cache.frame_time)
     return tuple(
-        own if isinstance(own, Layer) else replace(own, layer=layers.get(own.part))
+        own if isinstance(own, CanvasLayer) else replace(own, layer=layers.get(own.part))
         for own in objects
     )
 
 
 def _blend(
-    document: Document, moved: list[tuple[PosedObject, Lit]], view: View, cache: Cache
+    document: Document, moved: list[tuple[PosedObject, Lit]], view: ViewState, cache: Cache
 ) -> F32:
     """Where the canvas shows the edit, remembered."""
     looks = [look for _, look in moved]

@@ -12,8 +12,8 @@ import numpy as np
 from objectmorpher_core.document.model import Document, EditObject, Matte
 from objectmorpher_core.document.settings import Refined
 
-from ..editor.view import View
-from .layer import Layer, as_u8
+from ..editor.view import ViewState
+from .layer import CanvasLayer, as_u8
 from .memo import Memo
 
 if TYPE_CHECKING:
@@ -29,14 +29,14 @@ class Fronts:
 
     def __init__(self) -> None:
         self._levels, self._most = Memo(MOST), MOST
-        self._kept: dict[int, tuple[Matte, tuple[float, ...], Layer | None]] = {}
+        self._kept: dict[int, tuple[Matte, tuple[float, ...], CanvasLayer | None]] = {}
 
     def make_room(self, count: int) -> None:
         """Remembers so many, which are shown together."""
         self._most = max(MOST, count)
         self._levels.make_room(count)
 
-    def layer(self, item: EditObject, view: View) -> Layer | None:
+    def layer(self, item: EditObject, view: ViewState) -> CanvasLayer | None:
         """Px for px; None where nothing of it is on the canvas."""
         matte = item.matte
         assert matte is not None, "what stays in front has one"
@@ -58,7 +58,7 @@ def _levels(matte: Matte) -> TextureLevels:
     return build_levels(own, matte.alpha, matte.left, matte.top)
 
 
-def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | None:
+def drawn(levels: TextureLevels, view: ViewState, strength: float = 1.0) -> CanvasLayer | None:
     """Draw the photo's pixels as its texture is looked up: linearly, single ones when near.
 
     `levels` hold premultiplied colours, of which `strength` in [0, 1] is shown.
@@ -80,7 +80,7 @@ def drawn(levels: TextureLevels, view: View, strength: float = 1.0) -> Layer | N
     level = np.ascontiguousarray(levels.levels[times])
     shown = cv2.warpAffine(level, matrix, (x1 - x0, y1 - y0), flags=way | cv2.WARP_INVERSE_MAP)
     box = (float(x0), float(y0), float(x1), float(y1))
-    return Layer(box, as_u8(shown * np.float32(strength)))
+    return CanvasLayer(box, as_u8(shown * np.float32(strength)))
 
 
 # The document's refinement on the canvas: over the edit, as `compose/composite.py` mixes it.
@@ -91,9 +91,11 @@ class RefinedView:
 
     def __init__(self) -> None:
         self._levels = Memo()
-        self._kept: tuple[Refined, tuple[object, ...], Layer | None] | None = None
+        self._kept: tuple[Refined, tuple[object, ...], CanvasLayer | None] | None = None
 
-    def layers(self, document: Document, view: View, is_marked: bool = False) -> tuple[Layer, ...]:
+    def layers(
+        self, document: Document, view: ViewState, is_marked: bool = False
+    ) -> tuple[CanvasLayer, ...]:
         """Return layers of the photo's own pixels; none where the edit is unrefined or out of view.
 
         `is_marked`: all of it is the network's, which a view tells by hatching.

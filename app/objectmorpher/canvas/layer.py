@@ -12,7 +12,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Document, EditObject
 
 from ..editor.view import Shown
-from .shape import Shape
+from .shape import CanvasShape
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
@@ -24,7 +24,7 @@ PAINTED = (Shown.DEPTH, Shown.NORMALS, Shown.STRAIN)
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class CanvasLayer:
     """A rendered object on the canvas."""
 
     box: tuple[float, float, float, float]  # x0, y0, x1, y1 canvas px
@@ -47,7 +47,7 @@ class Rendered:
     """An exact picture."""
 
     rgba: np.ndarray  # (h, w, 4) u8, premultiplied
-    invented: np.ndarray | None = None  # (h, w) u8, see `Layer`
+    invented: np.ndarray | None = None  # (h, w) u8, see `CanvasLayer`
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +58,11 @@ class ExactPicture:
     texture: TextureLevels
     window: Camera
     camera: Camera  # the photo's
-    part: Part
+    part: ObjectPart
 
 
 @dataclass(frozen=True)
-class Part:
+class ObjectPart:
     """An object, and how it is shown: as it is, with what of it is invented, or painted."""
 
     k: int
@@ -83,7 +83,7 @@ class PosedObject:
 
     k: int
     item: EditObject
-    shape: Shape
+    shape: CanvasShape
     posed: PosedSplats
     draft: PosedSplats  # of a large object fewer, wider Gaussians; else the same
 
@@ -95,11 +95,11 @@ class FrameObject(PosedObject):
     look: Shown
     lit: Lit  # light, focus, grain and shadow of its new place
     splats: PosedSplats  # `posed` in the colours of the look
-    layer: Layer | None = None  # its picture, where it is drawn and on the canvas
+    layer: CanvasLayer | None = None  # its picture, where it is drawn and on the canvas
 
     @property
-    def part(self) -> Part:
-        return Part(self.k, self.look)
+    def part(self) -> ObjectPart:
+        return ObjectPart(self.k, self.look)
 
 
 def is_front(document: Document, k: int) -> bool:
@@ -114,7 +114,7 @@ def is_front(document: Document, k: int) -> bool:
 NEUTRAL = (1.0, 1.0, 1.0)
 
 
-def in_light(shown: Layer, look: Lit, place: tuple[float, ...]) -> Layer:
+def in_light(shown: CanvasLayer, look: Lit, place: tuple[float, ...]) -> CanvasLayer:
     """Light an object in the order of the export; `place` is the `View.place` of the picture."""
     from objectmorpher_core.compose.light.harmonize import lit_rgba
 
@@ -131,7 +131,7 @@ def in_light(shown: Layer, look: Lit, place: tuple[float, ...]) -> Layer:
     return replace(shown, rgba=rgba, gain=gain)
 
 
-def _out_of_focus(shown: Layer, blur: float, size: tuple[int, int]) -> Layer:
+def _out_of_focus(shown: CanvasLayer, blur: float, size: tuple[int, int]) -> CanvasLayer:
     """A picture px for px, blurred by so many canvas px, on a canvas of that `size`."""
     from objectmorpher_core.compose.light.defocus import blurred_rgba, reach_of
 

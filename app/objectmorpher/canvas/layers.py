@@ -17,9 +17,18 @@ import numpy as np
 
 from objectmorpher_core.base.camera import Camera
 
-from ..editor.view import Shown, View
+from ..editor.view import Shown, ViewState
 from .derived import Derived
-from .layer import Box, ExactPicture, FrameObject, Layer, Part, Rendered, as_u8, in_light
+from .layer import (
+    Box,
+    CanvasLayer,
+    ExactPicture,
+    FrameObject,
+    ObjectPart,
+    Rendered,
+    as_u8,
+    in_light,
+)
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
@@ -44,10 +53,12 @@ class _Work:
     view: tuple[float, ...]
     request: ExactPicture  # for the exact one
     box: Box  # canvas px
-    shown: Layer
+    shown: CanvasLayer
     since: float  # s, monotonic, when the splats or the view changed last
     is_asked: bool = False
-    lit: tuple[Layer, Lit, Layer] | None = None  # `shown`, light and grain, and `shown` in them
+    lit: tuple[CanvasLayer, Lit, CanvasLayer] | None = (
+        None  # `shown`, light and grain, and `shown` in them
+    )
 
 
 Ask = Callable[[ExactPicture, Callable[[Rendered], None]], None]
@@ -58,7 +69,7 @@ class Layers:
 
     def __init__(self, derived: Derived) -> None:
         self._derived = derived
-        self._works: dict[Part, _Work] = {}  # its last picture
+        self._works: dict[ObjectPart, _Work] = {}  # its last picture
         self._drawn: list[_Work] = []  # in the last frame
         self._rates: dict[tuple[Shown, bool], float] = {}  # s per px, exact or draft
         self._sharpening = 0.0  # s per px of the view, of a draft; measured
@@ -70,8 +81,8 @@ class Layers:
         return any(w.shown.is_draft and not w.is_asked for w in self._drawn)
 
     def draw(
-        self, objects: Sequence[FrameObject], camera: Camera, view: View, seconds: float
-    ) -> dict[Part, Layer]:
+        self, objects: Sequence[FrameObject], camera: Camera, view: ViewState, seconds: float
+    ) -> dict[ObjectPart, CanvasLayer]:
         """The pictures of what is on the canvas of `objects`, made in about so many seconds.
 
         `camera` is the photo's.
@@ -92,11 +103,11 @@ class Layers:
             if part.k in lifted and posed(part.k) is work.source
         }
 
-    def _is_there(self, own: FrameObject, view: View) -> bool:
+    def _is_there(self, own: FrameObject, view: ViewState) -> bool:
         work = self._works.get(own.part)
         return work is not None and work.splats is own.splats and work.view == view.place
 
-    def _render(self, own: FrameObject, camera: Camera, view: View, seconds: float) -> None:
+    def _render(self, own: FrameObject, camera: Camera, view: ViewState, seconds: float) -> None:
         """A new picture of the object, in about so many seconds."""
         layer = self._draw(own, camera, view, self._factor(own, camera, view, seconds))
         if layer is None:
@@ -110,7 +121,7 @@ class Layers:
             own.posed, own.splats, view.place, request, box, layer, time.monotonic()
         )
 
-    def _factor(self, own: FrameObject, camera: Camera, view: View, seconds: float) -> int:
+    def _factor(self, own: FrameObject, camera: Camera, view: ViewState, seconds: float) -> int:
         """Canvas px per px of what can be drawn in so many seconds; 1 is exact."""
         points = own.item.pose.points if own.item.pose else own.shape.puppet.lifted.control_points
         matrix = own.posed.world_from_object
@@ -125,7 +136,9 @@ class Layers:
         excess = pixels * self._rates.get((look, True), FIRST_RATE) / max(left, 1e-9)
         return int(np.clip(math.ceil(math.sqrt(excess)), 2, COARSEST))
 
-    def _draw(self, own: FrameObject, camera: Camera, view: View, factor: int) -> Layer | None:
+    def _draw(
+        self, own: FrameObject, camera: Camera, view: ViewState, factor: int
+    ) -> CanvasLayer | None:
         """The picture of an object, or None where nothing of it is on the canvas."""
         from objectmorpher_core.raster import tiles
 
@@ -188,7 +201,7 @@ def _prepare(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Drawa
 
 
 def _rendered(
-    drawable: Drawable, texture: TextureLevels, part: Part, box: Box | None = None
+    drawable: Drawable, texture: TextureLevels, part: ObjectPart, box: Box | None = None
 ) -> Rendered:
     """All of the view or the part `box` of it."""
     from objectmorpher_core.raster import tiles
@@ -200,25 +213,30 @@ def _rendered(
     return Rendered(as_u8(rgba), as_u8(picture.alpha - picture.from_photo))
 
 
-def _layer(box: Box, rendered: Rendered, part: Part) -> Layer:
-    return Layer(_floats(box), rendered.rgba, rendered.invented, is_tint=_is_tint(part))
+def _layer(box: Box, rendered: Rendered, part: ObjectPart) -> CanvasLayer:
+    return CanvasLayer(_floats(box), rendered.rgba, rendered.invented, is_tint=_is_tint(part))
 
 
 def _coarse_layer(
-    drawable: Drawable, texture: TextureLevels, part: Part, box: Box, factor: int
-) -> Layer:
+    drawable: Drawable, texture: TextureLevels, part: ObjectPart, box: Box, factor: int
+) -> CanvasLayer:
     """A painted object, smooth already; `box` in px of the drawable, `factor` canvas px wide."""
     from objectmorpher_core.raster import tiles
 
     rgba = tiles.draw_rgba(drawable, texture, box)
     x0, y0, x1, y1 = box
     covered = _floats((factor * x0, factor * y0, factor * x1, factor * y1))
-    return Layer(covered, rgba, is_draft=True, is_coarse=True, is_tint=_is_tint(part))
+    return CanvasLayer(covered, rgba, is_draft=True, is_coarse=True, is_tint=_is_tint(part))
 
 
 def _sharp_layer(
-    picture: Picture3D, texture: TextureLevels, part: Part, box: Box, factor: int, view: View
-) -> Layer:
+    picture: Picture3D,
+    texture: TextureLevels,
+    part: ObjectPart,
+    box: Box,
+    factor: int,
+    view: ViewState,
+) -> CanvasLayer:
     """An object that shows the photo, see `sharpening`; `box` as above."""
     from objectmorpher_core.raster.sharpening import sharpen
 
@@ -228,10 +246,10 @@ def _sharp_layer(
     rgba, invented = sharpen(
         picture, texture, factor, covered, corner, view.zoom, is_marked=part.is_marked
     )
-    return Layer(_floats(covered), rgba, invented, is_draft=True)
+    return CanvasLayer(_floats(covered), rgba, invented, is_draft=True)
 
 
-def _lit(work: _Work, look: Lit) -> Layer:
+def _lit(work: _Work, look: Lit) -> CanvasLayer:
     """Its picture in the light of where the object is; varying over it, in focus, with grain."""
     shown = work.shown
     if work.request.part.is_painted:
@@ -249,7 +267,7 @@ def _floats(box: Box) -> tuple[float, float, float, float]:
     return float(x0), float(y0), float(x1), float(y1)
 
 
-def _is_tint(part: Part) -> bool:
+def _is_tint(part: ObjectPart) -> bool:
     return part.look is Shown.STRAIN
 
 

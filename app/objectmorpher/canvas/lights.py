@@ -17,8 +17,8 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32, Mask
 from objectmorpher_core.document.model import Document, Placement, Plate
 
-from ..editor.view import View
-from .layer import Layer, PosedObject
+from ..editor.view import ViewState
+from .layer import CanvasLayer, PosedObject
 from .memo import Memo, same
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class _Kept:
     since: float  # s, monotonic
     is_sketch: bool
     is_asked: bool = False  # for the exact one
-    shade: Layer | None = None
+    shade: CanvasLayer | None = None
 
 
 Ask = Callable[[int, Callable[[], "Lit"], Callable[["Lit"], None]], None]
@@ -113,7 +113,7 @@ class Lights:
 
     # The picture
 
-    def layers(self, looks: Mapping[int, Lit], view: View) -> tuple[Layer, ...]:
+    def layers(self, looks: Mapping[int, Lit], view: ViewState) -> tuple[CanvasLayer, ...]:
         """The shadows on the canvas, of objects in these lights."""
         found = []
         for k, look in looks.items():
@@ -127,13 +127,13 @@ class Lights:
             if kept.shade is None or kept.shade.box != box:
                 shade = look.shade
                 rgba = kept.shade.rgba if kept.shade else _inked(shade.alpha, shade.colour)
-                kept.shade = Layer(box, rgba, is_coarse=True)
+                kept.shade = CanvasLayer(box, rgba, is_coarse=True)
             found.append(kept.shade)
         return tuple(found)
 
     # Where it is shown
 
-    def touched(self, plate: Plate | None, looks: Iterable[Lit], view: View, cell: int) -> F32:
+    def touched(self, plate: Plate | None, looks: Iterable[Lit], view: ViewState, cell: int) -> F32:
         """(h, w) on a grid of `cell` canvas px: 1 where shadows or repairs are.
 
         `plate` is the one that the edit shows; None where nothing has moved.
@@ -166,7 +166,11 @@ def _shrunk(mask: Mask | None) -> tuple[Mask, float]:
 
 
 def _mark(
-    touched: F32, there: Mask, corner: tuple[float, float], pitch: float, grid: tuple[View, int]
+    touched: F32,
+    there: Mask,
+    corner: tuple[float, float],
+    pitch: float,
+    grid: tuple[ViewState, int],
 ) -> None:
     """Sets the cells whose middles are where something is `there`, or close beside it."""
     view, cell = grid

@@ -10,16 +10,16 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32, F64, I32
 from objectmorpher_core.document.model import Document
 
-from ..editor.view import Shown, ToolName, View
+from ..editor.view import Shown, ToolName, ViewState
 from .derived import Derived
-from .layer import Part, PosedObject
+from .layer import ObjectPart, PosedObject
 from .memo import Memo
 
 if TYPE_CHECKING:
     from objectmorpher_core.raster.posed import PosedSplats
 
 
-def shown_now(document: Document | None, view: View) -> Shown:
+def shown_now(document: Document | None, view: ViewState) -> Shown:
     """The view that was chosen, as soon as there is an object for it; selecting needs the photo,
     and from elsewhere than the photo's view the composite's object is alone."""
     if document is None or not any(o.lifted for o in document.objects):
@@ -38,13 +38,13 @@ class Painter:
     def __init__(self, derived: Derived) -> None:
         self._derived = derived
         # of each object and view the last one, with what it was painted from
-        self._painted: dict[Part, tuple[PosedSplats, object, PosedSplats]] = {}
+        self._painted: dict[ObjectPart, tuple[PosedSplats, object, PosedSplats]] = {}
         self._spread: DepthRange | None = None
         self._spreads = Memo()
 
     def painted(self, document: Document, own: PosedObject, look: Shown) -> PosedSplats:
         """An object as a view shows it: in plain colours, or as it is."""
-        splats, part = own.posed, Part(own.k, look)
+        splats, part = own.posed, ObjectPart(own.k, look)
         if not part.is_painted:
             return splats
         spread = self.spread(document) if look is Shown.DEPTH else None

@@ -38,7 +38,7 @@ REACH = 0.01  # object units that a point is moved for practice
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class RestSurface:
     """The solid Gaussians of an object at rest, object frame."""
 
     tree: KDTree  # of their means
@@ -47,7 +47,7 @@ class Surface:
 
 
 @dataclass(eq=False)
-class Shape:
+class CanvasShape:
     """An object that can be posed, drawn and picked, with the photo that it carries."""
 
     puppet: Puppet
@@ -55,38 +55,38 @@ class Shape:
     is_rehearsed: bool = False  # or is being so: nobody else has to
 
     @cached_property
-    def surface(self) -> Surface:
+    def surface(self) -> RestSurface:
         return build_surface(self.puppet.lifted)
 
-    def with_rig(self, rig: Rig) -> Shape:
+    def with_rig(self, rig: Rig) -> CanvasShape:
         """Return the same object with another rig; whatever does not depend on it is kept."""
-        other = Shape(self.puppet.with_rig(rig), self.texture)
+        other = CanvasShape(self.puppet.with_rig(rig), self.texture)
         if "surface" in vars(self):
             other.surface = self.surface
         return other
 
 
-def build_surface(lifted: LiftedObject) -> Surface:
+def build_surface(lifted: LiftedObject) -> RestSurface:
     from scipy.spatial import KDTree
 
     body = lifted.body
     tree, normals = KDTree(body.means), body.normals.astype(np.float64)
-    return Surface(tree, normals, normals[tree.query(lifted.control_points)[1]])
+    return RestSurface(tree, normals, normals[tree.query(lifted.control_points)[1]])
 
 
-Shapes: TypeAlias = Sequence[tuple[EditObject, Shape]]
+Shapes: TypeAlias = Sequence[tuple[EditObject, CanvasShape]]
 
 
-def build_shape(camera: Camera, thing: EditObject) -> Shape:
+def build_shape(camera: Camera, thing: EditObject) -> CanvasShape:
     """A fraction of a second; what only a drag needs is made later. `camera` is the photo's."""
     from objectmorpher_core.compose.light.lighting import object_texture
     from objectmorpher_core.deform.puppet import puppet_of
 
     assert thing.matte is not None
-    return Shape(puppet_of(thing, camera), object_texture(thing.matte, thing.lifted))
+    return CanvasShape(puppet_of(thing, camera), object_texture(thing.matte, thing.lifted))
 
 
-def build_ready_shape(camera: Camera, thing: EditObject) -> Shape:
+def build_ready_shape(camera: Camera, thing: EditObject) -> CanvasShape:
     """Build a shape and rehearse it; this takes some seconds and belongs in a thread."""
     shape = build_shape(camera, thing)
     shape.is_rehearsed = True
@@ -117,14 +117,14 @@ def build_ready(document: Document) -> Shapes:
     """The shapes of all lifted objects, rehearsed; copies share one."""
     camera, built = document.photo.camera, Memo(len(document.objects))
 
-    def shape(thing: EditObject) -> Shape:
+    def shape(thing: EditObject) -> CanvasShape:
         parts = thing.lifted, thing.deform, thing.rig
         return built(lambda: build_ready_shape(camera, thing), *parts)
 
     return [(thing, shape(thing)) for thing in document.objects if thing.lifted is not None]
 
 
-def rehearse(shape: Shape, camera: Camera, placement: Placement | None = None) -> None:
+def rehearse(shape: CanvasShape, camera: Camera, placement: Placement | None = None) -> None:
     """Does once what a drag does; all that is slow the first time is kept, or compiled.
 
     In a thread or in another process: it changes nothing that somebody else looks at. The

@@ -10,17 +10,17 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.document.model import Document
 
-from ..editor.view import View
+from ..editor.view import ViewState
 from .blend import CELL
 from .frame import Cache, Frame, build_frame
-from .layer import Layer
+from .layer import CanvasLayer
 
 SMALL = 320  # px, longer side of the picture on which shares are counted
 LEAST = 0.02  # of a pixel that something new covers: with less it counts as unchanged
 
 
 @dataclass(frozen=True)
-class Shares:
+class CanvasShares:
     """Origins of the changed pixels; they sum to 1, or are 0 where nothing changed."""
 
     from_photo: float = 0.0
@@ -30,7 +30,7 @@ class Shares:
     changed: float = 0.0  # of all pixels of the photo
 
 
-def shares(document: Document, cache: Cache) -> Shares:
+def shares(document: Document, cache: Cache) -> CanvasShares:
     """Where the changed pixels come from; remembered.
 
     The export counts at the photo's own size and reports the exact figures.
@@ -47,7 +47,7 @@ def count_changed(document: Document, cache: Cache) -> int:
     return round(count, 2 - len(str(count)))
 
 
-def _count(document: Document, cache: Cache) -> Shares:
+def _count(document: Document, cache: Cache) -> CanvasShares:
     view = _small_view(document)
     frame = build_frame(document, view, cache, renderer="gl")
     assert frame.blend is not None, "the composite has one"
@@ -60,25 +60,25 @@ def _count(document: Document, cache: Cache) -> Shares:
     lifted, inpainted, through = _through_objects(document, frame, view, inpainted)
     is_changed = (edited > 0) & (through < 1 - LEAST)
     if not is_changed.any():
-        return Shares()
+        return CanvasShares()
     by_lifter = float((lifted * edited)[is_changed].mean())
     by_inpainter = float((inpainted * edited)[is_changed].mean())
     by_refiner = float(_alpha(frame.refined, view)[is_changed].mean())
     rest = 1 - by_refiner  # as the composite's figures: a refinement lies over all the others
     by_lifter, by_inpainter = rest * by_lifter, rest * by_inpainter
     from_photo = rest - by_lifter - by_inpainter
-    return Shares(from_photo, by_lifter, by_inpainter, by_refiner, float(is_changed.mean()))
+    return CanvasShares(from_photo, by_lifter, by_inpainter, by_refiner, float(is_changed.mean()))
 
 
-def _small_view(document: Document) -> View:
+def _small_view(document: Document) -> ViewState:
     width, height = document.photo.size
-    view = View(zoom=min(SMALL / max(width, height), 1.0))
+    view = ViewState(zoom=min(SMALL / max(width, height), 1.0))
     view.width, view.height = round(width * view.zoom), round(height * view.zoom)
     return view
 
 
 def _through_objects(
-    document: Document, frame: Frame, view: View, inpainted: F32
+    document: Document, frame: Frame, view: ViewState, inpainted: F32
 ) -> tuple[F32, F32, F32]:
     """What each pixel shows of what a lifter invented, of `inpainted`, and of what is unchanged."""
     from objectmorpher_core.raster import tiles
@@ -86,7 +86,7 @@ def _through_objects(
     camera = document.photo.camera
     lifted, through_all = np.zeros_like(inpainted), 1 - inpainted
     for own in frame.objects:
-        if isinstance(own, Layer):
+        if isinstance(own, CanvasLayer):
             through, invented = 1 - _alpha((own,), view), np.float32(0)
         else:
             picture = tiles.render(own.draft, own.shape.texture, view.camera(camera), camera)
@@ -97,7 +97,7 @@ def _through_objects(
     return lifted, inpainted, through_all
 
 
-def _alpha(layers: tuple[Layer, ...], view: View) -> F32:
+def _alpha(layers: tuple[CanvasLayer, ...], view: ViewState) -> F32:
     """(h, w) of pictures that lie over the canvas, px for px."""
     alpha = np.zeros((view.height, view.width), np.float32)
     for layer in layers:

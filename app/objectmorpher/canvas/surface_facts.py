@@ -11,7 +11,7 @@ from objectmorpher_core.document.model import Document
 
 from .derived import Derived
 from .memo import Memo
-from .shape import Surface
+from .shape import RestSurface
 
 if TYPE_CHECKING:
     from objectmorpher_core.deform.symmetry import MirrorPlane
@@ -26,7 +26,7 @@ class SurfaceFacts:
         self._derived = derived
         self._seen, self._influences, self._mirrors = Memo(), Memo(), Memo()
 
-    def surface(self, document: Document, k: int) -> Surface:
+    def surface(self, document: Document, k: int) -> RestSurface:
         return self._derived.shape(document.photo, document.objects[k]).surface
 
     def turn_of(self, document: Document, k: int) -> F64:

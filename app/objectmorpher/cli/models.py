@@ -9,7 +9,7 @@ from pathlib import Path
 
 from objectmorpher_core import lift, model_sets, models
 from objectmorpher_core.lift.workers import file as worker_file
-from objectmorpher_core.models import Added, HubModel, HubState, State, TrunkState
+from objectmorpher_core.models import Added, CacheState, HubModel, HubState, TrunkState
 
 from .terminal import UsageError, progress_bar
 
@@ -168,11 +168,11 @@ def _look(action: str, id: str | None) -> None:
         raise UsageError(f"{', '.join(broken)}: not installed or damaged, see `models list`")
 
 
-def _states(action: str, id: str | None) -> tuple[State, ...]:
+def _states(action: str, id: str | None) -> tuple[CacheState, ...]:
     return models.verify(id) if action == "verify" else models.look(id)
 
 
-def _line_of(action: str, state: State) -> str:
+def _line_of(action: str, state: CacheState) -> str:
     weight = state.weight
     if action != "list":
         return _checked(action, weight.id, state)
@@ -217,7 +217,7 @@ def _line_of_added(action: str, own: Added) -> str:
 
 
 def _checked(
-    action: str, id: str, found: State | TrunkState | HubState | Added, reason: str = ""
+    action: str, id: str, found: CacheState | TrunkState | HubState | Added, reason: str = ""
 ) -> str:
     """What `verify` and `path` say; `reason`: why it is damaged."""
     if action == "verify":

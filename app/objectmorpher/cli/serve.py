@@ -46,8 +46,8 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
     from ..server.alone import Alone
-    from ..server.cluster import Cluster, Plan
-    from ..server.front import Front, Limits
+    from ..server.cluster import Cluster, ClusterPlan
+    from ..server.front import Front, RequestLimits
     from ..server.table import table
     from ..system.logs import show_log
     from ..worker.stages import STAGES
@@ -67,7 +67,7 @@ def run_serve(options: argparse.Namespace) -> None:
     if not options.alone and find_spec("ray") is None:
         raise UsageError("Ray is not installed: `pip install 'objectmorpher[cluster]'`, or --alone")
     store = None if options.store is None else options.store << 20
-    plan = Plan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
+    plan = ClusterPlan(options.ray, stages, least, most, options.cpus, options.gpus, store=store)
     show_log()
     served = {name: row for name, row in table().items() if row.stage in stages}
     stop = threading.Event()
@@ -78,7 +78,7 @@ def run_serve(options: argparse.Namespace) -> None:
     runner = Alone(stages) if options.alone else Cluster(plan)
     signal.signal(signal.SIGTERM, end)  # only now: Ray sets its own when it starts
     try:
-        limits = Limits(body=options.max_body << 20)
+        limits = RequestLimits(body=options.max_body << 20)
         front = Front((options.host, options.port), token, runner, served, limits)
         front.start()
         try:

@@ -57,7 +57,7 @@ class About:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldJournal:
     """A journal's folder and its lock."""
 
     journal: Journal
@@ -78,8 +78,8 @@ class Autosave:
         self._asked: Document | None = None  # last one given to the thread
         self._asked_at = -INTERVAL  # s, monotonic
         self._is_kept = False  # the folder holds something, or soon will
-        self._held: Held | None = None  # the thread's own
-        self._orders: queue.SimpleQueue[tuple[Document, About] | Held | str | None]
+        self._held: HeldJournal | None = None  # the thread's own
+        self._orders: queue.SimpleQueue[tuple[Document, About] | HeldJournal | str | None]
         self._orders = queue.SimpleQueue()
         self._problem: str | None = None  # why the last write failed
         self._is_told = False
@@ -112,7 +112,7 @@ class Autosave:
         )
         return is_asked and self._given == self._done
 
-    def adopt(self, held: Held) -> None:
+    def adopt(self, held: HeldJournal) -> None:
         """Goes on in the folder of an editor that crashed, whose document is open now."""
         self._is_kept = True
         self._order(held)
@@ -145,7 +145,7 @@ class Autosave:
 
     # In the thread
 
-    def _order(self, order: tuple[Document, About] | Held | None) -> None:
+    def _order(self, order: tuple[Document, About] | HeldJournal | None) -> None:
         self._given += 1
         self._orders.put(order)
         if self._thread is None:
@@ -167,7 +167,7 @@ class Autosave:
         if self._held is not None:
             self._held.lock.release()
 
-    def _carry_out(self, order: tuple[Document, About] | Held | str | None) -> None:
+    def _carry_out(self, order: tuple[Document, About] | HeldJournal | str | None) -> None:
         if isinstance(order, tuple):
             started = time.monotonic()
             self._held = self._held or _new_folder()
@@ -176,13 +176,13 @@ class Autosave:
         else:
             if self._held is not None:
                 self._held.remove()
-            self._held = order if isinstance(order, Held) else None
+            self._held = order if isinstance(order, HeldJournal) else None
 
 
-def _new_folder() -> Held:
+def _new_folder() -> HeldJournal:
     folder = recovery_root() / uuid.uuid4().hex
     folder.mkdir(parents=True)
     lock = FileLock.take(folder / LOCK)
     if lock is None:
         raise OSError(f"{folder} is locked")
-    return Held(Journal(folder), lock)
+    return HeldJournal(Journal(folder), lock)

@@ -25,7 +25,7 @@ from objectmorpher_core.segment import Found
 
 from ..worker import job_functions
 from ..worker.job_error import JobError
-from ..worker.job_functions import Choice
+from ..worker.job_functions import BackendChoice
 from ..worker.jobs import RELUCTANCE
 from .tasks import SELECT, Question, Tasks
 
@@ -308,7 +308,7 @@ class CloserLook:
         )  # fmt: skip
 
 
-def choice_of(editor: EditorState) -> Choice:
+def choice_of(editor: EditorState) -> BackendChoice:
     """Which segmenter is asked."""
     seed = editor.document.seed if editor.document is not None else 0
-    return Choice(editor.settings.backends.segment, seed)
+    return BackendChoice(editor.settings.backends.segment, seed)

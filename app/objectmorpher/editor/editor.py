@@ -29,16 +29,16 @@ from .intents.exporting import Exporting
 from .intents.hinting import Hinting
 from .intents.landing import Landing
 from .intents.leaving_out import LeavingOut
-from .intents.looking import Looking
+from .intents.looking import LookingIntents
 from .intents.masking import Masking
 from .intents.methods import Methods
 from .intents.models import Models
 from .intents.objects import Objects
 from .intents.placing import Placing
 from .intents.posing import HandleNumbers, Posing
-from .intents.refining import Refining
+from .intents.refining import RefiningIntents
 from .intents.rigging import Rigging
-from .intents.sample import Sample
+from .intents.sample import SampleOpening
 from .intents.selection import Selection
 from .intents.shaping import Shaping
 from .recovery import Recovery
@@ -59,7 +59,7 @@ class Editor(EditorState):
         self.handle_numbers = HandleNumbers(self, self.posing)
         self.placing, self.objects = Placing(self, self.posing), Objects(self, self.posing)
         self.landing = Landing(self, self.objects)
-        self.looking = Looking(self, self.landing)
+        self.looking = LookingIntents(self, self.landing)
         self.tasks = Tasks(self, self.posing)
         self.refits = Refits(self, self.posing, self.tasks)
         self.masking = Masking(self, self.landing, self.posing)
@@ -74,10 +74,10 @@ class Editor(EditorState):
         self.models = Models(self, self.methods, self.shaping, self.tasks)
         self.composing = Composing(self, self.methods, self.tasks, self.choose_tool)
         self.hinting = Hinting(self, self.composing)
-        self.refining, self.exporting = Refining(self, self.methods), Exporting(self)
+        self.refining, self.exporting = RefiningIntents(self, self.methods), Exporting(self)
         self.filing = Filing(self, self.tasks, self.exporting, self._uses(), self.start)
         self.leaving_out = LeavingOut(self)
-        self.sample = Sample(self, self.filing, self.selection, self.tasks)
+        self.sample = SampleOpening(self, self.filing, self.selection, self.tasks)
         self.autosave = Autosave(self)
         self.recovery = Recovery(self, self.autosave, self.filing, self.start, self.close)
         self._pollers = self._in_order()

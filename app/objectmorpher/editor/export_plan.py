@@ -35,7 +35,7 @@ _KEYS = {
 }  # fmt: skip
 
 
-class Motion(Enum):
+class VideoMotion(Enum):
     """Subjects of a video, named as in `objectmorpher_core.scripting.animation.MOTIONS`."""
 
     MORPH = "Photo to edit"
@@ -61,7 +61,7 @@ LENGTHS = (1.0, 12.0)  # s, of a video
 
 
 @dataclass(frozen=True)
-class Plan:
+class ExportPlan:
     """An export that was decided on."""
 
     what: What
@@ -69,7 +69,7 @@ class Plan:
     object: int = 0  # index of the one whose cut-out or mask it is
     bits: int = 0  # 8 or 16 a channel; 0: the photo's own
     quality: int = 95  # of the format; 100 is lossless where it has that
-    motion: Motion = Motion.MORPH
+    motion: VideoMotion = VideoMotion.MORPH
     seconds: float = 4.0
 
     @property

@@ -19,7 +19,7 @@ class Action:
 
 
 @dataclass(frozen=True)
-class Message:
+class StatusMessage:
     """A sentence for the status line."""
 
     text: str

@@ -16,7 +16,7 @@ from ..system import clipboard
 from ..system.texts import t
 from ..worker.job_error import JobError
 from .export_plan import FORMATS
-from .opening import PHOTO_ENDINGS, SESSION_ENDING, Opened, is_object, read_document, read_photo
+from .opening import PHOTO_ENDINGS, SESSION_ENDING, OpenedFile, is_object, read_document, read_photo
 
 if TYPE_CHECKING:
     from .intents.exporting import Exporting
@@ -187,7 +187,7 @@ class Filing:
     def paste(self) -> None:
         """Opens the photo in the clipboard, or the file there, after the usual question."""
 
-        def read(progress: Progress) -> tuple[Opened, Path | None]:
+        def read(progress: Progress) -> tuple[OpenedFile, Path | None]:
             pasted = clipboard.paste()
             if pasted.path is not None:
                 return read_document(pasted.path, self.fov, self.seed, progress), pasted.path
@@ -198,29 +198,29 @@ class Filing:
     def _open(self, path: Path, then: Callable[[], None]) -> None:
         """Reads the file in a thread; `then` is called when it is shown."""
 
-        def read(progress: Progress) -> tuple[Opened, Path | None]:
+        def read(progress: Progress) -> tuple[OpenedFile, Path | None]:
             return read_document(path, self.fov, self.seed, progress), path
 
         self._begin(t("Opening {name}", name=path.name), read, then)
 
     def _begin(
-        self, title: str, read: Callable[[Progress], tuple[Opened, Path | None]],
+        self, title: str, read: Callable[[Progress], tuple[OpenedFile, Path | None]],
         then: Callable[[], None],
     ) -> None:  # fmt: skip
         """What is open now may be lost: that was asked. What is done to it meanwhile may not."""
         editor, given_up = self._editor, self._editor.committed
 
-        def prepared(progress: Progress) -> tuple[Opened, Path | None, Shapes]:
+        def prepared(progress: Progress) -> tuple[OpenedFile, Path | None, Shapes]:
             opened, path = read(progress)
             return opened, path, build_ready(opened.document)
 
-        def show(opened: Opened, path: Path | None, shapes: Shapes) -> None:
+        def show(opened: OpenedFile, path: Path | None, shapes: Shapes) -> None:
             self._start(opened.document, shapes)
             editor.path = path if opened.is_session else None
             editor.source = None if opened.is_session else path
             then()
 
-        def accept(answer: tuple[Opened, Path | None, Shapes]) -> None:
+        def accept(answer: tuple[OpenedFile, Path | None, Shapes]) -> None:
             if editor.committed is given_up or editor.is_saved:
                 show(*answer)
             else:

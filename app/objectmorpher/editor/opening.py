@@ -22,7 +22,7 @@ class OpeningError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class OpenedFile:
     """The contents of an opened file."""
 
     document: Document
@@ -34,7 +34,7 @@ def is_object(path: Path) -> bool:
     return path.suffix.lower() in OBJECT_ENDINGS
 
 
-def read_document(path: Path, fov: float | None, seed: int, progress: Progress) -> Opened:
+def read_document(path: Path, fov: float | None, seed: int, progress: Progress) -> OpenedFile:
     """The document in a file; `fov` (degrees) and `seed` are for photos. Raises OpeningError."""
     if path.is_dir():
         raise OpeningError(f"{path.name} is a folder; choose a photo in it")
@@ -49,7 +49,7 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
                 from objectmorpher_core.session.file import read_session
 
                 progress(0.1, "")
-                return Opened(read_session(file), is_session=True)
+                return OpenedFile(read_session(file), is_session=True)
         data = _read(path, progress)
         progress(0.35, "")
         return read_photo(data, path.name, fov, seed)
@@ -64,12 +64,12 @@ def read_document(path: Path, fov: float | None, seed: int, progress: Progress) 
         raise OpeningError(f"{path.name} cannot be opened: {error}") from error
 
 
-def read_photo(data: bytes, name: str, fov: float | None, seed: int) -> Opened:
+def read_photo(data: bytes, name: str, fov: float | None, seed: int) -> OpenedFile:
     """A new document of a photo, the bytes of its file. Raises OpeningError."""
     from objectmorpher_core.pipeline import open_photo
 
     try:
-        return Opened(open_photo(data, name, fov=fov, seed=seed), is_session=False)
+        return OpenedFile(open_photo(data, name, fov=fov, seed=seed), is_session=False)
     except MemoryError as error:
         raise OpeningError(f"{name} does not fit into the memory") from error
     except ValueError as error:

@@ -20,7 +20,7 @@ from ..canvas.shape import Shapes, build_ready
 from ..system.file_lock import FileLock
 from ..system.texts import t
 from ..worker.job_error import JobError
-from .autosave import LOCK, Held, recovery_root
+from .autosave import LOCK, HeldJournal, recovery_root
 from .feedback import Action
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class Recovery:
         self._forget(left)
         lock = FileLock.take(left.folder / LOCK) if left.folder.is_dir() else None
         if lock is not None:
-            Held(Journal(left.folder), lock).remove()
+            HeldJournal(Journal(left.folder), lock).remove()
 
     def _recover(self, left: Left) -> None:
         editor = self._editor
@@ -128,7 +128,7 @@ class Recovery:
             editor.path, editor.source = left.path, left.source
             assert editor.history is not None
             editor.history.mark_unsaved()
-            self._autosave.adopt(Held(Journal(left.folder), lock))
+            self._autosave.adopt(HeldJournal(Journal(left.folder), lock))
             editor.say(t("Recovered {name} as it was at {time}", name=left.name,
                          time=when(left.edited)))  # fmt: skip
 

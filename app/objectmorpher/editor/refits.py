@@ -28,7 +28,7 @@ REFIT = "refit"  # kind of job
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class RefitRequest:
     """The request behind an answer, which is dropped when the request has changed since."""
 
     k: int
@@ -49,7 +49,7 @@ class Refits:
     def __init__(self, editor: EditorState, posing: Posing, tasks: Tasks) -> None:
         self._editor = editor
         self._posing, self._tasks = posing, tasks
-        self._asked: Wanted | None = None  # or failed for, or cancelled
+        self._asked: RefitRequest | None = None  # or failed for, or cancelled
         self._answer: Refitted | None = None  # that is not shown yet
 
     def forget(self) -> None:
@@ -83,12 +83,12 @@ class Refits:
 
     def _ask(self, document: Document, k: int) -> None:
         from objectmorpher_core.lift.refitting import Lifted, background_of
-        from objectmorpher_core.lift.registration.importing import Scene
+        from objectmorpher_core.lift.registration.importing import ImportTarget
 
         editor, item, photo = self._editor, document.objects[k], document.photo
         assert item.mask is not None and item.lifted is not None
         assert item.shaped is not None and item.matte is not None and item.selection is not None
-        wanted = Wanted(k, item.mask, item.lifted, document.plate)
+        wanted = RefitRequest(k, item.mask, item.lifted, document.plate)
         self._asked, self._answer = wanted, None
 
         def accept(answer: Refitted) -> None:
@@ -101,12 +101,12 @@ class Refits:
         editor.jobs.start(
             t("Fitting {name} to its new outline", name=item.name), job_functions.refit,
             Lifted(item.shaped, item.matte, item.lifted, item.shape),
-            Scene(photo.pixels, photo.camera, item.selection),
+            ImportTarget(photo.pixels, photo.camera, item.selection),
             background_of(document, k, editor.settings.backends.inpaint), document.seed,
             done=accept, failed=fail, kind=REFIT,
         )  # fmt: skip
 
-    def _show(self, wanted: Wanted, answer: Refitted) -> None:
+    def _show(self, wanted: RefitRequest, answer: Refitted) -> None:
         """What drawing it takes is made in a thread first."""
         editor, k = self._editor, wanted.k
         self._answer = None

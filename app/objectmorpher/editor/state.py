@@ -22,10 +22,10 @@ from ..worker.job_error import JobError
 from ..worker.job_functions import WARM
 from ..worker.jobs import Jobs
 from ..worker.threads import Chores
-from .feedback import Action, Hover, Message
+from .feedback import Action, Hover, StatusMessage
 from .history import History
 from .settings import Settings
-from .view import View
+from .view import ViewState
 
 
 class EditorState:
@@ -34,7 +34,7 @@ class EditorState:
     def __init__(self, settings: Settings, wake: Callable[[], None] = lambda: None) -> None:
         """`wake` is called from another thread when a job has something to deliver."""
         self.settings = settings
-        self.view = View()
+        self.view = ViewState()
         self.hand = Hand()
         self.jobs = Jobs(WARM, wake)
         self.chores = Chores(wake)
@@ -47,7 +47,7 @@ class EditorState:
         self.hover = Hover()
         self.pointer: Pointer | None = None  # where it is now, on the canvas
         self.rubber: tuple[float, float, float, float] | None = None  # box being drawn, canvas px
-        self.message: Message | None = None
+        self.message: StatusMessage | None = None
         self.is_over = False  # the window closes
 
     # What there is
@@ -101,11 +101,11 @@ class EditorState:
     # Saying things
 
     def say(self, text: str, action: Action | None = None) -> None:
-        self.message = Message(text, action=action)
+        self.message = StatusMessage(text, action=action)
 
     def complain(self, text: str, details: str = "", action: Action | None = None) -> None:
         """An error: one sentence, its first letter a capital."""
-        self.message = Message(sentence(text), is_error=True, details=details, action=action)
+        self.message = StatusMessage(sentence(text), is_error=True, details=details, action=action)
 
     def complain_of(self, error: JobError) -> None:
         """A job that failed; where another try may help there is a button for it."""

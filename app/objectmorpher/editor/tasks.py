@@ -29,11 +29,11 @@ from objectmorpher_core.segment import Found
 
 from ..canvas.layer import ExactPicture, Rendered
 from ..canvas.memo import same
-from ..canvas.shape import Shape, build_ready_shape, rehearse
+from ..canvas.shape import CanvasShape, build_ready_shape, rehearse
 from ..system.texts import folder_of, t
 from ..worker import job_functions
 from ..worker.job_error import JobError
-from ..worker.job_functions import Choice, Cut
+from ..worker.job_functions import BackendChoice, Cut
 from .feedback import Action
 from .view import SelectMode, ToolName
 
@@ -173,7 +173,7 @@ class Tasks:
         editor.jobs.start(
             t("Selecting"), job_functions.segment, photo.pixels,
             edits.beside(document, question.k, question.prompt),
-            Choice(editor.settings.backends.segment, document.seed),
+            BackendChoice(editor.settings.backends.segment, document.seed),
             done=accept, failed=fail,
             cancelled=self._drop_question, kind=SELECT,
         )  # fmt: skip
@@ -212,7 +212,7 @@ class Tasks:
         editor.jobs.start(
             title, job_functions.lift,
             Cut(photo.pixels, photo.camera, thing.selection),
-            Choice(settings.backends.lift, document.seed), wanted,
+            BackendChoice(settings.backends.lift, document.seed), wanted,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
 
@@ -234,7 +234,7 @@ class Tasks:
             return
         camera, thing = changed.photo.camera, changed.objects[k]
 
-        def accept(shape: Shape) -> None:
+        def accept(shape: CanvasShape) -> None:
             now = editor.document
             changed = None if now is None else change(now)
             if now is None or changed is None:
@@ -355,7 +355,7 @@ class Tasks:
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
             plate_cover(document),
-            Choice(editor.settings.backends.inpaint, document.seed, document.hints),
+            BackendChoice(editor.settings.backends.inpaint, document.seed, document.hints),
             done=accept, failed=fail, cancelled=say_so, replaced=forget, kind=PLATE,
         )  # fmt: skip
 

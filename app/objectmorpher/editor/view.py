@@ -140,7 +140,7 @@ class ComposeView:
 
 
 @dataclass(eq=False)
-class View:
+class ViewState:
     """Mutable: the tools and panels write it, the window reads it each frame."""
 
     width: int = 1  # canvas px

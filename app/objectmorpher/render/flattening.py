@@ -17,7 +17,7 @@ from objectmorpher_core.base.kernel_files import numba
 from objectmorpher_core.base.threads import EXACT, in_threads
 
 from ..canvas.blend import CELL
-from ..canvas.layer import Layer
+from ..canvas.layer import CanvasLayer
 
 Bounds = tuple[float, float, float, float]
 
@@ -28,7 +28,9 @@ BYTE, EIGHT, SIXTEEN, TOP = (np.uint32(v) for v in (255, 8, 16, 24))
 NOTHING, OPAQUE = np.uint32(0), np.uint32(255 << 24)
 
 
-def flatten(photo: U8, back: U8, blend: F32, layers: tuple[Layer, ...], photo_box: Bounds) -> U8:
+def flatten(
+    photo: U8, back: U8, blend: F32, layers: tuple[CanvasLayer, ...], photo_box: Bounds
+) -> U8:
     """(h, w, 4) of the canvas, its rows from the bottom up as OpenGL has them.
 
     `photo`, `back` (h, w, 4): the photo and the edit's background as the view shows them; `blend`
@@ -51,11 +53,11 @@ def rehearse() -> None:
     """Loads the kernels, or compiles them the first time, before somebody waits for them."""
     some, blend = np.zeros((CELL, CELL, 4), np.uint8), np.ones((1, 1), np.float32)
     box = (0.0, 0.0, float(CELL), float(CELL))
-    layers = Layer(box, some), Layer(box, some, is_coarse=True)
+    layers = CanvasLayer(box, some), CanvasLayer(box, some, is_coarse=True)
     flatten(some, some, blend, layers, box)
 
 
-def _add(layer: Layer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
+def _add(layer: CanvasLayer, blend: F32, photo_box: Bounds, out: np.ndarray) -> None:
     """Draws a layer over what is there; upside down like the rest."""
     low = [max(a, b, 0.0) for a, b in zip(layer.box[:2], photo_box[:2], strict=True)]
     size = out.shape[1], out.shape[0]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from ..canvas.layer import Layer
-from ..editor.view import View
+from ..canvas.layer import CanvasLayer
+from ..editor.view import ViewState
 from .photo_pass import hatch_uniforms
 from .scene import Scene, SplatObject
 from .shaders import Programs, set_uniforms
@@ -36,18 +36,18 @@ class LayerPass:
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
         self._programs = Programs(context, "quad.vert", "layer.frag", _UNITS)
-        self._uploaded: dict[int, tuple[Layer, dict[int, moderngl.Texture]]] = {}
+        self._uploaded: dict[int, tuple[CanvasLayer, dict[int, moderngl.Texture]]] = {}
         self._factors: moderngl.Texture | None = None
         self._grain = GrainTextures(context)
 
-    def draw(self, scene: Scene, view: View) -> None:
+    def draw(self, scene: Scene, view: ViewState) -> None:
         """Draw into the current viewport, which is the canvas."""
-        between = tuple(item for item in scene.objects if isinstance(item, Layer))
+        between = tuple(item for item in scene.objects if isinstance(item, CanvasLayer))
         self._forget(scene.shades + scene.layers + between)
         for layer in scene.shades + scene.layers:
             self.draw_layer(layer, scene, view)
 
-    def draw_layer(self, layer: Layer, scene: Scene, view: View) -> None:
+    def draw_layer(self, layer: CanvasLayer, scene: Scene, view: ViewState) -> None:
         """Draw one layer over what is there."""
         for unit, texture in self._textures(layer).items():
             texture.use(unit)
@@ -59,7 +59,7 @@ class LayerPass:
         self._render(program, quad, scene, view)
 
     def draw_picture(
-        self, picture: SplatPicture, item: SplatObject, scene: Scene, view: View
+        self, picture: SplatPicture, item: SplatObject, scene: Scene, view: ViewState
     ) -> None:
         """A picture of the whole canvas that is on the GPU already."""
         picture.color.use(LAYER)
@@ -78,7 +78,7 @@ class LayerPass:
         set_uniforms(program, box=(0, 0, view.width, view.height), **values)
         self._render(program, quad, scene, view)
 
-    def _use_factors(self, relit: Relit, view: View) -> tuple[float, float, float, float]:
+    def _use_factors(self, relit: Relit, view: ViewState) -> tuple[float, float, float, float]:
         """Uploads them, with nothing around them; where on the canvas they lie."""
         factors = np.pad(relit.factor, 1)
         if self._factors is not None:
@@ -93,7 +93,7 @@ class LayerPass:
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def _render(
-        self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: View
+        self, program: moderngl.Program, quad: moderngl.VertexArray, scene: Scene, view: ViewState
     ) -> None:
         set_uniforms(
             program,
@@ -107,14 +107,14 @@ class LayerPass:
         quad.render(moderngl.TRIANGLE_STRIP, 4)
         self._context.disable(moderngl.BLEND)
 
-    def _forget(self, layers: tuple[Layer, ...]) -> None:
+    def _forget(self, layers: tuple[CanvasLayer, ...]) -> None:
         """Releases what is not shown any more."""
         kept = {id(layer.rgba) for layer in layers}
         for key in [key for key in self._uploaded if key not in kept]:
             for texture in self._uploaded.pop(key)[1].values():
                 texture.release()
 
-    def _textures(self, layer: Layer) -> dict[int, moderngl.Texture]:
+    def _textures(self, layer: CanvasLayer) -> dict[int, moderngl.Texture]:
         """The layer's textures by their unit."""
         key = id(layer.rgba)  # it stays the same where the light changes
         if key not in self._uploaded:
@@ -134,7 +134,7 @@ class LayerPass:
         return self._context.texture((width, height), channels, data, alignment=1, dtype=kind)
 
 
-def _appearance(thing: Layer | SplatObject) -> dict[str, Any]:
+def _appearance(thing: CanvasLayer | SplatObject) -> dict[str, Any]:
     return {"opacity": TINT if thing.is_tint else 1.0, "gain": thing.gain}
 
 
@@ -144,7 +144,7 @@ def _defines(scene: Scene, is_marked: bool, is_over: bool) -> list[str]:
     return defines + (["HAS_BLEND"] if scene.blend is not None and not is_over else [])
 
 
-def photo_box(scene: Scene, view: View) -> tuple[float, float, float, float]:
+def photo_box(scene: Scene, view: ViewState) -> tuple[float, float, float, float]:
     """The photo on the canvas: what lies beyond it is not exported."""
     height, width = scene.photo.shape[:2]
     (x0, y0), (x1, y1) = view.canvas_from_image(np.array([[0, 0], [width, height]]))
@@ -165,7 +165,7 @@ class GrainTextures:
         self._deviations: moderngl.Texture | None = None
         self._amounts: moderngl.Texture | None = None
 
-    def use(self, grain: Grain, view: View, units: tuple[int, int, int]) -> dict[str, Any]:
+    def use(self, grain: Grain, view: ViewState, units: tuple[int, int, int]) -> dict[str, Any]:
         """Binds amounts, tile and deviations to texture units; what the shader asks for."""
         from objectmorpher_core.compose.light.grain import tile_level
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import moderngl
 
-from ..editor.view import View
+from ..editor.view import ViewState
 from .scene import Hatch, Scene
 from .shaders import Programs, set_uniforms
 from .textures import BLEND, PictureTexture, blend_cells
@@ -24,7 +24,7 @@ class PhotoPass:
         self._plate = PictureTexture(context)
         self._mask = PictureTexture(context)
 
-    def draw(self, scene: Scene, view: View) -> None:
+    def draw(self, scene: Scene, view: ViewState) -> None:
         """Draw into the current viewport, which is the canvas."""
         self._photo.upload(scene.photo, zoom=view.zoom)
         self._plate.upload(scene.plate.pixels if scene.plate else None, zoom=view.zoom)
@@ -54,7 +54,7 @@ class PhotoPass:
         quad.render(moderngl.TRIANGLE_STRIP, 4)
 
 
-def hatch_uniforms(hatch: Hatch | None, view: View) -> dict[str, Any]:
+def hatch_uniforms(hatch: Hatch | None, view: ViewState) -> dict[str, Any]:
     """Return the uniforms of shaders/hatch.glsl."""
     if hatch is None:
         return {"unit": view.scale}

@@ -10,8 +10,8 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import U8
 
-from ..canvas.layer import Layer
-from ..editor.view import View
+from ..canvas.layer import CanvasLayer
+from ..editor.view import ViewState
 from .defocus_pass import DefocusPass
 from .layer_pass import LayerPass
 from .photo_pass import PhotoPass
@@ -67,7 +67,7 @@ class Renderer:
         self._use((0, 0, self._size[0], self._size[1]))
         self._target.clear(*self._surround, 1.0)
 
-    def draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+    def draw(self, scene: Scene, view: ViewState, viewport: Viewport) -> None:
         """The whole window: the scene in `viewport`, its colour around it."""
         kept = self._kept
         place = (self._surround, self._size, viewport, view.place, view.scale)
@@ -82,7 +82,7 @@ class Renderer:
         self._context.copy_framebuffer(self._target, kept.buffer)
         self._use(viewport)
 
-    def _flat(self, scene: Scene, view: View, viewport: Viewport, place: Place) -> U8 | None:
+    def _flat(self, scene: Scene, view: ViewState, viewport: Viewport, place: Place) -> U8 | None:
         """The canvas by the processor, where that is faster; None where it is not."""
         if not self._is_emulated:
             return None
@@ -90,7 +90,7 @@ class Renderer:
             scene, view, place, lambda under: self._read_canvas(under, view, viewport)
         )
 
-    def _read_canvas(self, scene: Scene, view: View, viewport: Viewport) -> U8:
+    def _read_canvas(self, scene: Scene, view: ViewState, viewport: Viewport) -> U8:
         """A scene drawn by the shaders, (h, w, 4) u8, upright."""
         buffer = self._target = self._kept.begin(self._size, self._surround)
         self._draw(scene, view, viewport)
@@ -98,14 +98,14 @@ class Renderer:
         data = buffer.read(viewport=viewport, components=4, alignment=1)
         return np.frombuffer(data, np.uint8).reshape(view.height, view.width, 4)[::-1].copy()
 
-    def _draw(self, scene: Scene, view: View, viewport: Viewport) -> None:
+    def _draw(self, scene: Scene, view: ViewState, viewport: Viewport) -> None:
         """Into the target."""
         self._use(viewport)
         self._blend.use(scene)
         self._photo_pass.draw(scene, view)
         self._layer_pass.draw(scene, view)
         for item in scene.objects:
-            if isinstance(item, Layer):
+            if isinstance(item, CanvasLayer):
                 self._layer_pass.draw_layer(item, scene, view)
                 continue
             picture = self._render(item, view)
@@ -118,7 +118,7 @@ class Renderer:
         if self._splat_pass is not None:
             self._splat_pass.sweep()
 
-    def _render(self, item: SplatObject, view: View) -> SplatPicture | None:
+    def _render(self, item: SplatObject, view: ViewState) -> SplatPicture | None:
         """The object's picture on the GPU; from the first failure on the processor makes them."""
         if self.kind != "gl":
             return None

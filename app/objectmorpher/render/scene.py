@@ -11,7 +11,7 @@ from objectmorpher_core.base.brush import Box
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Plate
 
-from ..canvas.layer import Layer
+from ..canvas.layer import CanvasLayer
 
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.grain import Grain
@@ -54,10 +54,10 @@ class Scene:
     photo: Pixels
     surround: Colour
     plate: Plate | None = None  # shown where there is one
-    shades: tuple[Layer, ...] = ()  # shadows, below all objects
-    layers: tuple[Layer, ...] = ()  # objects that are rendered already, back to front
+    shades: tuple[CanvasLayer, ...] = ()  # shadows, below all objects
+    layers: tuple[CanvasLayer, ...] = ()  # objects that are rendered already, back to front
     # objects to render, back to front, and between them what is rendered already
-    objects: tuple[SplatObject | Layer, ...] = ()
+    objects: tuple[SplatObject | CanvasLayer, ...] = ()
     mask: Selection | None = None  # what `veil` and `hatch` refer to
     touched: Sequence[Box] = ()  # of a mask that is painted in place: what changed, in its order
     veil: float = 0.0  # share of black outside the mask

@@ -11,7 +11,7 @@ import moderngl
 from objectmorpher_core.base.arrays import U8
 
 from ..canvas.memo import same
-from ..editor.view import View
+from ..editor.view import ViewState
 from .layer_pass import photo_box
 from .scene import Colour, Scene
 
@@ -25,7 +25,7 @@ class StillView:
         self._place: Place = ()
         self._pictures: dict[str, tuple[Scene, U8]] = {}  # with what they were drawn from
 
-    def flat(self, scene: Scene, view: View, place: Place, draw: Draw) -> U8 | None:
+    def flat(self, scene: Scene, view: ViewState, place: Place, draw: Draw) -> U8 | None:
         """The canvas, its rows from the bottom up; None where the shaders have to draw it.
 
         That is when the view moves, and where the scene is more than an edited photo. `draw`

@@ -8,7 +8,7 @@ from objectmorpher_core.base.progress import Cancelled, Progress
 
 from ..worker.stages import STAGES
 from .offers import Offers, look_at_offers
-from .running import Call, Outcome, perform
+from .running import Call, JobOutcome, perform
 from .table import Served
 
 WAIT = 0.1  # s between two looks at whether a waiting call is still wanted
@@ -31,7 +31,7 @@ class Alone:
             self._offers = {stage: found[stage] for stage in self._stages}
         return self._offers
 
-    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> Outcome:
+    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         while not self._turn.acquire(timeout=WAIT):
             if stop.is_set():
                 raise Cancelled

@@ -15,7 +15,7 @@ from objectmorpher_core.base.progress import Progress
 
 from .address import PROTOCOL, NotServed, ServedError, Server, ServerLost
 from .fitting import fits, is_sound
-from .message import Message, MessageError, decode, encode
+from .message import MessageError, WireMessage, decode, encode
 from .table import table, types
 
 CONNECT = 3.0  # s until there is a connection
@@ -72,7 +72,7 @@ def call(server: Server, name: str, arguments: tuple[Any, ...], progress: Progre
     return answer
 
 
-def _send_blobs(server: Server, message: Message, names: Any, progress: Progress) -> None:
+def _send_blobs(server: Server, message: WireMessage, names: Any, progress: Progress) -> None:
     """The large arrays that the server lacks."""
     if not isinstance(names, list) or not set(names) <= set(message.blobs):
         raise ServerLost(f"{server.address} asks for what there is not")

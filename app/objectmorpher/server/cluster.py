@@ -28,7 +28,7 @@ from objectmorpher_core.base.progress import Cancelled, Progress
 
 from ..worker.stages import STAGES
 from .offers import Offers, look_at_offers
-from .running import Call, Outcome, perform
+from .running import Call, JobOutcome, perform
 from .table import Served, table
 
 log = logging.getLogger(__name__)
@@ -46,7 +46,7 @@ ON_CPU = ("dino", "subject", "grabcut", "sam-onnx", "lama", "migan", "patchmatch
 
 
 @dataclass(frozen=True)
-class Plan:
+class ClusterPlan:
     """The spread of the backends over processes."""
 
     address: str | None = None  # of a running cluster; None: one is started here
@@ -61,7 +61,7 @@ class Plan:
 class Cluster:
     """The stages on Ray Serve."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: ClusterPlan) -> None:
         """Blocks until each stage has a process, if it can run. Raises RuntimeError."""
         self._plan = plan
         self._stored: OrderedDict[str, Any] = OrderedDict()  # name -> reference
@@ -85,7 +85,7 @@ class Cluster:
     def offers(self) -> Offers:
         return self._offers
 
-    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> Outcome:
+    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         from ray import exceptions
 
         lost = exceptions.RayActorError, exceptions.WorkerCrashedError, exceptions.ObjectLostError
@@ -98,7 +98,7 @@ class Cluster:
                 log.warning("%s lost its process; it is run again", call.name)
                 self._forget(call)
                 tell(0.0, "once more, in another process")
-        return Outcome(error=f"{call.name} has ended {TRIES} processes of the server")
+        return JobOutcome(error=f"{call.name} has ended {TRIES} processes of the server")
 
     def close(self) -> None:
         """Ends the stages, and the cluster if it was started here."""
@@ -146,7 +146,7 @@ class Cluster:
         handle = serve.run(deployment.bind(), name=_app(name), route_prefix=None)
         return handle.options(stream=True)
 
-    def _try(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> Outcome:
+    def _try(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         """Raises one of Ray's errors where the process is lost."""
         from ray import exceptions
 
@@ -207,7 +207,7 @@ def _app(name: str) -> str:
     return f"objectmorpher-{name}"
 
 
-def _looked_up(plan: Plan) -> Offers:
+def _looked_up(plan: ClusterPlan) -> Offers:
     """What the machines can run, by a process that has what the backends' will have."""
     import ray
 
@@ -216,7 +216,7 @@ def _looked_up(plan: Plan) -> Offers:
     return cast(Offers, ray.get(look.remote()))
 
 
-def _gpus(plan: Plan, offers: Offers) -> float:
+def _gpus(plan: ClusterPlan, offers: Offers) -> float:
     """Of one process, as Ray counts them."""
     import ray
 
@@ -227,7 +227,7 @@ def _gpus(plan: Plan, offers: Offers) -> float:
     return int(100 / max(sharing, 1)) / 100 if has_any else 0.0
 
 
-def _start_ray(plan: Plan) -> None:
+def _start_ray(plan: ClusterPlan) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     if plan.address is None and "RAY_AUTH_MODE" not in os.environ:
         assert "ray" not in sys.modules, "Ray reads these when it is imported"
@@ -267,7 +267,7 @@ class Replica:
         stop = threading.Event()
         steps: list[tuple[float, str]] = []
 
-        def work() -> Outcome | None:
+        def work() -> JobOutcome | None:
             import ray
 
             arrays: Any = {key: ray.get(reference) for key, reference in blobs.items()}

@@ -10,7 +10,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from objectmorpher_core.base.arrays import Pixels
-from objectmorpher_core.compose.plate.repair import Patch
+from objectmorpher_core.compose.plate.repair import PlatePatch
 from objectmorpher_core.document.model import LiftedObject, Matte, Plate
 from objectmorpher_core.document.settings import Refined
 from objectmorpher_core.segment import Found
@@ -123,7 +123,7 @@ def _(part: Variant, asked: Any) -> bool:
 
 
 @_is_whole.register
-def _(part: Patch, asked: Any) -> bool:
+def _(part: PlatePatch, asked: Any) -> bool:
     pixels = _photo(asked)
     is_same = part.pixels.shape == pixels.shape and part.pixels.dtype == pixels.dtype
     return is_same and part.coverage.shape == pixels.shape[:2]

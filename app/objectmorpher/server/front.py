@@ -33,7 +33,7 @@ from .address import PROTOCOL
 from .http import Handler, HttpServer, Refusal
 from .message import MessageError, MissingError, decode, digest
 from .offers import told_offers
-from .running import Call, Outcome, Runner
+from .running import Call, JobOutcome, Runner
 from .table import Table, types
 from .tokens import check_token, is_same
 
@@ -43,7 +43,7 @@ BEAT = 0.1  # s between two lines
 
 
 @dataclass(frozen=True)
-class Limits:
+class RequestLimits:
     """Limits on what one may ask for."""
 
     body: int = BODY_LIMIT
@@ -57,7 +57,7 @@ class Front(HttpServer):
 
     def __init__(
         self, address: tuple[str, int], token: str, runner: Runner, table: Table,
-        limits: Limits = Limits(),
+        limits: RequestLimits = RequestLimits(),
     ) -> None:  # fmt: skip
         """Raises OSError where the address is taken, TokenError."""
         self.token, self.runner, self.table, self.limits = (
@@ -150,7 +150,7 @@ class _Conversation:
         self._handler, self._call = handler, call
         self._stop = threading.Event()
         self._said: queue.SimpleQueue[tuple[float, str]] = queue.SimpleQueue()
-        self._outcome: Outcome | None = None
+        self._outcome: JobOutcome | None = None
         self._done = threading.Event()
 
     def hold(self) -> None:
@@ -203,7 +203,7 @@ class _Conversation:
             pass
         except Exception as error:
             log.exception("%s cannot be run", self._call.name)
-            self._outcome = Outcome(error=str(error) or type(error).__name__)
+            self._outcome = JobOutcome(error=str(error) or type(error).__name__)
         finally:
             self._done.set()
 

@@ -50,7 +50,7 @@ class MissingError(MessageError):
 
 
 @dataclass(frozen=True)
-class Message:
+class WireMessage:
     """A value on the wire."""
 
     body: bytes
@@ -65,7 +65,7 @@ def digest(body: bytes) -> str:
     return hashlib.sha256(body).hexdigest()
 
 
-def encode(value: Any, types: Types, is_split: bool = False) -> Message:
+def encode(value: Any, types: Types, is_split: bool = False) -> WireMessage:
     """`value` as bytes; `is_split`: large arrays beside it. TypeError where it has no form."""
     arrays: list[np.ndarray] = []
     blobs: dict[str, bytes] = {}
@@ -96,7 +96,7 @@ def encode(value: Any, types: Types, is_split: bool = False) -> Message:
         raise TypeError(f"a {name} cannot be sent")
 
     tree = json.dumps(plain(value), allow_nan=False)
-    return Message(_packed(tree, arrays), blobs)
+    return WireMessage(_packed(tree, arrays), blobs)
 
 
 def _packed(tree: str, arrays: list[np.ndarray]) -> bytes:

@@ -27,7 +27,7 @@ class Call:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JobOutcome:
     """The answer's bytes, or why there is none."""
 
     body: bytes = b""
@@ -46,7 +46,7 @@ class Runner(Protocol):
         """Which backends can run."""
         ...
 
-    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> Outcome:
+    def run(self, call: Call, served: Served, tell: Progress, stop: threading.Event) -> JobOutcome:
         """Blocks until the outcome is there. Raises Cancelled soon after `stop` is set."""
         ...
 
@@ -57,7 +57,7 @@ class Runner(Protocol):
 
 def perform(
     call: Call, served: Served, tell: Callable[[float, str], None], is_stopped: Callable[[], bool]
-) -> Outcome:
+) -> JobOutcome:
     """Runs a call here. Raises Cancelled."""
 
     def progress(fraction: float, note: str) -> None:
@@ -68,12 +68,12 @@ def perform(
     try:
         arguments: Any = served.checked(decode(call.body, types(), call.blobs))
         answer = served.function(*arguments, progress=progress)
-        return Outcome(encode(answer, types()).body)
+        return JobOutcome(encode(answer, types()).body)
     except Cancelled:
         raise
     except MessageError as error:
-        return Outcome(error=str(error), is_expected=True)
+        return JobOutcome(error=str(error), is_expected=True)
     except Exception as error:
         told = JobError.of(error, call.name)
         told.write_log(call.name)
-        return Outcome(error=told.sentence, is_expected=told.is_expected)
+        return JobOutcome(error=told.sentence, is_expected=told.is_expected)

@@ -18,11 +18,11 @@ from objectmorpher_core.document import model as documents
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import LiftedObject, LiftSettings, Matte, Plate, Prompt
 from objectmorpher_core.document.settings import Hint, Refined, Shadow
-from objectmorpher_core.scripting.runner import Refining
+from objectmorpher_core.scripting.runner import RefineOptions
 
 from ..editor.settings import AUTO
 from ..worker import job_functions
-from ..worker.job_functions import Choice, Cut, Cutout, Variant
+from ..worker.job_functions import BackendChoice, Cut, Cutout, Variant
 from .fitting import fits, is_photo
 from .message import MessageError
 
@@ -41,7 +41,7 @@ class Served:
 
     def backend(self, arguments: tuple[Any, ...]) -> str:
         """Which backend of the stage is asked, of arguments that were checked."""
-        chosen = [a.backend for a in arguments if isinstance(a, Choice | Refining)]
+        chosen = [a.backend for a in arguments if isinstance(a, BackendChoice | RefineOptions)]
         named = [a for a in arguments if isinstance(a, str)]  # where nothing but the name is chosen
         return next(iter((*chosen, *named)), AUTO)
 
@@ -62,34 +62,34 @@ Table = Mapping[str, Served]
 @cache
 def table() -> Table:
     """Name -> job function."""
-    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.plate.repair import PlatePatch
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.segment import Found
 
-    asking = (Pixels, Prompt | documents.BesidePrompt, Choice)
+    asking = (Pixels, Prompt | documents.BesidePrompt, BackendChoice)
     rows = (
         Served(job_functions.read_photo, "segment", (Pixels, str), None, _check_photo),
         Served(job_functions.segment, "segment", asking, Found, _check_asking),
         Served(job_functions.closer_look, "segment", asking, Found, _check_asking),
         Served(job_functions.candidate, "segment", asking, Found | str, _check_asking),
         Served(
-            job_functions.lift, "lift", (Cut, Choice, LiftSettings), tuple[Matte, LiftedObject],
-            _check_lift,
+            job_functions.lift, "lift", (Cut, BackendChoice, LiftSettings),
+            tuple[Matte, LiftedObject], _check_lift,
         ),
-        Served(job_functions.inpaint, "inpaint", (Pixels, Mask, Choice), Plate, _check_fill),
+        Served(job_functions.inpaint, "inpaint", (Pixels, Mask, BackendChoice), Plate, _check_fill),
         Served(
-            job_functions.fill_variants, "inpaint", (Pixels, Mask, Choice, int),
+            job_functions.fill_variants, "inpaint", (Pixels, Mask, BackendChoice, int),
             tuple[Variant, ...], _check_variants,
         ),
         Served(
-            job_functions.repair, "inpaint", (Patch, float, Choice), tuple[Patch, str],
-            _check_repair,
+            job_functions.repair, "inpaint", (PlatePatch, float, BackendChoice),
+            tuple[PlatePatch, str], _check_repair,
         ),
         Served(
-            job_functions.take_shadow, "inpaint", (Cutout, Choice),
+            job_functions.take_shadow, "inpaint", (Cutout, BackendChoice),
             tuple[Shadow | None, Plate] | None, _check_shadow,
         ),
-        Served(job_functions.refine, "refine", (CoarseEdit, Refining), Refined, _check_refine),
+        Served(job_functions.refine, "refine", (CoarseEdit, RefineOptions), Refined, _check_refine),
     )  # fmt: skip
     return {row.function.__name__: row for row in rows}
 
@@ -97,14 +97,14 @@ def table() -> Table:
 @cache
 def types() -> Mapping[str, type]:
     """Name -> dataclass that a message may hold."""
-    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.plate.repair import PlatePatch
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
     from objectmorpher_core.segment import Found
 
     kinds = (
-        documents.BesidePrompt, Camera, Choice, documents.Click, CoarseEdit, Cut, Cutout, Found,
-        Gaussians, Hint, LiftedObject, LiftSettings, Matte, Patch, documents.PhotoTexture, Plate,
-        Prompt, Refined, Refining, Shadow, Variant,
+        documents.BesidePrompt, Camera, BackendChoice, documents.Click, CoarseEdit, Cut, Cutout,
+        Found, Gaussians, Hint, LiftedObject, LiftSettings, Matte, PlatePatch,
+        documents.PhotoTexture, Plate, Prompt, Refined, RefineOptions, Shadow, Variant,
     )  # fmt: skip
     return {kind.__name__: kind for kind in kinds}
 
@@ -137,7 +137,7 @@ def _check_matte(matte: Matte) -> None:
     _require(is_right, "a cut-out's alpha and colours are of different sizes")
 
 
-def _check_lift(cut: Cut, choice: Choice, shape: LiftSettings) -> None:
+def _check_lift(cut: Cut, choice: BackendChoice, shape: LiftSettings) -> None:
     _check_photo(cut.pixels)
     _check_mask(cut.mask, cut.pixels, "mask")
     height, width = cut.mask.shape
@@ -154,23 +154,23 @@ def _check_fill(pixels: Any, covered: Any, *_: Any) -> None:
     _check_mask(covered, pixels, "mask")
 
 
-def _check_variants(pixels: Any, covered: Any, choice: Choice, count: int) -> None:
+def _check_variants(pixels: Any, covered: Any, choice: BackendChoice, count: int) -> None:
     _check_fill(pixels, covered)
     _require(0 < count <= MOST_VARIANTS, f"{count} backgrounds are asked for")
 
 
-def _check_repair(patch: Any, margin: float, choice: Choice) -> None:
+def _check_repair(patch: Any, margin: float, choice: BackendChoice) -> None:
     _check_photo(patch.pixels)
     shape = patch.coverage.shape
     _require(shape == patch.pixels.shape[:2], "what is painted is of another size than its pixels")
 
 
-def _check_shadow(cutout: Cutout, choice: Choice) -> None:
+def _check_shadow(cutout: Cutout, choice: BackendChoice) -> None:
     _check_fill(cutout.pixels, cutout.covered)
     _check_matte(cutout.matte)
 
 
-def _check_refine(edit: Any, how: Refining) -> None:
+def _check_refine(edit: Any, how: RefineOptions) -> None:
     _check_photo(edit.pixels)
     shape = edit.pixels.shape
     is_right = edit.coarse.shape == shape and edit.alpha.shape == shape[:2]

@@ -18,7 +18,7 @@ MACOS = ("defaults", "read", "com.apple.universalaccess", "reduceMotion")
 WINDOWS_ANIMATIONS = 0x1042  # SPI_GETCLIENTAREAANIMATION
 
 
-class Motion:
+class MotionPreference:
     """The program's motion preference. There is one instance, `motion`."""
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Motion:
         return self._system_is_reduced if choice == AUTO else choice == REDUCED
 
 
-motion = Motion()
+motion = MotionPreference()
 
 
 def is_reduced_by_system() -> bool:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..editor.view import Composed
 from ..system.texts import t
-from .pointer import Button, Pointer, Shape, Stroke, ignore
+from .pointer import Button, Pointer, PointerShape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -49,9 +49,9 @@ class ComposeTool:
         finally:  # Esc closes the stroke where it waits
             editor.composing.drop_stroke()
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         is_painting = editor.view.compose.is_bare and editor.is_on_photo(pointer.xy)
-        return Shape.CROSS if is_painting else Shape.ARROW
+        return PointerShape.CROSS if is_painting else PointerShape.ARROW
 
     def hint(self, editor: Editor) -> str:
         if not editor.view.compose.is_bare:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..editor.view import Orbit
 from ..system.texts import t
-from .pointer import TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved
+from .pointer import TURN_SPEED, Button, Pointer, PointerShape, Stroke, has_moved
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -25,8 +25,8 @@ class LookTool:
                 dx, dy = (pointer.xy - first.xy) / editor.view.scale * TURN_SPEED
                 editor.looking.turn(start.turned(-float(dx), float(dy)))
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.TURN
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
+        return PointerShape.TURN
 
     def hint(self, editor: Editor) -> str:
         if editor.looking.orbit is not None:

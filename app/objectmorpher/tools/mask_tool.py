@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..editor.view import Painted
 from ..system.texts import t
-from .pointer import Button, Pointer, Shape, Stroke, ignore
+from .pointer import Button, Pointer, PointerShape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -32,8 +32,8 @@ class MaskTool:
         finally:
             editor.masking.drop_stroke()
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
-        return Shape.CROSS if editor.is_on_photo(pointer.xy) else Shape.ARROW
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
+        return PointerShape.CROSS if editor.is_on_photo(pointer.xy) else PointerShape.ARROW
 
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:

@@ -13,7 +13,17 @@ from objectmorpher_core.document.model import Placement
 
 from ..system.texts import t
 from .gizmo import TURNS, Gizmo, Ring, gizmo
-from .pointer import SNAP, TURN_SPEED, Button, Pointer, Shape, Stroke, has_moved, ignore, one_axis
+from .pointer import (
+    SNAP,
+    TURN_SPEED,
+    Button,
+    Pointer,
+    PointerShape,
+    Stroke,
+    has_moved,
+    ignore,
+    one_axis,
+)
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -27,8 +37,8 @@ SCALE_SNAP = 0.1  # with Shift
 MIN_SCALE, MAX_SCALE = 0.02, 50.0
 OTHER = "other"  # another object, which a press takes instead
 SHAPES = {
-    "move": Shape.MOVE, OTHER: Shape.MOVE, "scale": Shape.SIZE, "depth": Shape.SIZE,
-    "horizon": Shape.HAND,
+    "move": PointerShape.MOVE, OTHER: PointerShape.MOVE, "scale": PointerShape.SIZE,
+    "depth": PointerShape.SIZE, "horizon": PointerShape.HAND,
 }  # fmt: skip
 
 Change = Callable[[Pointer, float], Placement]  # of the pointer now, diameters by the wheel
@@ -104,11 +114,11 @@ class PlaceTool:
             return "horizon"
         return "ball" if from_centre < 1.0 else "turn"
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         part = self.part_at(editor, pointer)
         other = editor.objects.other_at(pointer.xy) if part == OTHER else None
         editor.hover = replace(editor.hover, part=part, other=other)
-        return Shape.ARROW if part is None else SHAPES.get(part, Shape.TURN)
+        return PointerShape.ARROW if part is None else SHAPES.get(part, PointerShape.TURN)
 
     def hint(self, editor: Editor) -> str:
         text = _hints().get(editor.hover.part or "")

@@ -20,7 +20,7 @@ import numpy as np
 
 from objectmorpher_core.document.model import Document
 
-from ..editor.view import View
+from ..editor.view import ViewState
 
 CLICK_SLACK = 4.0  # points; a press that moves less is a click
 TURN_SPEED = 0.4  # degrees per point that the pointer moves
@@ -35,7 +35,7 @@ class Button(Enum):
     MIDDLE = 2
 
 
-class Shape(Enum):
+class PointerShape(Enum):
     """Shapes of the pointer, which announce the effect of a press."""
 
     ARROW = "arrow"
@@ -73,7 +73,7 @@ Stroke = Generator[None, Pointer, None]
 class Previewing(Protocol):
     """What a stroke shows while it lasts: the editor's state."""
 
-    view: View
+    view: ViewState
     preview: Document | None
     rubber: tuple[float, float, float, float] | None  # box being drawn, canvas px
 

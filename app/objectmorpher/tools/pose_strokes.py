@@ -25,7 +25,7 @@ SIGHT = np.array([0.0, 0.0, 1.0])  # world, into the picture
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldHandles:
     """The places of the dragged handles when the stroke began."""
 
     spots: dict[int, Spot]
@@ -42,7 +42,7 @@ def drag(editor: Editor, start: Pointer, handle: int, is_new: bool) -> Stroke:
     before = posing.selected
     chosen = _chosen(before, handle, start.shift)
     posing.select(*chosen)
-    held = Held({h: posing.spot(h) for h in chosen}, {h: posing.line(h) for h in chosen})
+    held = HeldHandles({h: posing.spot(h) for h in chosen}, {h: posing.line(h) for h in chosen})
     posing.expect_drag(chosen)
     pointer, is_moved, depth = start, False, 0.0
     while (pointer := (yield)).is_down:
@@ -75,7 +75,7 @@ def _chosen(before: tuple[int, ...], handle: int, is_added: bool) -> tuple[int, 
     return (handle,)
 
 
-def _follow(editor: Editor, held: Held, start: Pointer, now: Pointer, depth: float) -> None:
+def _follow(editor: Editor, held: HeldHandles, start: Pointer, now: Pointer, depth: float) -> None:
     delta = (now.xy - start.xy) / editor.view.zoom  # (2,) image px
     if now.alt:
         assert editor.document is not None

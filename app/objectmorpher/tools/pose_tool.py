@@ -10,7 +10,7 @@ from ..editor.feedback import Hover
 from ..editor.view import PoseMode
 from ..system.texts import t
 from . import pose_strokes, rig_brush
-from .pointer import Button, Pointer, Shape, Stroke, ignore
+from .pointer import Button, Pointer, PointerShape, Stroke, ignore
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -76,26 +76,26 @@ class PoseTool:
         gap = float(np.linalg.norm(pointer.xy - centre)) / editor.view.scale
         return abs(gap - RING) <= RING_REACH
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         if editor.view.pose.mode is not PoseMode.DRAG:
             editor.hover = Hover()
-            return Shape.CROSS
+            return PointerShape.CROSS
         handle = self.handle_at(editor, pointer)
         is_ring = handle is None and self.is_on_ring(editor, pointer)
         is_beside = handle is None and not is_ring
         other = editor.objects.other_at(pointer.xy) if is_beside else None
         if other is not None:
             editor.hover = Hover(other=other)
-            return Shape.HAND
+            return PointerShape.HAND
         point = editor.posing.surface_at(pointer.xy) if is_beside else None
         is_pin = pointer.alt and not pointer.ctrl
         part = RING_PART if is_ring else None
         editor.hover = Hover(handle=handle, surface=point, is_pin=is_pin, part=part)
         if is_ring or (pointer.ctrl and not (is_beside and point is None)):
-            return Shape.TURN
+            return PointerShape.TURN
         if handle is not None:
-            return Shape.MOVE
-        return Shape.CROSS if point is not None else Shape.ARROW
+            return PointerShape.MOVE
+        return PointerShape.CROSS if point is not None else PointerShape.ARROW
 
     def hint(self, editor: Editor) -> str:
         if editor.view.pose.mode is not PoseMode.DRAG:

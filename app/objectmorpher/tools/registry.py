@@ -10,7 +10,7 @@ from .compose_tool import ComposeTool
 from .look_tool import LookTool
 from .mask_tool import MaskTool
 from .place_tool import PlaceTool
-from .pointer import Pointer, Shape, Stroke
+from .pointer import Pointer, PointerShape, Stroke
 from .pose_tool import PoseTool
 from .select_tool import SelectTool
 
@@ -22,7 +22,7 @@ class Tool(Protocol):
         """A button went down on the canvas."""
         ...
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         """The pointer is over the canvas, no button down. Sets what the overlays show."""
         ...
 

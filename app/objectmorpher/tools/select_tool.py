@@ -12,7 +12,7 @@ from ..editor.feedback import Hover
 from ..editor.tasks import Combine
 from ..editor.view import SelectMode
 from ..system.texts import t
-from .pointer import Button, Pointer, Shape, Stroke, draw_box, ignore
+from .pointer import Button, Pointer, PointerShape, Stroke, draw_box, ignore
 
 if TYPE_CHECKING:
     from ..editor.editor import Editor
@@ -72,7 +72,7 @@ class SelectTool:
         if np.ptp(outline, axis=0).min() >= MIN_BOX:
             editor.selection.set_outline(outline, _combine(start))
 
-    def hover(self, editor: Editor, pointer: Pointer) -> Shape:
+    def hover(self, editor: Editor, pointer: Pointer) -> PointerShape:
         is_on_photo = editor.is_on_photo(pointer.xy)
         x, y = editor.view.image_from_canvas(pointer.xy)
         other = editor.landing.moved_at(pointer.xy)
@@ -80,8 +80,8 @@ class SelectTool:
         editor.hover = Hover(place=(float(x), float(y)) if is_place else None,
                              other=None if other == editor.current else other)  # fmt: skip
         if editor.hover.other is not None:
-            return Shape.HAND
-        return Shape.CROSS if is_on_photo else Shape.ARROW
+            return PointerShape.HAND
+        return PointerShape.CROSS if is_on_photo else PointerShape.ARROW
 
     def hint(self, editor: Editor) -> str:
         if editor.hand.is_busy:

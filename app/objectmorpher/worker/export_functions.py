@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import Document
 
-from ..editor.export_plan import Plan
+from ..editor.export_plan import ExportPlan
 
 if TYPE_CHECKING:
     from objectmorpher_core.scripting.outputs import Export
 
 
-def write_export(document: Document, plan: Plan, progress: Progress) -> None:
+def write_export(document: Document, plan: ExportPlan, progress: Progress) -> None:
     """Renders what the plan asks for and writes it. Raises OutputError, ImageError."""
     from objectmorpher_core.base.files import make_folder, write_all
 
@@ -36,12 +36,12 @@ def write_export(document: Document, plan: Plan, progress: Progress) -> None:
         raise
 
 
-def encode_export(document: Document, plan: Plan, progress: Progress) -> bytes:
+def encode_export(document: Document, plan: ExportPlan, progress: Progress) -> bytes:
     """Return the file that `write_export` would write."""
     return _export(document, plan, progress).encode(plan.what.key, plan.path)
 
 
-def _export(document: Document, plan: Plan, progress: Progress) -> Export:
+def _export(document: Document, plan: ExportPlan, progress: Progress) -> Export:
     from objectmorpher_core.scripting.animation import Clip
     from objectmorpher_core.scripting.outputs import Export
 

@@ -31,24 +31,24 @@ from ..canvas.layers import render
 from ..canvas.shape import rehearse_lift
 
 if TYPE_CHECKING:
-    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.plate.repair import PlatePatch
     from objectmorpher_core.compose.refine.refinement import CoarseEdit
-    from objectmorpher_core.doctor import Stage
+    from objectmorpher_core.doctor import StageReport
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
-    from objectmorpher_core.lift.registration.importing import Import, Scene
+    from objectmorpher_core.lift.registration.importing import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
-    from objectmorpher_core.scripting.runner import Refining
+    from objectmorpher_core.scripting.runner import RefineOptions
     from objectmorpher_core.segment import Found, Segmenter
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
 
 @dataclass(frozen=True)
-class Choice:
+class BackendChoice:
     """Which backend does a stage, its random seed, and what the user has said about a fill."""
 
     backend: str
@@ -116,7 +116,7 @@ def forget_segmenter(progress: Progress) -> None:
     _memory.forget()
 
 
-def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+def segment(pixels: Pixels, prompt: Prompt, choice: BackendChoice, progress: Progress) -> Found:
     """Return the mask that the prompt means, the backend that found it, and its confidence.
 
     At a glance, where the backend can tell better by a `closer_look`.
@@ -130,14 +130,14 @@ def segment(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) 
     return reading.segment(prompt, rest, choice.seed)
 
 
-def closer_look(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found:
+def closer_look(pixels: Pixels, prompt: Prompt, choice: BackendChoice, progress: Progress) -> Found:
     """Segment like `segment`, however long it takes."""
     reading = _memory.reading(pixels, choice.backend, part(progress, 0.0, 0.6))
     return reading.segment(prompt, part(progress, 0.6, 1.0), choice.seed)
 
 
 def lift(
-    cut: Cut, choice: Choice, shape: LiftSettings, progress: Progress
+    cut: Cut, choice: BackendChoice, shape: LiftSettings, progress: Progress
 ) -> tuple[Matte, LiftedObject]:
     """The masked object's soft cut-out and its 3D Gaussians."""
     from objectmorpher_core.pipeline import lift_mask
@@ -152,7 +152,7 @@ def lift(
 
 
 def refit(
-    was: Lifted, scene: Scene, behind: Background | None, seed: int, progress: Progress
+    was: Lifted, scene: ImportTarget, behind: Background | None, seed: int, progress: Progress
 ) -> Refitted:
     """A lifted object whose selection was refined, in its new shape."""
     from objectmorpher_core.lift.refitting import refit
@@ -168,7 +168,7 @@ def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:
 
 
 def import_object(
-    path: Path, scene: Scene, seed: int, progress: Progress
+    path: Path, scene: ImportTarget, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """An object's file registered to the photo, and in the best pose textured with it."""
     from objectmorpher_core.lift.registration.importing import Source, place_import, register_file
@@ -185,7 +185,7 @@ def import_object(
 
 
 def place_object(
-    scene: Scene, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
+    scene: ImportTarget, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
 ) -> tuple[Matte, LiftedObject]:
     """An object's Gaussians in a proposed pose, textured with the photo."""
     from objectmorpher_core.lift.registration.importing import place_import
@@ -194,7 +194,7 @@ def place_object(
 
 
 def fit_object(
-    scene: Scene, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
+    scene: ImportTarget, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """The best pose near `start` (4, 4 world from object), textured with the photo."""
     from objectmorpher_core.lift.registration.importing import fit_near, place_import
@@ -204,7 +204,9 @@ def fit_object(
     return found, *place_import(scene, gaussians, found.registration.best, rest, seed)
 
 
-def candidate(pixels: Pixels, prompt: Prompt, choice: Choice, progress: Progress) -> Found | str:
+def candidate(
+    pixels: Pixels, prompt: Prompt, choice: BackendChoice, progress: Progress
+) -> Found | str:
     """Segment like `segment`; where nothing can be selected, return the sentence that says so."""
     from objectmorpher_core.segment import SelectionError
 
@@ -247,7 +249,7 @@ def render_exact(request: ExactPicture, progress: Progress) -> Rendered:
     return render(request)
 
 
-def inpaint(pixels: Pixels, covered: Mask, choice: Choice, progress: Progress) -> Plate:
+def inpaint(pixels: Pixels, covered: Mask, choice: BackendChoice, progress: Progress) -> Plate:
     """The photo without its objects."""
     from objectmorpher_core.pipeline import make_plate
 
@@ -263,7 +265,7 @@ class Variant:
 
 
 def fill_variants(
-    pixels: Pixels, covered: Mask, choice: Choice, count: int, progress: Progress
+    pixels: Pixels, covered: Mask, choice: BackendChoice, count: int, progress: Progress
 ) -> tuple[Variant, ...]:
     """The photo without its objects, `count` times, each with another seed."""
     from objectmorpher_core.compose.plate.repair import thumbnail
@@ -278,7 +280,9 @@ def fill_variants(
     return tuple(found)
 
 
-def repair(patch: Patch, margin: float, choice: Choice, progress: Progress) -> tuple[Patch, str]:
+def repair(
+    patch: PlatePatch, margin: float, choice: BackendChoice, progress: Progress
+) -> tuple[PlatePatch, str]:
     """A part of the background filled in anew where it is painted, and by which backend."""
     from objectmorpher_core import compose
     from objectmorpher_core.compose.plate.repair import fill_patch
@@ -298,7 +302,7 @@ class Cutout:
 
 
 def take_shadow(
-    cutout: Cutout, choice: Choice, progress: Progress
+    cutout: Cutout, choice: BackendChoice, progress: Progress
 ) -> tuple[Shadow | None, Plate] | None:
     """A shadow like the object's in the photo, and the background without that and its reflection.
 
@@ -328,7 +332,7 @@ def cut_edit(document: Document, progress: Progress) -> CoarseEdit:
     return coarse_edit(document, progress)
 
 
-def refine(edit: CoarseEdit, how: Refining, progress: Progress) -> Refined:
+def refine(edit: CoarseEdit, how: RefineOptions, progress: Progress) -> Refined:
     """The edit as a network makes it look."""
     from objectmorpher_core.compose import refine
     from objectmorpher_core.compose.refine import refinement
@@ -345,7 +349,7 @@ def write_session(document: Document, path: Path, progress: Progress) -> None:
     save_session(document, path)
 
 
-def look_at_stages(progress: Progress) -> tuple[Stage, ...]:
+def look_at_stages(progress: Progress) -> tuple[StageReport, ...]:
     """Return what each stage's backends can do here; may load PyTorch to ask for a GPU."""
     from objectmorpher_core import doctor
 

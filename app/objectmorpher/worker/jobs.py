@@ -24,7 +24,7 @@ from objectmorpher_core.base.progress import Cancelled
 from ..system.logs import crash_folder, note_crashes
 from .job_error import JobError
 from .requests import Executor, Request
-from .wire import Connection, Reader, Writer
+from .wire import Connection, PipeReader, PipeWriter
 
 if TYPE_CHECKING:
     from ..server.elsewhere import Elsewhere
@@ -69,7 +69,7 @@ class Worker:
         self.process.join()
 
     def _write(self) -> None:
-        writer = Writer(self._connection)
+        writer = PipeWriter(self._connection)
         while (request := self._requests.get()) is not None:
             try:
                 writer.write(request)
@@ -79,7 +79,7 @@ class Worker:
                 self._deliver("failed", request[0], JobError.of(error, "the request"))
 
     def _read(self) -> None:
-        reader = Reader(self._connection)
+        reader = PipeReader(self._connection)
         try:
             while True:
                 self._deliver(*reader.read())
@@ -249,7 +249,7 @@ def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Pat
         note_crashes(crashes)
     for module in warm:
         importlib.import_module(module)
-    reader, writer = Reader(connection), Writer(connection, kept=0)
+    reader, writer = PipeReader(connection), PipeWriter(connection, kept=0)
     while True:
         try:
             number, function, arguments = reader.read()
@@ -278,7 +278,7 @@ def _lower_priority() -> None:
         os.nice(15)
 
 
-def _reporter(writer: Writer, number: int, stop: Any) -> Callable[[float, str], None]:
+def _reporter(writer: PipeWriter, number: int, stop: Any) -> Callable[[float, str], None]:
     last = ""
     last_time = 0.0
 

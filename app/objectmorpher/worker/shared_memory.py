@@ -22,7 +22,7 @@ LEAST = 1 << 25  # bytes: smaller ones would use up the open files that a proces
 PIECE = 1 << 30  # bytes that one write takes
 
 
-class Block(mmap.mmap):
+class SharedBlock(mmap.mmap):
     """Read-only memory that another process can have, too."""
 
     descriptor = -1
@@ -42,17 +42,17 @@ def pipe_of(connection: object) -> Pipe | None:
     return connection if isinstance(connection, Connection) else None
 
 
-def block_of(buffer: memoryview) -> Block | None:
+def block_of(buffer: memoryview) -> SharedBlock | None:
     """The block whose very bytes an array's `buffer` shows, all of them."""
     owner = buffer.obj
     while isinstance(owner, np.ndarray | memoryview):
         owner = owner.base if isinstance(owner, np.ndarray) else owner.obj
-    if not isinstance(owner, Block) or len(owner) != buffer.nbytes:
+    if not isinstance(owner, SharedBlock) or len(owner) != buffer.nbytes:
         return None
     return owner  # as long as the block, so it begins where the block does
 
 
-def shared(buffer: memoryview) -> Block | None:
+def shared(buffer: memoryview) -> SharedBlock | None:
     """A block with the bytes of `buffer`, a copy unless they came in one.
 
     None where the system has no memory for it.
@@ -75,14 +75,14 @@ def shared(buffer: memoryview) -> Block | None:
     return _mapped(descriptor, buffer.nbytes)
 
 
-def send(pipe: Pipe, block: Block) -> None:
+def send(pipe: Pipe, block: SharedBlock) -> None:
     """Send it to the caller of `receive` on the other side."""
     assert sys.platform == "linux"
     with _socket(pipe) as line:
         socket.send_fds(line, [b"\0"], [block.descriptor])
 
 
-def receive(pipe: Pipe, size: int) -> Block:
+def receive(pipe: Pipe, size: int) -> SharedBlock:
     """The block of `size` bytes that was sent. Raises EOFError, OSError."""
     assert sys.platform == "linux"
     with _socket(pipe) as line:
@@ -92,9 +92,9 @@ def receive(pipe: Pipe, size: int) -> Block:
     return _mapped(found[0], size)
 
 
-def _mapped(descriptor: int, size: int) -> Block:
+def _mapped(descriptor: int, size: int) -> SharedBlock:
     try:
-        block = Block(descriptor, size, access=mmap.ACCESS_READ)
+        block = SharedBlock(descriptor, size, access=mmap.ACCESS_READ)
     except BaseException:
         os.close(descriptor)
         raise

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from objectmorpher_core.doctor import Stage
+    from objectmorpher_core.doctor import StageReport
 
 DOCTORS = {  # stage, as in the settings -> what the doctor calls it
     "segment": "select", "lift": "lift", "inpaint": "background", "refine": "refine",
@@ -14,7 +14,7 @@ DOCTORS = {  # stage, as in the settings -> what the doctor calls it
 STAGES = tuple(DOCTORS)
 
 
-def by_stage(looked_at: Iterable[Stage]) -> dict[str, Stage]:
+def by_stage(looked_at: Iterable[StageReport]) -> dict[str, StageReport]:
     """Return the doctor's findings by the names of STAGES."""
     found = {stage.name: stage for stage in looked_at}
     return {stage: found[name] for stage, name in DOCTORS.items()}

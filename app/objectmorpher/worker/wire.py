@@ -24,7 +24,7 @@ KEPT = 12  # large values remembered on both sides; least recently used first ou
 KEPT_BYTES = 1 << 30  # that they may have in all
 
 
-Buffer: TypeAlias = bytes | shared_memory.Block
+Buffer: TypeAlias = bytes | shared_memory.SharedBlock
 
 
 class Connection(Protocol):
@@ -37,7 +37,7 @@ class Connection(Protocol):
 
 
 class _Pickler(pickle.Pickler):
-    def __init__(self, file: io.BytesIO, writer: Writer, buffers: list[pickle.PickleBuffer]):
+    def __init__(self, file: io.BytesIO, writer: PipeWriter, buffers: list[pickle.PickleBuffer]):
         super().__init__(file, protocol=5, buffer_callback=buffers.append)
         self._writer = writer
 
@@ -65,7 +65,7 @@ def _is_large(value: Any) -> bool:
     return type(value) is np.ndarray and value.nbytes >= LARGE and not value.flags.writeable
 
 
-class Writer:
+class PipeWriter:
     """The sending end."""
 
     def __init__(self, connection: Connection, kept: int = KEPT) -> None:
@@ -119,7 +119,7 @@ class Writer:
                 self._connection.send_bytes(raw)
 
 
-class Reader:
+class PipeReader:
     """The receiving end."""
 
     def __init__(self, connection: Connection) -> None:

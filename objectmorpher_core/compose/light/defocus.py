@@ -36,14 +36,14 @@ GUESSED_ROWS = 2.0  # bands that two ways to find the ground may be apart where 
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class StandingPlane:
     """The plane that an object stands on."""
 
     normal: F64  # (3,) world, unit, down
     is_known: bool  # by the horizon, or by the artist
 
 
-class Focus:
+class PhotoDefocus:
     """The blur of one photo, place by place; each is measured once."""
 
     def __init__(self, photo: Pixels, covered: Mask) -> None:
@@ -98,8 +98,8 @@ class Focus:
 
 
 def find_defocus(
-    splats: PosedSplats, rest: PosedSplats, matte: Matte, ground: Ground, focus: Focus,
-    camera: Camera,
+    splats: PosedSplats, rest: PosedSplats, matte: Matte, ground: StandingPlane,
+    focus: PhotoDefocus, camera: Camera,
 ) -> float:  # fmt: skip
     """Return the blur that a moved object is to get: standard deviation, px of the photo.
 
@@ -153,8 +153,8 @@ def _shown(means: F64, camera: Camera) -> _Shown:
 
 
 def _blur_there(
-    before: F64, change: float, was: _Shown, now: _Shown, ground: Ground, focus: Focus,
-    camera: Camera,
+    before: F64, change: float, was: _Shown, now: _Shown, ground: StandingPlane,
+    focus: PhotoDefocus, camera: Camera,
 ) -> float | None:  # fmt: skip
     """The photo's blur at the depth where the object is now; the lesser where there is doubt."""
     rows = camera.project(before)[:, 1]
@@ -214,7 +214,7 @@ STEPS = np.array([[0, 1], [1, 1], [1, 0], [1, -1]])  # rows and columns, by the 
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class BlurredEdges:
     """The edges of a picture, and how blurred each is."""
 
     blur: F64  # (n,) px, standard deviation
@@ -240,7 +240,7 @@ def measure_blur(pixels: Pixels, asked: Mask) -> float | None:
     return None
 
 
-def find_edges(pixels: Pixels, asked: Mask) -> list[Edges]:
+def find_edges(pixels: Pixels, asked: Mask) -> list[BlurredEdges]:
     """The edges of a picture (h, w, 3) that lie where it is `asked`, of each size of it."""
     light = unit_pixels(pixels).mean(-1)
     found, scale = [], 1
@@ -256,7 +256,7 @@ def find_edges(pixels: Pixels, asked: Mask) -> list[Edges]:
     return found
 
 
-def _edges(light: F32, asked: Mask, scale: int) -> Edges:
+def _edges(light: F32, asked: Mask, scale: int) -> BlurredEdges:
     """Of one level (h, w), `scale` px of the picture per px of it."""
     across, down, narrow = _gradient(light, NARROW)
     wide = _gradient(light, WIDE)[2]
@@ -274,7 +274,7 @@ def _edges(light: F32, asked: Mask, scale: int) -> Edges:
     blur = np.minimum(blur, 2 * WIDEST)
     # A px of a smaller picture is the mean of several, which blurs it, too.
     own = np.sqrt(np.maximum(blur**2 * scale**2 - (scale**2 - 1) / 12, 0))
-    return Edges(own, scale)
+    return BlurredEdges(own, scale)
 
 
 def _gradient(light: F32, sigma: float) -> tuple[F32, F32, F32]:

@@ -30,7 +30,7 @@ from ...raster.reference_layers import Picture3D
 from ...raster.rules import HALF, RULES, ZERO
 from ...raster.sampling import sample
 from ...raster.texture import TextureLevels, build_levels
-from ..silhouette import Grid, cell_places, fine_grid, sketched
+from ..silhouette import SilhouetteGrid, cell_places, fine_grid, sketched
 from .defocus import attenuation
 from .noise import BANDS, LEVELS, TILE, Noise, band_masks
 
@@ -229,7 +229,7 @@ def _missing(kept: np.ndarray) -> F32:
     return np.sqrt(np.where(kept > KEPT, 0, 1 - np.clip(kept, 0, 1))).astype(np.float32)
 
 
-def _kept(picture: Picture3D, share: F32, grid: Grid, noise: Noise) -> F32:
+def _kept(picture: Picture3D, share: F32, grid: SilhouetteGrid, noise: Noise) -> F32:
     """(h, w, BANDS) of the noise's variance where the photo is looked up as in `picture`."""
     height, width = share.shape
     step = max(-(-max(height, width) // NODES), 1)

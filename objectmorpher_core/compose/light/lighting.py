@@ -20,9 +20,9 @@ from ...document.settings import Shadow
 from ...raster.posed import PosedSplats
 from ...raster.texture import TextureLevels, build_levels
 from ..plate.plate import plate_cover
-from ..shadow.shadow import COARSE, FINE, Shade, Standing, cast, ground_normal
+from ..shadow.shadow import COARSE, FINE, Shade, StandingObject, cast, ground_normal
 from ..silhouette import SKETCHED, sketch, sketched
-from .defocus import Focus, Ground, find_defocus
+from .defocus import PhotoDefocus, StandingPlane, find_defocus
 from .grain import Grain, find_grain, sketch_grain
 from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .noise import Noise, find_noise
@@ -82,9 +82,9 @@ class Lighting:
         return find_noise(self._document.photo.pixels)
 
     @cached_property
-    def focus(self) -> Focus:
+    def focus(self) -> PhotoDefocus:
         """Return the blur of the photo."""
-        return Focus(self._document.photo.pixels, plate_cover(self._document))
+        return PhotoDefocus(self._document.photo.pixels, plate_cover(self._document))
 
     def of(
         self,
@@ -134,7 +134,7 @@ class Lighting:
         assert item.lifted is not None and item.matte is not None
         camera, shadow = self._document.photo.camera, item.shadow
         normal = _normal_under(item.lifted, camera, horizon, shadow)
-        ground = Ground(normal, horizon is not None or shadow.ground is not None)
+        ground = StandingPlane(normal, horizon is not None or shadow.ground is not None)
         return find_defocus(splats, rest, item.matte, ground, self.focus, camera)
 
     def _light_of(self, item: EditObject) -> F64:
@@ -153,7 +153,7 @@ def stand(
     horizon: float | None = None,
     shadow: Shadow | None = None,
     most: int = SKETCHED,
-) -> Standing | None:
+) -> StandingObject | None:
     """Return the stance of an object with the Gaussians `splats`; None where none of them is solid.
 
     The ground is as `shadow` and `horizon` say; of about `most` of the Gaussians.
@@ -162,7 +162,7 @@ def stand(
     if not len(few):
         return None
     normal = _normal_under(splats.rest.lifted, camera, horizon, shadow or Shadow())
-    return Standing(splats.means[few], normal, camera)
+    return StandingObject(splats.means[few], normal, camera)
 
 
 def ground_seen_from(

@@ -20,7 +20,7 @@ from ...base.threads import EXACT, FAST, in_threads
 from ...raster import tiles
 from ...raster.posed import PosedSplats
 from ...raster.texture import build_levels
-from ..silhouette import Grid, cell_places, fine_grid, sketch_grid, sketched
+from ..silhouette import SilhouetteGrid, cell_places, fine_grid, sketch_grid, sketched
 
 LEAST, MOST = 0.6, 1.6  # factor of encoded values
 SEEN = 0.05  # cosine with the direction to the viewer, from which a surface counts
@@ -163,7 +163,7 @@ def _factors(splats: PosedSplats, normals: F64, light: F64) -> F64:
     return np.clip(np.exp(turned @ light), LEAST, MOST)
 
 
-def _drawn(splats: PosedSplats, factors: F64, grid: Grid, camera: Camera) -> F32:
+def _drawn(splats: PosedSplats, factors: F64, grid: SilhouetteGrid, camera: Camera) -> F32:
     """(h, w) the factors as a picture of the object, continued beyond it."""
     share = (factors - LEAST) / (MOST - LEAST)
     painted = splats.painted(np.repeat(share[:, None], 3, axis=1), has_edge=False)
@@ -172,7 +172,7 @@ def _drawn(splats: PosedSplats, factors: F64, grid: Grid, camera: Camera) -> F32
     return (LEAST + (MOST - LEAST) * values).astype(np.float32)
 
 
-def _sketched(means: F64, normals: F64, factors: F64, grid: Grid, camera: Camera) -> F32:
+def _sketched(means: F64, normals: F64, factors: F64, grid: SilhouetteGrid, camera: Camera) -> F32:
     """Likewise, the mean in each cell of Gaussians (n, 3) that face the viewer."""
     front = -(normals * means).sum(1) > SEEN * np.linalg.norm(means, axis=1)
     index, is_there = grid.cells(means[front], camera)

@@ -30,7 +30,7 @@ WHOLLY = 0.999  # painted: nothing of what was there is left
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
+class PlatePatch:
     """A part of the plate, and where it is painted."""
 
     left: int  # px, corner in the photo
@@ -45,13 +45,13 @@ class Patch:
         return self.left, self.top, self.left + width, self.top + height
 
 
-def patch_of(document: Document, coverage: F32, box: Box) -> Patch:
+def patch_of(document: Document, coverage: F32, box: Box) -> PlatePatch:
     """Return a repair's input: `coverage` (H, W) is painted, nothing of it outside `box`."""
     assert document.plate is not None, "make the plate first"
     around = _with_context(box, document.photo.size)
     left, top, right, bottom = around
     painted = coverage[top:bottom, left:right].copy()
-    return Patch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
+    return PlatePatch(left, top, plate_crop(document.photo.pixels, document.plate, around), painted)
 
 
 def _with_context(box: Box, size: tuple[int, int]) -> Box:
@@ -63,8 +63,12 @@ def _with_context(box: Box, size: tuple[int, int]) -> Box:
 
 
 def fill_patch(
-    patch: Patch, margin: float, inpainter: Inpainter, progress: Progress = silent, seed: int = 0
-) -> Patch:
+    patch: PlatePatch,
+    margin: float,
+    inpainter: Inpainter,
+    progress: Progress = silent,
+    seed: int = 0,
+) -> PlatePatch:
     """The patch filled in anew where it is painted, from what is around it.
 
     `margin`: the photo's `hole_margin`. Raises InpaintError where all of it is painted.
@@ -83,7 +87,7 @@ def fill_patch(
     return replace(patch, pixels=np.where(painted[..., None], mixed, patch.pixels))
 
 
-def with_patch(document: Document, patch: Patch, backend: str) -> Plate:
+def with_patch(document: Document, patch: PlatePatch, backend: str) -> Plate:
     """The document's plate with a filled patch in it."""
     plate = document.plate
     assert plate is not None, "make the plate first"
@@ -100,7 +104,7 @@ def with_patch(document: Document, patch: Patch, backend: str) -> Plate:
                  grown.painted)  # fmt: skip
 
 
-def restored(document: Document, patch: Patch) -> Plate:
+def restored(document: Document, patch: PlatePatch) -> Plate:
     """The plate with the photo's own pixels where they are painted and no object hides them."""
     plate = document.plate
     assert plate is not None, "make the plate first"
@@ -168,7 +172,7 @@ def refitted_plate(
         plate = replace(change.plate, left=grown.left, top=grown.top, pixels=grown.pixels,
                         hole=grown.hole, painted=grown.painted)  # fmt: skip
         around = _with_context(_bounds(is_more, grown.box), (width, height))
-        patch = Patch(around[0], around[1], plate_crop(change.pixels, plate, around),
+        patch = PlatePatch(around[0], around[1], plate_crop(change.pixels, plate, around),
                       crop(more, grown.box, around))  # fmt: skip
         filled = fill_patch(patch, margin, inpainter, progress, seed)
         np.copyto(grown.pixels, crop(filled.pixels, around, grown.box), where=is_more[..., None])

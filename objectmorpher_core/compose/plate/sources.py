@@ -28,7 +28,7 @@ class Guide:
 
 
 @dataclass(frozen=True, eq=False)
-class Guidance:
+class PatchGuide:
     """A guide at one size, as `patch_search` reads it; the second layer is the mirror image."""
 
     wanted: F32  # (h, w, 3)
@@ -36,7 +36,7 @@ class Guidance:
     unlikely: F32  # (2, h, w)
 
 
-def guidance(guide: Guide, hole: Mask) -> Guidance:
+def guidance(guide: Guide, hole: Mask) -> PatchGuide:
     """The guide for a picture with this `hole` (h, w)."""
     height, width = hole.shape
     scale = width / guide.unlikely.shape[1], height / guide.unlikely.shape[0]
@@ -55,7 +55,9 @@ def guidance(guide: Guide, hole: Mask) -> Guidance:
     unlikely = np.asarray(resized, np.float32)
     mirrored = offered[:, ::-1].copy()
     mirrored[..., :2] = 0  # no line goes on mirrored
-    return Guidance(wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]]))
+    return PatchGuide(
+        wanted, np.stack([offered, mirrored]), np.stack([unlikely, unlikely[:, ::-1]])
+    )
 
 
 # How unlikely it is that the background behind a hole looks like this or that source.

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, Pixels
 from ...base.pixels import unit_pixels
 from ...document.model import Matte
-from .mirroring import KNOTS, Box, Mirroring, knots, premultiplied
+from .mirroring import KNOTS, Box, MirrorLine, knots, premultiplied
 from .old_reflection import OldReflection, TakingOff
 from .shadow import GAMMA
 
@@ -50,7 +50,7 @@ FULL = 0.99  # of the photo's range, from where light may be clipped
 
 
 def fitted(
-    pixels: Pixels, matte: Matte, free: tuple[Mask, Mask], start: Mirroring, box: Box
+    pixels: Pixels, matte: Matte, free: tuple[Mask, Mask], start: MirrorLine, box: Box
 ) -> OldReflection | None:
     """`start` made exact; None where nothing is explained.
 
@@ -100,7 +100,7 @@ class _Scene:
         """(n,) all bands of (h, w, 3)."""
         return np.concatenate([band.ravel() for band in self.bands(image)])
 
-    def added(self, mirroring: Mirroring) -> tuple[F32, F32, F32]:
+    def added(self, mirroring: MirrorLine) -> tuple[F32, F32, F32]:
         """Return the light (h, w, 3) that a share of 1 adds, its alpha, and px below the line."""
         laid = mirroring.laid(self.picture, self.corner, self.box, self.pitch)
         alpha, below = laid[..., 3], mirroring.below(self.box, self.pitch)
@@ -158,7 +158,7 @@ def _continued(ground: F32, bare: F32) -> F32:
     return np.asarray(mean / np.maximum(total, 1e-12)[..., None], np.float32)
 
 
-def _searched(scene: _Scene, seen: F32, start: Mirroring) -> Mirroring | None:
+def _searched(scene: _Scene, seen: F32, start: MirrorLine) -> MirrorLine | None:
     """The mirror image near `start` that explains most; None where none explains anything."""
     here = start
     for skipped in COARSE_TO_FINE:
@@ -168,12 +168,12 @@ def _searched(scene: _Scene, seen: F32, start: Mirroring) -> Mirroring | None:
     return here if is_seen else None
 
 
-def _climbed(scene: _Scene, seen: F32, start: Mirroring, skipped: int) -> Mirroring:
+def _climbed(scene: _Scene, seen: F32, start: MirrorLine, skipped: int) -> MirrorLine:
     """The same without the `skipped` finest bands."""
     first = sum(3 * scene.free[:: 2**n, :: 2**n].size for n in range(skipped))
     data = seen[first:]
 
-    def column(mirroring: Mirroring) -> F32:
+    def column(mirroring: MirrorLine) -> F32:
         added, _, below = scene.added(mirroring)
         return scene.banded(added * mirroring.faded(below)[..., None])[first:]
 
@@ -208,7 +208,7 @@ def _change(columns: F32, seen: F32) -> F64:
     return np.clip(solved[1:] / solved[0], -LARGEST, LARGEST)
 
 
-def _moved(mirroring: Mirroring, change: F64, pitch: float) -> Mirroring:
+def _moved(mirroring: MirrorLine, change: F64, pitch: float) -> MirrorLine:
     tilt, scale, aside, down, blur, fade = change.tolist()
     blurs, fades = np.array(BLUR_RANGE) * pitch, np.array(FADES) * mirroring.height
     return replace(
@@ -222,7 +222,7 @@ def _moved(mirroring: Mirroring, change: F64, pitch: float) -> Mirroring:
     )
 
 
-def _shared(scene: _Scene, seen: F32, mirroring: Mirroring) -> Mirroring:
+def _shared(scene: _Scene, seen: F32, mirroring: MirrorLine) -> MirrorLine:
     """Its share along its height, and what light that takes besides the ground's."""
     added, alpha, below = scene.added(mirroring)
     faded, weights = mirroring.faded(below), knots(below, mirroring.height)
@@ -240,7 +240,7 @@ def _shared(scene: _Scene, seen: F32, mirroring: Mirroring) -> Mirroring:
     return replace(mirroring, shares=tuple(shares.tolist()), taken=tuple(taken.tolist()))
 
 
-def _ended(scene: _Scene, seen: F32, mirroring: Mirroring) -> Mirroring:
+def _ended(scene: _Scene, seen: F32, mirroring: MirrorLine) -> MirrorLine:
     """To where it explains what is seen: below, it would only be drawn."""
     added, alpha, below = scene.added(mirroring)
     taken = np.array(mirroring.taken, np.float32)
@@ -258,7 +258,7 @@ def _ended(scene: _Scene, seen: F32, mirroring: Mirroring) -> Mirroring:
     return replace(mirroring, ends=float(ends))
 
 
-def _contrasted(scene: _Scene, mirroring: Mirroring) -> Mirroring:
+def _contrasted(scene: _Scene, mirroring: MirrorLine) -> MirrorLine:
     """As much of the ground's contrast is lost as makes it what it is beside the reflection."""
     laid = mirroring.laid(scene.picture, scene.corner, scene.box, scene.pitch)
     below = mirroring.below(scene.box, scene.pitch)
@@ -283,7 +283,7 @@ def _energy(scene: _Scene, light: F32) -> F32:
     return np.asarray((fine**2).sum(-1) + cv2.resize((coarse**2).sum(-1), size), np.float32)
 
 
-def _covers(scene: _Scene, mirroring: Mirroring) -> F32:
+def _covers(scene: _Scene, mirroring: MirrorLine) -> F32:
     """(h, w) 1 where it is seen."""
     laid = mirroring.laid(scene.picture, scene.corner, scene.box, scene.pitch)
     share = mirroring.share(mirroring.below(scene.box, scene.pitch))
@@ -293,7 +293,7 @@ def _covers(scene: _Scene, mirroring: Mirroring) -> F32:
     return cover
 
 
-def _smoothed(scene: _Scene, mirroring: Mirroring) -> F32:
+def _smoothed(scene: _Scene, mirroring: MirrorLine) -> F32:
     """(h, w, 3) the ground without texture, as it is where the mirror image is taken off."""
     laid = mirroring.laid(scene.picture, scene.corner, scene.box, scene.pitch)
     below = mirroring.below(scene.box, scene.pitch)
@@ -312,7 +312,7 @@ def _near(scene: _Scene, image: F32) -> F32:
     return np.asarray(cv2.GaussianBlur(image * scene.free, (0, 0), NEAR) / weight, np.float32)
 
 
-def _unexplained(scene: _Scene, mirroring: Mirroring) -> F32:
+def _unexplained(scene: _Scene, mirroring: MirrorLine) -> F32:
     """(h, w) 1 where more is left over than the bare ground's texture, or too little was seen."""
     laid = mirroring.laid(scene.picture, scene.corner, scene.box, scene.pitch)
     below = mirroring.below(scene.box, scene.pitch)

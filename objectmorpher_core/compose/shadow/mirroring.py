@@ -24,7 +24,7 @@ Box = tuple[int, int, int, int]  # x0, y0, x1, y1 px of the photo
 
 
 @dataclass(frozen=True)
-class Mirroring:
+class MirrorLine:
     """About which line an object is mirrored, how blurred, and what share of the light that is."""
 
     foot: tuple[float, float]  # photo px, a point of the line

@@ -15,7 +15,7 @@ from ...base.pixels import pixels_from_unit, unit_pixels
 from ...document.model import Matte
 from ..plate.plate import Box
 from ..silhouette import cells_bounds, sampled
-from .mirroring import Mirroring, premultiplied
+from .mirroring import MirrorLine, premultiplied
 from .shadow import GAMMA
 
 ROWS = 512  # px, taken at once: less memory
@@ -26,7 +26,7 @@ BLURS = 4  # x the blur, that its kernel reaches
 class TakingOff:
     """A mirror image on a grid over a box of the photo."""
 
-    mirroring: Mirroring
+    mirroring: MirrorLine
     matte: Matte  # of what is mirrored
     smooth: F32  # (h, w, 3) linear light of the ground, without texture
     unexplained: F32  # (h, w) 1 where it cannot be taken off

@@ -20,7 +20,7 @@ from ...base.pixels import crop, unit_pixels
 from ...document.model import Matte
 from ..silhouette import sampled
 from .mirror_fit import fitted, grid_pitch
-from .mirroring import Mirroring, premultiplied
+from .mirroring import MirrorLine, premultiplied
 from .old_reflection import OldReflection
 
 CELLS = 96  # along the object's longer side, about
@@ -307,7 +307,7 @@ def _last(agrees: np.ndarray) -> int:
     return first + int(ended[0]) if len(ended) else len(agrees)
 
 
-def _placed(seen: _Seen, found: _Found) -> Mirroring:
+def _placed(seen: _Seen, found: _Found) -> MirrorLine:
     """The mirror image in the photo's pixels."""
     tilt, scale = found.mirror.tilt, found.mirror.scale
     across = np.array([-np.sin(np.radians(tilt)), np.cos(np.radians(tilt))])
@@ -316,12 +316,12 @@ def _placed(seen: _Seen, found: _Found) -> Mirroring:
     foot += across * (across @ shift) / (1 + scale)
     height = seen.height * seen.pitch
     aside = float(shift @ [across[1], -across[0]])
-    return Mirroring((float(foot[0]), float(foot[1])), tilt, aside, scale, seen.pitch, height,
+    return MirrorLine((float(foot[0]), float(foot[1])), tilt, aside, scale, seen.pitch, height,
                      FADE * height)  # fmt: skip
 
 
 def _exact(
-    pixels: Pixels, matte: Matte, others: Mask | None, start: Mirroring
+    pixels: Pixels, matte: Matte, others: Mask | None, start: MirrorLine
 ) -> OldReflection | None:
     """What is mirrored as `start` says, about, with what of it can be taken off."""
     height, width = pixels.shape[:2]

@@ -24,7 +24,7 @@ from ...base.arrays import F32, F64
 from ...base.camera import Camera
 from ...document.settings import Shadow
 from ..blend import Box
-from ..silhouette import Grid, box_around, sampled
+from ..silhouette import SilhouetteGrid, box_around, sampled
 
 GAMMA = 2.2  # of the encoded values
 USUAL_GROUND = 15.0  # degrees, from which a ground is seen whose horizon is not known
@@ -82,7 +82,7 @@ def ground_normal(camera: Camera, horizon: float | None, shadow: Shadow, row: fl
     return np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
-def cast(shadow: Shadow, standing: Standing, cells: int = FINE) -> Shade | None:
+def cast(shadow: Shadow, standing: StandingObject, cells: int = FINE) -> Shade | None:
     """The shadow of an object, of at most so many `cells`; None where there is none."""
     if shadow.strength <= 0 or (grid := standing.grid(shadow, cells)) is None:
         return None
@@ -91,7 +91,7 @@ def cast(shadow: Shadow, standing: Standing, cells: int = FINE) -> Shade | None:
     return _shade(shadow, light, grid)
 
 
-class Standing:
+class StandingObject:
     """An object that stands on the ground, or hangs a little above it."""
 
     def __init__(self, points: F64, normal: F64, camera: Camera) -> None:
@@ -119,7 +119,7 @@ class Standing:
         # Lengths on the ground, towards the viewer, look so much shorter.
         self._slope = float(np.clip(sine, LEAST_SLOPE, 1.0))
 
-    def grid(self, shadow: Shadow, cells: int = FINE) -> Grid | None:
+    def grid(self, shadow: Shadow, cells: int = FINE) -> SilhouetteGrid | None:
         """About the whole shadow, at most so many `cells` long; None where none is seen."""
         points = np.concatenate([self._fallen(shadow), self._feet[self._is_low]])
         box = box_around(points, self._camera, 0.0)
@@ -131,9 +131,9 @@ class Standing:
         blur = max(BLURS[-1] * shadow.softness, LAST_BLURS[1], BAND_BLUR)
         room = 3 * blur * self._size + 4 * pitch
         width, height = (int(np.ceil((a + 2 * room) / pitch)) for a in (right - left, bottom - top))
-        return Grid(left - room, top - room, pitch, width, height)
+        return SilhouetteGrid(left - room, top - room, pitch, width, height)
 
-    def far(self, shadow: Shadow, grid: Grid) -> F32:
+    def far(self, shadow: Shadow, grid: SilhouetteGrid) -> F32:
         """(h, w) of the light, what the whole object takes, in [0, 1]."""
         high = self._above / self._height
         cover, share = _spread(self._fallen(shadow), high, grid, self._camera)
@@ -146,7 +146,7 @@ class Standing:
             )
         return self._smooth(mixed, last_blur(shadow) * size)
 
-    def contact(self, grid: Grid) -> F32:
+    def contact(self, grid: SilhouetteGrid) -> F32:
         """(h, w) what touches the ground, blurred and a little lower, 1 at its darkest."""
         low = 1 - self._above[self._is_low] / (BAND * self._height)
         cover, share = _spread(self._feet[self._is_low], low, grid, self._camera)
@@ -205,7 +205,7 @@ def smooth(values: F32, across: float, down: float | None = None) -> F32:
     return values
 
 
-def _spread(points: F64, values: F64, grid: Grid, camera: Camera) -> tuple[F32, F32]:
+def _spread(points: F64, values: F64, grid: SilhouetteGrid, camera: Camera) -> tuple[F32, F32]:
     """What world points (N, 3) cover of a grid (h, w) in [0, 1], and the mean of their values."""
     index, is_there = grid.cells(points, camera)
     shape, cells = (grid.height, grid.width), grid.width * grid.height
@@ -221,7 +221,7 @@ def _spread(points: F64, values: F64, grid: Grid, camera: Camera) -> tuple[F32, 
     return np.asarray(cover, np.float32), np.asarray(total / np.maximum(count, 1e-6), np.float32)
 
 
-def _shade(shadow: Shadow, light: F32, grid: Grid) -> Shade | None:
+def _shade(shadow: Shadow, light: F32, grid: SilhouetteGrid) -> Shade | None:
     """Of the light (h, w) that is left, as a picture that ends clear."""
     alpha = 1 - (1 - DARKEST * shadow.strength * (1 - light)) ** (1 / GAMMA)
     alpha = np.clip((alpha - FAINTEST) / (1 - FAINTEST), 0, 1).astype(np.float32)

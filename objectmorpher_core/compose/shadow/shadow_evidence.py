@@ -18,7 +18,7 @@ from ...base.arrays import F32, F64, Mask
 from ...document.settings import Shadow
 from .robust_fit import regressed
 from .shadow_flat import Flat
-from .shadow_shear import Sheet
+from .shadow_shear import ShadowSheet
 
 FULL = 0.75  # of the light, that a full shadow is taken to leave out
 CORE = 0.3  # of the darkest that was fitted: what is darker is the shadow's core
@@ -41,21 +41,21 @@ LIKELY = 0.7  # margin where somebody has asked for the shadow, sees it outlined
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Surroundings:
     """The object's surroundings on a small grid."""
 
     brightness: F32  # (h, w) natural logarithm of linear light
     colour: F32  # (h, w, 2) logarithms of ratios
     cover: F32  # (h, w) of the object
     free: Mask  # (h, w) ground, or whatever else is not the object
-    standing: Sheet | Flat
+    standing: ShadowSheet | Flat
     left: float
     top: float
     pitch: float
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class ShadowGround:
     """The ground around an object, and its variation without a shadow."""
 
     index: np.ndarray  # (n,) of the cells
@@ -70,7 +70,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class TriedShadow:
     """A shadow that was tried."""
 
     shadow: Shadow
@@ -87,13 +87,13 @@ def taken(shadow: F32) -> F32:
     return np.asarray(-np.log(1 - FULL * np.clip(shadow, 0, 1)), np.float32)
 
 
-def fitted(seen: Seen, found: Found) -> F32:
+def fitted(seen: Surroundings, found: TriedShadow) -> F32:
     """(h, w) natural logarithm of the light that the shadow takes which was found."""
     contact = taken(seen.standing.contact())
     return np.asarray(found.dark * found.thrown + found.contact * contact, np.float32)
 
 
-def score(seen: Seen, ground: Ground, found: Found) -> float:
+def score(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> float:
     """Return the evidence for the shadow against other dark things (see SURE); -inf for none."""
     numbers = evidence(seen, ground, found)
     if numbers["tint"] > MOST_TINT:
@@ -101,7 +101,7 @@ def score(seen: Seen, ground: Ground, found: Found) -> float:
     return sum(weight * numbers[name] for name, weight in WEIGHTS.items()) + BIAS
 
 
-def evidence(seen: Seen, ground: Ground, found: Found) -> dict[str, float]:
+def evidence(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> dict[str, float]:
     """Return the evidence for the shadow by the names of WEIGHTS."""
     thrown = fitted(seen, found)
     lacking = (ground.everywhere @ found.ground).astype(np.float32) - seen.brightness
@@ -135,10 +135,10 @@ def _evened(values: F32, free: Mask) -> F32:
     return np.asarray(cv2.GaussianBlur(values * weight, (0, 0), OVER) / spread, np.float32)
 
 
-def _joined(seen: Seen, even: F32, told: F32, near: Mask) -> float:
+def _joined(seen: Surroundings, even: F32, told: F32, near: Mask) -> float:
     """The share of where the object touches the ground, in shadow, that is dark indeed."""
     standing = seen.standing
-    if isinstance(standing, Sheet):
+    if isinstance(standing, ShadowSheet):
         rows = np.arange(len(near))[:, None] + 0.5
         near = near & (np.abs(rows - standing.ground) < FOOT * standing.height)
     return float((even[near] > 0.5 * told[near]).mean()) if near.any() else 0.0
@@ -167,7 +167,7 @@ def _whole(lacking: F32, thrown: F32, asked: Mask, most: float) -> float:
     return float((steps[0] > AS_DARK * steps[1]).mean())
 
 
-def _tint(seen: Seen, ground: Ground, found: Found) -> float:
+def _tint(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> float:
     """How much it changes colours, x its darkness: another material begins with another colour."""
     column = found.thrown.ravel()[ground.index].astype(np.float64)
     basis = np.column_stack([ground.basis, -column])

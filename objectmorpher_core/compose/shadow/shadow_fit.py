@@ -22,7 +22,17 @@ from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
 from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
-from .shadow_evidence import CORE, LIT, SURE, Found, Ground, Seen, fitted, score, taken
+from .shadow_evidence import (
+    CORE,
+    LIT,
+    SURE,
+    ShadowGround,
+    Surroundings,
+    TriedShadow,
+    fitted,
+    score,
+    taken,
+)
 from .shadow_flat import Flat, lie
 from .shadow_shear import stand
 
@@ -102,7 +112,9 @@ def find_old_shadow(
     return OldShadow(shadow, depth, seen.left, seen.top, seen.pitch, ground.scale, free)
 
 
-def _told(seen: Seen, lengths: tuple[float, ...], margin: float) -> tuple[Ground, Found] | None:
+def _told(
+    seen: Surroundings, lengths: tuple[float, ...], margin: float
+) -> tuple[ShadowGround, TriedShadow] | None:
     """The ground and the shadow on it; None where none is sure."""
     ground = _ground(seen)
     found = None if ground is None else _searched(seen, ground, lengths)
@@ -124,7 +136,7 @@ def _leaves_below(pixels: Pixels, matte: Matte) -> bool:
     return bool(solid[max(last - 1, 0) : last + 1].any(0).sum() > CUT_OFF * solid.any(0).sum())
 
 
-def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Seen:
+def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Surroundings:
     height, width = pixels.shape[:2]
     rows, columns = (np.flatnonzero((matte.alpha > 0.5).any(axis)) for axis in (1, 0))
     size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
@@ -161,12 +173,12 @@ def _look(pixels: Pixels, matte: Matte, others: Mask | None, slope: float) -> Se
     free = inside & (cv2.dilate(hidden, np.ones((3, 3))) < FREE)
     logarithm = np.log(light + BLACK)
     colour = logarithm[..., [0, 2]] - logarithm[..., 1:2]
-    return Seen(
+    return Surroundings(
         logarithm @ LUMA, colour, cover, free, stand(cover, slope), float(left), float(top), pitch
     )
 
 
-def _ground(seen: Seen) -> Ground | None:
+def _ground(seen: Surroundings) -> ShadowGround | None:
     """None where too little of it is seen."""
     rows, columns = seen.cover.shape
     base, height = seen.standing.base, seen.standing.height
@@ -183,10 +195,10 @@ def _ground(seen: Seen) -> Ground | None:
     contact = taken(seen.standing.contact()).ravel()[index].astype(np.float64)
     brightness = brightness.astype(np.float64)
     alone, loss, scale = regressed(basis, brightness, weight)
-    return Ground(index, weight, basis, everywhere, brightness, contact, alone, loss, scale)
+    return ShadowGround(index, weight, basis, everywhere, brightness, contact, alone, loss, scale)
 
 
-def _tried(seen: Seen, ground: Ground, shadow: Shadow) -> Found | None:
+def _tried(seen: Surroundings, ground: ShadowGround, shadow: Shadow) -> TriedShadow | None:
     """None where it would be no shadow but a light."""
     thrown = taken(seen.standing.thrown(shadow))
     column = thrown.ravel()[ground.index].astype(np.float64)
@@ -201,10 +213,12 @@ def _tried(seen: Seen, ground: Ground, shadow: Shadow) -> Found | None:
     if found[6] <= 0:
         return None
     gain = 1 - loss / max(ground.loss, 1e-12)
-    return Found(shadow, gain, thrown, found[:6], float(found[6]), float(found[7]), scale)
+    return TriedShadow(shadow, gain, thrown, found[:6], float(found[6]), float(found[7]), scale)
 
 
-def _searched(seen: Seen, ground: Ground, lengths: tuple[float, ...]) -> Found | None:
+def _searched(
+    seen: Surroundings, ground: ShadowGround, lengths: tuple[float, ...]
+) -> TriedShadow | None:
     """Of all directions and lengths what most speaks for, then the best that lies around it."""
     few = _thinned(ground, seen.cover.shape[1])
     tried = [_tried(seen, few, shadow) for shadow in _coarsely(lengths)]
@@ -220,7 +234,7 @@ def _searched(seen: Seen, ground: Ground, lengths: tuple[float, ...]) -> Found |
     return _tried(seen, ground, best.shadow)
 
 
-def _thinned(ground: Ground, columns: int) -> Ground:
+def _thinned(ground: ShadowGround, columns: int) -> ShadowGround:
     """Every other cell of every other row: enough to compare shadows by."""
     row, column = np.divmod(ground.index, columns)
     kept = (row % 2 == 0) & (column % 2 == 0)
@@ -232,9 +246,9 @@ def _thinned(ground: Ground, columns: int) -> Ground:
     return replace(few, loss=regressed(few.basis, few.brightness, few.weight)[1])
 
 
-def _distinct(gained: list[Found]) -> list[Found]:
+def _distinct(gained: list[TriedShadow]) -> list[TriedShadow]:
     """The first few of which no two go nearly the same way."""
-    kept: list[Found] = []
+    kept: list[TriedShadow] = []
     for found in gained:
         turns = [abs((found.shadow.direction - k.shadow.direction + 180) % 360 - 180) for k in kept]
         if all(turn > APART for turn in turns):
@@ -261,7 +275,7 @@ def _around(shadow: Shadow, step: float, factor: float) -> Iterator[Shadow]:
                 )  # fmt: skip
 
 
-def _missing(seen: Seen, ground: Ground, found: Found) -> F32:
+def _missing(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> F32:
     """(h, w) natural logarithm of the light that is missing: mostly as it is measured.
 
     What was tried is only about where the shadow is. It grows over all that is as dark beside it,
@@ -292,7 +306,7 @@ def _missing(seen: Seen, ground: Ground, found: Found) -> F32:
     return np.asarray(depth, np.float32)
 
 
-def _of_one_colour(seen: Seen, ground: Ground, found: Found) -> F32:
+def _of_one_colour(seen: Surroundings, ground: ShadowGround, found: TriedShadow) -> F32:
     """(h, w) in [0, 1] where it is as coloured as the ground around the shadow.
 
     What is not is another material, or stands upright on the ground: no shadow is taken off it.
@@ -314,7 +328,7 @@ def _of_one_colour(seen: Seen, ground: Ground, found: Found) -> F32:
     return np.asarray(cv2.GaussianBlur(opened.astype(np.float32), (0, 0), 0.7), np.float32)
 
 
-def _room(seen: Seen, ground: Ground, member: F32, blur: float) -> F32:
+def _room(seen: Surroundings, ground: ShadowGround, member: F32, blur: float) -> F32:
     """(h, w) natural logarithm of the light that lacks until a cell is as bright as lit ground.
 
     Beneath the object, and beyond what is lit, the ground is only continued: it may be told too
@@ -345,7 +359,7 @@ def _spread(member: F32, dark: F32, thrown: F32, least: float, free: Mask) -> F3
     return np.asarray(cv2.GaussianBlur(grown, (0, 0), REACH / 2), np.float32)
 
 
-def _imitated(found: Found) -> Shadow:
+def _imitated(found: TriedShadow) -> Shadow:
     """The numbers of a shadow that takes as much light (see `shadow`)."""
     darkest = 1 - np.exp(-found.dark * float(found.thrown.max()))
     below = 1 - np.exp(-found.contact * float(taken(np.ones((1, 1), np.float32)).max()))

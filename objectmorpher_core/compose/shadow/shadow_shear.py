@@ -26,7 +26,7 @@ SOLID = 0.5  # alpha from which on a pixel belongs to the object
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class ShadowSheet:
     """A silhouette, and where it stands; all in px of its grid."""
 
     alpha: F32  # (h, w)
@@ -56,7 +56,7 @@ class Sheet:
         return _moved(near, 0, round(BAND_DROP * self.height), near.shape)
 
 
-def stand(alpha: F32, slope: float) -> Sheet:
+def stand(alpha: F32, slope: float) -> ShadowSheet:
     """Return a standing object with that silhouette (h, w), its ground at an angle of that sine.
 
     Raises ValueError where it has none.
@@ -73,10 +73,12 @@ def stand(alpha: F32, slope: float) -> Sheet:
     there = columns[lower > 0]
     held = np.interp(columns, there, held[there])
     level = cv2.GaussianBlur(held[None], (0, 0), max(LEVEL * np.ptp(there), 0.5))[0]
-    return Sheet(alpha, np.asarray(level, np.float64), share.astype(np.float32), height, slope)
+    return ShadowSheet(
+        alpha, np.asarray(level, np.float64), share.astype(np.float32), height, slope
+    )
 
 
-def _blurred(shadow: Shadow, standing: Sheet) -> F32:
+def _blurred(shadow: Shadow, standing: ShadowSheet) -> F32:
     """The silhouette, more blurred and weaker the higher above the ground."""
     share = _above(standing) / np.float32(standing.height)
     mixed = np.zeros_like(standing.alpha)
@@ -87,13 +89,13 @@ def _blurred(shadow: Shadow, standing: Sheet) -> F32:
     return np.asarray(mixed * (1 - FADE * np.clip(share, 0, 1)), np.float32)
 
 
-def _above(standing: Sheet) -> F32:
+def _above(standing: ShadowSheet) -> F32:
     """(h, w) px above the ground of each pixel's middle."""
     rows = np.arange(standing.alpha.shape[0], dtype=np.float32)[:, None] + np.float32(0.5)
     return np.asarray(standing.ground.astype(np.float32) - rows, np.float32)
 
 
-def _contact(standing: Sheet) -> F32:
+def _contact(standing: ShadowSheet) -> F32:
     """What touches the ground, blurred, 1 at its darkest."""
     band = np.clip(1 - np.abs(_above(standing)) / (BAND * standing.height), 0, 1)
     touching = np.asarray(standing.alpha * band * standing.share, np.float32)
@@ -108,7 +110,7 @@ def _moved(part: F32, left: int, top: int, shape: tuple[int, ...]) -> F32:
     return crop(part, own, box)
 
 
-def _thrown(shadow: Shadow, standing: Sheet) -> tuple[F32, int, int]:
+def _thrown(shadow: Shadow, standing: ShadowSheet) -> tuple[F32, int, int]:
     """Each pixel of the silhouette where its shadow falls; the picture's corner on the grid.
 
     Pixels that fall on one another are averaged, each weighing what it is: clear ones nothing.

@@ -21,7 +21,7 @@ UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class ImportTarget:
     """The target of an import: a photo, and the mask that the object stands for."""
 
     pixels: Pixels  # (H, W, 3)
@@ -52,7 +52,7 @@ class Source:
 
 
 def register_file(
-    source: Source, scene: Scene, progress: Progress = silent, seed: int = 0
+    source: Source, scene: ImportTarget, progress: Progress = silent, seed: int = 0
 ) -> Import:
     """Reads an object and finds out where it stands in the photo.
 
@@ -66,7 +66,11 @@ def register_file(
 
 
 def fit_near(
-    scene: Scene, gaussians: Gaussians, start: F64, progress: Progress = silent, seed: int = 0
+    scene: ImportTarget,
+    gaussians: Gaussians,
+    start: F64,
+    progress: Progress = silent,
+    seed: int = 0,
 ) -> Import:
     """The best pose near `start` (4, 4 world from object); that one where none is better."""
     progress(0.0, "Fitting the object")
@@ -76,7 +80,7 @@ def fit_near(
 
 
 def place_import(
-    scene: Scene,
+    scene: ImportTarget,
     gaussians: Gaussians,
     proposal: Proposal,
     progress: Progress = silent,

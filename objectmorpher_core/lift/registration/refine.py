@@ -16,7 +16,7 @@ from ...base.arrays import F32, F64
 from ...base.camera import Camera
 from .matches import NEAR, Matches
 from .sketch import COVERAGE, Surfels
-from .view import Agreement, Stance, View, agreement, fitted_light, lit, sketched
+from .view import Agreement, RegistrationView, Stance, agreement, fitted_light, lit, sketched
 
 BLUR = 0.9  # px of the view, of the silhouettes' and the colours' differences
 COLOUR = 1.4  # weight of a difference of colour beside one of coverage
@@ -39,7 +39,7 @@ class Fit:
 def refine(
     surfels: Surfels,
     start: Stance,
-    view: View,
+    view: RegistrationView,
     photo: Camera,
     is_focal_free: bool,
     steps: int,
@@ -78,7 +78,7 @@ class _Problem:
     def __init__(
         self,
         surfels: Surfels,
-        view: View,
+        view: RegistrationView,
         photo: Camera,
         is_focal_free: bool,
         matches: Matches | None,

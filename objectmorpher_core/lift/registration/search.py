@@ -19,7 +19,7 @@ from ...base.progress import Progress
 from ...base.rotations import matrices_from_quats
 from ...base.threads import FAST, core_count, in_threads
 from .sketch import CHANNELS, COLOR, NEAR, Surfels, draw
-from .view import Stance, Target, View, window_of
+from .view import RegistrationView, Stance, Target, window_of
 
 ROTATIONS = 3600  # about 15 degrees apart
 PSI = 1.533751168755204288118041413  # the root of psi^4 = psi + 4, of the spiral
@@ -40,7 +40,7 @@ def spread_rotations(count: int) -> F64:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundStance:
     """A stance that the search has kept, and how well it agrees with the photo."""
 
     stance: Stance
@@ -48,8 +48,12 @@ class Found:
 
 
 def search(
-    surfels: Surfels, view: View, target: Target, focals: tuple[float, ...], progress: Progress
-) -> list[Found]:
+    surfels: Surfels,
+    view: RegistrationView,
+    target: Target,
+    focals: tuple[float, ...],
+    progress: Progress,
+) -> list[FoundStance]:
     """The best stance near every rotation that is better than those around it, best first.
 
     `focals` in photo px.
@@ -70,12 +74,12 @@ def search(
         tables.append(table)
     scores = np.stack([table[:, 0] for table in tables])
     best = scores.argmax(0)
-    kept: list[Found] = []
+    kept: list[FoundStance] = []
     for i in _peaks(turns, scores.max(0)):
         k = int(best[i])
         x, y, size = tables[k][i, 1:]
         stance = Stance(turns[i], np.array([x, y]) / zoom + corner, size / zoom, guesses[k][0])
-        kept.append(Found(stance, float(scores[k, i])))
+        kept.append(FoundStance(stance, float(scores[k, i])))
     return kept
 
 
@@ -96,7 +100,7 @@ def _peaks(turns: F64, scores: F64) -> list[int]:
 
 
 def _try_all(
-    surfels: Surfels, view: View, window: Camera, box: F64, turns: F64, out: F64
+    surfels: Surfels, view: RegistrationView, window: Camera, box: F64, turns: F64, out: F64
 ) -> None:  # fmt: skip
     """Fills `out` (n, 4): score, and where it is put: x, y, size in px of the window."""
     shape = surfels.points, surfels.normals, surfels.colors, surfels.spacing

@@ -23,7 +23,7 @@ EXPOSURE_PRIOR, LIGHT_PRIOR, VEIL_PRIOR = 1e-3, 2e-2, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RegistrationView:
     """The mask's surroundings at a low resolution."""
 
     camera: Camera  # the window's
@@ -65,7 +65,7 @@ class Target:
         grown = [np.array([x0, y0, x1, y1]) + share * beyond for share in BEYOND]
         return tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in grown)
 
-    def view(self, size: int) -> View:
+    def view(self, size: int) -> RegistrationView:
         """A square picture of `size` px around the mask."""
         x0, y0, x1, y1 = self.box
         side = (1 + 2 * MARGIN) * max(x1 - x0, y1 - y0)
@@ -86,7 +86,9 @@ class Target:
         own = cv2.warpAffine(own, warp, (size, size), flags=cv2.INTER_LINEAR)
         share = own[..., 3]
         straight = own[..., :3] / np.maximum(share, 1e-3)[..., None]
-        return View(camera, *(frozen(a, np.float32) for a in (share, straight, own[..., 4])))
+        return RegistrationView(
+            camera, *(frozen(a, np.float32) for a in (share, straight, own[..., 4]))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +140,7 @@ def window_of(camera: Camera, photo: Camera, focal: float) -> Camera:
     return replace(camera, focal=camera.focal * focal / photo.focal)
 
 
-def sketched(surfels: Surfels, stance: Stance, view: View, photo: Camera) -> F32:
+def sketched(surfels: Surfels, stance: Stance, view: RegistrationView, photo: Camera) -> F32:
     """(h, w, CHANNELS) the object in the view."""
     window = window_of(view.camera, photo, stance.focal)
     return sketch(surfels, stance.matrix(photo), window)
@@ -153,7 +155,7 @@ class Agreement:
     score: float  # IoU less colour error, and the support of matches where there are any
 
 
-def agreement(picture: F32, view: View, support: float = 0.0) -> Agreement:
+def agreement(picture: F32, view: RegistrationView, support: float = 0.0) -> Agreement:
     """See `Agreement`; what would be beyond the photo's frame does not count."""
     coverage, mask = sharpened(picture[..., COVERAGE]) * view.within, sharpened(view.mask)
     both = np.minimum(coverage, mask)
@@ -169,7 +171,7 @@ def sharpened(coverage: F32) -> F32:
     return np.clip((coverage - 0.5) * EDGE + 0.5, 0, 1)
 
 
-def fitted_light(picture: F32, view: View, weight: F32) -> F32:
+def fitted_light(picture: F32, view: RegistrationView, weight: F32) -> F32:
     """(3, 5) for each channel an exposure, the slope of a directed light, and a veil.
 
     Least squares; weak priors keep a colour that is missing from turning into light.

@@ -14,8 +14,8 @@ from .bilinear import bilinear
 from .cuts import Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
 from .prism import Prism
-from .silhouette import Silhouette
-from .standing import FLAT, Standing, stand
+from .silhouette import ReliefSilhouette
+from .standing import FLAT, StandingSheet, stand
 from .thickness import Thickness
 
 FRONT, BACK, MIDDLE = 1.0, -1.0, 0.0  # a sheet, as the share of the thickness it lies in front
@@ -24,11 +24,11 @@ MOST_OBLIQUE = 2.0  # x its own thickness, along the line of sight, of what stan
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class ReliefBody:
     """Heights are px towards the camera, at a depth at which a px of the photo is as wide."""
 
-    silhouette: Silhouette
-    standing: Standing
+    silhouette: ReliefSilhouette
+    standing: StandingSheet
     middle: F64  # (h, w) px, height of the middle sheet
     front: Thickness
     back: Thickness
@@ -40,11 +40,11 @@ class Body:
 
     @staticmethod
     def of(
-        silhouette: Silhouette,
+        silhouette: ReliefSilhouette,
         camera: Camera,
         settings: LiftSettings,
         axis: MirrorAxis | None = None,
-    ) -> Body:
+    ) -> ReliefBody:
         """`axis`: of an object that looks the same left and right."""
         standing = stand(silhouette, camera, settings.horizon) if settings.is_standing else FLAT
         xy = silhouette.photo_xy(silhouette.cells)
@@ -61,9 +61,9 @@ class Body:
             halves = camera.focal * far * (1 - 1 / _nearer(standing.prism, xy))
             share = _share(standing.prism, xy, silhouette.extent)
             sides = [inflated.mixed(settings.thickness * half, share) for half in halves]
-        return Body(silhouette, standing, middle, sides[0], sides[1])
+        return ReliefBody(silhouette, standing, middle, sides[0], sides[1])
 
-    def nearer(self, height: F64) -> Body:
+    def nearer(self, height: F64) -> ReliefBody:
         """Return the body with its parts moved towards the camera by `height` (h, w) px."""
         return replace(self, middle=self.middle + height)
 

@@ -15,7 +15,7 @@ LEAST_SIDE = 384  # px that the longer side keeps
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class ReliefCanvas:
     """A crop of the photo on pixels of its own."""
 
     corner: F64  # (2,) px in the photo
@@ -25,7 +25,7 @@ class Canvas:
     whole: F32  # (h, w) alpha, and 1 where the object is hidden
 
     @staticmethod
-    def of(matte: Matte, hidden: Mask | None = None, fineness: float = 1.0) -> Canvas:
+    def of(matte: Matte, hidden: Mask | None = None, fineness: float = 1.0) -> ReliefCanvas:
         """A crop that holds the matte and what is `hidden` (H, W) in the photo, too.
 
         `fineness` px of the photo may be one; nothing becomes blurred that is larger.
@@ -41,7 +41,7 @@ class Canvas:
         step = max(1, min(int(fineness), max(alpha.shape) // LEAST_SIDE, *alpha.shape))
         small = [_in_blocks(image, step) for image in (alpha, foreground)]
         whole = small[0] if whole is alpha else _in_blocks(whole, step)
-        return Canvas(np.array(box[:2], np.float64), step, small[0], small[1], whole)
+        return ReliefCanvas(np.array(box[:2], np.float64), step, small[0], small[1], whole)
 
 
 Box = tuple[int, int, int, int]

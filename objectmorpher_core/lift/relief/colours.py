@@ -15,9 +15,9 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
 from .bilinear import bilinear
-from .canvas import Canvas
+from .canvas import ReliefCanvas
 from .mirror import MirrorAxis
-from .silhouette import Silhouette
+from .silhouette import ReliefSilhouette
 
 FINENESS = 3.0  # px to a mean spacing: more of the photo plain colours need not see
 BLUR = 1.2  # x mean spacing: plain colours, so that neighbours agree
@@ -45,7 +45,7 @@ class Colouring:
 
 
 def colouring(
-    canvas: Canvas, silhouette: Silhouette, spacing: float, is_mirrored: bool,
+    canvas: ReliefCanvas, silhouette: ReliefSilhouette, spacing: float, is_mirrored: bool,
     axis: MirrorAxis | None,
 ) -> Colouring:  # fmt: skip
     """`spacing`: of the Gaussians, px. `axis`: of an object that looks the same left and right."""
@@ -78,7 +78,7 @@ def _blurred(image: F32, sigma: float) -> F32:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), max(sigma, 0.5)), np.float32)
 
 
-def _depth(silhouette: Silhouette, xy: F64) -> F64:
+def _depth(silhouette: ReliefSilhouette, xy: F64) -> F64:
     """(h, w) how deep photo px (h, w, 2) are inside: 0 at the outline, 1 amid a limb or body."""
     fields = np.stack([silhouette.depth, silhouette.radius], -1)
     depth, radius = bilinear(fields, silhouette.grid_xy(xy.reshape(-1, 2))).T

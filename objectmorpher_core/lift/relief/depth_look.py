@@ -17,9 +17,9 @@ from ...base.arrays import F32, RGB, Mask, Pixels
 from ...models.depth_net import DepthNet
 from ...pictures.image import to_u8
 from .. import LiftError
-from .depth_prior import Seen
+from .depth_prior import NetworkDepth
 
-Look = Callable[[Pixels, Mask], Seen | None]
+Look = Callable[[Pixels, Mask], NetworkDepth | None]
 """Of a photo (H, W, 3), where a mask (H, W) of it is."""
 GRAPHS = "depth-graph"  # family of the networks that need no PyTorch
 DEPTH_ANYTHING = "depth-anything-v2-small"
@@ -27,7 +27,7 @@ PACKAGES = ("torch", "transformers", "safetensors")
 MARGIN = 0.35  # x the object's longer side: what of the photo around it is looked at, too
 
 
-def look(pixels: Pixels, mask: Mask) -> Seen | None:
+def look(pixels: Pixels, mask: Mask) -> NetworkDepth | None:
     """Look with the network at `mask` (H, W) of the photo; None where no network is installed.
 
     Raises LiftError where the network cannot look at that.
@@ -39,7 +39,7 @@ def look(pixels: Pixels, mask: Mask) -> Seen | None:
     x0, y0, x1, y1 = box
     rgb = np.ascontiguousarray(to_u8(pixels[y0:y1, x0:x1]))
     try:
-        return Seen(_memory.look(there, rgb), box)
+        return NetworkDepth(_memory.look(there, rgb), box)
     except models.ModelError as error:
         raise LiftError(f"{error}; without the depth model it can be lifted") from error
 

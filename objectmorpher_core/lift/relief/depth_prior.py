@@ -19,8 +19,8 @@ from scipy.sparse.linalg import spsolve
 
 from ...base.arrays import F32, F64, Mask
 from .bilinear import bilinear
-from .body import Body
-from .silhouette import Silhouette
+from .body import ReliefBody
+from .silhouette import ReliefSilhouette
 
 RIM = (
     0.01,
@@ -38,7 +38,7 @@ COARSE = 96  # cells on the longer side of the grid on which the membrane is spa
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class NetworkDepth:
     """A network's depth of the object and its surroundings."""
 
     inverse: F32  # (h, w) relative inverse depth: larger is nearer, scale and shift unknown
@@ -52,7 +52,9 @@ class Seen:
         return bilinear(self.inverse, own.reshape(-1, 2)).reshape(xy.shape[:-1])
 
 
-def follow(body: Body, seen: Seen, focal: float, thickness: float, hidden: Mask | None) -> Body:
+def follow(
+    body: ReliefBody, seen: NetworkDepth, focal: float, thickness: float, hidden: Mask | None
+) -> ReliefBody:
     """`body`, whose thickness was multiplied by `thickness`, as deep as `seen` says.
 
     `hidden` (h, w) cells of its silhouette of which the photo shows something else.
@@ -130,7 +132,7 @@ def _fitted(basis: F64, values: F64, weight: F64) -> F64:
     return np.asarray(found, np.float64)
 
 
-def membrane(values: F64, is_known: Mask, outline: Silhouette) -> F64:
+def membrane(values: F64, is_known: Mask, outline: ReliefSilhouette) -> F64:
     """(h, w) the smoothest sheet through `values` (h, w) where they are known."""
     h, w = outline.shape
     step = max(1, int(np.ceil(max(h, w) / COARSE)))

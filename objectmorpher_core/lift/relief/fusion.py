@@ -13,13 +13,13 @@ from ...base.camera import Camera
 from ...base.distances import nearest_in
 from ..crop import SIDE, rays
 from .bilinear import bilinear
-from .body import Body
+from .body import ReliefBody
 from .cuts import find_cuts
 from .integration import integrated
 from .settling import Settling
 from .shape_look import SeenShape
-from .silhouette import Silhouette
-from .standing import Standing
+from .silhouette import ReliefSilhouette
+from .standing import StandingSheet
 from .thickness import Thickness
 
 # How far off the silhouette's body is expected to be: crop units, and per its half-thickness. Both
@@ -48,7 +48,9 @@ class Sheets(NamedTuple):
     edge: F64  # probability that the front ends beside a cell
 
 
-def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: float) -> Body:
+def fused(
+    body: ReliefBody, seen: SeenShape, camera: Camera, thickness: float, trust: float
+) -> ReliefBody:
     """`body`, whose thickness was multiplied by `thickness`, as `seen` where that is surer.
 
     `trust` in [0, 1]: 0 leaves the body as it is.
@@ -112,7 +114,7 @@ def fused(body: Body, seen: SeenShape, camera: Camera, thickness: float, trust: 
     return replace(body, middle=middle, front=front, back=back, cuts=cuts, own=own)
 
 
-def sheets_of(seen: SeenShape, camera: Camera, outline: Silhouette) -> Sheets:
+def sheets_of(seen: SeenShape, camera: Camera, outline: ReliefSilhouette) -> Sheets:
     """Return the sheets over the cells of a silhouette; beyond the look its nearest pixel holds."""
     crop, mask = seen.crop, seen.mask
     ways = rays(crop.tangents)
@@ -153,7 +155,7 @@ def _is_round(facing: F64) -> F64:
     return np.clip((ROUND[1] - facing) / (ROUND[1] - ROUND[0]), 0, 1)
 
 
-def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
+def closing(half: F64, facing: F64, outline: ReliefSilhouette, inflated: F64) -> F64:
     """Return `half` (h, w) px, brought down to 0 at the outline where the front turns away there.
 
     A pixel is too wide to tell how. There it closes as the silhouette's body does, `inflated`,
@@ -172,12 +174,12 @@ def closing(half: F64, facing: F64, outline: Silhouette, inflated: F64) -> F64:
     return np.maximum(half + amount * (closed - half), 0.0)
 
 
-def _inward(outline: Silhouette) -> F64:
+def _inward(outline: ReliefSilhouette) -> F64:
     """(h, w) from 0 at the outline to 1, from where on nothing closes any more."""
     return np.clip(outline.depth / (RIM * outline.extent), 0, 1)
 
 
-def _doubts(standing: Standing) -> tuple[float, float]:
+def _doubts(standing: StandingSheet) -> tuple[float, float]:
     """Of the silhouette's front and thickness, x `INFLATED_ERROR`."""
     if standing.prism is not None:
         return CYLINDER if standing.prism.is_round else BOX
@@ -189,7 +191,7 @@ def _share(error: F64, own: F64) -> F64:
     return error**2 / (error**2 + own**2)
 
 
-def _half(side: Thickness, outline: Silhouette) -> F64:
+def _half(side: Thickness, outline: ReliefSilhouette) -> F64:
     """(h, w) px."""
     return side.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
 

@@ -22,20 +22,20 @@ from ...deform.control_points import COUNT, sample_control_points
 from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
-from .. import LiftError, Subject
+from .. import LiftError, LiftSubject
 from ..shapes import Recognised, completed, flattened, recognised, rounded
 from . import shape_look
 from .bilinear import bilinear
-from .body import MIDDLE, Body
-from .canvas import Canvas
+from .body import MIDDLE, ReliefBody
+from .canvas import ReliefCanvas
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
 from .mirror import MirrorAxis, find_axis
 from .sides import with_sides
-from .silhouette import Silhouette
-from .spreading import Surface, spread
+from .silhouette import ReliefSilhouette
+from .spreading import SurfacePoints, spread
 
 TANGENT_SIGMA = 0.66  # x mean spacing: neighbours overlap without gaps
 NORMAL_SIGMA = 0.12  # x mean spacing: flat, but never degenerate seen edge-on
@@ -48,7 +48,7 @@ NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of 
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
-Shaper = Callable[[Silhouette, Camera, LiftSettings, MirrorAxis | None], Body]
+Shaper = Callable[[ReliefSilhouette, Camera, LiftSettings, MirrorAxis | None], ReliefBody]
 See = Callable[[Pixels, Mask, Camera], shape_look.SeenShape | None]
 
 
@@ -58,7 +58,7 @@ class ReliefLifter:
     name = "relief"
 
     def __init__(
-        self, look: Look = look, shape: Shaper = Body.of, see: See = shape_look.look
+        self, look: Look = look, shape: Shaper = ReliefBody.of, see: See = shape_look.look
     ) -> None:
         """`look` tells the depth of what is seen: by default as an installed network does.
 
@@ -71,7 +71,7 @@ class ReliefLifter:
         return None
 
     def lift(
-        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
         """See `Lifter`. Raises LiftError for an object of fewer than about 25 pixels."""
         mask, camera, matte = subject.mask, subject.camera, subject.matte
@@ -101,7 +101,7 @@ class ReliefLifter:
         progress(0.85, "Filling in its sides")
         return with_sides(lifted, matte, camera, seed)
 
-    def body(self, subject: Subject, settings: LiftSettings) -> Body:
+    def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
         area = int(np.count_nonzero(subject.mask))
         canvas = _canvas(subject.matte, _hidden(subject, settings), area, settings.count)
@@ -109,13 +109,13 @@ class ReliefLifter:
 
     def _body(
         self,
-        subject: Subject,
+        subject: LiftSubject,
         settings: LiftSettings,
         axis: MirrorAxis | None,
         progress: Progress,
-    ) -> Body:
+    ) -> ReliefBody:
         mask, camera, hidden = subject.mask, subject.camera, _hidden(subject, settings)
-        outline = Silhouette.of(mask if hidden is None else mask | hidden)
+        outline = ReliefSilhouette.of(mask if hidden is None else mask | hidden)
         body = self._shape(outline, camera, settings, axis)
         if settings.trust > 0:
             progress(0.05, "Looking at its shape")
@@ -137,8 +137,8 @@ class ReliefLifter:
         return body
 
     def _followed(
-        self, body: Body, subject: Subject, settings: LiftSettings, hidden: Mask | None
-    ) -> Body:
+        self, body: ReliefBody, subject: LiftSubject, settings: LiftSettings, hidden: Mask | None
+    ) -> ReliefBody:
         """The body as deep as a depth network sees it; the same one where none is installed."""
         seen = self._look(subject.pixels, subject.mask if hidden is None else subject.mask | hidden)
         if seen is None:
@@ -151,23 +151,23 @@ class ReliefLifter:
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
 
 
-def _contradicts(shape: Recognised, body: Body, settings: LiftSettings) -> bool:
+def _contradicts(shape: Recognised, body: ReliefBody, settings: LiftSettings) -> bool:
     """Whether a thing that is seen as a sheet has the outline of a prism that stands upright."""
     return settings.kind == "auto" and shape.kind == "flat" and body.standing.prism is not None
 
 
-def _hidden(subject: Subject, settings: LiftSettings) -> Mask | None:
+def _hidden(subject: LiftSubject, settings: LiftSettings) -> Mask | None:
     """(H, W) where something stands before the object."""
     return None if settings.hidden is None else settings.hidden & ~subject.mask
 
 
-def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> Canvas:
+def _canvas(matte: Matte, hidden: Mask | None, area: int, count: int) -> ReliefCanvas:
     """The cut-out, fine enough for `count` Gaussians on an object of `area` px."""
     spacing = np.sqrt(2 * area / count)  # at least: it has a front and a back
-    return Canvas.of(matte, hidden, float(spacing / (FINENESS * PIXELS)))
+    return ReliefCanvas.of(matte, hidden, float(spacing / (FINENESS * PIXELS)))
 
 
-def _axis(canvas: Canvas, settings: LiftSettings) -> MirrorAxis | None:
+def _axis(canvas: ReliefCanvas, settings: LiftSettings) -> MirrorAxis | None:
     """Of an object that looks the same left and right."""
     if settings.is_symmetric is False:
         return None
@@ -175,7 +175,7 @@ def _axis(canvas: Canvas, settings: LiftSettings) -> MirrorAxis | None:
     return axis if settings.is_symmetric or axis.is_sure else None
 
 
-def _is_mirrored(body: Body, settings: LiftSettings, axis: MirrorAxis | None) -> bool:
+def _is_mirrored(body: ReliefBody, settings: LiftSettings, axis: MirrorAxis | None) -> bool:
     """Whether the back looks like the front."""
     if settings.back != "auto":
         return settings.back == "mirrored"
@@ -184,7 +184,7 @@ def _is_mirrored(body: Body, settings: LiftSettings, axis: MirrorAxis | None) ->
     return body.standing.prism is not None or (axis is None and body.standing.is_known and is_wide)
 
 
-def _nearness(subject: Subject, painted: F32, outline: Silhouette) -> F64:
+def _nearness(subject: LiftSubject, painted: F32, outline: ReliefSilhouette) -> F64:
     """(h, w) px on the silhouette's grid of what was painted, its edges drawn to the photo's."""
     at = outline.photo_xy(outline.cells)
     height, width = subject.mask.shape
@@ -203,7 +203,7 @@ def _resampled(image: np.ndarray, xy: F64) -> F32:
     return bilinear(image, at).reshape(*xy.shape[:2], *image.shape[2:]).astype(np.float32)
 
 
-def _unseen(surface: Surface, hidden: Mask, margin: float) -> Surface:
+def _unseen(surface: SurfacePoints, hidden: Mask, margin: float) -> SurfacePoints:
     """The surface of which the photo shows nothing within `margin` px of `hidden` (H, W)."""
     away = cv2.distanceTransform((~hidden).astype(np.uint8), cv2.DIST_L2, 5)
     gap = bilinear(away, surface.xy - 0.5)
@@ -237,7 +237,7 @@ def _touched(share: np.ndarray, step: int) -> Mask:
 
 
 def _assemble(
-    surface: Surface, spacing: float, body: Body, colours: Colouring, camera: Camera
+    surface: SurfacePoints, spacing: float, body: ReliefBody, colours: Colouring, camera: Camera
 ) -> LiftedObject:
     """Relief coordinates -> world -> object frame, with texture and control points."""
     extent = body.silhouette.extent

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F32, F64
-from .canvas import Canvas
+from .canvas import ReliefCanvas
 
 SIDE = 96  # px, longer side of the reduced picture in which the axis is looked for
 ANGLES = np.radians(np.arange(-40, 41, 5.0))  # of the axis from the upright
@@ -37,7 +37,7 @@ class MirrorAxis:
         return xy - 2 * ((xy @ normal)[..., None] - self.offset) * normal
 
 
-def find_axis(canvas: Canvas) -> MirrorAxis:
+def find_axis(canvas: ReliefCanvas) -> MirrorAxis:
     """The best axis of the object; what is hidden of it belongs to it.
 
     The axis is upright within 40 degrees. Colours count where they are shown.

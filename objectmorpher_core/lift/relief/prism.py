@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base.arrays import F64
 from ...base.camera import Camera
-from .silhouette import TOUCHING, Silhouette, lower_hull
+from .silhouette import TOUCHING, ReliefSilhouette, lower_hull
 
 SIDES = (0.2, 0.7)  # x height of the silhouette above its foot: where a prism's sides are seen
 SIDE_ROWS = 25
@@ -37,7 +37,7 @@ COLUMNS = 65  # places in which a round front is known
 class Prism:
     """The front of an upright prism: how much nearer than its middle plane it is."""
 
-    plan: Plan
+    plan: GroundPlane
     turn: float  # of the middle plane, forward per across
     row: float  # px, to which columns refer
     columns: F64  # (n,) px, ascending
@@ -46,7 +46,7 @@ class Prism:
 
 
 @dataclass(frozen=True, eq=False)
-class Sides:
+class PrismSides:
     """The straight left and right side of a silhouette: x = start + lean (y - row), px."""
 
     row: float
@@ -54,7 +54,7 @@ class Sides:
     lean: F64  # (2,)
 
     @staticmethod
-    def of(silhouette: Silhouette, middle: float, row: float) -> Sides | None:
+    def of(silhouette: ReliefSilhouette, middle: float, row: float) -> PrismSides | None:
         """Left and right of the column `middle`, about `row` px; None where they are no lines."""
         inside, cell = silhouette.inside, silhouette.cell
         heights = np.flatnonzero(inside.any(1))
@@ -73,7 +73,7 @@ class Sides:
                 return None
             lines.append((x, lean))
         x, lean = np.array(lines).T
-        return Sides(row, x, lean) if np.abs(lean).max() <= MOST_LEAN and x[1] > x[0] else None
+        return PrismSides(row, x, lean) if np.abs(lean).max() <= MOST_LEAN and x[1] > x[0] else None
 
     def at(self, y: F64) -> F64:
         """(2, n) columns px of both in the rows (n,) px."""
@@ -93,16 +93,16 @@ class Sides:
         return camera.cy - camera.focal * slope if is_told else None
 
 
-def find_prism(silhouette: Silhouette, camera: Camera, horizon: float | None) -> Prism | None:
+def find_prism(silhouette: ReliefSilhouette, camera: Camera, horizon: float | None) -> Prism | None:
     """The upright prism that has this silhouette; None where it is not that of one."""
     x, y = silhouette.lower_outline
     row = float(y.max())
-    sides = Sides.of(silhouette, float(x[np.argmax(y)]), row)
+    sides = PrismSides.of(silhouette, float(x[np.argmax(y)]), row)
     contact = None if sides is None else _contact(silhouette, sides, x, y)
     if sides is None or contact is None:
         return None
     told = sides.horizon(camera) if horizon is None else horizon
-    plan = Plan.under(silhouette, camera, told, row)
+    plan = GroundPlane.under(silhouette, camera, told, row)
     if not plan.is_seen(contact[1]):
         return None
     if _is_round(*contact):
@@ -121,7 +121,9 @@ def _line(t: F64, x: F64, allowed: float) -> tuple[float, float]:
     return float(start), float(slope)
 
 
-def _contact(silhouette: Silhouette, sides: Sides, x: F64, y: F64) -> tuple[F64, F64] | None:
+def _contact(
+    silhouette: ReliefSilhouette, sides: PrismSides, x: F64, y: F64
+) -> tuple[F64, F64] | None:
     """Columns and rows (n,) px in which a prism with these sides meets the ground."""
     ends = _ends(silhouette, sides)
     if ends is None:
@@ -142,7 +144,7 @@ def _contact(silhouette: Silhouette, sides: Sides, x: F64, y: F64) -> tuple[F64,
     return None if fold < LEAST_FOLD * np.ptp(x) or is_high or is_ragged else (x, rim)
 
 
-def _ends(silhouette: Silhouette, sides: Sides) -> list[tuple[float, float]] | None:
+def _ends(silhouette: ReliefSilhouette, sides: PrismSides) -> list[tuple[float, float]] | None:
     """px (x, y) of the lowest places in which the outline is the left and the right side."""
     inside, cell = silhouette.inside, silhouette.cell
     rows = np.flatnonzero(inside.any(1))
@@ -164,7 +166,7 @@ def _is_round(x: F64, y: F64) -> bool:
     return float(np.trapezoid(fold, x) / (np.ptp(x) * fold.max())) > ROUND
 
 
-def _cylinder(plan: Plan, x: F64, y: F64, row: float) -> Prism:
+def _cylinder(plan: GroundPlane, x: F64, y: F64, row: float) -> Prism:
     """The front of an upright cylinder between the columns x[0] and x[-1] px."""
     columns = np.linspace(x[0], x[-1], COLUMNS)
     share = np.linspace(-1, 1, COLUMNS)
@@ -174,7 +176,7 @@ def _cylinder(plan: Plan, x: F64, y: F64, row: float) -> Prism:
     return Prism(plan, 0.0, row, plan.foot(columns, level, row), 1 / (1 - deep), True)
 
 
-def _box(plan: Plan, x: F64, y: F64, row: float) -> Prism | None:
+def _box(plan: GroundPlane, x: F64, y: F64, row: float) -> Prism | None:
     """What the contact at columns and rows (n,) px says; None where it is turned too far."""
     across, forward = plan.on_ground(x, y)
     turn = float((forward[-1] - forward[0]) / (across[-1] - across[0]))
@@ -196,21 +198,23 @@ LEAST_BELOW = 0.1  # x height of the photo that ground must be below the horizon
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class GroundPlane:
     """The camera's height above the ground is the unit."""
 
     camera: Camera
     horizon: float  # px, the row of the photo it lies in
 
     @staticmethod
-    def under(silhouette: Silhouette, camera: Camera, horizon: float | None, row: float) -> Plan:
+    def under(
+        silhouette: ReliefSilhouette, camera: Camera, horizon: float | None, row: float
+    ) -> GroundPlane:
         """The ground that the object touches about `row` px.
 
         `horizon` None: not known. A photo is seldom taken from much lower than a thing is large.
         """
         if horizon is None:
             horizon = row - max(row - camera.cy, CAMERA_HEIGHT * silhouette.extent)
-        return Plan(camera, horizon)
+        return GroundPlane(camera, horizon)
 
     @property
     def down(self) -> tuple[float, float]:

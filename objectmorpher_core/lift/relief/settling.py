@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64
-from .silhouette import Silhouette
+from .silhouette import ReliefSilhouette
 
 WIDTHS = (0.02, 0.05, 0.1)  # x extent, standard deviations over which planes are fitted
 OF_RADIUS = 0.3  # x the radius of the part, that the width is
@@ -25,7 +25,7 @@ STEADY = 0.05  # variance, x the width's own, that keeps a plane level where cel
 class Settling:
     """Planes over the cells of a silhouette, each cell as much as `weight` (h, w) says."""
 
-    outline: Silhouette
+    outline: ReliefSilhouette
     weight: F64
 
     def settled(self, field: F64) -> F64:

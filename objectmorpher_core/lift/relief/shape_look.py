@@ -74,7 +74,7 @@ def missing() -> str | None:
     return None if shipped.is_shipped() else "the shape network is missing from this installation"
 
 
-class ShapeNet:
+class ShapeModel:
     """The network in an ONNX file."""
 
     def __init__(self, data: bytes) -> None:
@@ -95,7 +95,7 @@ class _Memory:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._net: ShapeNet | None = None
+        self._net: ShapeModel | None = None
         self._last: tuple[bytes, SeenShape] | None = None
 
     def look(self, pixels: Pixels, mask: Mask, crop: Crop) -> SeenShape | None:
@@ -108,7 +108,7 @@ class _Memory:
             if self._last is not None and self._last[0] == digest:
                 return self._last[1]
             if self._net is None:
-                self._net = ShapeNet(shipped.shape_network())
+                self._net = ShapeModel(shipped.shape_network())
             tokens = dino_tokens.shared().inner_tokens(rgb)
             found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
             self._last = digest, found

@@ -26,7 +26,7 @@ TOUCHING = 0.03  # x extent: how far above its lower hull an outline still touch
 
 
 @dataclass(frozen=True, eq=False)
-class Silhouette:
+class ReliefSilhouette:
     """The object's coarse place, and the distance of its outline."""
 
     inside: Mask  # (h, w) the outermost ring is outside
@@ -37,7 +37,7 @@ class Silhouette:
     is_open: tuple[bool, bool, bool, bool]  # top, bottom, left, right: it leaves the photo there
 
     @staticmethod
-    def of(mask: Mask) -> Silhouette:
+    def of(mask: Mask) -> ReliefSilhouette:
         """Build it from `mask` (H, W), which has at least one pixel."""
         extension = frame_extension(mask)
         whole = extended_mask(mask, extension)
@@ -52,7 +52,7 @@ class Silhouette:
             bool(mask[0].any()), bool(mask[-1].any()),
             bool(mask[:, 0].any()), bool(mask[:, -1].any()),
         )  # fmt: skip
-        return Silhouette(inside, cell, *corner, extent, is_open)
+        return ReliefSilhouette(inside, cell, *corner, extent, is_open)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -16,9 +16,9 @@ from ...base.arrays import F64, Mask
 from ...base.poisson_disk import thin_to_spacing
 from ...base.threads import in_threads
 from .bilinear import bilinear
-from .body import BACK, FRONT, MIDDLE, Body
+from .body import BACK, FRONT, MIDDLE, ReliefBody
 from .rim import RimLine, rim_lines
-from .silhouette import Silhouette
+from .silhouette import ReliefSilhouette
 
 OVERSAMPLING = 20  # candidates per point before thinning: fewer leave gaps
 PACKING = 0.68  # points per (spacing^2 of area) that thinning at that spacing leaves
@@ -30,7 +30,7 @@ MIN_SPACING = 1.0  # px: more points than pixels carry nothing
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class SurfacePoints:
     """Points on a closed surface, in relief coordinates: photo px and height in px."""
 
     xy: F64  # (N, 2) photo px
@@ -41,11 +41,13 @@ class Surface:
     is_brim: Mask  # (N,) outside the silhouette
     color_xy: F64  # (N, 2) photo px of which it has the colour
 
-    def select(self, index: np.ndarray) -> Surface:
-        return Surface(*(getattr(self, f.name)[index] for f in fields(self)))
+    def select(self, index: np.ndarray) -> SurfacePoints:
+        return SurfacePoints(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def spread(body: Body, count: int, band: float, rng: np.random.Generator) -> tuple[Surface, float]:
+def spread(
+    body: ReliefBody, count: int, band: float, rng: np.random.Generator
+) -> tuple[SurfacePoints, float]:
     """About `count` points and their mean spacing in px.
 
     `band`: how far outside the silhouette the matte covers something, px. Candidates are drawn in
@@ -90,13 +92,16 @@ def _thinned(
     return kept
 
 
-def _joined(sheets: list[Surface]) -> Surface:
-    return Surface(
-        *(np.concatenate([getattr(sheet, f.name) for sheet in sheets]) for f in fields(Surface))
+def _joined(sheets: list[SurfacePoints]) -> SurfacePoints:
+    return SurfacePoints(
+        *(
+            np.concatenate([getattr(sheet, f.name) for sheet in sheets])
+            for f in fields(SurfacePoints)
+        )
     )
 
 
-def _area(body: Body, side: float) -> F64:
+def _area(body: ReliefBody, side: float) -> F64:
     """(h, w) px^2 of a sheet's true surface over each cell of the silhouette."""
     outline = body.silhouette
     rows, columns = np.nonzero(outline.inside)
@@ -107,7 +112,7 @@ def _area(body: Body, side: float) -> F64:
     return area
 
 
-def _draw(outline: Silhouette, expected: F64, rng: np.random.Generator) -> F64:
+def _draw(outline: ReliefSilhouette, expected: F64, rng: np.random.Generator) -> F64:
     """Photo px (N, 2) of random points, `expected` (h, w) of them per cell."""
     counts = np.floor(expected + rng.random(expected.shape)).astype(int)
     rows, columns = np.nonzero(counts)
@@ -116,16 +121,16 @@ def _draw(outline: Silhouette, expected: F64, rng: np.random.Generator) -> F64:
     return outline.photo_xy(cells + rng.random((len(cells), 2)) - 0.5)
 
 
-def _sheet(body: Body, xy: F64, side: float) -> Surface:
+def _sheet(body: ReliefBody, xy: F64, side: float) -> SurfacePoints:
     """The front, or the back, at photo px (N, 2)."""
     height, gradient = body.sample(xy, side)
     normals = side * np.column_stack([-gradient, np.ones(len(xy))])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     is_front = np.full(len(xy), side == FRONT)
-    return Surface(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
+    return SurfacePoints(xy, height, normals, is_front, is_front, np.zeros(len(xy), bool), xy)
 
 
-def _wall_area(body: Body, lines: list[RimLine]) -> float:
+def _wall_area(body: ReliefBody, lines: list[RimLine]) -> float:
     """px^2 between the sheets where they do not meet at the outlines."""
     total = 0.0
     for line in lines:
@@ -136,7 +141,7 @@ def _wall_area(body: Body, lines: list[RimLine]) -> float:
     return total
 
 
-def _chain(body: Body, lines: list[RimLine], side: float, spacing: float) -> F64:
+def _chain(body: ReliefBody, lines: list[RimLine], side: float, spacing: float) -> F64:
     """Photo px (N, 2) along the outlines, evenly apart on a sheet: an edge is a line.
 
     They lie so far inside that what is drawn of them ends at the outline.
@@ -155,7 +160,7 @@ def _chain(body: Body, lines: list[RimLine], side: float, spacing: float) -> F64
     return np.concatenate(found)
 
 
-def _wall(body: Body, lines: list[RimLine], spacing: float) -> Surface:
+def _wall(body: ReliefBody, lines: list[RimLine], spacing: float) -> SurfacePoints:
     """What joins the sheets at the outlines: rows of points along them, as many as fit in.
 
     One at least: where the sheets meet it is what one sees of the rim when it turns.
@@ -177,7 +182,7 @@ def _wall(body: Body, lines: list[RimLine], spacing: float) -> Surface:
     xy, height = xy[kept], height[kept]
     normals = np.column_stack([body.silhouette.outward(xy), np.zeros(len(xy))])
     no = np.zeros(len(xy), bool)
-    return Surface(xy, height, normals, no, no, no, xy)
+    return SurfacePoints(xy, height, normals, no, no, no, xy)
 
 
 def _along(length: F64, step: float, values: F64) -> F64:
@@ -188,7 +193,7 @@ def _along(length: F64, step: float, values: F64) -> F64:
     return np.column_stack([np.interp(at, length, column) for column in closed.T])
 
 
-def _inner_area(body: Body) -> float:
+def _inner_area(body: ReliefBody) -> float:
     """px^2 of what is between parts of the object."""
     inner = body.overlaps
     if inner is None:
@@ -198,7 +203,7 @@ def _inner_area(body: Body) -> float:
     return walls + 2 * cell**2 * int(inner.is_apart.sum())
 
 
-def _inner(body: Body, density: float, rng: np.random.Generator) -> list[Surface]:
+def _inner(body: ReliefBody, density: float, rng: np.random.Generator) -> list[SurfacePoints]:
     """Between parts of the object: the sides of near ones, their backs, and what is beneath."""
     inner, outline = body.overlaps, body.silhouette
     if inner is None:
@@ -215,7 +220,7 @@ def _inner(body: Body, density: float, rng: np.random.Generator) -> list[Surface
     normals = np.column_stack([walls.step[which], np.zeros(len(which))]).astype(np.float64)
     no = np.zeros(len(which), bool)
     behind = outline.photo_xy(walls.near[which] - walls.step[which].astype(np.float64))
-    sheets = [Surface(xy, height, normals, ~no, no, no, behind)]
+    sheets = [SurfacePoints(xy, height, normals, ~no, no, no, behind)]
     assert body.cuts is not None, "there are overlaps"
     for field, side in ((inner.own_back, BACK), (inner.beneath, FRONT)):
         down, right = (slope / cell for slope in body.cuts.gradient(field))
@@ -230,11 +235,13 @@ def _inner(body: Body, density: float, rng: np.random.Generator) -> list[Surface
         no = np.zeros(len(xy), bool)
         j, i = np.clip(np.rint(at).astype(int), 0, np.array(field.shape[::-1]) - 1).T
         source = xy if side == BACK else outline.photo_xy(inner.beside[i, j].astype(np.float64))
-        sheets.append(Surface(xy, height, normals, ~no, no, no, source))
+        sheets.append(SurfacePoints(xy, height, normals, ~no, no, no, source))
     return sheets
 
 
-def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) -> Surface:
+def _brim(
+    body: ReliefBody, reach: float, density: float, rng: np.random.Generator
+) -> SurfacePoints:
     """Around the silhouette, as far as `reach` px, at the height of its middle."""
     outline = body.silhouette
     pad = int(np.ceil(reach / outline.cell)) + 1
@@ -245,4 +252,4 @@ def _brim(body: Body, reach: float, density: float, rng: np.random.Generator) ->
     height, _ = body.sample(xy, MIDDLE)
     normals = np.column_stack([outline.outward(xy), np.zeros(len(xy))])
     yes = np.ones(len(xy), bool)
-    return Surface(xy, height, normals, yes, yes, yes, xy)
+    return SurfacePoints(xy, height, normals, yes, yes, yes, xy)

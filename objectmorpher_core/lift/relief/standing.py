@@ -14,8 +14,8 @@ import numpy as np
 
 from ...base.arrays import F64
 from ...base.camera import Camera
-from .prism import MOST_TURN, Plan, Prism, find_prism
-from .silhouette import TOUCHING, Silhouette, lower_hull
+from .prism import MOST_TURN, GroundPlane, Prism, find_prism
+from .silhouette import TOUCHING, ReliefSilhouette, lower_hull
 
 STEEPEST = 0.9  # slope of the outline in the photo, beyond which it leaves the ground
 STEEPEST_BRIDGE = 0.35  # likewise of a line between two feet
@@ -27,7 +27,7 @@ LEAST_DEPTH = 0.25  # inverse depth over that of the middle: the sheet never com
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class StandingSheet:
     """The middle sheet: an upright plane through the contact with the ground."""
 
     plane: F64  # (3,) relative inverse depth = plane . (x px, y px, 1); 1 amid the silhouette
@@ -43,10 +43,10 @@ class Standing:
         return np.maximum(xy @ self.plane[:2] + self.plane[2], LEAST_DEPTH)
 
 
-FLAT = Standing(np.array([0.0, 0.0, 1.0]))
+FLAT = StandingSheet(np.array([0.0, 0.0, 1.0]))
 
 
-def stand(silhouette: Silhouette, camera: Camera, horizon: float | None) -> Standing:
+def stand(silhouette: ReliefSilhouette, camera: Camera, horizon: float | None) -> StandingSheet:
     """Return the object's stance on level ground; FLAT where none is seen.
 
     `horizon`: the row of the photo it lies in, px. None: unknown, and guessed.
@@ -55,11 +55,11 @@ def stand(silhouette: Silhouette, camera: Camera, horizon: float | None) -> Stan
     if silhouette.is_open[1] or len(x) < 3:
         return FLAT
     if (prism := find_prism(silhouette, camera, horizon)) is not None:
-        return Standing(_upright(silhouette, prism.plan, prism.turn), prism)
+        return StandingSheet(_upright(silhouette, prism.plan, prism.turn), prism)
     touches = _touching(x, y, silhouette.extent)
     if touches.sum() < 2:
         return FLAT
-    plan = Plan.under(silhouette, camera, horizon, float(np.median(y[touches])))
+    plan = GroundPlane.under(silhouette, camera, horizon, float(np.median(y[touches])))
     if not plan.is_seen(y[touches]):
         return FLAT
     across, forward = plan.on_ground(x[touches], y[touches])
@@ -67,10 +67,10 @@ def stand(silhouette: Silhouette, camera: Camera, horizon: float | None) -> Stan
     sure = float(np.clip((span - LEAST_SPAN[0]) / (LEAST_SPAN[1] - LEAST_SPAN[0]), 0, 1))
     turn = sure * TRUST * float(np.polyfit(across, forward, 1)[0])
     # Only a prism is known to stand upright: what is round has no lean of its own.
-    return Standing(_upright(silhouette, Plan(camera, camera.cy), turn))
+    return StandingSheet(_upright(silhouette, GroundPlane(camera, camera.cy), turn))
 
 
-def _upright(silhouette: Silhouette, plan: Plan, turn: float) -> F64:
+def _upright(silhouette: ReliefSilhouette, plan: GroundPlane, turn: float) -> F64:
     """(3,) the plane that stands upright amid the silhouette; `turn`: forward per across."""
     camera = plan.camera
     cosine, sine = plan.down

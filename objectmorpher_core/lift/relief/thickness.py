@@ -18,7 +18,7 @@ from ...base.arrays import F64
 from ...base.kernel_files import numba
 from .bilinear import bilinear
 from .cuts import Cuts
-from .silhouette import Silhouette, is_covered
+from .silhouette import ReliefSilhouette, is_covered
 
 FULL_BODY = 0.6  # x extent: radius of the disc that becomes a ball 0.7 times as deep as wide
 RIM_SLOPE = 5.0  # tangent of the angle, before FULLNESS, at which the surface leaves the rim
@@ -40,7 +40,7 @@ class Thickness:
     cuts: Cuts | None = None  # between cells that are not of one surface
 
     @staticmethod
-    def of(silhouette: Silhouette) -> Thickness:
+    def of(silhouette: ReliefSilhouette) -> Thickness:
         cell = silhouette.cell
         depth = silhouette.continued(silhouette.depth, MARGIN) / cell  # cells
         radius = silhouette.continued(silhouette.radius, MARGIN) / cell
@@ -60,7 +60,7 @@ class Thickness:
         )
 
     @staticmethod
-    def balls(silhouette: Silhouette) -> F64:
+    def balls(silhouette: ReliefSilhouette) -> F64:
         """(h, w) px^2, height squared of the union of the balls of all discs that fit into it."""
         depth = silhouette.continued(silhouette.depth, MARGIN) / silhouette.cell
         square = _balls(depth, np.ones(depth.shape)) * silhouette.cell**2

@@ -9,11 +9,11 @@ import numpy as np
 
 from ...base.arrays import F64, Mask
 from ...base.camera import Camera
-from ..relief.body import Body
+from ..relief.body import ReliefBody
 from ..relief.cuts import Cuts
-from ..relief.silhouette import Silhouette
+from ..relief.silhouette import ReliefSilhouette
 from ..relief.thickness import Thickness
-from .recognition import SHEET, Places, Recognised
+from .recognition import SHEET, PlacedShape, Recognised
 
 STRAY = 0.1  # x extent, from which a front is something else than the shape's
 ROUNDS = 4  # of a plane that is fitted to most of a front
@@ -23,8 +23,8 @@ INNER = 0.02  # x extent from the outline, nearer to which fronts are not compar
 
 
 def completed(
-    body: Body, shape: Recognised, camera: Camera, thickness: float, trust: float
-) -> Body:
+    body: ReliefBody, shape: Recognised, camera: Camera, thickness: float, trust: float
+) -> ReliefBody:
     """`body`, whose thickness was multiplied by `thickness`, as `shape` as far as that is sure.
 
     `trust` in [0, 1]: 0 leaves the body as it is. How far away it is the body says.
@@ -52,12 +52,12 @@ def completed(
     return _whole(body, share)
 
 
-def flattened(body: Body, thickness: float) -> Body:
+def flattened(body: ReliefBody, thickness: float) -> ReliefBody:
     """`body` as a sheet that lies as its middle does."""
     return _sheet(body, body.middle, np.ones(body.silhouette.shape), thickness)
 
 
-def rounded(body: Body, thickness: float) -> Body:
+def rounded(body: ReliefBody, thickness: float) -> ReliefBody:
     """`body` as a tube: every cross-section of its outline is a circle (Blum 1967).
 
     Its front stays where it is, smoothed along.
@@ -75,7 +75,7 @@ def rounded(body: Body, thickness: float) -> Body:
     return _whole(body, share)
 
 
-def _sheet(body: Body, middle: F64, share: F64, thickness: float) -> Body:
+def _sheet(body: ReliefBody, middle: F64, share: F64, thickness: float) -> ReliefBody:
     half = np.full(share.shape, thickness * SHEET * body.silhouette.extent)
     sides = [side.mixed(half, share) for side in (body.front, body.back)]
     middle = body.middle + share * (middle - body.middle)
@@ -83,7 +83,7 @@ def _sheet(body: Body, middle: F64, share: F64, thickness: float) -> Body:
     return _whole(body, share)
 
 
-def _plane(field: F64, known: Mask, outline: Silhouette) -> F64:
+def _plane(field: F64, known: Mask, outline: ReliefSilhouette) -> F64:
     """(h, w) the plane nearest to most of `field` (h, w) where that is `known` (h, w)."""
     cells = np.concatenate([outline.cells, np.ones((*outline.shape, 1))], -1)
     own, values, weight = cells[known], field[known], np.ones(int(known.sum()))
@@ -96,7 +96,7 @@ def _plane(field: F64, known: Mask, outline: Silhouette) -> F64:
     return cells @ plane
 
 
-def _whole(body: Body, share: F64) -> Body:
+def _whole(body: ReliefBody, share: F64) -> ReliefBody:
     """Without cuts where most of the body, `share` (h, w), is one shape."""
     cuts = None if body.cuts is None else _uncut(body.cuts, share > 0.5)
     own = None if cuts is None or body.own is None else 1 - (1 - share) * (1 - body.own)
@@ -104,7 +104,7 @@ def _whole(body: Body, share: F64) -> Body:
     return replace(body, front=sides[0], back=sides[1], cuts=cuts, own=own)
 
 
-def _share(places: Places, off: F64, body: Body) -> F64:
+def _share(places: PlacedShape, off: F64, body: ReliefBody) -> F64:
     """(h, w) how much of each cell is the shape's, whose front is `off` (h, w) px wrong."""
     outline = body.silhouette
     sigma = SOFT * outline.extent / outline.cell

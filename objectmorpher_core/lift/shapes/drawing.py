@@ -19,7 +19,7 @@ class Mesh(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Grid:
+class RayGrid:
     """Rays through a grid of pixels: the tangents of pixel (j, i) are start + step (j, i)."""
 
     start: tuple[float, float]
@@ -42,7 +42,7 @@ class Drawn(NamedTuple):
     face: I64  # (h, w) the nearest face
 
 
-def drawn(mesh: Mesh, grid: Grid) -> Drawn:
+def drawn(mesh: Mesh, grid: RayGrid) -> Drawn:
     """`mesh`, all of it in front of the camera, as the rays of `grid` meet it."""
     x, y, z = mesh.vertices.T
     places = np.column_stack(

@@ -16,7 +16,7 @@ from ...base.arrays import F64, Mask
 from ...base.kernel_files import numba
 from ..crop import rays
 from ..relief.shape_look import SeenShape
-from .drawing import Grid, Mesh, drawn, face_normals
+from .drawing import Mesh, RayGrid, drawn, face_normals
 
 STRIDE = 4  # px of the crop per cell
 INNER = 2.0  # px of the crop from the outline, nearer to which its pixels mix
@@ -57,7 +57,7 @@ FAR = Misfit(1e3, 1e3, 1e3, 1e3)
 class Evidence:
     """Fields (h, w) over a coarse grid of the crop."""
 
-    grid: Grid
+    grid: RayGrid
     mask: Mask
     sure: Mask  # within the mask, where the network's pixels are not mixed
     outside: F64  # px of the crop to the outline, on either side
@@ -86,7 +86,7 @@ class Evidence:
         rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
         extent = float(max(np.ptp(rows), np.ptp(columns)) + 1)
         shape = mask[own, own].shape
-        grid = Grid((low[0], low[1]), STRIDE * width / side, (shape[0], shape[1]))
+        grid = RayGrid((low[0], low[1]), STRIDE * width / side, (shape[0], shape[1]))
         return Evidence(
             grid, mask[own, own], (inside > INNER)[own, own],
             np.where(mask, inside - 0.5, outside - 0.5)[own, own].astype(np.float64),

@@ -11,9 +11,9 @@ from ...base.arrays import F64
 from ...base.camera import Camera
 from ...base.distances import nearest_in
 from ..relief.shape_look import SeenShape
-from ..relief.silhouette import Silhouette
+from ..relief.silhouette import ReliefSilhouette
 from .boxes import fit_box
-from .drawing import Grid, Mesh, drawn
+from .drawing import Mesh, RayGrid, drawn
 from .evidence import Evidence, Misfit
 from .flats import fit_flat
 from .rings import fit_ring
@@ -54,29 +54,31 @@ class Recognised:
     plane: F64 | None = None  # (3,) of a sheet: see `flats`
     description: float = 0.0  # length, of a solid
 
-    def over(self, outline: Silhouette, camera: Camera) -> Places:
+    def over(self, outline: ReliefSilhouette, camera: Camera) -> PlacedShape:
         """The shape on the cells of a silhouette."""
         first = (outline.photo_xy(np.zeros(2)) - [camera.cx, camera.cy]) / camera.focal
-        grid = Grid((float(first[0]), float(first[1])), outline.cell / camera.focal, outline.shape)
+        grid = RayGrid(
+            (float(first[0]), float(first[1])), outline.cell / camera.focal, outline.shape
+        )
         if self.plane is not None:
             rays = np.concatenate([grid.tangents, np.ones((*grid.shape, 1))], -1)
             near = np.maximum(rays @ self.plane, 0.3 * float(np.median(rays @ self.plane)))
-            return Places(1 / near, 1 / near, np.ones(outline.shape), self.weight)
+            return PlacedShape(1 / near, 1 / near, np.ones(outline.shape), self.weight)
         assert self.mesh is not None
         seen = drawn(self.mesh, grid)
         met = (seen.near > 0) & outline.inside
         if not met.any():
             ones = np.ones(outline.shape)
-            return Places(ones, ones, 0 * ones, 0.0)
+            return PlacedShape(ones, ones, 0 * ones, 0.0)
         nearest = nearest_in(met)
         near, far = (1 / field.ravel()[nearest] for field in (seen.near, seen.far))
         gap = cv2.distanceTransform((~met).astype(np.uint8), cv2.DIST_L2, 3) * outline.cell
         share = np.clip(2 - gap / (REACH * outline.extent), 0, 1)
-        return Places(near, far, share, self.weight)
+        return PlacedShape(near, far, share, self.weight)
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class PlacedShape:
     """A shape over cells (h, w), depths in units of its own."""
 
     near: F64

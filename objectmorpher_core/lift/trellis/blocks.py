@@ -62,7 +62,7 @@ EPSILON = 1e-6  # of the layer norms inside blocks
 Attend = Callable[[Tensor, Tensor, Tensor], Tensor]
 
 
-class Part(nn.Module):
+class NetworkPart(nn.Module):
     """A network of its own file. Its torso may be of lower precision than the rest."""
 
     torso: tuple[str, ...] = ()  # what the names of its modules begin with
@@ -154,7 +154,7 @@ class FeedForward(nn.Module):
         return self.mlp(x)
 
 
-class Block(nn.Module):
+class TransformerBlock(nn.Module):
     """Attention and feed-forward net, each added to what came in."""
 
     def __init__(self, form: Transformer) -> None:

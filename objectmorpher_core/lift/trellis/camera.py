@@ -19,7 +19,7 @@ LEAST = 6  # points that tell a camera
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Framing:
     """The view of an object in a picture."""
 
     intrinsic: F64  # (3, 3), of a picture whose side is 1, x right and y down
@@ -34,7 +34,7 @@ class View:
         return xyw[:, :2] / xyw[:, 2:]
 
 
-def view(points: F64, uv: F64) -> View:
+def view(points: F64, uv: F64) -> Framing:
     """The camera for which `points` (N, 3) fall on `uv` (N, 2). Raises LiftError."""
     if len(points) < LEAST:
         raise LiftError(f"{len(points)} points are too few to tell how the object is seen")
@@ -53,7 +53,7 @@ def view(points: F64, uv: F64) -> View:
     intrinsic, turn = intrinsic @ signs, signs @ turn
     shift = np.linalg.solve(intrinsic, matrix[:, 3])
     pose = np.column_stack([turn, shift]).astype(np.float64)
-    return View(intrinsic / intrinsic[2, 2], pose, points, uv)
+    return Framing(intrinsic / intrinsic[2, 2], pose, points, uv)
 
 
 def _normed(points: F64) -> tuple[F64, F64]:

@@ -15,7 +15,7 @@ from ...models.plans import Plan
 from .camera import view
 from .generator import LATENT, STRUCTURE, Extras, Folders, Generator, Placed, occupied
 from .latent import looked_up
-from .picture import Picture
+from .picture import ConditionPicture
 from .voxels import Voxels
 
 PLACES = "sparse_structure_uv_decoder"
@@ -42,7 +42,7 @@ class CupidGenerator(Generator):
         uv = torch.sigmoid(places[:, *telling.cells.T].T)
         return Placed(voxels, view(centres(telling), uv.cpu().double().numpy()))
 
-    def _extras(self, picture: Picture, seen: Tensor, placed: Placed) -> Extras | None:
+    def _extras(self, picture: ConditionPicture, seen: Tensor, placed: Placed) -> Extras | None:
         assert placed.view is not None
         xy = placed.view.project(centres(placed.voxels)).clip(0, 1)
         uv = torch.from_numpy(xy.astype(np.float32)).to(seen.device)

@@ -9,12 +9,12 @@ from ...base.camera import Camera
 from ...base.progress import Progress
 from ...document.gaussians import Gaussians
 from ...splat_files.splats.axes import QUARTER_TURN, turned
-from .. import Subject
+from .. import LiftSubject
 from ..registration.placement import Hints
 from . import configs
-from .camera import View, pose_in
+from .camera import Framing, pose_in
 from .lifter import UP, TrellisLifter
-from .picture import Picture
+from .picture import ConditionPicture
 
 if TYPE_CHECKING:
     from ...models.plans import Plan
@@ -32,20 +32,20 @@ class CupidLifter(TrellisLifter):
 
         return CupidGenerator(folders, plan)
 
-    def stance(self, subject: Subject, progress: Progress, seed: int = 0) -> F64 | None:
+    def stance(self, subject: LiftSubject, progress: Progress, seed: int = 0) -> F64 | None:
         """(4, 4) world from the network's own frame of the object; None where no camera sees it so.
 
         The frame is about the same for two pictures of one object. Raises LiftError.
         """
-        from .picture import Picture
+        from .picture import ConditionPicture
 
-        picture = Picture.of(subject.matte)
+        picture = ConditionPicture.of(subject.matte)
         made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
         return pose_seen(made.view, picture, subject.camera)
 
     def _made(
-        self, picture: Picture, subject: Subject, progress: Progress, seed: int
+        self, picture: ConditionPicture, subject: LiftSubject, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         made = self.make(lambda generator: generator.make(picture, progress, seed))
         assert made.view is not None
@@ -53,7 +53,7 @@ class CupidLifter(TrellisLifter):
         return turned(made.gaussians, QUARTER_TURN), Hints(up=UP, start=start)
 
 
-def pose_seen(seen: View, picture: Picture, camera: Camera) -> F64 | None:
+def pose_seen(seen: Framing, picture: ConditionPicture, camera: Camera) -> F64 | None:
     """(4, 4) world from object, in our axes, where the photo's camera sees it so.
 
     The photo's focal length is kept, whatever the network's view has. None where there is none.

@@ -18,10 +18,10 @@ from ...document.gaussians import Gaussians
 from ...models.device import empty_cache
 from ...models.plans import Plan
 from .. import LiftError
-from .camera import View
+from .camera import Framing
 from .configs import Pipeline, Sampling, part_path, pipeline
 from .parts import load_part
-from .picture import Encoder, Picture
+from .picture import ConditionPicture, Encoder
 from .voxels import Voxels
 
 log = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class Placed:
     """The place of an object."""
 
     voxels: Voxels
-    view: View | None = None  # how the picture shows it, of a generator that says so
+    view: Framing | None = None  # how the picture shows it, of a generator that says so
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Generator:
 
     def make(
         self,
-        picture: Picture,
+        picture: ConditionPicture,
         progress: Progress = silent,
         seed: int = 0,
         how: tuple[Sampling, Sampling] | None = None,
@@ -137,7 +137,7 @@ class Generator:
             self._parts["encoder"] = Encoder(self.folders.encoder, self.device, torch.float32)
         return self._parts["encoder"]
 
-    def _seen(self, picture: Picture) -> Tensor:
+    def _seen(self, picture: ConditionPicture) -> Tensor:
         """(1, M, D) what the flows are told."""
         encoder = self._encoder()
         return encoder.tokens(picture.on_black(encoder.side))
@@ -159,7 +159,7 @@ class Generator:
         """Where the object is, from the first flow's latents."""
         return Placed(occupied(self.part(STRUCTURE)(latents)[0, 0]))
 
-    def _extras(self, picture: Picture, seen: Tensor, placed: Placed) -> Extras | None:
+    def _extras(self, picture: ConditionPicture, seen: Tensor, placed: Placed) -> Extras | None:
         """What the second flow gets besides."""
         return None
 

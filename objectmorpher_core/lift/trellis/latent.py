@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from .. import LiftError
-from .blocks import EPSILON, FlowBlock, Norm, Part, TimeCode, place_code, unit_layer_norm
+from .blocks import EPSILON, FlowBlock, NetworkPart, Norm, TimeCode, place_code, unit_layer_norm
 from .configs import LatentFlowConfig, ViewLatentFlowConfig
 from .voxels import Voxels, pooled
 
@@ -65,7 +65,7 @@ class SparseResBlock(nn.Module):
         return self.conv2(h, voxels) + self.skip_connection(x)
 
 
-class LatentFlow(Part):
+class LatentFlow(NetworkPart):
     """Velocity of latents (B, N, C) of N cells.
 
     Convolutions halve the grid, the transformer works there, and convolutions lead back.

@@ -13,7 +13,7 @@ from ...document.model import LiftedObject, LiftSettings
 from ...models import ModelError, ledger
 from ...models.plans import Need
 from ...splat_files.splats.axes import QUARTER_TURN, turned
-from .. import LiftError, Subject
+from .. import LiftError, LiftSubject
 from ..registration.imported import lift_imported
 from ..registration.placement import Hints, Proposal, Registrar, register
 from ..registration.view import Target
@@ -23,7 +23,7 @@ from .configs import Sampling
 if TYPE_CHECKING:
     from ...models.plans import Plan
     from .generator import Folders, Generator, Made
-    from .picture import Picture
+    from .picture import ConditionPicture
 
 log = logging.getLogger(__name__)
 STEPS = 12  # of each flow: what the publishers' own example takes
@@ -46,12 +46,12 @@ class TrellisLifter:
         return configs.missing(*self.ids)
 
     def lift(
-        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
         """See `Lifter`. The same seed gives the same object on one device."""
-        from .picture import Picture
+        from .picture import ConditionPicture
 
-        picture = Picture.of(subject.matte)
+        picture = ConditionPicture.of(subject.matte)
         gaussians, hints = self._made(picture, subject, part(progress, 0.0, 0.8), seed)
         target = Target(subject.pixels, subject.mask, subject.camera)
         best = placed(gaussians, target, hints, part(progress, 0.8, 0.95), seed)
@@ -62,7 +62,7 @@ class TrellisLifter:
         return replace(lifted, backend=self.name)
 
     def _made(
-        self, picture: Picture, subject: Subject, progress: Progress, seed: int
+        self, picture: ConditionPicture, subject: LiftSubject, progress: Progress, seed: int
     ) -> tuple[Gaussians, Hints]:
         """The object in our axes, and what is known of its pose."""
         made = self.make(lambda g: g.make(picture, progress, seed, example_sampling(g)))

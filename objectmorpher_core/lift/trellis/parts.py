@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from .. import LiftError
-from .blocks import Part
+from .blocks import NetworkPart
 from .configs import (
     GaussianDecoderConfig,
     LatentEncoderConfig,
@@ -31,24 +31,24 @@ PICKLES = (".pt", ".pth", ".bin", ".ckpt", ".pkl")
 
 
 @dataclass(frozen=True)
-class Kind:
+class PublishedKind:
     """The meaning of a published class name."""
 
     config: type[Any]
-    part: Callable[[Any], Part]
+    part: Callable[[Any], NetworkPart]
 
 
 KINDS = {
-    "SparseStructureFlowModel": Kind(StructureFlowConfig, StructureFlow),
-    "SparseStructureDecoder": Kind(StructureDecoderConfig, StructureDecoder),
-    "SLatFlowModel": Kind(LatentFlowConfig, LatentFlow),
-    "SLatGaussianDecoder": Kind(GaussianDecoderConfig, GaussianDecoder),
-    "SLatEncoder": Kind(LatentEncoderConfig, LatentEncoder),
-    "VisualLatentConditioningSLatFlowModel": Kind(ViewLatentFlowConfig, ViewLatentFlow),
+    "SparseStructureFlowModel": PublishedKind(StructureFlowConfig, StructureFlow),
+    "SparseStructureDecoder": PublishedKind(StructureDecoderConfig, StructureDecoder),
+    "SLatFlowModel": PublishedKind(LatentFlowConfig, LatentFlow),
+    "SLatGaussianDecoder": PublishedKind(GaussianDecoderConfig, GaussianDecoder),
+    "SLatEncoder": PublishedKind(LatentEncoderConfig, LatentEncoder),
+    "VisualLatentConditioningSLatFlowModel": PublishedKind(ViewLatentFlowConfig, ViewLatentFlow),
 }
 
 
-def build(description: dict[str, Any]) -> Part:
+def build(description: dict[str, Any]) -> NetworkPart:
     """The network of a part's json, with weights as torch makes them. Raises LiftError."""
     name, args = description.get("name"), description.get("args")
     kind = KINDS.get(str(name).removeprefix("Elastic"))
@@ -57,7 +57,7 @@ def build(description: dict[str, Any]) -> Part:
     return kind.part(config(kind.config, args))
 
 
-def load_part(path: Path, device: torch.device, dtype: torch.dtype) -> Part:
+def load_part(path: Path, device: torch.device, dtype: torch.dtype) -> NetworkPart:
     """The part whose files are `path`.json and `path`.safetensors, on `device`, to be run.
 
     Its transformer or convolutions get `dtype`, the rest stays in single precision, as published.
@@ -111,7 +111,7 @@ def refuse_differences(
             raise LiftError(f"in the weights {name} {key} is {found[key]}, expected {shape}")
 
 
-def save_part(part: Part, description: dict[str, Any], path: Path) -> None:
+def save_part(part: NetworkPart, description: dict[str, Any], path: Path) -> None:
     """Writes what `load_part` reads."""
     import json
 

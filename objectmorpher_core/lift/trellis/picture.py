@@ -26,7 +26,7 @@ STD = np.array([0.229, 0.224, 0.225], np.float32)
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class ConditionPicture:
     """The object in a square of the photo, part of which may lie beyond its frame."""
 
     image: Image.Image  # RGBA, straight colours, at the photo's resolution
@@ -34,7 +34,7 @@ class Picture:
     top: int
 
     @staticmethod
-    def of(matte: Matte) -> Picture:
+    def of(matte: Matte) -> ConditionPicture:
         """Around what `matte` cuts out. Raises LiftError where that is nothing."""
         solid = matte.alpha > SOLID
         if not solid.any():  # glass
@@ -48,7 +48,7 @@ class Picture:
         rgba = np.dstack([matte.foreground, matte.alpha])
         whole = Image.fromarray(np.rint(255 * rgba.clip(0, 1)).astype(np.uint8), "RGBA")
         image = whole.crop((int(left), int(top), int(left) + 2 * half, int(top) + 2 * half))
-        return Picture(image, int(left) + matte.left, int(top) + matte.top)
+        return ConditionPicture(image, int(left) + matte.left, int(top) + matte.top)
 
     @property
     def side(self) -> int:

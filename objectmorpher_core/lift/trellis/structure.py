@@ -7,11 +7,11 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from .. import LiftError
-from .blocks import FlowBlock, Norm, Part, TimeCode, place_code, unit_layer_norm
+from .blocks import FlowBlock, NetworkPart, Norm, TimeCode, place_code, unit_layer_norm
 from .configs import StructureDecoderConfig, StructureFlowConfig
 
 
-class StructureFlow(Part):
+class StructureFlow(NetworkPart):
     """Velocity of latents (B, C, R, R, R) that become an object's structure."""
 
     torso = ("blocks.",)
@@ -75,7 +75,7 @@ class Doubling(nn.Module):
         return h.flatten(6, 7).flatten(4, 5).flatten(2, 3)
 
 
-class StructureDecoder(Part):
+class StructureDecoder(NetworkPart):
     """Latents (B, C, r, r, r) to (B, D, R, R, R): above 0 in the first channel is occupied."""
 
     torso = ("middle_block.", "blocks.")

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...document.gaussians import Gaussians
-from .blocks import Block, Part, attend_in_windows, place_code, unit_layer_norm
+from .blocks import NetworkPart, TransformerBlock, attend_in_windows, place_code, unit_layer_norm
 from .configs import Activations, GaussianDecoderConfig, LatentEncoderConfig, WindowedConfig
 from .voxels import Voxels
 
@@ -20,7 +20,7 @@ QUANTITIES = {  # numbers of a Gaussian, in the order in which the decoder says 
 }  # fmt: skip
 
 
-class Windowed(Part):
+class Windowed(NetworkPart):
     """Features (B, N, C) of N cells to (B, N, D); every second block's windows lie between."""
 
     torso = ("blocks.",)
@@ -29,7 +29,7 @@ class Windowed(Part):
         super().__init__()
         self.form = form
         self.input_layer = nn.Linear(channels, form.model_channels)
-        self.blocks = nn.ModuleList(Block(form) for _ in range(form.num_blocks))
+        self.blocks = nn.ModuleList(TransformerBlock(form) for _ in range(form.num_blocks))
         self.out_layer = nn.Linear(form.model_channels, out)
 
     def forward(self, x: Tensor, voxels: Voxels) -> Tensor:

@@ -28,13 +28,13 @@ from ...document.model import LiftedObject, LiftSettings
 from ...pictures.image import to_u8
 from ...splat_files import FORMATS, MESH_ENDINGS, SplatFileError, read, read_object
 from ...splat_files.splats.ply_table import read_header
-from .. import LiftError, Subject
+from .. import LiftError, LiftSubject
 from ..registration.imported import lift_imported
 from ..registration.placement import Hints, Proposal, Registrar, register
 from ..registration.view import Target
 from ..trellis.camera import pose_in
 from .answer import VERSION, WRONG, check_similarity, read_told
-from .file import Worker, read_worker
+from .file import LiftWorker, read_worker
 from .process import run_worker
 
 log = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ UP = (0.0, -1.0, 0.0)  # of the object frame: y is down
 class ExternalLifter:
     """A worker as a lifter."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: LiftWorker) -> None:
         self.worker, self.name = worker, worker.name
 
     def missing(self) -> str | None:
@@ -57,7 +57,7 @@ class ExternalLifter:
         return self.worker.missing()
 
     def lift(
-        self, subject: Subject, settings: LiftSettings, progress: Progress, seed: int = 0
+        self, subject: LiftSubject, settings: LiftSettings, progress: Progress, seed: int = 0
     ) -> LiftedObject:
         """See `Lifter`. Raises LiftError; Cancelled passes, and the worker has ended then."""
         with tempfile.TemporaryDirectory(prefix="objectmorpher-", ignore_cleanup_errors=True) as at:
@@ -74,7 +74,12 @@ class ExternalLifter:
         return replace(lifted, backend=self.name)
 
     def _placed(
-        self, made: Gaussians, seen: Seen | None, target: Target, progress: Progress, seed: int
+        self,
+        made: Gaussians,
+        seen: WorkerView | None,
+        target: Target,
+        progress: Progress,
+        seed: int,
     ) -> Proposal:
         if seen is None:
             return register(made, target, Hints(up=UP), progress, seed).best
@@ -90,7 +95,7 @@ class ExternalLifter:
         return best
 
 
-class Seen:
+class WorkerView:
     """A worker's report of the view of its object."""
 
     def __init__(self, world_from_object: F64, camera: Camera) -> None:
@@ -116,7 +121,7 @@ class Seen:
         return found
 
 
-def write_job(folder: Path, subject: Subject, count: int, seed: int) -> None:
+def write_job(folder: Path, subject: LiftSubject, count: int, seed: int) -> None:
     """Write the worker's input."""
     rgb = to_u8(subject.pixels)
     alpha = np.zeros(subject.mask.shape, np.uint8)
@@ -135,7 +140,7 @@ def write_job(folder: Path, subject: Subject, count: int, seed: int) -> None:
     (folder / "camera.json").write_text(json.dumps(told), encoding="utf-8")
 
 
-def read_answer(folder: Path, name: str, count: int) -> tuple[Gaussians, Seen | None]:
+def read_answer(folder: Path, name: str, count: int) -> tuple[Gaussians, WorkerView | None]:
     """The Gaussians that a worker left, and how it says they are seen. Raises LiftError."""
     at = _object_file(folder, name)
     seen = _seen(folder / SEEN, name)
@@ -176,7 +181,7 @@ def _declared(at: Path) -> int | None:
     return None if vertex is None or header.element("chunk") is not None else vertex.count
 
 
-def _seen(at: Path, name: str) -> Seen | None:
+def _seen(at: Path, name: str) -> WorkerView | None:
     """What object.json says. Raises LiftError."""
     if not at.exists():
         return None
@@ -190,7 +195,7 @@ def _seen(at: Path, name: str) -> Seen | None:
             raise ValueError("the camera is none")
     except WRONG as error:
         raise LiftError(f"the camera of the worker {name} is of no use: {reason(error)}") from error
-    return Seen(matrix, camera)
+    return WorkerView(matrix, camera)
 
 
 def load_worker(name: str) -> ExternalLifter:

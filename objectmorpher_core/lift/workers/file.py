@@ -43,7 +43,7 @@ NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,40}")
 
 
 @dataclass(frozen=True)
-class Worker:
+class LiftWorker:
     """A command that lifts, in an environment of its own."""
 
     name: str
@@ -91,7 +91,7 @@ def worker_names() -> tuple[str, ...]:
     return tuple(sorted(_files()))
 
 
-def read_worker(name: str) -> Worker:
+def read_worker(name: str) -> LiftWorker:
     """The worker called `name`. Raises LiftError: there is none, or its file is of no use."""
     files = _files()
     if name not in files:
@@ -144,7 +144,7 @@ def _files() -> dict[str, Path]:
     return {name: at for name, at in found.items() if NAME.fullmatch(name)}
 
 
-def _worker(told: dict, name: str, here: Path) -> Worker:
+def _worker(told: dict, name: str, here: Path) -> LiftWorker:
     """Raises ValueError."""
     texts = ("licence", "licence_kind", "page")
     if unknown := sorted(set(told) - {"name", "command", "timeout", *texts}):
@@ -172,4 +172,4 @@ def _worker(told: dict, name: str, here: Path) -> Worker:
         for sign, value in stands.items():
             argument = argument.replace(sign, value)
         filled.append(argument)
-    return Worker(name, tuple(filled), licence, float(timeout), kind or FREE, page)
+    return LiftWorker(name, tuple(filled), licence, float(timeout), kind or FREE, page)

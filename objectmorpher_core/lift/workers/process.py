@@ -20,7 +20,7 @@ from typing import IO, Any
 
 from ...base.progress import Progress
 from .. import LiftError
-from .file import Worker
+from .file import LiftWorker
 
 POLL = 0.05  # s between two looks at the process
 LINE = 1 << 14  # characters of a line that are read
@@ -53,7 +53,7 @@ class _Heard:
         self.last = " ".join(line.split())[:TOLD] or self.last
 
 
-def run_worker(worker: Worker, folder: Path, progress: Progress) -> None:
+def run_worker(worker: LiftWorker, folder: Path, progress: Progress) -> None:
     """Runs `worker` on the job in `folder`, which is its working directory, too.
 
     Raises LiftError: one sentence; Cancelled passes. The whole group has ended in every case.
@@ -84,7 +84,7 @@ def run_worker(worker: Worker, folder: Path, progress: Progress) -> None:
         raise LiftError(f"the worker {worker.name} {how}: {reason}")
 
 
-def _started(worker: Worker, folder: Path) -> subprocess.Popen[str]:
+def _started(worker: LiftWorker, folder: Path) -> subprocess.Popen[str]:
     own: dict[str, Any] = (
         {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}  # type: ignore[attr-defined]
         if sys.platform == "win32"

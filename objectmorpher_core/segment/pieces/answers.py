@@ -11,7 +11,7 @@ from ...base.arrays import RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import BAND, sharpen_band
 from ..selection import SMALLEST, fill_small_holes, is_bounded, keep_touched
-from .choice import Choice, Ground, Region
+from .choice import PieceChoice, PieceGround, PieceRegion
 from .correcting import said, wrong
 from .pieces import Pieces
 from .relabel import relabel, votes
@@ -26,16 +26,16 @@ DIAGONAL = 0.79  # pi / 4: px of an outline for each step of its staircase, all 
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class PieceAnswer:
     """The answer to a prompt, at the size of the reduced photo."""
 
     mask: Mask  # (h, w)
-    others: tuple[Region, ...]  # what else might be meant; the best has the score 1
+    others: tuple[PieceRegion, ...]  # what else might be meant; the best has the score 1
 
 
 def begin(
-    ground: Ground, image: RGB, prompt: Prompt, choice: Choice, whole: Mask | None = None
-) -> Answer:
+    ground: PieceGround, image: RGB, prompt: Prompt, choice: PieceChoice, whole: Mask | None = None
+) -> PieceAnswer:
     """The answer to a prompt's first positive click, or to its box or subject without any.
 
     `image` (h, w, 3): the reduced photo; `choice`: what the prompt means. `whole` (h, w): what it
@@ -47,10 +47,10 @@ def begin(
     if whole is not None:
         nested = mask & whole if prompt.level == "part" else mask | whole
         mask = whole if nested.all() or nested.sum() < SMALLEST else nested
-    return Answer(mask, choice.relative)
+    return PieceAnswer(mask, choice.relative)
 
 
-def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Answer:
+def add_click(ground: PieceGround, image: RGB, answer: PieceAnswer, prompt: Prompt) -> PieceAnswer:
     """The answer to a prompt whose last click is new."""
     pieces, click = ground.pieces, prompt.clicks[-1]
     column, row = pieces.pixel(click.x, click.y)
@@ -64,10 +64,10 @@ def add_click(ground: Ground, image: RGB, answer: Answer, prompt: Prompt) -> Ans
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEARBY + 1, 2 * NEARBY + 1))
     near = cv2.dilate(found.mask.astype(np.uint8), kernel) > 0
     mask = sharpen_band(image, changed, near, _band(pieces))
-    return Answer(_tidy(mask, _reduced(pieces, prompt), near), (*answer.others, *found.others))
+    return PieceAnswer(_tidy(mask, _reduced(pieces, prompt), near), (*answer.others, *found.others))
 
 
-def expected_overlap(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
+def expected_overlap(ground: PieceGround, answer: PieceAnswer, clicks: tuple[Click, ...]) -> float:
     """The overlap (IoU) of the answer with all that may be meant, in [0, 1].
 
     Every region that could have been chosen and that no click contradicts may be what is meant,
@@ -90,7 +90,7 @@ def expected_overlap(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) 
     return float(expected / total / (1 + BLUR * outline))
 
 
-def confidence(ground: Ground, answer: Answer, clicks: tuple[Click, ...]) -> float:
+def confidence(ground: PieceGround, answer: PieceAnswer, clicks: tuple[Click, ...]) -> float:
     """The overlap (IoU) of the answer with what is meant that is to be expected, in [0, 1].
 
     What else may be meant says one half of it, and the other how well the pieces along the outline
@@ -114,7 +114,7 @@ def _agreement(pieces: Pieces, mask: Mask) -> float:
     return float(np.where(mask[edge], chance, 1 - chance).mean())
 
 
-def vote(ground: Ground, prompt: Prompt, choice: Choice) -> Choice:
+def vote(ground: PieceGround, prompt: Prompt, choice: PieceChoice) -> PieceChoice:
     """Answer a first click by votes: its pieces are decided anew by similar ones."""
     known = said(ground.pieces, prompt, True)
     voted = relabel(ground.pieces, choice.pieces, known) & ground.inside(prompt)

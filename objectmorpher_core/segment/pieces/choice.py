@@ -53,7 +53,7 @@ SMALLEST_IN_BOX = 0.1  # x box's area; a smaller object would have had a smaller
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class PieceRegion:
     """Pieces that may be meant."""
 
     pieces: Mask  # (n,)
@@ -61,17 +61,17 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class PieceChoice:
     """Pieces that are meant, and what else might have been."""
 
     pieces: Mask  # (n,)
-    others: tuple[Region, ...]  # the best first
+    others: tuple[PieceRegion, ...]  # the best first
 
     @property
-    def relative(self) -> tuple[Region, ...]:
+    def relative(self) -> tuple[PieceRegion, ...]:
         """The others, the best of them with the score 1."""
         best = max(max(region.score for region in self.others), 1e-9)
-        return tuple(Region(region.pieces, region.score / best) for region in self.others)
+        return tuple(PieceRegion(region.pieces, region.score / best) for region in self.others)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Taste:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class PieceGround:
     """A photo to choose from."""
 
     pieces: Pieces
@@ -121,21 +121,21 @@ class Correction:
     taste: Taste = Taste(MINOR_CORRECTION, LARGER_CORRECTION)
     guess: Mask | None = None  # (n,) what the click may mean, too
 
-    def piece(self, ground: Ground) -> int:
+    def piece(self, ground: PieceGround) -> int:
         """The one that the click is on."""
         return ground.pieces.at(self.click.x, self.click.y)
 
-    def free(self, ground: Ground) -> Mask:
+    def free(self, ground: PieceGround) -> Mask:
         """(n,) what may change, with the click's own piece."""
         return self.allowed | only(ground.pieces, self.piece(ground))
 
-    def others(self, ground: Ground) -> tuple[int, ...]:
+    def others(self, ground: PieceGround) -> tuple[int, ...]:
         """The walls but the click's own piece."""
         piece = self.piece(ground)
         return tuple(wall for wall in self.walls if wall != piece)
 
 
-def choose(ground: Ground, prompt: Prompt) -> Choice:
+def choose(ground: PieceGround, prompt: Prompt) -> PieceChoice:
     """Choose by the first click, the box or the subject, before further clicks."""
     inside = ground.inside(prompt)
     first = next((c for c in prompt.clicks if c.is_foreground), None)
@@ -148,20 +148,20 @@ def choose(ground: Ground, prompt: Prompt) -> Choice:
         return _part(ground, first, whole)
     if prompt.level == "group":
         group = _group(ground, first, whole.pieces) & inside
-        return Choice(group, (*whole.others, Region(group, whole.others[0].score)))
+        return PieceChoice(group, (*whole.others, PieceRegion(group, whole.others[0].score)))
     return whole
 
 
-def correct(ground: Ground, ask: Correction) -> Choice:
+def correct(ground: PieceGround, ask: Correction) -> PieceChoice:
     """The part of the pieces it may change that a click on a wrong place means."""
     regions = [*_parts(ground, ask), *_left_over(ground, ask), *_reached(ground, ask)]
     if ask.guess is not None:
         regions.append(_guessed(ground, ask, ask.guess))
     regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
-    return Choice(regions[0].pieces, tuple(regions))
+    return PieceChoice(regions[0].pieces, tuple(regions))
 
 
-def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
+def _around_click(ground: PieceGround, click: Click, inside: Mask) -> PieceChoice:
     """The whole object that a click is on."""
     pieces, piece = ground.pieces, ground.pieces.at(click.x, click.y)
     growth = pieces.grow(piece) if inside.all() else pieces.grow(piece, inside)
@@ -171,7 +171,9 @@ def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
         subject = subject * inside
         masks.append(subject > 0.5)
     regions = [
-        Region(mask, _score(ground, mask, subject) * centred(pieces, mask, click) ** CENTRED_WHOLE)
+        PieceRegion(
+            mask, _score(ground, mask, subject) * centred(pieces, mask, click) ** CENTRED_WHOLE
+        )
         for mask in masks
         if mask[piece] and not mask.all()
     ]
@@ -182,10 +184,10 @@ def _around_click(ground: Ground, click: Click, inside: Mask) -> Choice:
     if subject is not None:
         settled = _settle(pieces, chosen, subject)
         chosen = settled if settled[piece] else chosen
-    return Choice(chosen, tuple(regions))
+    return PieceChoice(chosen, tuple(regions))
 
 
-def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
+def _part(ground: PieceGround, click: Click, whole: PieceChoice) -> PieceChoice:
     """The part of a whole that a click is on; the whole where it has none."""
     pieces = ground.pieces
     least = max(SMALLEST_PART * pieces.share(whole.pieces), SMALLEST_PIECES / pieces.count)
@@ -194,17 +196,17 @@ def _part(ground: Ground, click: Click, whole: Choice) -> Choice:
     if not regions:
         return whole
     regions = _likeliest(pieces, regions, SHARP_PART)
-    return Choice(regions[0].pieces, tuple(regions))
+    return PieceChoice(regions[0].pieces, tuple(regions))
 
 
-def _parts(ground: Ground, ask: Correction) -> list[Region]:
+def _parts(ground: PieceGround, ask: Correction) -> list[PieceRegion]:
     """The parts of what is allowed around a click."""
     pieces, piece = ground.pieces, ask.piece(ground)
     growth = pieces.grow(piece, ask.free(ground), ask.others(ground))
     return [_rated(ground, ask, pieces.region(growth, k)) for k in growth.peaks()]
 
 
-def _left_over(ground: Ground, ask: Correction) -> list[Region]:
+def _left_over(ground: PieceGround, ask: Correction) -> list[PieceRegion]:
     """What is left around a click of what is allowed by each part of it around one of `walls`."""
     pieces, piece = ground.pieces, ask.piece(ground)
     alone, free, others = only(pieces, piece), ask.free(ground), ask.others(ground)
@@ -220,7 +222,7 @@ def _left_over(ground: Ground, ask: Correction) -> list[Region]:
     return regions
 
 
-def _reached(ground: Ground, ask: Correction) -> list[Region]:
+def _reached(ground: PieceGround, ask: Correction) -> list[PieceRegion]:
     """The allowed pieces from which a walk is likelier to end at the click than to stay.
 
     What is not allowed is, but for what a box leaves out, already what the click says: it draws.
@@ -237,7 +239,7 @@ def _reached(ground: Ground, ask: Correction) -> list[Region]:
     return regions
 
 
-def _guessed(ground: Ground, ask: Correction, guess: Mask) -> Region:
+def _guessed(ground: PieceGround, ask: Correction, guess: Mask) -> PieceRegion:
     """What of a guess (n,) hangs together with a click and is allowed."""
     pieces = ground.pieces
     alone = only(pieces, ask.piece(ground))
@@ -246,7 +248,7 @@ def _guessed(ground: Ground, ask: Correction, guess: Mask) -> Region:
     return _rated(ground, ask, touching(pieces, free | alone, alone))
 
 
-def _rated(ground: Ground, ask: Correction, mask: Mask) -> Region:
+def _rated(ground: PieceGround, ask: Correction, mask: Mask) -> PieceRegion:
     """Pieces (n,), and how much a click on a place within what is allowed means just them."""
     pieces, allowed, taste = ground.pieces, ask.free(ground), ask.taste
     cut = (mask[pieces.left] != mask[pieces.right]) & allowed[pieces.left] & allowed[pieces.right]
@@ -260,10 +262,10 @@ def _rated(ground: Ground, ask: Correction, mask: Mask) -> Region:
     if ask.chance is not None:
         likely = LIKELY_ADDED if ask.click.is_foreground else LIKELY_GONE
         score *= np.average(ask.chance[mask], weights=pieces.area[mask]) ** likely
-    return Region(mask, float(score))
+    return PieceRegion(mask, float(score))
 
 
-def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[Region]:
+def _likeliest(pieces: Pieces, regions: list[PieceRegion], sharpness: float) -> list[PieceRegion]:
     """The regions, those first whose overlap (IoU) with what is meant is expected to be largest.
 
     Each may be meant, the more the better its score: a region like several good ones is a safer
@@ -279,13 +281,13 @@ def _likeliest(pieces: Pieces, regions: list[Region], sharpness: float) -> list[
     return [regions[k] for k in np.argsort(-expected, kind="stable")]
 
 
-def _group(ground: Ground, click: Click, whole: Mask) -> Mask:
+def _group(ground: PieceGround, click: Click, whole: Mask) -> Mask:
     """(n,) `whole` with what it stands with, and with what is like it elsewhere in the photo."""
     pieces = ground.pieces
     growth = pieces.grow(pieces.at(click.x, click.y))
     larger = [pieces.region(growth, k) | whole for k in growth.peaks()]
     larger = [m for m in larger if pieces.share(m) > LARGER_GROUP * pieces.share(whole)]
-    plain = Ground(pieces, None)
+    plain = PieceGround(pieces, None)
     scored = [(_score(plain, mask, None), k) for k, mask in enumerate(larger) if not mask.all()]
     best, k = max(scored, default=(0.0, -1))
     group = larger[k] if best > WORTH_A_GROUP * _score(plain, whole, None) else whole
@@ -297,7 +299,7 @@ def _group(ground: Ground, click: Click, whole: Mask) -> Mask:
     return group
 
 
-def _subjects(ground: Ground, inside: Mask) -> Choice:
+def _subjects(ground: PieceGround, inside: Mask) -> PieceChoice:
     """The photo's subject: what hangs together with the inmost place of each of its pieces."""
     if ground.salience is None or ground.salience.max() <= 0.5:
         raise SelectionError("no subject stands out in this photo: click the object")
@@ -315,11 +317,11 @@ def _subjects(ground: Ground, inside: Mask) -> Choice:
             place = (float(column) + 0.5) * wide / width, (float(row) + 0.5) * tall / height
             choices.append(_around_click(ground, Click(*place), inside))
     together = np.any([choice.pieces for choice in choices], axis=0)
-    others = choices[0].others if len(choices) == 1 else (Region(together, 1.0),)
-    return Choice(together, others)
+    others = choices[0].others if len(choices) == 1 else (PieceRegion(together, 1.0),)
+    return PieceChoice(together, others)
 
 
-def _in_box(ground: Ground, inside: Mask) -> Choice:
+def _in_box(ground: PieceGround, inside: Mask) -> PieceChoice:
     """The object that a box encloses: it reaches the box's sides and does not go beyond them."""
     pieces = ground.pieces
     if not inside.any():
@@ -348,17 +350,17 @@ def _in_box(ground: Ground, inside: Mask) -> Choice:
         reach = (right - left) * (bottom - top) / ((box[2] - box[0]) * (box[3] - box[1]))
         return (1 - leak) * reach**0.5 * _score(ground, mask, subject, is_boxed=True)
 
-    regions = [Region(mask, score(leak, mask)) for leak, mask in candidates]
+    regions = [PieceRegion(mask, score(leak, mask)) for leak, mask in candidates]
     if not regions:
-        return Choice(inside, (Region(inside, 1.0),))
+        return PieceChoice(inside, (PieceRegion(inside, 1.0),))
     regions.sort(key=lambda region: -region.score)
     chosen = regions[0].pieces
     if subject is not None:
         chosen = _settle(pieces, chosen, subject)
-    return Choice(chosen, tuple(regions))
+    return PieceChoice(chosen, tuple(regions))
 
 
-def _score(ground: Ground, mask: Mask, subject: F64 | None, is_boxed: bool = False) -> float:
+def _score(ground: PieceGround, mask: Mask, subject: F64 | None, is_boxed: bool = False) -> float:
     """How much pieces (n,) are one whole object. `subject` (n,): the one that was clicked."""
     pieces = ground.pieces
     contrast = pieces.contrast(mask)
@@ -383,7 +385,7 @@ def _settle(pieces: Pieces, chosen: Mask, subject: F64) -> Mask:
     return pieces.settle(is_object, is_ground) > 0.5
 
 
-def _subject_around(ground: Ground, piece: int) -> F64 | None:
+def _subject_around(ground: PieceGround, piece: int) -> F64 | None:
     """(n,) the subject map without what does not hang together with a piece; None off it."""
     pieces, salience = ground.pieces, ground.salience
     here = pieces.labels == piece

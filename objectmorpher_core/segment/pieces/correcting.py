@@ -23,10 +23,10 @@ from .choice import (
     LARGER_FINE,
     MINOR_CORRECTION,
     MINOR_FINE,
-    Choice,
     Correction,
-    Ground,
-    Region,
+    PieceChoice,
+    PieceGround,
+    PieceRegion,
     Taste,
     correct,
     depth,
@@ -49,7 +49,7 @@ class Wrong:
     """The fault of a mask that a click points out."""
 
     mask: Mask  # (h, w)
-    others: tuple[Region, ...] = ()  # what the object would be by the other things it may mean
+    others: tuple[PieceRegion, ...] = ()  # what the object would be by the other things it may mean
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class _Window:
         return area * FINER**2 <= WORK_AREA / 2
 
 
-def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
+def wrong(ground: PieceGround, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
     """Return the fault of a mask (h, w) that the prompt's last click points out.
 
     `image` (h, w, 3): the reduced photo. The click contradicts the mask.
@@ -89,7 +89,7 @@ def wrong(ground: Ground, image: RGB, before: Mask, prompt: Prompt) -> Wrong:
     choice = _meant(ground, before, prompt)
     had = pieces.mean(before) > 0.5
     others = tuple(
-        Region(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
+        PieceRegion(had | r.pieces if click.is_foreground else had & ~r.pieces, r.score)
         for r in choice.relative
     )
     rough = pieces.paint(choice.pieces)
@@ -110,19 +110,19 @@ def said(pieces: Pieces, prompt: Prompt, is_foreground: bool) -> tuple[int, ...]
     return tuple(pieces.at(c.x, c.y) for c in clicks)
 
 
-def _flippable(ground: Ground, before: Mask, prompt: Prompt) -> Mask:
+def _flippable(ground: PieceGround, before: Mask, prompt: Prompt) -> Mask:
     """(n,) the pieces that a click on a wrong place may change."""
     differs = before != prompt.clicks[-1].is_foreground
     return (ground.pieces.mean(differs) > 0.5) & ground.inside(prompt)
 
 
 def _meant(
-    ground: Ground,
+    ground: PieceGround,
     before: Mask,
     prompt: Prompt,
     reach: float = 0.0,
     guess: Mask | None = None,
-) -> Choice:
+) -> PieceChoice:
     """The pieces that the last click means of those that it may change.
 
     `guess` (h, w): what coarser pieces say, which is heard as one thing more that may be meant.
@@ -146,7 +146,7 @@ def _meant(
     return correct(ground, Correction(click, allowed, walls, chance, taste, guessed))
 
 
-def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask:
+def _voted(ground: PieceGround, before: Mask, prompt: Prompt, choice: PieceChoice) -> Mask:
     """(n,) the choice, with what hangs together with it and is like it by the vote of all."""
     pieces, click = ground.pieces, prompt.clicks[-1]
     had = pieces.mean(before) > 0.5
@@ -158,7 +158,7 @@ def _voted(ground: Ground, before: Mask, prompt: Prompt, choice: Choice) -> Mask
 
 
 def _finer(
-    ground: Ground,
+    ground: PieceGround,
     image: RGB,
     before: Mask,
     prompt: Prompt,
@@ -177,7 +177,7 @@ def _finer(
 
 
 def _within(
-    ground: Ground,
+    ground: PieceGround,
     image: RGB,
     before: Mask,
     prompt: Prompt,
@@ -228,7 +228,7 @@ def _around(mask: Mask) -> _Window:
     )
 
 
-def _look_closer(ground: Ground, image: RGB, window: _Window) -> Ground:
+def _look_closer(ground: PieceGround, image: RGB, window: _Window) -> PieceGround:
     """The window of the reduced photo (h, w, 3) in finer pieces; tokens as the photo has them."""
     crop = np.ascontiguousarray(image[window.inside])
     size = (crop.shape[1] * FINER, crop.shape[0] * FINER)
@@ -238,7 +238,7 @@ def _look_closer(ground: Ground, image: RGB, window: _Window) -> Ground:
         box = window.left, window.top, window.right, window.bottom
         tokens = crop_tokens(tokens, ground.pieces.shape, box)
     count = min(round(size[0] * size[1] / FINE_SIDE**2), PIECES)
-    return Ground(Pieces(large, tokens, count, FINER * ground.pieces.side), None)
+    return PieceGround(Pieces(large, tokens, count, FINER * ground.pieces.side), None)
 
 
 def _moved(pieces: Pieces, prompt: Prompt, window: _Window) -> Prompt:

@@ -14,8 +14,8 @@ from ...base.progress import Progress, part
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge
 from ..selection import cropped
-from .answers import Answer, add_click, begin, confidence, expected_overlap, vote
-from .choice import Choice, Ground, Region, choose
+from .answers import PieceAnswer, add_click, begin, confidence, expected_overlap, vote
+from .choice import PieceChoice, PieceGround, PieceRegion, choose
 from .features import crop_tokens
 from .pieces import PIECES, Pieces, reduced
 
@@ -47,7 +47,7 @@ class Tokens:
     pieces: Pieces
 
 
-class View:
+class PieceView:
     """A photo (H, W, 3), or a closer look at a crop of one, and what its last prompts meant."""
 
     def __init__(
@@ -58,12 +58,12 @@ class View:
         if salience is not None:
             size = (pieces.shape[1], pieces.shape[0])
             salience = np.asarray(cv2.resize(salience, size), np.float32)
-        self.ground = Ground(pieces, salience, is_of_large, embedding.tokens)
+        self.ground = PieceGround(pieces, salience, is_of_large, embedding.tokens)
         self._image = reduced(rgb)
-        self._known: dict[Prompt, Answer] = {}
-        self._choices: dict[Prompt, Choice] = {}
+        self._known: dict[Prompt, PieceAnswer] = {}
+        self._choices: dict[Prompt, PieceChoice] = {}
 
-    def answer(self, prompt: Prompt, whole: Mask | None, progress: Progress) -> Answer:
+    def answer(self, prompt: Prompt, whole: Mask | None, progress: Progress) -> PieceAnswer:
         """Answer a prompt; one that was answered before its last click is only improved.
 
         `whole` (H, W): what its first click means at the level "object", where it has another.
@@ -83,7 +83,7 @@ class View:
         assert answer is not None, "a prompt has at least one step"
         return answer
 
-    def choice(self, prompt: Prompt) -> Choice:
+    def choice(self, prompt: Prompt) -> PieceChoice:
         """Answer a prompt that has one positive click at most."""
         if prompt not in self._choices:
             choice = choose(self.ground, prompt)
@@ -92,9 +92,9 @@ class View:
             _remember(self._choices, prompt, choice, REMEMBERED)
         return self._choices[prompt]
 
-    def adopt(self, mask: Mask, steps: list[Prompt]) -> Answer:
+    def adopt(self, mask: Mask, steps: list[Prompt]) -> PieceAnswer:
         """The answer to further steps after one whose mask (H, W) was found elsewhere."""
-        answer = Answer(self._reduced(mask), ())
+        answer = PieceAnswer(self._reduced(mask), ())
         for step in steps:
             answer = add_click(self.ground, self._image, answer, step)
         return answer
@@ -107,21 +107,21 @@ class View:
         small = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
         return small > 0.5
 
-    def mask(self, answer: Answer) -> Mask:
+    def mask(self, answer: PieceAnswer) -> Mask:
         """(H, W) an answer at the photo's size."""
         return enlarge(self.rgb, answer.mask)
 
-    def expected_overlap(self, prompt: Prompt, answer: Answer) -> float:
+    def expected_overlap(self, prompt: Prompt, answer: PieceAnswer) -> float:
         """See `answers.expected_overlap`."""
         return expected_overlap(self.ground, answer, prompt.clicks)
 
-    def confidence(self, prompt: Prompt, answer: Answer) -> float:
+    def confidence(self, prompt: Prompt, answer: PieceAnswer) -> float:
         """See `answers.confidence`."""
         return confidence(self.ground, answer, prompt.clicks)
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class PromptAnswer:
     """The meaning that was found for a prompt."""
 
     mask: Mask  # (H, W)
@@ -135,19 +135,19 @@ class PhotoView:
     def __init__(self, rgb: RGB, embedding: Tokens, encode: Encode) -> None:
         self.embedding = embedding
         self._rgb, self._encode = rgb, encode
-        self._whole = View(rgb, embedding, is_of_large=self._is_large)
-        self._details: dict[tuple[Box, bool], View] = {}
-        self._found: dict[Prompt, Seen] = {}
+        self._whole = PieceView(rgb, embedding, is_of_large=self._is_large)
+        self._details: dict[tuple[Box, bool], PieceView] = {}
+        self._found: dict[Prompt, PromptAnswer] = {}
 
-    def find(self, prompt: Prompt, progress: Progress) -> Seen:
+    def find(self, prompt: Prompt, progress: Progress) -> PromptAnswer:
         """Answer a prompt; an answer that was found before returns at once."""
         return self._seen(prompt, False, progress)
 
-    def glance(self, prompt: Prompt, progress: Progress) -> Seen:
+    def glance(self, prompt: Prompt, progress: Progress) -> PromptAnswer:
         """Answer a prompt as far as encoded tokens allow, in a fraction of a second."""
         return self._seen(prompt, True, progress)
 
-    def _seen(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:
+    def _seen(self, prompt: Prompt, at_once: bool, progress: Progress) -> PromptAnswer:
         known = self._found.pop(prompt, None)
         if known is None or not (known.is_final or at_once):
             known = self._look(prompt, at_once, progress)
@@ -155,7 +155,7 @@ class PhotoView:
         _remember(self._found, prompt, known, MASKS)
         return known
 
-    def _look(self, prompt: Prompt, at_once: bool, progress: Progress) -> Seen:
+    def _look(self, prompt: Prompt, at_once: bool, progress: Progress) -> PromptAnswer:
         steps = steps_of(prompt)
         if prompt.level == "object" or not steps[0].clicks:
             return self._look_within(steps, None, at_once, progress)
@@ -166,11 +166,11 @@ class PhotoView:
         if len(steps) == 1:  # at the photo's size, too
             nested = mask & whole.mask if prompt.level == "part" else mask | whole.mask
             mask = nested if nested.any() and not nested.all() else whole.mask
-        return Seen(mask, seen.sureness, seen.is_final and whole.is_final)
+        return PromptAnswer(mask, seen.sureness, seen.is_final and whole.is_final)
 
     def _look_within(
         self, steps: list[Prompt], whole: Mask | None, at_once: bool, progress: Progress
-    ) -> Seen:
+    ) -> PromptAnswer:
         prompt = steps[-1]
         choice = self._whole.choice(steps[0])
         box = self._closer(choice, steps[0])
@@ -184,11 +184,11 @@ class PhotoView:
         else:  # a click elsewhere says that the thing is larger
             answer = self._whole.adopt(seen.mask, steps[count:])
         sureness = self._whole.confidence(prompt, answer)
-        return Seen(self._whole.mask(answer), sureness, seen is None or seen.is_final)
+        return PromptAnswer(self._whole.mask(answer), sureness, seen is None or seen.is_final)
 
     def _look_closer(
         self, box: Box, steps: list[Prompt], whole: Mask | None, at_once: bool, progress: Progress
-    ) -> tuple[Seen | None, int]:
+    ) -> tuple[PromptAnswer | None, int]:
         """The answer in a box, and to how many steps; None if it is cut."""
         progress(0.1, "looking closer")
         inside = None if whole is None else whole[box[1] : box[3], box[0] : box[2]]
@@ -217,15 +217,15 @@ class PhotoView:
         answer = detail.answer(last, inside, part(progress, 0.6, 1.0))
         mask = np.zeros(self._rgb.shape[:2], bool)
         mask[box[1] : box[3], box[0] : box[2]] = detail.mask(answer)
-        return Seen(mask, detail.confidence(last, answer), is_final), count
+        return PromptAnswer(mask, detail.confidence(last, answer), is_final), count
 
-    def _owed(self, steps: list[Prompt], whole: Mask | None, progress: Progress) -> Seen:
+    def _owed(self, steps: list[Prompt], whole: Mask | None, progress: Progress) -> PromptAnswer:
         """What the whole photo says of what a closer look may tell better."""
         answer = self._whole.answer(steps[-1], whole, progress)
         sureness = self._whole.confidence(steps[-1], answer)
-        return Seen(self._whole.mask(answer), sureness, is_final=False)
+        return PromptAnswer(self._whole.mask(answer), sureness, is_final=False)
 
-    def _closer(self, choice: Choice, prompt: Prompt) -> Box | None:
+    def _closer(self, choice: PieceChoice, prompt: Prompt) -> Box | None:
         """Where to look closer at what a prompt's first click may mean; None where it is large."""
         pieces = self.embedding.pieces
         if prompt.is_subject:
@@ -243,7 +243,7 @@ class PhotoView:
         chosen = max(likely, key=lambda region: region.score)
         return self._around(chosen)
 
-    def _around(self, region: Region) -> Box | None:
+    def _around(self, region: PieceRegion) -> Box | None:
         """The crop of the photo to look at around pieces; None where they do not fit a tile."""
         pieces = self.embedding.pieces
         (height, width), (tall, wide) = pieces.shape, pieces.photo_shape
@@ -283,7 +283,7 @@ class PhotoView:
     def _is_large(self) -> bool:
         return self._rgb.shape[0] * self._rgb.shape[1] > LARGE
 
-    def _detail(self, box: Box, is_anew: bool, progress: Progress) -> View:
+    def _detail(self, box: Box, is_anew: bool, progress: Progress) -> PieceView:
         """What a box shows, recognised anew at its size, or by how the whole photo shows it."""
         if (box, is_anew) not in self._details:
             left, top, right, bottom = box
@@ -299,7 +299,7 @@ class PhotoView:
             pieces = Pieces(crop, tokens, DETAIL_PIECES if is_finer else PIECES)
             # A large photo's tile has tokens enough.
             known = Tokens(tokens, salience, pieces)
-            view = View(crop, known, not self._is_large, self._is_large)
+            view = PieceView(crop, known, not self._is_large, self._is_large)
             _remember(self._details, (box, is_anew), view, DETAILS)
         return self._details[box, is_anew]
 

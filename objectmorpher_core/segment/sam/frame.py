@@ -18,7 +18,7 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom px of the photo
 
 
 @dataclass(frozen=True)
-class Frame:
+class SamFrame:
     """A box of the photo in a square of `side` px."""
 
     box: Box

@@ -26,7 +26,7 @@ from ..selection import (
     keep_touched,
 )
 from ..subject import SubjectNet, subject_guess
-from .frame import Box, Frame
+from .frame import Box, SamFrame
 from .network import SamNetwork
 from .view import Encoded, SamAnswer, SamView, inside_box
 
@@ -157,7 +157,7 @@ class Sam:
         return self._network
 
     def _encode(self, network: SamNetwork, rgb: RGB, box: Box) -> Encoded:
-        frame = Frame(box, network.side, network.is_padded)
+        frame = SamFrame(box, network.side, network.is_padded)
         try:
             return Encoded(self._open_id, frame, network.encode(frame.picture(rgb)))
         except ModelError as error:

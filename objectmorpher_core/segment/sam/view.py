@@ -16,7 +16,7 @@ from ...base.arrays import F32, RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge, sharpen_band
 from ..pieces.view import steps_of
-from .frame import Box, Frame
+from .frame import Box, SamFrame
 from .network import Asked, Masks, SamNetwork
 
 REMEMBERED = 16  # answers of a photo
@@ -29,7 +29,7 @@ class Encoded:
     """A SAM's encoding of a photo or of a crop."""
 
     model: str  # its id
-    frame: Frame
+    frame: SamFrame
     features: tuple[F32, ...]
 
 
@@ -49,7 +49,7 @@ class SamView:
         self._known: dict[Prompt, SamAnswer] = {}
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> SamFrame:
         return self.encoded.frame
 
     def answer(self, prompt: Prompt, before: F32 | None = None) -> SamAnswer:

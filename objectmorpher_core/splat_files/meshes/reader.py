@@ -25,7 +25,7 @@ from ..splats.ply_table import read_header
 from .folder import MeshFolder
 from .gltf_check import MAX_SIDE, MAX_TRIANGLES, check_gltf
 from .sampling import sample_surface
-from .surface import WORKING, Look, Surface, Texture, linear_from_srgb
+from .surface import WORKING, Look, Texture, TriangleMesh, linear_from_srgb
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ def read_mesh(path: Path, count: int, seed: int = 0) -> Gaussians:
     return turned(gaussians, AXES[ending])
 
 
-def load_surface(data: bytes, path: Path) -> Surface:
+def load_surface(data: bytes, path: Path) -> TriangleMesh:
     """The triangles of a mesh file and what they look like, in the file's axes."""
     ending, folder = path.suffix.lower(), MeshFolder(path)
     is_gltf = ending in (".glb", ".gltf")
@@ -134,7 +134,7 @@ def _check_text(data: bytes) -> None:
         raise SplatFileError("the mesh file is damaged: it is no text in UTF-8")
 
 
-def _surface(scene: Any, is_gltf: bool) -> Surface:
+def _surface(scene: Any, is_gltf: bool) -> TriangleMesh:
     """Every triangle of the scene where its node puts it."""
     parts, looks, total = [], {}, 0
     for node in sorted(scene.graph.nodes_geometry):
@@ -164,7 +164,7 @@ def _surface(scene: Any, is_gltf: bool) -> Surface:
         raise SplatFileError("the mesh file holds no triangles")
     corners, uv, tint, which = (np.concatenate(column) for column in zip(*parts, strict=True))
     kept = (np.abs(corners) <= GREATEST).all((1, 2))  # NaN compares false
-    return Surface(
+    return TriangleMesh(
         corners[kept], np.nan_to_num(uv[kept]), tint[kept].astype(np.float32), which[kept],
         tuple(look for _, look in sorted(looks.values(), key=lambda item: item[0])),
     )  # fmt: skip

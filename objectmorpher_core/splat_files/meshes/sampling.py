@@ -18,7 +18,7 @@ from ...base.rotations import matrices_from_quats, quats_along, quats_from_matri
 from ...document.gaussians import Gaussians
 from ..limits import SplatFileError
 from ..splats.outside import sides
-from .surface import Spots, Surface, srgb_from_linear
+from .surface import Spots, TriangleMesh, srgb_from_linear
 
 OVERSAMPLING = 20  # spots a Gaussian: fewer leave gaps
 MOST_SPOTS = 3_000_000
@@ -48,7 +48,7 @@ class _Cover:
     spacing: float  # mean, in the surface's units
 
 
-def sample_surface(surface: Surface, count: int, seed: int = 0) -> Gaussians:
+def sample_surface(surface: TriangleMesh, count: int, seed: int = 0) -> Gaussians:
     """About `count` Gaussians on the surface; open sheets get one on either side.
 
     Raises SplatFileError for a surface without area, all transparent, or of 1e-40 units.
@@ -72,7 +72,7 @@ def sample_surface(surface: Surface, count: int, seed: int = 0) -> Gaussians:
 
 
 def _thrown(
-    surface: Surface, is_closed: np.ndarray, count: int, rng: np.random.Generator
+    surface: TriangleMesh, is_closed: np.ndarray, count: int, rng: np.random.Generator
 ) -> _Cover:
     amount = max(2000, min(OVERSAMPLING * count, MOST_SPOTS))
     spots = Spots.spread(surface, amount, rng)
@@ -200,7 +200,7 @@ def _shapes(cover: _Cover, owner: np.ndarray, frames: F64) -> tuple[F64, F64, F6
 SAME = 1e-6  # x extent: corners nearer than this are one
 
 
-def oriented(surface: Surface) -> tuple[Surface, Mask]:
+def oriented(surface: TriangleMesh) -> tuple[TriangleMesh, Mask]:
     """Return the surface with every closed part facing outwards, and (T,) whether a part is closed.
 
     A part is closed where each edge has one triangle on either side, turned the same way: then
@@ -236,7 +236,7 @@ def oriented(surface: Surface) -> tuple[Surface, Mask]:
     volume = np.bincount(part, np.einsum("ta,ta->t", a, np.cross(b, c)), minlength=parts)
     inward = is_closed & (volume[part] < 0)
     turn = np.where(inward[:, None], [2, 1, 0], [0, 1, 2])[:, :, None]
-    return Surface(
+    return TriangleMesh(
         np.take_along_axis(surface.corners, turn, axis=1),
         np.take_along_axis(surface.uv, turn, axis=1),
         np.take_along_axis(surface.tint, turn, axis=1),

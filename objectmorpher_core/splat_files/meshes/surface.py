@@ -20,7 +20,7 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class TriangleMesh:
     """Triangles, counter-clockwise from outside."""
 
     corners: F64  # (T, 3, 3)
@@ -38,9 +38,9 @@ class Surface:
         cross = self._cross()
         return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
 
-    def select(self, kept: Mask) -> Surface:
+    def select(self, kept: Mask) -> TriangleMesh:
         """The triangles at `kept` (T,)."""
-        return Surface(
+        return TriangleMesh(
             self.corners[kept], self.uv[kept], self.tint[kept], self.which[kept], self.looks
         )  # fmt: skip
 
@@ -58,7 +58,7 @@ class Spots:
     weights: F64  # (M, 3) barycentric
 
     @staticmethod
-    def spread(surface: Surface, count: int, rng: np.random.Generator) -> Spots:
+    def spread(surface: TriangleMesh, count: int, rng: np.random.Generator) -> Spots:
         """`count` places, as many a unit of area everywhere."""
         cumulative = np.cumsum(surface.areas())
         # one in each count-th part of the area: evener than independent draws
@@ -69,7 +69,7 @@ class Spots:
         points = np.einsum("mk,mka->ma", weights, surface.corners[triangle])
         return Spots(points, triangle.astype(np.int32), weights)
 
-    def colors(self, surface: Surface, width: float) -> F32:
+    def colors(self, surface: TriangleMesh, width: float) -> F32:
         """Premultiplied linear RGBA (M, 4) of spots `width` wide, in the surface's units."""
         tint = np.einsum("mk,mka->ma", self.weights, surface.tint[self.triangle])
         uv = np.einsum("mk,mka->ma", self.weights, surface.uv[self.triangle])
@@ -93,7 +93,7 @@ class Spots:
         return colors
 
 
-def _stretch(surface: Surface) -> F64:
+def _stretch(surface: TriangleMesh) -> F64:
     """(T,) share of the picture's side a unit of length on the surface."""
     a, b, c = (surface.uv[:, k] for k in range(3))
     ab, ac = b - a, c - a

@@ -31,7 +31,7 @@ GENERATOR = "ObjectMorpher"
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class MeshPart:
     """Triangles of one material: with texture coordinates, or with colours."""
 
     points: F64  # (V, 3) in our axes
@@ -45,7 +45,7 @@ def plain_glb(gaussians: Gaussians) -> bytes:
     outward = facing_outwards(thinnest_last(gaussians))
     points, triangles = surface_of(outward)
     near = _Nearest(outward, points, triangles)
-    return _glb([Part(points, triangles, colors=near.blended(outward.colors))], None)
+    return _glb([MeshPart(points, triangles, colors=near.blended(outward.colors))], None)
 
 
 def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
@@ -65,7 +65,7 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
     world = lifted.world_points(posed) @ motion[:3, :3].T + motion[:3, 3]
     seen = near.blended(lifted.texture.visibility[lifted.is_body, None])[:, 0]
     if matte is None:
-        return _glb([Part(world, triangles, colors=near.blended(body.colors))], None)
+        return _glb([MeshPart(world, triangles, colors=near.blended(body.colors))], None)
     is_front = seen[triangles].mean(1) > SEEN
     uv = _places_in(matte, puppet.camera.project(lifted.world_points(points)))
     parts = [
@@ -75,11 +75,11 @@ def textured_glb(thing: EditObject, puppet: Puppet) -> bytes:
     return _glb([part for part in parts if len(part.triangles)], _texture(matte))
 
 
-def _part(points: F64, triangles: I64, **values: F64) -> Part:
+def _part(points: F64, triangles: I64, **values: F64) -> MeshPart:
     """These triangles with the vertices that they have."""
     used, fresh = np.unique(triangles, return_inverse=True)
     own = {name: value[used] for name, value in values.items()}
-    return Part(points[used], fresh.reshape(-1, 3), **own)
+    return MeshPart(points[used], fresh.reshape(-1, 3), **own)
 
 
 class _Nearest:
@@ -119,7 +119,7 @@ def _texture(matte: Matte) -> bytes:
     return encode_picture(Picture(to_u8(pixels)), ".jpg")
 
 
-def _glb(parts: list[Part], texture: bytes | None) -> bytes:
+def _glb(parts: list[MeshPart], texture: bytes | None) -> bytes:
     """The file of these parts; those with texture coordinates show `texture`, a JPEG file."""
     buffer = _Buffer()
     primitives = [_primitive(part, buffer) for part in parts]
@@ -149,7 +149,7 @@ def _glb(parts: list[Part], texture: bytes | None) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def _primitive(part: Part, buffer: _Buffer) -> dict[str, object]:
+def _primitive(part: MeshPart, buffer: _Buffer) -> dict[str, object]:
     points = part.points @ HALF_TURN.T
     normals = vertex_normals(points, part.triangles)
     attributes = {"POSITION": buffer.accessor(points, has_bounds=True),

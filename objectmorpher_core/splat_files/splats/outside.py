@@ -21,14 +21,14 @@ LOOKS = np.arange(1.0, 4.6, 0.25)  # cells from the surface at which a point loo
 
 
 @dataclass(frozen=True, eq=False)
-class Sides:
+class OutsideDistance:
     """The distance from each point to the outside, in cells; inf where it is not near."""
 
     before: F64  # (N,) along the normal
     behind: F64  # (N,) against it
 
 
-def sides(points: F64, normals: F64) -> Sides:
+def sides(points: F64, normals: F64) -> OutsideDistance:
     """Return the sides of points (N, 3) on a surface with unit normals (N, 3)."""
     from scipy.ndimage import binary_dilation, binary_propagation
     from scipy.spatial import KDTree
@@ -67,4 +67,4 @@ def sides(points: F64, normals: F64) -> Sides:
         in_threads(run, len(points), PARTS, least=LEAST_ROWS)
         return found
 
-    return Sides(first_open(normals), first_open(-normals))
+    return OutsideDistance(first_open(normals), first_open(-normals))

@@ -10,7 +10,7 @@ from typing import Any
 from objectmorpher_core.raster.depth_order import depth_order
 
 from .classic_gl import ClassicViewer
-from .scenes import Row, Scene
+from .scenes import BenchScene, Row
 from .timing import Effort, measure
 
 log = logging.getLogger(__name__)
@@ -25,7 +25,7 @@ class Drawer:
         self._pass: Any = None
         self.name = None if context is None else str(context.info["GL_RENDERER"])
 
-    def rows(self, scene: Scene, effort: Effort) -> list[Row]:
+    def rows(self, scene: BenchScene, effort: Effort) -> list[Row]:
         """The scene by each renderer that draws such."""
         kinds = {"gl": self._own_row}
         if scene.name == "cloud":  # the peer knows no photo
@@ -38,7 +38,7 @@ class Drawer:
                 log.warning("No %s row of the %s: %s", name, scene.name, error)
         return rows
 
-    def _own_row(self, scene: Scene, effort: Effort) -> Row:
+    def _own_row(self, scene: BenchScene, effort: Effort) -> Row:
         """The pass with which the editor draws."""
         if self._pass is None:
             from objectmorpher.render.splat_pass import SplatPass
@@ -54,7 +54,7 @@ class Drawer:
         sort = measure(lambda _: depth_order(depths), effort)
         return scene.row("gl", measure(frame, effort), sort if scene.name == "cloud" else None)
 
-    def _classic_row(self, scene: Scene, effort: Effort) -> Row:
+    def _classic_row(self, scene: BenchScene, effort: Effort) -> Row:
         viewer = ClassicViewer(self._context, scene.posed_gaussians(), scene.camera)
 
         def frame(_: int) -> None:

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from .scenes import Scene
+from .scenes import BenchScene
 from .timing import Effort, measure
 
 NAME = "gsplat-torch"
 NOTE = "projection and sort only, of what is not skinned: its rasteriser needs CUDA"
 
 
-def rows(scene: Scene, effort: Effort) -> list[dict[str, Any]]:
+def rows(scene: BenchScene, effort: Effort) -> list[dict[str, Any]]:
     """The scene's Gaussians projected, where that is possible and they are a plain cloud."""
     if scene.name != "cloud":
         return []

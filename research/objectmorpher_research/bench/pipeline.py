@@ -26,7 +26,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class BenchCase:
     """A photo, the bytes of its file, and where it is clicked, in px."""
 
     name: str
@@ -44,7 +44,7 @@ def bench_pipeline(is_quick: bool) -> list[Row]:
     return rows
 
 
-def _case(name: str) -> Case:
+def _case(name: str) -> BenchCase:
     from objectmorpher.system.resources import resource
     from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture, resized
 
@@ -52,17 +52,17 @@ def _case(name: str) -> Case:
 
     data, (x, y) = resource(SAMPLE).read_bytes(), SAMPLE_CLICK
     if name == "sample":
-        return Case(name, data, (x, y))
+        return BenchCase(name, data, (x, y))
     if name == "made":
         pixels = made_photo(MADE, made_mask(MADE))
-        return Case(name, encode_picture(Picture(pixels), ".png"), (MADE / 2, MADE / 2))
+        return BenchCase(name, encode_picture(Picture(pixels), ".png"), (MADE / 2, MADE / 2))
     pixels = read_picture(data).pixels
     height, width = (round(ENLARGED * n) for n in pixels.shape[:2])
     large = Picture(resized(pixels, width, height))
-    return Case(name, encode_picture(large, ".png"), (ENLARGED * x, ENLARGED * y))
+    return BenchCase(name, encode_picture(large, ".png"), (ENLARGED * x, ENLARGED * y))
 
 
-def _rows(case: Case, again: int, asked: float) -> list[Row]:
+def _rows(case: BenchCase, again: int, asked: float) -> list[Row]:
     """The rows of one photo, in this process; it was `asked` for then, s since 1970."""
     from objectmorpher_core.pictures.image import encode_picture
     from objectmorpher_core.pipeline import run_script

@@ -18,12 +18,12 @@ from objectmorpher_core.raster.projection import project
 from objectmorpher_core.raster.rules import Z
 
 from . import gl, gsplat_torch
-from .scenes import VIEW, Row, Scene, cloud_scene, lift_scene
+from .scenes import VIEW, BenchScene, Row, cloud_scene, lift_scene
 from .timing import Effort, Timing, measure
 
 
 @dataclass(frozen=True)
-class Plan:
+class RenderBench:
     """The settings of the benchmark."""
 
     counts: tuple[int, ...]  # Gaussians of the clouds
@@ -34,8 +34,10 @@ class Plan:
     effort: Effort
 
 
-FULL = Plan((10_000, 100_000, 300_000), 20_000, (512, 1024), VIEW, (1_000, 256), Effort(1.5, 9, 60))
-QUICK = Plan((2_000,), 1_000, (256,), 256, (200, 96), Effort(0.0, 3, 3))
+FULL = RenderBench(
+    (10_000, 100_000, 300_000), 20_000, (512, 1024), VIEW, (1_000, 256), Effort(1.5, 9, 60)
+)
+QUICK = RenderBench((2_000,), 1_000, (256,), 256, (200, 96), Effort(0.0, 3, 3))
 
 
 def bench_render(is_quick: bool) -> tuple[list[Row], str | None]:
@@ -55,20 +57,20 @@ def bench_render(is_quick: bool) -> tuple[list[Row], str | None]:
     return rows, drawer.name
 
 
-def _scenes(plan: Plan) -> Iterator[Scene]:
+def _scenes(plan: RenderBench) -> Iterator[BenchScene]:
     """One at a time: the largest fill hundreds of megabytes."""
     for count in plan.counts:
         yield cloud_scene(count, plan.view)
     yield lift_scene(plan.lifted, plan.view)
 
 
-def tiles_frame(scene: Scene, frame: int) -> np.ndarray:
+def tiles_frame(scene: BenchScene, frame: int) -> np.ndarray:
     """(h, w, 4) u8, premultiplied: as the editor draws it on the CPU."""
     drawable = tiles.prepare(scene.splats(frame), scene.camera, scene.puppet.camera)
     return tiles.draw_rgba(drawable, scene.texture)
 
 
-def tiles_row(scene: Scene, effort: Effort) -> Row:
+def tiles_row(scene: BenchScene, effort: Effort) -> Row:
     """The CPU rasteriser, and what the parts of its frame take alone.
 
     Each part works on what the one before it has made; what is left of drawing is `draw_ms`.
@@ -96,7 +98,7 @@ def tiles_row(scene: Scene, effort: Effort) -> Row:
     )
 
 
-def _reference_row(scene: Scene) -> Row:
+def _reference_row(scene: BenchScene) -> Row:
     """The specification, once: it takes seconds."""
     camera, photo = scene.camera, scene.puppet.camera
     once = Effort(0.0, 1, 1)

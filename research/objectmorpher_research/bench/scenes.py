@@ -43,7 +43,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class BenchScene:
     """An object in the middle of a drag, and the view of it."""
 
     name: str
@@ -77,13 +77,13 @@ class Scene:
             "solve_ms": ms(np.median(self.solve_seconds)),
         }
 
-    def sized(self, size: int) -> Scene:
+    def sized(self, size: int) -> BenchScene:
         """Return the same view on size x size px."""
         photo = self.puppet.camera
         return replace(self, camera=photo.windowed(0, 0, size, size, size / photo.width))
 
 
-def cloud_scene(count: int, view: int = VIEW) -> Scene:
+def cloud_scene(count: int, view: int = VIEW) -> BenchScene:
     """A closed bumpy surface of `count` plainly coloured Gaussians, standard deviation 1 to 3 px.
 
     Drawn one by one as 3D Gaussian splatting does; so are objects from a file.
@@ -111,7 +111,7 @@ def cloud_scene(count: int, view: int = VIEW) -> Scene:
     return _dragged("cloud", lifted, levels, camera)
 
 
-def lift_scene(count: int, view: int = VIEW) -> Scene:
+def lift_scene(count: int, view: int = VIEW) -> BenchScene:
     """Half of a photo of view x view px, lifted by the embedded default."""
     camera = Camera.from_fov(view, view)
     mask = made_mask(view)
@@ -155,7 +155,7 @@ def _bumpy(count: int, rng: np.random.Generator) -> tuple[F64, F64]:
     return points, slope / np.linalg.norm(slope, axis=1, keepdims=True)
 
 
-def _dragged(name: str, lifted: LiftedObject, texture: TextureLevels, camera: Camera) -> Scene:
+def _dragged(name: str, lifted: LiftedObject, texture: TextureLevels, camera: Camera) -> BenchScene:
     """The object whose uppermost control point is dragged to the right, the lowest pinned."""
     puppet = Puppet(lifted, DeformSettings(), camera)
     points = lifted.control_points.astype(np.float64)
@@ -175,4 +175,4 @@ def _dragged(name: str, lifted: LiftedObject, texture: TextureLevels, camera: Ca
         move = SWAY * lifted.diameter * share * np.array([1.0, 0.0, 0.0])
         solves.append(seconds(lambda move=move: solve(top + move)))
         poses.append(pose)
-    return Scene(name, puppet, texture, camera, tuple(poses), tuple(solves))
+    return BenchScene(name, puppet, texture, camera, tuple(poses), tuple(solves))

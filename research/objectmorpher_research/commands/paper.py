@@ -18,8 +18,8 @@ from .figures import Number, aligned, cell, number, numbers
 
 if TYPE_CHECKING:
     from ..evaluation.bootstrap import Estimate
-    from ..evaluation.paper.table import Row, Table
-    from ..evaluation.subjects.subject import Subject
+    from ..evaluation.paper.table import MethodRow, PaperTable
+    from ..evaluation.subjects.subject import EvaluatedEdit
 
 OURS = "objectmorpher"  # the method's name
 PAPERS = ("LPIPS", "SIFID", "KID")  # the paper's columns, before RI and MT
@@ -75,7 +75,7 @@ def run_paper(options: argparse.Namespace) -> None:
         write_all({options.json: (told + "\n").encode()})
 
 
-def as_text(table: Table) -> str:
+def as_text(table: PaperTable) -> str:
     """Return text for the terminal: a line for each method, and notes on the figures below."""
     from ..evaluation.paper.table import COLUMNS, NOTHING
 
@@ -115,7 +115,7 @@ def interaction(latency: Estimate | None) -> str:
     return f"{verdict}, {_seconds(latency)}"
 
 
-def as_json(table: Table) -> dict[str, Any]:
+def as_json(table: PaperTable) -> dict[str, Any]:
     """Return plain numbers for JSON; missing ones are null, infinite ones "inf"."""
     return {
         "subjects": table.subjects,
@@ -138,7 +138,7 @@ def as_json(table: Table) -> dict[str, Any]:
     }
 
 
-def run_ours(options: argparse.Namespace, subjects: Sequence[Subject]) -> tuple[str, ...]:
+def run_ours(options: argparse.Namespace, subjects: Sequence[EvaluatedEdit]) -> tuple[str, ...]:
     """Edits every subject into the folder; what was made already stays. Why some were not."""
     folder, left = options.ours, []
     wanted = []
@@ -173,7 +173,7 @@ def _run_there(job: dict[str, Any]) -> dict[str, Any]:
     return {"name": name, "left": _run_one(subjects[name], Path(job["folder"]))}
 
 
-def _run_one(subject: Subject, folder: Path) -> list[str]:
+def _run_one(subject: EvaluatedEdit, folder: Path) -> list[str]:
     """Edits a subject; why not, if not."""
     from objectmorpher_core.base.files import write_all
     from objectmorpher_core.pictures.image import encode_picture
@@ -216,7 +216,7 @@ def named_folder(text: str) -> tuple[str, Path]:
     return method, Path(where)
 
 
-def _time(row: Row) -> str:
+def _time(row: MethodRow) -> str:
     return "not recorded" if row.computing is None else _seconds(row.computing)
 
 

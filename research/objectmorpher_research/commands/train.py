@@ -108,22 +108,22 @@ def _make_pairs(options: argparse.Namespace) -> None:
     """Shards that are not there yet."""
     from ..training.composition import shards as disk
     from ..training.composition.pictures import PADDING
-    from ..training.composition.sources import Looking, find_pairs
-    from ..training.composition.triplet import How, Limits
+    from ..training.composition.sources import SourceReading, find_pairs
+    from ..training.composition.triplet import TripletLimits, TripletPlan
 
     check_ray(options)
     if options.size < 64 or options.made < 0:
         raise UsageError("--size is at least 64 px, --made not negative")
     least = {} if options.least_iou is None else {"least_iou": options.least_iou}
-    how = How(
+    how = TripletPlan(
         options.segment, options.lift, options.inpaint, options.poses, longest=options.size,
-        seed=options.seed, limits=Limits(**least),
+        seed=options.seed, limits=TripletLimits(**least),
     )  # fmt: skip
     how.check()
     if options.made:
         _made_up(options)
     padding = PADDING if options.padding is None else options.padding
-    looking = Looking(options.layout, not options.one_way, options.every, padding)
+    looking = SourceReading(options.layout, not options.one_way, options.every, padding)
     all_of_them = disk.shards_of(find_pairs(options.source, looking), options.shard_size)
     disk.begin(options.out, all_of_them, how)
     left = disk.left_over(options.out, all_of_them)
@@ -161,12 +161,12 @@ def _train_lora(options: argparse.Namespace) -> None:
     least = min(options.steps, options.save_every)
     if least < 1 or min(options.look_every, options.sample_steps) < 0:
         raise UsageError("--steps and --save-every are at least 1, the others not negative")
-    from ..training.composition.train_lora import Course, Places, Trainer
+    from ..training.composition.train_lora import Course, Trainer, TrainingFolders
 
     weights = edit_models.folder_of(model, options.weights)
     cache = options.cache or options.triplets / "latents"
     options.out.mkdir(parents=True, exist_ok=True)
-    places = Places(options.triplets, options.out, weights, cache)
+    places = TrainingFolders(options.triplets, options.out, weights, cache)
     course = Course(options.steps, options.save_every, options.look_every, options.sample_steps)
     with progress_bar("Training") as progress:
         trainer = Trainer(places, plan, progress)
@@ -235,7 +235,7 @@ def _train_shape(options: argparse.Namespace) -> None:
     if absent:
         raise UsageError(f"training needs {' and '.join(absent)}: `pip install {' '.join(absent)}`")
     from ..training.shapes.families import FAMILIES
-    from ..training.train_shape import Plan, figures, train, trained
+    from ..training.train_shape import TrainingPlan, figures, train, trained
 
     held_out = tuple(options.hold_out or ())
     unknown = sorted(set(held_out) - set(FAMILIES))
@@ -243,7 +243,7 @@ def _train_shape(options: argparse.Namespace) -> None:
         raise UsageError(f"there is no family {unknown[0]!r}; there are {', '.join(FAMILIES)}")
     if options.start is not None and not options.start.is_file():
         raise UsageError(f"there is no file {options.start}")
-    plan = Plan(options.samples, options.passes, held_out=held_out, seed=options.seed)
+    plan = TrainingPlan(options.samples, options.passes, held_out=held_out, seed=options.seed)
     with progress_bar("training") as progress:
         checkpoint = train(options.folder, plan, options.minutes, progress, options.start)
     net = trained(checkpoint)

@@ -18,7 +18,7 @@ from .measures import dino, fidelity, trunk_files
 from .measures.frechet import frechet_of_samples
 from .measures.mmd import Subsets, kid, paired_kid
 from .measures.regions import Measure, Region
-from .pairs import Pair
+from .pairs import MaskedPair
 
 WHOLE, INSIDE, OUTSIDE = "whole", "inside", "outside"
 Features = Callable[[RGB], F64]  # (d,) of a picture
@@ -26,7 +26,7 @@ Distance = Callable[[F64, F64], Estimate]  # of two sets (n, d)
 
 
 @dataclass(frozen=True)
-class Score:
+class RegionScore:
     """A measure of one region."""
 
     metric: str
@@ -48,7 +48,7 @@ class Results:
     """The results of one comparison."""
 
     pairs: int
-    scores: tuple[Score, ...]
+    scores: tuple[RegionScore, ...]
     lacking: tuple[Lacking, ...]
     weights: Mapping[str, str]  # sha256 by the name of the file, of the networks used
 
@@ -152,7 +152,7 @@ class Taken:
     features: Mapping[str, tuple[F64, F64]]  # (d,) of A and B, by the first measure that needs them
 
 
-class Opened:
+class OpenedMeasures:
     """The measures of `choices` that can be taken here of `pairs` pairs, and why others cannot."""
 
     def __init__(self, choices: Choices, pairs: int) -> None:
@@ -189,7 +189,7 @@ class Opened:
         first: dict[Features, str] = {}
         return {name: first.setdefault(features, name) for name, features in self._sets.items()}
 
-    def take(self, pair: Pair) -> Taken:
+    def take(self, pair: MaskedPair) -> Taken:
         """Take all measures of one pair. Raises EvaluationError."""
         a, b, mask = pair.read()
         regions = _regions(mask)
@@ -211,24 +211,24 @@ class Opened:
                 values.setdefault(key, {})[one.name] = value
         seed = self._choices.subsets.seed
         scores = [
-            Score(name, region, mean_with_interval(tuple(each.values()), seed), each)
+            RegionScore(name, region, mean_with_interval(tuple(each.values()), seed), each)
             for (name, region), each in values.items()
         ]
         distances = _distances(self._choices.subsets)
         for name, leader in self._leaders.items():
             sides = zip(*(one.features[leader] for one in taken), strict=True)
             x, y = (np.stack(side) for side in sides)
-            scores.append(Score(name, WHOLE, distances[name](x, y), {}))
+            scores.append(RegionScore(name, WHOLE, distances[name](x, y), {}))
         return Results(len(taken), tuple(scores), self._lacking, self._networks.used)
 
 
-def measure(pairs: Sequence[Pair], choices: Choices, progress: Progress = silent) -> Results:
+def measure(pairs: Sequence[MaskedPair], choices: Choices, progress: Progress = silent) -> Results:
     """Take all chosen measures of all pairs. Raises EvaluationError: one sentence.
 
     A region that holds nothing in some picture is left out of the mean there. A measure whose
     network is not here is told among the lacking; if it is asked for by its name, that is an error.
     """
-    opened, taken = Opened(choices, len(pairs)), []
+    opened, taken = OpenedMeasures(choices, len(pairs)), []
     for k, pair in enumerate(pairs):
         progress(k / len(pairs), pair.name)
         taken.append(opened.take(pair))

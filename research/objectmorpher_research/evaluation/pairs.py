@@ -15,7 +15,7 @@ from .measures.regions import check_pair
 
 
 @dataclass(frozen=True)
-class Pair:
+class MaskedPair:
     """Two pictures of one thing, and where the mask is."""
 
     name: str
@@ -36,7 +36,7 @@ class Pair:
             raise EvaluationError(f"{self.name}: {error}") from error
 
 
-def find_pairs(a: Path, b: Path, mask: Path | None = None) -> tuple[Pair, ...]:
+def find_pairs(a: Path, b: Path, mask: Path | None = None) -> tuple[MaskedPair, ...]:
     """Pairs of two files, or of two folders by the files' stems, in the order of the names.
 
     `mask`: one file for all pairs, or a folder with one for each. Raises EvaluationError.
@@ -47,13 +47,15 @@ def find_pairs(a: Path, b: Path, mask: Path | None = None) -> tuple[Pair, ...]:
     if a.is_dir() != b.is_dir():
         raise EvaluationError("compare two files, or two folders, not one with the other")
     if not a.is_dir():
-        return (Pair(a.stem, a, b, _mask_of(a.stem, mask)),)
+        return (MaskedPair(a.stem, a, b, _mask_of(a.stem, mask)),)
     left, right = _pictures(a), _pictures(b)
     lacking = sorted(left.keys() ^ right.keys())
     if lacking:
         where = b if lacking[0] in left else a
         raise EvaluationError(f"{where} has no picture called {lacking[0]!r}")
-    return tuple(Pair(name, left[name], right[name], _mask_of(name, mask)) for name in sorted(left))
+    return tuple(
+        MaskedPair(name, left[name], right[name], _mask_of(name, mask)) for name in sorted(left)
+    )
 
 
 def _mask_of(name: str, mask: Path | None) -> Path | None:

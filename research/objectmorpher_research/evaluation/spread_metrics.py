@@ -12,15 +12,15 @@ import numpy as np
 from objectmorpher.server.spread import Job, spread
 from objectmorpher_core.base.progress import Progress
 
-from .metrics import Choices, Opened, Results, Taken
-from .pairs import Pair
+from .metrics import Choices, OpenedMeasures, Results, Taken
+from .pairs import MaskedPair
 
 
 def measure_spread(
-    pairs: Sequence[Pair], choices: Choices, address: str, progress: Progress
+    pairs: Sequence[MaskedPair], choices: Choices, address: str, progress: Progress
 ) -> Results:
     """Measure like `measure`, on the cluster at `address`. Raises EvaluationError, SpreadError."""
-    opened = Opened(choices, len(pairs))
+    opened = OpenedMeasures(choices, len(pairs))
     jobs = [_job(k, pair, choices, len(pairs)) for k, pair in enumerate(pairs)]
     taken: dict[int, Taken] = {}
     for answer in spread(take_there, jobs, address):
@@ -29,7 +29,7 @@ def measure_spread(
     return opened.results([taken[k] for k in range(len(pairs))])
 
 
-def _job(number: int, pair: Pair, choices: Choices, pairs: int) -> Job:
+def _job(number: int, pair: MaskedPair, choices: Choices, pairs: int) -> Job:
     files = (pair.a, pair.b, pair.mask)
     return {
         "number": number, "pairs": pairs, "name": pair.name,
@@ -44,7 +44,7 @@ def take_there(job: Job) -> dict[str, Any]:
     a, b, mask = (None if name is None else Path(name) for name in job["files"])
     assert a is not None and b is not None
     opened = _opened(tuple(job["metrics"]), job["weights"], job["is_lenient"], job["pairs"])
-    taken = opened.take(Pair(job["name"], a, b, mask))
+    taken = opened.take(MaskedPair(job["name"], a, b, mask))
     return {
         "number": job["number"],
         "name": taken.name,
@@ -54,10 +54,12 @@ def take_there(job: Job) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-def _opened(metrics: tuple[str, ...], weights: str | None, is_lenient: bool, pairs: int) -> Opened:
+def _opened(
+    metrics: tuple[str, ...], weights: str | None, is_lenient: bool, pairs: int
+) -> OpenedMeasures:
     """The networks stay open from one pair to the next."""
     folder = None if weights is None else Path(weights)
-    return Opened(Choices(metrics, folder, is_lenient=is_lenient), pairs)
+    return OpenedMeasures(Choices(metrics, folder, is_lenient=is_lenient), pairs)
 
 
 def _taken(answer: dict[str, Any]) -> Taken:

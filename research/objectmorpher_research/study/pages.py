@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..evaluation.subjects.subject import Subject
+from ..evaluation.subjects.subject import EvaluatedEdit
 from .design import Item
-from .pictures import Pictures
+from .pictures import StudyPictures
 from .store import (
-    Answer,
+    PageAnswer,
     Participant,
     Study,
     StudyStore,
@@ -31,12 +31,12 @@ class Pages:
     """A study, for one server."""
 
     def __init__(
-        self, store: StudyStore, subjects: Sequence[Subject], consent: str = CONSENT
+        self, store: StudyStore, subjects: Sequence[EvaluatedEdit], consent: str = CONSENT
     ) -> None:
         """Raises EvaluationError for pictures that cannot be shown."""
         self._store = store
         self._subjects = {subject.name: subject for subject in subjects}
-        self.pictures = Pictures(subjects)
+        self.pictures = StudyPictures(subjects)
         self._consent = consent
 
     def about(self, said: Mapping[str, Any]) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class Pages:
             raise QuestionError("that is no answer")
         if isinstance(seconds, bool) or not isinstance(seconds, int | float):
             raise QuestionError("that is no answer")
-        answer = Answer(tuple(ratings), float(min(max(seconds, -1), 1e9)), now())
+        answer = PageAnswer(tuple(ratings), float(min(max(seconds, -1), 1e9)), now())
         check_answer(answer)
         return {"finished": self._store.answer(_key(said), item, answer).is_finished}
 
@@ -93,7 +93,7 @@ class Pages:
             "guidance": self._guidance(self._subjects[item.subject], width),
         }
 
-    def _guidance(self, subject: Subject, width: int) -> dict[str, Any]:
+    def _guidance(self, subject: EvaluatedEdit, width: int) -> dict[str, Any]:
         guidance = subject.guidance
         picture = self.pictures.name_guidance(subject.name)
         scale = width / self.pictures.photo_width(subject.name)
@@ -105,7 +105,7 @@ class Pages:
         return told
 
 
-def study_of(subjects: Sequence[Subject], seed: int, checks: int) -> Study:
+def study_of(subjects: Sequence[EvaluatedEdit], seed: int, checks: int) -> Study:
     """The study of all results of some subjects."""
     return Study({s.name: tuple(sorted(s.results)) for s in subjects if s.results}, seed, checks)
 

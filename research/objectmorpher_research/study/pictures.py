@@ -21,7 +21,7 @@ from objectmorpher_core.pictures.image import (
 
 from ..evaluation.error import EvaluationError
 from ..evaluation.pairs import read_pixels
-from ..evaluation.subjects.subject import Subject
+from ..evaluation.subjects.subject import EvaluatedEdit
 
 LONGEST = 1600  # px of a picture's longer side
 KEPT = 24  # pictures in memory
@@ -35,10 +35,10 @@ class _Shown:
     size: tuple[int, int]  # px
 
 
-class Pictures:
+class StudyPictures:
     """Names for pictures, and their bytes. Safe to use from several threads."""
 
-    def __init__(self, subjects: Sequence[Subject]) -> None:
+    def __init__(self, subjects: Sequence[EvaluatedEdit]) -> None:
         """Looks at every picture once. Raises EvaluationError for one that cannot be shown."""
         self._subjects = {subject.name: subject for subject in subjects}
         checked = {subject.name: _checked(subject) for subject in subjects}
@@ -103,7 +103,7 @@ class Pictures:
             return name
 
 
-def _checked(subject: Subject) -> tuple[int, tuple[int, int]]:
+def _checked(subject: EvaluatedEdit) -> tuple[int, tuple[int, int]]:
     """The photo's own width, and the size in which it is shown."""
     photo = read_pixels(subject.image)
     for method, result in subject.results.items():

@@ -45,7 +45,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Answer:
+class PageAnswer:
     """The answer to one page."""
 
     ratings: tuple[int, ...]  # by CRITERIA
@@ -60,7 +60,7 @@ class Participant:
     number: int  # from 1
     key_hash: str
     items: tuple[Item, ...]
-    answers: Mapping[int, Answer] = field(default_factory=dict)  # by item
+    answers: Mapping[int, PageAnswer] = field(default_factory=dict)  # by item
 
     @property
     def is_finished(self) -> bool:
@@ -107,7 +107,7 @@ class StudyStore:
             number = self._by_hash.get(_hash(key))
             return None if number is None else self._people[number]
 
-    def answer(self, key: str, item: int, answer: Answer) -> Participant:
+    def answer(self, key: str, item: int, answer: PageAnswer) -> Participant:
         """Keeps an answer, on the disk when this returns; earlier ones may be given anew.
 
         Raises EvaluationError where it is none.
@@ -134,7 +134,7 @@ class StudyStore:
         self._by_hash[person.key_hash] = person.number
 
 
-def check_answer(answer: Answer) -> None:
+def check_answer(answer: PageAnswer) -> None:
     """Raises EvaluationError for what the page cannot have sent."""
     is_rating = all(type(r) is int and LEAST <= r <= MOST for r in answer.ratings)
     if len(answer.ratings) != len(CRITERIA) or not is_rating:
@@ -222,9 +222,9 @@ def _person(told: dict[str, Any]) -> Participant:
         Item(str(i["subject"]), str(i.get("method", "")), tuple(i.get("check", ())))
         for i in told["items"]
     )
-    answers: dict[int, Answer] = {}
+    answers: dict[int, PageAnswer] = {}
     for k, a in told["answers"].items():
-        answer = Answer(tuple(a["ratings"]), float(a["seconds"]), str(a["at"]))
+        answer = PageAnswer(tuple(a["ratings"]), float(a["seconds"]), str(a["at"]))
         check_answer(answer)
         if not 0 <= int(k) < len(items):
             raise ValueError("an answer to no page")

@@ -10,10 +10,10 @@ from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import Crop, rays
-from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.shape_look import SeenShape
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 
 
 class Surfaces(NamedTuple):
@@ -23,18 +23,18 @@ class Surfaces(NamedTuple):
     thickness: F64  # (s, s)
 
 
-class Score(NamedTuple):
+class ShapeError(NamedTuple):
     """Errors over the object's mean true thickness; 0 is perfect."""
 
     front: float  # mean, after the best scale and shift
     thickness: float  # mean, as it is
 
 
-def score(found: Surfaces, true: Surfaces, mask: Mask) -> Score:
+def score(found: Surfaces, true: Surfaces, mask: Mask) -> ShapeError:
     """Within `mask` (s, s)."""
     size = max(float(true.thickness[mask].mean()), 1e-3)
     front = aligned(found.front[mask], true.front[mask])
-    return Score(
+    return ShapeError(
         float(np.abs(front - true.front[mask]).mean() / size),
         float(np.abs(found.thickness[mask] - true.thickness[mask]).mean() / size),
     )
@@ -47,13 +47,13 @@ def aligned(found: F64, true: F64) -> F64:
     return scale * a + true.mean()
 
 
-def relief(mask: Mask, tangents: F32, is_standing: bool = True) -> Body:
+def relief(mask: Mask, tangents: F32, is_standing: bool = True) -> ReliefBody:
     """Return the relief lifter's surfaces of a mask (s, s) alone, seen by the crop's camera."""
     settings = LiftSettings(is_standing=is_standing)
-    return Body.of(Silhouette.of(mask), camera_of(tangents, len(mask)), settings)
+    return ReliefBody.of(ReliefSilhouette.of(mask), camera_of(tangents, len(mask)), settings)
 
 
-def learned(mask: Mask, tangents: F32, raw: F32) -> Body:
+def learned(mask: Mask, tangents: F32, raw: F32) -> ReliefBody:
     """Return the lifter's surfaces with the network's output, (9, s, s)."""
     side = len(mask)
     seen = SeenShape.of(raw, mask, Crop(0, 0, side, tangents))
@@ -75,7 +75,7 @@ def true_surfaces(front: F32, depth: F32, tangents: F32) -> Surfaces:
     return Surfaces(forward * (front - away), forward * depth)
 
 
-def surfaces_of(body: Body, mask: Mask) -> Surfaces:
+def surfaces_of(body: ReliefBody, mask: Mask) -> Surfaces:
     """At the pixels of a mask (h, w), in its px."""
     rows, columns = np.nonzero(mask)
     xy = np.column_stack([columns, rows]).astype(np.float64) + 0.5

@@ -22,7 +22,7 @@ SCALES = {"front": 0.15, "thick": 0.2, "normal": 0.5}  # the usual size of what 
 FACING = -0.5  # z of the normals before training, towards the camera
 
 
-class Block(nn.Module):
+class ResidualBlock(nn.Module):
     """Two convolutions beside the way straight on (He et al. 2016)."""
 
     def __init__(self, width: int) -> None:
@@ -60,16 +60,16 @@ class ShapeNet(nn.Module):
         super().__init__()
         a, b, c, d = CHANNELS
         self.down1 = _conv(PLANES, a, stride=2)
-        self.down2 = nn.Sequential(_conv(a, b, stride=2), Block(b))
-        self.down3 = nn.Sequential(_conv(b, c, stride=2), Block(c))
-        self.down4 = nn.Sequential(_conv(c, d, stride=2), Block(d))
+        self.down2 = nn.Sequential(_conv(a, b, stride=2), ResidualBlock(b))
+        self.down3 = nn.Sequential(_conv(b, c, stride=2), ResidualBlock(c))
+        self.down4 = nn.Sequential(_conv(c, d, stride=2), ResidualBlock(d))
         self.tokens = nn.Conv2d(WIDTH, d, 1)
         self.tokens_fine = nn.Conv2d(WIDTH, c // 2, 1)
         self.middle = nn.Sequential(
-            _conv(2 * d, MIXED, size=1), Block(MIXED), Attention(MIXED), Attention(MIXED)
+            _conv(2 * d, MIXED, size=1), ResidualBlock(MIXED), Attention(MIXED), Attention(MIXED)
         )
-        self.up3 = nn.Sequential(_conv(MIXED + c + c // 2, 128), Block(128))
-        self.up2 = nn.Sequential(_conv(128 + b, 64), Block(64))
+        self.up3 = nn.Sequential(_conv(MIXED + c + c // 2, 128), ResidualBlock(128))
+        self.up2 = nn.Sequential(_conv(128 + b, 64), ResidualBlock(64))
         self.up1 = _conv(64 + a, FINE)
         self.head = nn.Conv2d(FINE, 4 * OUTPUTS, 1)  # of four pixels each (Shi et al. 2016)
 

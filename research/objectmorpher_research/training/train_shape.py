@@ -23,7 +23,7 @@ from objectmorpher_core.base.progress import Progress, silent
 
 from .export_shape import weights_of
 from .shape_data import SHARD, Batch, batch_of, batches, write_shards
-from .shape_eval import Score, Surfaces, learned, relief, score, surfaces_of, true_surfaces
+from .shape_eval import ShapeError, Surfaces, learned, relief, score, surfaces_of, true_surfaces
 from .shape_losses import losses
 from .shape_net import ShapeNet
 
@@ -38,7 +38,7 @@ SAVED = 120.0  # s between two checkpoints
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """A plan of training; the same plan gives the same weights, but for rounding."""
 
     samples: int = 8192
@@ -67,7 +67,7 @@ class Plan:
 
 def train(
     folder: Path,
-    plan: Plan,
+    plan: TrainingPlan,
     minutes: float | None = None,
     progress: Progress = silent,
     weights: Path | None = None,
@@ -110,7 +110,7 @@ def _samples(folder: Path, first: int, count: int, progress: Progress) -> list[P
     return [folder / f"{seed:08d}.npz" for seed in range(first, first + count, SHARD)]
 
 
-def _endless(files: list[Path], plan: Plan, done: int) -> Iterator[Batch]:
+def _endless(files: list[Path], plan: TrainingPlan, done: int) -> Iterator[Batch]:
     number = done * plan.size // max(plan.samples, 1)
     while True:
         rng = np.random.default_rng([plan.seed, number, done])
@@ -121,7 +121,7 @@ def _endless(files: list[Path], plan: Plan, done: int) -> Iterator[Batch]:
 class _State:
     """The network, what trains it, and how far it is."""
 
-    def __init__(self, file: Path, plan: Plan, start: dict[str, Tensor] | None) -> None:
+    def __init__(self, file: Path, plan: TrainingPlan, start: dict[str, Tensor] | None) -> None:
         torch.manual_seed(plan.seed)
         self.file, self.plan, self.step = file, plan, 0
         net = ShapeNet()
@@ -135,7 +135,7 @@ class _State:
         self.history: list[dict[str, float]] = []
 
     @staticmethod
-    def resumed(folder: Path, plan: Plan, start: dict[str, Tensor] | None = None) -> _State:
+    def resumed(folder: Path, plan: TrainingPlan, start: dict[str, Tensor] | None = None) -> _State:
         """Resume from the last save of the same plan, or start anew."""
         state = _State(folder / plan.file, plan, start)
         kept = torch.load(state.file, weights_only=True) if state.file.exists() else None
@@ -220,7 +220,7 @@ def figures(checkpoint: Path, net: ShapeNet) -> dict[str, Any]:
     }
 
 
-Scores = dict[str, Score]  # of one sample, by way
+Scores = dict[str, ShapeError]  # of one sample, by way
 
 
 def _middles(rows: list[Scores], middle: Callable[..., Any]) -> dict[str, dict[str, float]]:
@@ -228,7 +228,7 @@ def _middles(rows: list[Scores], middle: Callable[..., Any]) -> dict[str, dict[s
     return {
         way: {
             name: round(float(middle([getattr(row[way], name) for row in rows])), 4)
-            for name in Score._fields
+            for name in ShapeError._fields
         }
         for way in rows[0]
     }

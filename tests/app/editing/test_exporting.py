@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 from conftest import CENTRE, HEIGHT, WIDTH, wait_for_jobs
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
-from objectmorpher.editor.export_plan import FORMATS, Format, Motion, What
+from objectmorpher.editor.export_plan import FORMATS, Format, VideoMotion, What
 from objectmorpher.editor.settings import Settings
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
@@ -154,8 +154,8 @@ def test_a_video_shows_what_is_wanted(moved: Editor, ball: Document) -> None:
     moved.apply("Move object", edits.set_placement(ball, 0, Placement()))
     exporting.open()  # as it was last, but for what cannot be shown
     assert exporting.draft is not None and exporting.draft.what is What.VIDEO
-    assert exporting.draft.motion is Motion.SWAY and exporting.draft.seconds == 1.0
-    exporting.choose_motion(Motion.MORPH)
+    assert exporting.draft.motion is VideoMotion.SWAY and exporting.draft.seconds == 1.0
+    exporting.choose_motion(VideoMotion.MORPH)
     assert exporting.problem == "Move or pose an object first"
     exporting.close()
     exporting.export_to(path.with_suffix(".mp4"))  # a photo is no film

@@ -11,7 +11,7 @@ from objectmorpher.server.address import Address, Server
 from objectmorpher.server.alone import Alone
 from objectmorpher.server.elsewhere import Elsewhere
 from objectmorpher.server.front import Front
-from objectmorpher.server.running import Call, Outcome
+from objectmorpher.server.running import Call, JobOutcome
 from objectmorpher.server.table import Served, table
 from objectmorpher.worker import job_functions
 from objectmorpher.worker.jobs import Jobs
@@ -28,7 +28,7 @@ class Counting(Alone):
         super().__init__()
         self.asked: list[str] = []
 
-    def run(self, call: Call, served: Served, tell: Progress, stop: Any) -> Outcome:
+    def run(self, call: Call, served: Served, tell: Progress, stop: Any) -> JobOutcome:
         self.asked.append(call.name)
         return super().run(call, served, tell, stop)
 
@@ -76,4 +76,4 @@ def fill() -> tuple:
     pixels = frozen(random.integers(90, 140, (90, 120, 3)).astype(np.uint8))
     hole = np.zeros((90, 120), bool)
     hole[30:60, 40:80] = True
-    return pixels, frozen(hole), job_functions.Choice("telea"), 2
+    return pixels, frozen(hole), job_functions.BackendChoice("telea"), 2

@@ -26,7 +26,7 @@ from objectmorpher.server.address import Address, NotServed, ServedError, Server
 from objectmorpher.server.client import call, hello
 from objectmorpher.server.offers import read_offers
 from objectmorpher.worker import job_functions
-from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core import compose
 from objectmorpher_core.base.arrays import frozen
 from objectmorpher_core.base.camera import Camera
@@ -138,7 +138,7 @@ def test_a_lift_is_what_it_is_here_to_the_last_bit(
     server: Server, photo: np.ndarray, mask: np.ndarray
 ) -> None:
     cut = Cut(photo, Camera.from_fov(450, 300), mask)
-    arguments = cut, Choice("auto", 1), LiftSettings(count=2000)
+    arguments = cut, BackendChoice("auto", 1), LiftSettings(count=2000)
     steps: list[float] = []
     answer = call(server, "lift", arguments, lambda fraction, _: steps.append(fraction))
     assert same_values(answer, job_functions.lift(*arguments, progress=silent))
@@ -148,7 +148,7 @@ def test_a_lift_is_what_it_is_here_to_the_last_bit(
 def test_a_job_whose_process_is_killed_is_done_by_the_other_one_with_the_same_answer(
     serving: Serving, photo: np.ndarray, mask: np.ndarray
 ) -> None:
-    arguments = photo, mask, Choice("auto", 3), 2
+    arguments = photo, mask, BackendChoice("auto", 3), 2
     killed: list[int] = []
 
     def kill(fraction: float, note: str) -> None:
@@ -167,7 +167,7 @@ def test_a_job_whose_process_is_killed_is_done_by_the_other_one_with_the_same_an
 def test_two_processes_work_at_a_time_and_a_third_job_waits(
     serving: Serving, photo: np.ndarray, mask: np.ndarray
 ) -> None:
-    arguments = photo, mask, Choice("auto", 5), 2
+    arguments = photo, mask, BackendChoice("auto", 5), 2
     answers: list[Any] = []
 
     def work() -> None:
@@ -193,7 +193,7 @@ def test_a_backend_has_processes_of_its_own_which_start_with_its_first_job(
     before = re.findall(deployed, serving.log.read_text())
     assert before == [f"{stage}-{offers[stage].auto}" for stage in ("lift", "inpaint")]
     for name in ("auto", "telea", "telea"):
-        answer = call(serving.server, "inpaint", (photo, mask, Choice(name)), silent)
+        answer = call(serving.server, "inpaint", (photo, mask, BackendChoice(name)), silent)
         assert answer.backend == (name if name != "auto" else offers["inpaint"].auto)
     of_auto, first, second = serving.pids[-3:]
     assert of_auto not in (first, second)
@@ -203,7 +203,7 @@ def test_a_backend_has_processes_of_its_own_which_start_with_its_first_job(
 def test_cancelling_ends_the_job_in_its_process(
     server: Server, photo: np.ndarray, mask: np.ndarray
 ) -> None:
-    arguments = photo, mask, Choice("auto", 5), 12
+    arguments = photo, mask, BackendChoice("auto", 5), 12
 
     def progress(fraction: float, note: str) -> None:
         if fraction > 0.1:
@@ -221,9 +221,9 @@ def test_a_job_that_fails_there_says_why(
     server: Server, photo: np.ndarray, mask: np.ndarray
 ) -> None:
     with pytest.raises(ServedError, match="no inpainter"):
-        call(server, "inpaint", (photo, mask, Choice("nobody")), silent)
+        call(server, "inpaint", (photo, mask, BackendChoice("nobody")), silent)
 
 
 def test_a_stage_that_is_not_served_is_refused(server: Server, photo: np.ndarray) -> None:
     with pytest.raises(NotServed, match="does not segment"):
-        call(server, "segment", (photo, Prompt((Click(9.0, 9.0),)), Choice("auto")), silent)
+        call(server, "segment", (photo, Prompt((Click(9.0, 9.0),)), BackendChoice("auto")), silent)

@@ -51,7 +51,7 @@ def test_a_job_goes_to_the_server_and_answers_as_here(desk: Desk, fill: tuple) -
 
 
 def test_every_served_function_answers_as_here(desk: Desk, fill: tuple) -> None:
-    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.plate.repair import PlatePatch
 
     pixels, hole, choice, _ = fill
     assert desk.server is not None
@@ -62,14 +62,14 @@ def test_every_served_function_answers_as_here(desk: Desk, fill: tuple) -> None:
     camera = Camera.from_fov(120, 90)
     calls = {
         "read_photo": (ball, "grabcut"),
-        "segment": (ball, click, job_functions.Choice("grabcut")),
-        "closer_look": (ball, click, job_functions.Choice("grabcut")),
-        "candidate": (ball, Prompt(), job_functions.Choice("grabcut")),
-        "lift": (job_functions.Cut(ball, camera, hole), job_functions.Choice("auto"),
+        "segment": (ball, click, job_functions.BackendChoice("grabcut")),
+        "closer_look": (ball, click, job_functions.BackendChoice("grabcut")),
+        "candidate": (ball, Prompt(), job_functions.BackendChoice("grabcut")),
+        "lift": (job_functions.Cut(ball, camera, hole), job_functions.BackendChoice("auto"),
                  LiftSettings(1000)),
         "inpaint": (pixels, hole, choice),
         "fill_variants": fill,
-        "repair": (Patch(0, 0, pixels, cover), 2.0, choice),
+        "repair": (PlatePatch(0, 0, pixels, cover), 2.0, choice),
         "take_shadow": (cutout, choice),
     }  # fmt: skip
     assert {*calls, "refine"} == set(table())  # which has tests of its own
@@ -121,7 +121,7 @@ def test_a_server_that_ends_in_the_middle_of_a_job_changes_nothing_but_the_time(
 ) -> None:
     pixels, hole = np.tile(fill[0], (6, 6, 1)), np.zeros((540, 720), bool)
     hole[150:400, 200:500] = True  # seconds of work, so that it cannot be done before the end
-    desk.ask(job_functions.fill_variants, pixels, hole, job_functions.Choice("auto"), 3)
+    desk.ask(job_functions.fill_variants, pixels, hole, job_functions.BackendChoice("auto"), 3)
     end = time.monotonic() + 60
     while desk.jobs.current is None or desk.jobs.current.fraction < 0.1:
         assert time.monotonic() < end
@@ -144,7 +144,7 @@ def test_a_wrong_token_is_said_and_the_work_is_done_here(desk: Desk, fill: tuple
 
 
 def test_a_request_at_fault_is_not_tried_again_here(desk: Desk, fill: tuple) -> None:
-    desk.ask(job_functions.inpaint, *fill[:2], job_functions.Choice("nobody"))
+    desk.ask(job_functions.inpaint, *fill[:2], job_functions.BackendChoice("nobody"))
     desk.wait()
     assert "no inpainter" in desk.errors[0].sentence
     assert desk.errors[0].is_expected
@@ -152,7 +152,7 @@ def test_a_request_at_fault_is_not_tried_again_here(desk: Desk, fill: tuple) -> 
 
 
 def test_cancelling_a_job_over_there_is_as_here(desk: Desk, fill: tuple) -> None:
-    wanted = fill[0], fill[1], job_functions.Choice("auto"), 12
+    wanted = fill[0], fill[1], job_functions.BackendChoice("auto"), 12
     desk.ask(job_functions.fill_variants, *wanted)
     while desk.jobs.current is None or desk.jobs.current.fraction == 0:
         desk.jobs.poll()

@@ -16,7 +16,7 @@ from same_values import same_values
 from objectmorpher.server.fitting import is_sound
 from objectmorpher.server.message import LARGE, MessageError, MissingError, decode, encode
 from objectmorpher.server.table import table, types
-from objectmorpher.worker.job_functions import Choice, Cut
+from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Click, LiftSettings, Matte, Plate, Prompt
 from objectmorpher_core.document.settings import Hint
@@ -32,7 +32,7 @@ VALUES = [
     (MASK, RANDOM.normal(size=5), PHOTO.astype(np.uint16)), np.asfortranarray(PHOTO[..., 0]),
     Prompt((Click(1.5, 2.0), Click(3.0, 1.0, False)), (0.0, 0.0, 9.0, 9.0), level="part"),
     Cut(PHOTO, CAMERA, MASK), LiftSettings(hidden=MASK, horizon=3.5),
-    Choice("auto", 7, (Hint((1.0, 2.0), (3.0, 4.0), 5.0),)),
+    BackendChoice("auto", 7, (Hint((1.0, 2.0), (3.0, 4.0), 5.0),)),
     Matte(-2, 3, MASK.astype(np.float32), PHOTO / np.float32(255)),
     Plate(0, 0, PHOTO, MASK, "patchmatch", painted=None),
 ]  # fmt: skip
@@ -184,7 +184,7 @@ def test_random_damage_is_refused_or_changes_values_only() -> None:
             continue
 
 
-LIFT = (Cut(PHOTO, CAMERA, MASK), Choice("auto"), LiftSettings())
+LIFT = (Cut(PHOTO, CAMERA, MASK), BackendChoice("auto"), LiftSettings())
 ASKED_WRONGLY = {
     "too few arguments": ("lift", LIFT[:2]),
     "another type": ("lift", (LIFT[0], "auto", LIFT[2])),
@@ -194,9 +194,9 @@ ASKED_WRONGLY = {
     "a hidden mask of another size": ("lift", (*LIFT[:2], LiftSettings(hidden=MASK[:3]))),
     "a photo of floats": ("read_photo", (PHOTO / 255.0, "auto")),
     "a photo without colours": ("read_photo", (PHOTO[..., 0], "auto")),
-    "a mask of numbers": ("inpaint", (PHOTO, PHOTO[..., 0], Choice("auto"))),
-    "too many variants": ("fill_variants", (PHOTO, MASK, Choice("auto"), 10**6)),
-    "a flag for a number": ("fill_variants", (PHOTO, MASK, Choice("auto"), True)),
+    "a mask of numbers": ("inpaint", (PHOTO, PHOTO[..., 0], BackendChoice("auto"))),
+    "too many variants": ("fill_variants", (PHOTO, MASK, BackendChoice("auto"), 10**6)),
+    "a flag for a number": ("fill_variants", (PHOTO, MASK, BackendChoice("auto"), True)),
 }
 
 

@@ -19,7 +19,7 @@ from objectmorpher.server import client
 from objectmorpher.server.address import Address, ServedError, Server, ServerLost
 from objectmorpher.server.alone import Alone
 from objectmorpher.server.client import hello
-from objectmorpher.server.front import Front, Limits
+from objectmorpher.server.front import Front, RequestLimits
 from objectmorpher.server.message import LARGE, digest, encode
 from objectmorpher.server.table import types
 from objectmorpher_core.base.progress import Cancelled, silent
@@ -30,7 +30,7 @@ MOST = 4 << 20  # bytes of a request
 
 @pytest.fixture(scope="module")
 def front() -> Iterator[Front]:
-    limits = Limits(body=MOST, connections=16, jobs=3)
+    limits = RequestLimits(body=MOST, connections=16, jobs=3)
     front = Front(("127.0.0.1", 0), TOKEN, Alone(), served_jobs.TABLE, limits)
     front.start()
     yield front

@@ -20,7 +20,7 @@ from objectmorpher_core.base.arrays import F32, RGB, frozen
 from objectmorpher_core.base.progress import Progress, silent
 from objectmorpher_core.compose import refine
 from objectmorpher_core.compose.refine.refinement import CoarseEdit
-from objectmorpher_core.scripting.runner import Refining
+from objectmorpher_core.scripting.runner import RefineOptions
 
 
 class Dimming:
@@ -53,7 +53,7 @@ def coarse() -> CoarseEdit:
 
 
 def test_a_refinement_is_what_it_is_here(desk: Desk, dimming: None) -> None:
-    asked = coarse(), Refining("dimming", 2, 0.5)
+    asked = coarse(), RefineOptions("dimming", 2, 0.5)
     assert desk.server is not None
     there = call(desk.server, "refine", asked, silent)
     assert same_values(there, job_functions.refine(*asked, progress=silent))
@@ -67,7 +67,7 @@ def test_a_refinement_is_of_the_edit_that_was_asked_about(
     edit = coarse()
     scale = np.array(257 if depth == "uint16" else 1, depth)
     edit = replace(edit, pixels=edit.pixels * scale)
-    how = Refining("auto")
+    how = RefineOptions("auto")
     assert desk.server is not None
     made = call(desk.server, "refine", (edit, how), silent)
     assert (made.backend, made.left, made.top, made.pixels.dtype.name) == ("dimming", 7, 5, depth)
@@ -81,7 +81,7 @@ def test_a_refinement_is_of_the_edit_that_was_asked_about(
 
 
 def test_an_edit_whose_parts_disagree_is_refused(desk: Desk, dimming: None) -> None:
-    edit, how = coarse(), Refining("dimming")
+    edit, how = coarse(), RefineOptions("dimming")
     for wrong in (
         (replace(edit, coarse=edit.coarse[1:]), how), (replace(edit, alpha=edit.alpha * 2), how),
         (replace(edit, alpha=edit.alpha[:, 1:]), how), (edit, replace(how, strength=1.5)),
@@ -96,7 +96,7 @@ def test_a_refinement_without_the_server_is_done_here_or_says_why_not(
 ) -> None:
     """The worker is a process of its own: it has the refiners that this machine has."""
     desk.front.close()
-    desk.ask(job_functions.refine, coarse(), Refining("qwen"))
+    desk.ask(job_functions.refine, coarse(), RefineOptions("qwen"))
     desk.wait()
     assert len(desk.said) == 1 and "cannot be reached" in desk.said[0]
     assert desk.answers or desk.errors[0].sentence == refine.missing("qwen")
@@ -119,7 +119,7 @@ def test_a_networks_refinement_is_the_same_there_and_here_when_the_server_has_go
     models.use_folder("flux2-klein-4b", tiny_pipelines.write_klein(tmp_path / "klein"))
     flat, hole = np.full((96, 96, 3), 128, np.uint8), np.zeros((96, 96), np.float32)
     hole[40:60, 40:60] = 1
-    asked = CoarseEdit(0, 0, flat, flat, hole), Refining("auto", 3)
+    asked = CoarseEdit(0, 0, flat, flat, hole), RefineOptions("auto", 3)
     desk = Desk()  # its worker starts with that folder
     try:
         assert desk.runner.offers()["refine"] == Offer("klein", ("klein",))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from objectmorpher.canvas.blend import CELL
-from objectmorpher.canvas.layer import Layer
-from objectmorpher.editor.view import View
+from objectmorpher.canvas.layer import CanvasLayer
+from objectmorpher.editor.view import ViewState
 from objectmorpher.render.scene import Hatch, Scene
 from objectmorpher_core.document.model import Plate
 from tests.app.render.pictures import make_renderer
@@ -45,19 +45,19 @@ def scene() -> Scene:
     item = random.integers(0, 256, (70, 90, 4)).astype(np.uint8)
     item[10:40, 10:60, 3], item[50:] = 255, 0
     item[..., :3] = np.minimum(item[..., :3], item[..., 3:])  # premultiplied
-    shades = (Layer((20.3, 14.6, 120.1, 99.7), shade, is_coarse=True),)
-    layers = (Layer((40.0, 30.0, 130.0, 100.0), item, gain=(1.2, 0.9, 0.7)),)
+    shades = (CanvasLayer((20.3, 14.6, 120.1, 99.7), shade, is_coarse=True),)
+    layers = (CanvasLayer((40.0, 30.0, 130.0, 100.0), item, gain=(1.2, 0.9, 0.7)),)
     return Scene(photo, (0.1, 0.2, 0.3), plate, shades, layers, blend=blend)
 
 
-def _view(zoom: float) -> View:
-    view = View()
+def _view(zoom: float) -> ViewState:
+    view = ViewState()
     view.resize(VIEWPORT[2:], 1.0, PHOTO)
     view.set_zoom(zoom, (45, 30), PHOTO)
     return view
 
 
-def _shown(renderer, scene: Scene, view: View, is_emulated: bool) -> np.ndarray:
+def _shown(renderer, scene: Scene, view: ViewState, is_emulated: bool) -> np.ndarray:
     """After another picture of the same view: only what stands still is flattened."""
     renderer._is_emulated = is_emulated
     for drawn in (Scene(scene.photo, scene.surround), scene):
@@ -66,7 +66,9 @@ def _shown(renderer, scene: Scene, view: View, is_emulated: bool) -> np.ndarray:
     return renderer.read(SIZE).astype(int)
 
 
-def _both(renderer, monkeypatch, scene: Scene, view: View) -> tuple[np.ndarray, np.ndarray, int]:
+def _both(
+    renderer, monkeypatch, scene: Scene, view: ViewState
+) -> tuple[np.ndarray, np.ndarray, int]:
     """The window by the processor and by the shaders, and how often the first was asked."""
     from objectmorpher.render import flattening
 

@@ -7,8 +7,8 @@ import pytest
 
 from objectmorpher.canvas.frame import Cache, build_frame
 from objectmorpher.canvas.fronts import Fronts
-from objectmorpher.canvas.layer import FrameObject, Layer, is_front
-from objectmorpher.editor.view import View
+from objectmorpher.canvas.layer import CanvasLayer, FrameObject, is_front
+from objectmorpher.editor.view import ViewState
 from objectmorpher.gui.window.scenes import OF_THE_PHOTO, splat_objects
 from objectmorpher.render.scene import Scene
 from objectmorpher_core.compose.composite import composite
@@ -44,8 +44,8 @@ def document() -> Document:
     return edits.set_placement(document, 0, Placement(move=(50.0, 0.0), depth=-0.3))
 
 
-def _view(zoom: float) -> View:
-    view = View()
+def _view(zoom: float) -> ViewState:
+    view = ViewState()
     view.resize(SIZE, 1.0, SIZE)
     view.set_zoom(zoom, (80, 60), SIZE)
     view.left, view.top = (0.0, 0.0) if zoom == 1 else (105.0, 20.0)
@@ -98,4 +98,4 @@ def test_it_is_shown_over_the_edit_and_not_while_selecting(document):
     assert is_front(document, 1) and not is_front(document, 0)
     assert OF_THE_PHOTO  # where the photo is shown as it was
     own, front = build_frame(document, _view(1.0), Cache(), renderer="gl").objects
-    assert isinstance(own, FrameObject) and own.k == 0 and isinstance(front, Layer)
+    assert isinstance(own, FrameObject) and own.k == 0 and isinstance(front, CanvasLayer)

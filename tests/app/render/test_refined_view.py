@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher.canvas.frame import Cache, build_frame
-from objectmorpher.editor.view import View
+from objectmorpher.editor.view import ViewState
 from objectmorpher.gui.window.scenes import REFINED, splat_objects
 from objectmorpher.render.scene import Scene
 from objectmorpher_core.compose.composite import composite
@@ -43,8 +43,8 @@ def refined_edit(strength: float) -> Document:
 
 
 @pytest.fixture
-def view() -> View:
-    view = View()
+def view() -> ViewState:
+    view = ViewState()
     view.resize(SIZE, 1.0, SIZE)
     view.set_zoom(1.0, (80, 60), SIZE)
     view.left = view.top = 0.0
@@ -52,7 +52,7 @@ def view() -> View:
 
 
 def scene_of(
-    document: Document, view: View, kind: str, cache: Cache, is_marked: bool = False
+    document: Document, view: ViewState, kind: str, cache: Cache, is_marked: bool = False
 ) -> Scene:
     frame = build_frame(document, view, cache, renderer=kind)
     refined = cache.refined.layers(document, view, is_marked)

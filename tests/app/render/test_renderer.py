@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher.canvas.frame import Cache, build_frame
-from objectmorpher.editor.view import View
+from objectmorpher.editor.view import ViewState
 from objectmorpher.gui.window.scenes import splat_objects
 from objectmorpher.render.scene import Scene, SplatObject
 from objectmorpher_core.compose.composite import composite, straight_cutout
@@ -34,8 +34,8 @@ def renderer(context, monkeypatch):
     context.finish()
 
 
-def _view() -> View:
-    view = View()
+def _view() -> ViewState:
+    view = ViewState()
     view.resize(SIZE, 1.0, SIZE)
     return view
 
@@ -50,7 +50,7 @@ def _object(turn: tuple[float, float, float]) -> SplatObject:
     return SplatObject(splats, scene.texture, scene.camera)
 
 
-def _window_picture(renderer, scene: Scene, view: View) -> np.ndarray:
+def _window_picture(renderer, scene: Scene, view: ViewState) -> np.ndarray:
     renderer.begin((0.0, 0.0, 0.0), SIZE)
     renderer.draw(scene, view, (0, 0, *SIZE))
     return renderer.read(SIZE).astype(np.float32) / 255
@@ -67,7 +67,7 @@ def test_the_window_shows_the_object_over_the_photo(renderer):
     assert np.abs(shown - expected)[inside].max() <= PIXEL
 
 
-def _photo_box(view: View) -> tuple[int, int, int, int]:
+def _photo_box(view: ViewState) -> tuple[int, int, int, int]:
     """Canvas px that are wholly within the photo; nothing is drawn beyond it."""
     low, high = view.canvas_from_image(np.array([[0, 0], SIZE]))
     return int(low[0]) + 1, int(low[1]) + 1, int(high[0]), int(high[1])
@@ -193,7 +193,7 @@ def test_the_window_shows_grain_as_it_is_exported(renderer, kind, zoom):
 @pytest.mark.parametrize("kind", ["tiles", "gl"])
 def test_the_window_shows_focus_as_it_is_exported(renderer, kind, zoom):
     document = focussed.farther(focussed.scene(5.0), 1.8)
-    cache, view = Cache(), View()
+    cache, view = Cache(), ViewState()
     cache.frame_time = np.inf
     view.resize(SIZE, 1.0, document.photo.size)
     view.set_zoom(zoom, (80, 60), SIZE)

@@ -9,7 +9,7 @@ from conftest import duplicate
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
-from objectmorpher.tools.pointer import Button, Pointer, Shape
+from objectmorpher.tools.pointer import Button, Pointer, PointerShape
 from objectmorpher.tools.registry import TOOLS, Tool
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document
@@ -30,7 +30,7 @@ def tool_of(editor: Editor) -> Tool:
     return TOOLS[editor.view.tool]
 
 
-def hover(editor: Editor, place: tuple[float, float]) -> Shape:
+def hover(editor: Editor, place: tuple[float, float]) -> PointerShape:
     return tool_of(editor).hover(editor, Pointer(*editor.view.canvas_from_image(np.array(place))))
 
 
@@ -78,7 +78,9 @@ def test_a_copy_that_lies_over_the_current_one_does_not_take_the_pointer(
 def test_a_click_chooses_it_and_is_no_step(two: Editor, tool: ToolName) -> None:
     two.choose_tool(tool)
     before = two.document
-    assert hover(two, SECOND) is (Shape.MOVE if tool is ToolName.PLACE else Shape.HAND)
+    assert hover(two, SECOND) is (
+        PointerShape.MOVE if tool is ToolName.PLACE else PointerShape.HAND
+    )
     assert two.hover.other == 1
     assert "chooses this object" in tool_of(two).hint(two)
     press(two, SECOND)

@@ -11,7 +11,7 @@ from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import TURNS, gizmo
 from objectmorpher.tools.place_tool import SLOW, PlaceTool, wrapped
-from objectmorpher.tools.pointer import Pointer, Shape
+from objectmorpher.tools.pointer import Pointer, PointerShape
 from objectmorpher_core.base.rotations import turn_matrix, vector_from_matrix
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
@@ -193,8 +193,8 @@ def test_an_aborted_turn_changes_nothing(placed: Editor) -> None:
 def test_the_pointer_tells_what_it_would_take(placed: Editor) -> None:
     shown, tool = gizmo(placed), PlaceTool()
     assert shown is not None
-    assert tool.hover(placed, Pointer(*spot_on(placed))) is Shape.MOVE
-    assert tool.hover(placed, Pointer(*shown.corners[1])) is Shape.SIZE
+    assert tool.hover(placed, Pointer(*spot_on(placed))) is PointerShape.MOVE
+    assert tool.hover(placed, Pointer(*shown.corners[1])) is PointerShape.SIZE
     reach = 9.0 * placed.view.scale  # hit areas are 10 points
     beside = shown.arrow.at((shown.arrow.near + shown.arrow.far) / 2) + (reach, 0)
     assert tool.part_at(placed, Pointer(*beside)) == "depth"

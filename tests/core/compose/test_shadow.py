@@ -10,7 +10,7 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.lighting import stand
-from objectmorpher_core.compose.shadow.shadow import Standing, cast, ground_normal
+from objectmorpher_core.compose.shadow.shadow import StandingObject, cast, ground_normal
 from objectmorpher_core.compose.silhouette import sampled
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
@@ -28,7 +28,7 @@ CAMERA = Camera.from_fov(260, 200)
 FOOT = np.array([124.0, 114.0])  # px, amid what the block stands on
 
 
-def _block() -> Standing:
+def _block() -> StandingObject:
     """A board of 40 x 60 px."""
     mask = np.zeros((200, 260), bool)
     mask[54:114, 104:144] = True
@@ -41,10 +41,10 @@ def _moved(name: str = "ellipse", placement: Placement = MOVE) -> Document:
 
 def test_no_strength_is_no_shadow():
     assert cast(Shadow(), _block()) is None
-    behind = Standing(np.array([[0.0, 0.0, -1.0]]), np.array([0.0, 1.0, 0.0]), CAMERA)
+    behind = StandingObject(np.array([[0.0, 0.0, -1.0]]), np.array([0.0, 1.0, 0.0]), CAMERA)
     assert cast(DARK, behind) is None
     with pytest.raises(ValueError, match="without a single"):
-        Standing(np.zeros((0, 3)), np.array([0.0, 1.0, 0.0]), CAMERA)
+        StandingObject(np.zeros((0, 3)), np.array([0.0, 1.0, 0.0]), CAMERA)
 
 
 @pytest.mark.parametrize("direction", [0, 60, 90, 170, -90, -30])
@@ -92,7 +92,7 @@ def test_it_lies_on_the_ground_that_is_seen_so(ground):
     points = upright(mask, CAMERA, ground)
     normal = ground_normal(CAMERA, None, Shadow(ground=ground), 99.0)
     sharp = Shadow(1.0, 90.0, 0.5, 0.0, 0.0)
-    shade = cast(sharp, Standing(points, normal, CAMERA))
+    shade = cast(sharp, StandingObject(points, normal, CAMERA))
     assert shade is not None
     top = points[points[:, 1].argmin()]
     height = float((points @ normal).max() - top @ normal)
@@ -110,7 +110,7 @@ def test_what_turns_throws_another_shadow():
     normal = ground_normal(CAMERA, None, Shadow(ground=25.0), CAMERA.cy)
     sharp, sizes = Shadow(1.0, 0.0, 1.0, 0.0, 0.0), []
     for board in (flat, away):
-        shade = cast(sharp, Standing(board + [0.0, 0.2, 3.0], normal, CAMERA))
+        shade = cast(sharp, StandingObject(board + [0.0, 0.2, 3.0], normal, CAMERA))
         assert shade is not None
         rows = np.flatnonzero((shade.alpha > 0.3).any(1))
         sizes.append(np.ptp(rows) * shade.pitch)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.deform.binding import NEIGHBOURS, STEEPEST, Binding, bind
-from objectmorpher_core.deform.graph import Graph, build_graph
+from objectmorpher_core.deform.graph import ControlGraph, build_graph
 from tests import shapes
 
 F64 = 1e-9
@@ -15,7 +15,7 @@ CONTROL = shapes.even(shapes.horseshoe(3000), 120)
 GRAPH = build_graph(CONTROL)
 
 
-def slow_bind(points: np.ndarray, p: np.ndarray, graph: Graph) -> Binding:
+def slow_bind(points: np.ndarray, p: np.ndarray, graph: ControlGraph) -> Binding:
     """The twin of `bind` for parts with more than K control points: one point at a time."""
     nodes, weights, gradients = [], [], []
     for x in points:
@@ -118,7 +118,9 @@ def test_coincident_control_points_share_what_they_move():
     graph = build_graph(control)
     for i in range(8):  # itself first
         neighbours[i] = np.roll(neighbours[i], -i)
-    graph = Graph(graph.weights, graph.auxiliary, neighbours, graph.components, graph.mean_spacing)
+    graph = ControlGraph(
+        graph.weights, graph.auxiliary, neighbours, graph.components, graph.mean_spacing
+    )
     points = np.array([[0.0, 0, 0], [1e-200, 0, 0], [1e-9, 0, 0], [0.2, 0.1, 0], [1, 0, 0]])
     binding = bind(points, control, graph)
     assert np.isfinite(binding.weights).all() and np.isfinite(binding.weight_gradients).all()

@@ -7,7 +7,7 @@ import numpy as np
 from objectmorpher_core.base.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
 from objectmorpher_core.deform.binding import Binding, bind
 from objectmorpher_core.deform.faithful_skinning import skin_faithful, stretches
-from objectmorpher_core.deform.graph import Graph, build_graph
+from objectmorpher_core.deform.graph import ControlGraph, build_graph
 from objectmorpher_core.deform.skinning import Motion, Skinned
 from tests import shapes
 
@@ -19,7 +19,7 @@ BINDING = bind(SURFACE, CONTROL, GRAPH)
 
 
 def slow_skin_faithful(
-    points: np.ndarray, binding: Binding, motion: Motion, graph: Graph
+    points: np.ndarray, binding: Binding, motion: Motion, graph: ControlGraph
 ) -> Skinned:
     """The twin of `skin_faithful`: Eq. 5, a line each, for all points at once."""
     own, weights = binding.control_points, binding.weights
@@ -40,7 +40,7 @@ def slow_skin_faithful(
     return Skinned(moved, matrices_from_quats(blended) * scale[:, None, None])
 
 
-def _two_nodes() -> tuple[Binding, Graph, np.ndarray]:
+def _two_nodes() -> tuple[Binding, ControlGraph, np.ndarray]:
     """A point in the middle between two control points."""
     control = np.array([[0.0, 0, 0], [1.0, 0, 0]])
     weights, nodes = np.array([[0.5, 0.5, 0, 0]]), np.array([[0, 1, 0, 0]], np.int32)

@@ -10,7 +10,7 @@ from objectmorpher_core.deform.graph import (
     FALLOFF,
     LINK_RADIUS,
     REACH,
-    Graph,
+    ControlGraph,
     build_graph,
 )
 from objectmorpher_core.document.model import DeformSettings
@@ -48,7 +48,7 @@ def _distances(points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points[:, None] - points[None], axis=-1)
 
 
-def _geodesics(graph: Graph) -> np.ndarray:
+def _geodesics(graph: ControlGraph) -> np.ndarray:
     """(M, M) all distances along the surface."""
     return np.stack([graph.distances_from(i) for i in range(len(graph.components))])
 

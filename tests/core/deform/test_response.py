@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from objectmorpher_core.base.arrays import F64
-from objectmorpher_core.deform.constraints import HeldResponse, Patch
+from objectmorpher_core.deform.constraints import HeldResponse, StiffnessPatch
 from objectmorpher_core.deform.response import (
     DenseResponse,
     SparseResponse,
@@ -75,7 +75,7 @@ def _held(laplacian: F64, rows: F64, compliance: F64, added: F64) -> HeldRespons
     patch = added[np.ix_(nodes, nodes)].copy()
     patch[0, 0] -= 1.0  # takes the ground back
     response = DenseResponse(csr_array(_grounded(laplacian)))
-    return HeldResponse(response, Patch(nodes, patch), csr_array(rows), compliance)
+    return HeldResponse(response, StiffnessPatch(nodes, patch), csr_array(rows), compliance)
 
 
 def _saddle(matrix: F64, rows: F64, compliance: F64, forces: F64, targets: F64) -> F64:

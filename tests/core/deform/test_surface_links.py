@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from objectmorpher_core.deform.graph import LINK_RADIUS, Graph, Surface, build_graph
+from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph, SolidSurface, build_graph
 from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
@@ -34,7 +34,7 @@ class Capsule:
         along = np.clip((points - self.a) @ axis / max(axis @ axis, 1e-30), 0, 1)
         return np.linalg.norm(points - self.a - along[:, None] * axis, axis=1) - self.radius
 
-    def sample(self, count: int, rng: np.random.Generator) -> Surface:
+    def sample(self, count: int, rng: np.random.Generator) -> SolidSurface:
         axis = self.b - self.a
         length = np.linalg.norm(axis)
         ball = shapes.ball(count, seed=int(rng.integers(1 << 30))) * 2
@@ -45,14 +45,14 @@ class Capsule:
         normals = np.where(is_side, side, ball)
         ends = np.where(along[:, None] > 0, self.b, self.a)
         means = np.where(is_side, self.a + rng.random((count, 1)) * axis, ends)
-        return Surface(means + self.radius * normals, normals)
+        return SolidSurface(means + self.radius * normals, normals)
 
 
 def _capsule(a, b, radius: float) -> Capsule:
     return Capsule(np.array(a, float), np.array(b, float), radius)
 
 
-def _union(*parts: Capsule, count: int = GAUSSIANS) -> Surface:
+def _union(*parts: Capsule, count: int = GAUSSIANS) -> SolidSurface:
     """The common surface of all parts, with sharp creases where they meet."""
     rng = np.random.default_rng(0)
     areas = np.array([c.radius * (np.linalg.norm(c.b - c.a) + 2 * c.radius) for c in parts])
@@ -64,14 +64,14 @@ def _union(*parts: Capsule, count: int = GAUSSIANS) -> Surface:
         means.append(piece.means[is_outer])
         normals.append(piece.normals[is_outer])
     chosen = np.sort(rng.permutation(sum(map(len, means)))[:count])
-    return Surface(np.concatenate(means)[chosen], np.concatenate(normals)[chosen])
+    return SolidSurface(np.concatenate(means)[chosen], np.concatenate(normals)[chosen])
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A surface of several limbs."""
 
-    surface: Surface
+    surface: SolidSurface
     limbs: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # see `_false_links`
     count: int = 512  # control points
 
@@ -128,13 +128,13 @@ def _cup(gap: float) -> Scene:
     def wall(radius, side, low, count):
         angle, z = rng.uniform(0, 2 * np.pi, count), rng.uniform(low, height, count)
         n = np.column_stack([np.cos(angle), np.sin(angle), 0 * z])
-        return Surface(radius * n + np.column_stack([0 * z, 0 * z, z]), side * n)
+        return SolidSurface(radius * n + np.column_stack([0 * z, 0 * z, z]), side * n)
 
     def disc(z, side, low, high, count):
         angle = rng.uniform(0, 2 * np.pi, count)
         radius = np.sqrt(rng.uniform(low**2, high**2, count))
         x, y = radius * np.cos(angle), radius * np.sin(angle)
-        return Surface(np.column_stack([x, y, z + 0 * x]), np.tile([0.0, 0, side], (count, 1)))
+        return SolidSurface(np.column_stack([x, y, z + 0 * x]), np.tile([0.0, 0, side], (count, 1)))
 
     cup = [wall(outer, 1, 0, 12_000), wall(inner, -1, r, 10_000), disc(0, -1, 0, outer, 1200),
            disc(r, 1, 0, inner, 800), disc(height, 1, inner, outer, 400)]  # fmt: skip
@@ -142,7 +142,7 @@ def _cup(gap: float) -> Scene:
     is_clear = [np.min([h.distance(s.means) for h in handle], axis=0) > 0 for s in cup]
     is_clear.append(np.hypot(grip.means[:, 0], grip.means[:, 1]) > outer)
     parts = list(zip([*cup, grip], is_clear, strict=True))
-    surface = Surface(*(np.concatenate([getattr(s, k)[c] for s, c in parts])
+    surface = SolidSurface(*(np.concatenate([getattr(s, k)[c] for s, c in parts])
                         for k in ("means", "normals")))  # fmt: skip
 
     def limbs(p):
@@ -172,7 +172,7 @@ def _scene(name: str) -> tuple[Scene, np.ndarray]:
     return scene, shapes.even(scene.surface.means, scene.count)
 
 
-def _false_links(graph: Graph, points: np.ndarray, scene: Scene, reach: float) -> int:
+def _false_links(graph: ControlGraph, points: np.ndarray, scene: Scene, reach: float) -> int:
     """Links between two limbs although the way along the surface is longer than `reach`.
 
     `scene.limbs` numbers the limb of each point, -1 for none, and tells how far along the
@@ -203,7 +203,9 @@ def test_limbs_across_a_gap_are_not_linked(name):
 def test_size_and_motion_of_the_object_do_not_change_what_is_a_gap(name, scale):
     scene, points = _scene(name)
     turn, shift = shapes.rotation(3), scale * np.array([5.0, -2.0, 9.0])
-    surface = Surface(scale * scene.surface.means @ turn.T + shift, scene.surface.normals @ turn.T)
+    surface = SolidSurface(
+        scale * scene.surface.means @ turn.T + shift, scene.surface.normals @ turn.T
+    )
     moved = build_graph(scale * points @ turn.T + shift, surface=surface).weights
     weights = build_graph(points, surface=scene.surface).weights
     # 1e-7: coordinates of size 10 keep distances of size 0.1 to 1e-14 / 0.1, squared in exp
@@ -217,7 +219,7 @@ def test_the_papers_graph_knows_no_surface(name):
     assert (weights != build_graph(points, FAITHFUL).weights).nnz == 0
 
 
-def _kept(surface: Surface, count: int = 512) -> float:
+def _kept(surface: SolidSurface, count: int = 512) -> float:
     """Share of the links that the rule leaves; the object must stay in as many parts."""
     points = shapes.even(surface.means, count)
     ours, plain = build_graph(points, surface=surface), build_graph(points)
@@ -226,23 +228,23 @@ def _kept(surface: Surface, count: int = 512) -> float:
     return ours.link_count / plain.link_count
 
 
-def _ball(count: int = GAUSSIANS) -> Surface:
+def _ball(count: int = GAUSSIANS) -> SolidSurface:
     points = shapes.ball(count)
-    return Surface(points, 2 * points)
+    return SolidSurface(points, 2 * points)
 
 
-def _bar() -> Surface:
+def _bar() -> SolidSurface:
     points = shapes.bar(GAUSSIANS)
     sides = np.column_stack([np.zeros(len(points)), points[:, 1:]])
     sides[np.abs(sides) < np.abs(sides).max(1, keepdims=True)] = 0
-    return Surface(points, sides / np.linalg.norm(sides, axis=1, keepdims=True))
+    return SolidSurface(points, sides / np.linalg.norm(sides, axis=1, keepdims=True))
 
 
-def _horseshoe(count: int = GAUSSIANS) -> Surface:
+def _horseshoe(count: int = GAUSSIANS) -> SolidSurface:
     points = shapes.horseshoe(count)
     middle = points * [1, 1, 0]
     normals = points - 0.4 * middle / np.linalg.norm(middle, axis=1, keepdims=True)
-    return Surface(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    return SolidSurface(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 @pytest.mark.parametrize("surface", [_ball(), _bar(), _horseshoe()], ids=["ball", "bar", "shoe"])
@@ -260,7 +262,7 @@ def test_few_gaussians_cut_nothing(surface, count):
 @pytest.mark.parametrize("gaussians", [5000, 16_000, 100_000])
 def test_limbs_stay_on_the_body_they_grow_from(gaussians):
     own = five_limbs(gaussians, 4).gaussians
-    assert _kept(Surface(own.means, own.normals)) > 0.98
+    assert _kept(SolidSurface(own.means, own.normals)) > 0.98
 
 
 @pytest.mark.parametrize("name", shapes.MASKS)
@@ -268,7 +270,7 @@ def test_limbs_stay_on_the_body_they_grow_from(gaussians):
 def test_a_lifted_silhouette_stays_in_as_many_parts(name, gaussians):
     lifted = shapes.scene(name, gaussians).lifted
     is_body = lifted.texture.solidity > 0.5
-    surface = Surface(lifted.gaussians.means[is_body], lifted.gaussians.normals[is_body])
+    surface = SolidSurface(lifted.gaussians.means[is_body], lifted.gaussians.normals[is_body])
     assert _kept(surface, 128) > 0.97
     assert _kept(surface, 512) > 0.97
 
@@ -293,7 +295,7 @@ def test_the_two_sides_of_a_sheet_stay_joined(thickness):
     flat = rng.uniform(-0.5, 0.5, (GAUSSIANS, 2)) * [1.2, 0.8]
     means = np.column_stack([flat, 0.5 * thickness * side])
     normals = np.column_stack([0 * flat, side])
-    assert _kept(Surface(means, normals)) > 0.99
+    assert _kept(SolidSurface(means, normals)) > 0.99
 
 
 @pytest.mark.parametrize("noise", [0.3, 0.7, 10.0])
@@ -301,18 +303,18 @@ def test_rough_normals_cut_nothing_apart(noise):
     ball = _ball()
     normals = ball.normals + noise * np.random.default_rng(0).normal(size=ball.normals.shape)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    assert _kept(Surface(ball.means, normals)) > 0.98
+    assert _kept(SolidSurface(ball.means, normals)) > 0.98
 
 
 def test_a_surface_without_gaussians_says_nothing():
     points = shapes.even(shapes.ball(2000), 100)
-    none = Surface(np.empty((0, 3)), np.empty((0, 3)))
+    none = SolidSurface(np.empty((0, 3)), np.empty((0, 3)))
     assert (build_graph(points, surface=none).weights != build_graph(points).weights).nnz == 0
 
 
 def test_coincident_gaussians_and_control_points_break_nothing():
     ball = _ball(4000)
-    twice = Surface(np.repeat(ball.means, 2, axis=0), np.repeat(ball.normals, 2, axis=0))
+    twice = SolidSurface(np.repeat(ball.means, 2, axis=0), np.repeat(ball.normals, 2, axis=0))
     points = np.repeat(shapes.even(ball.means, 60), 2, axis=0)
     graph = build_graph(points, surface=twice)
     assert graph.component_count == 1

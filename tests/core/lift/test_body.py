@@ -8,9 +8,9 @@ import pytest
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
 from objectmorpher_core.lift.relief.mirror import MirrorAxis
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder
 
@@ -19,17 +19,17 @@ CAMERA = Camera.from_fov(640, 480)
 masks = pytest.mark.parametrize("name", shapes.MASKS)
 
 
-def _body(name: str, **settings) -> Body:
-    outline = Silhouette.of(shapes.mask(name))
-    return Body.of(outline, shapes.camera(), LiftSettings(**settings))
+def _body(name: str, **settings) -> ReliefBody:
+    outline = ReliefSilhouette.of(shapes.mask(name))
+    return ReliefBody.of(outline, shapes.camera(), LiftSettings(**settings))
 
 
-def _inside(body: Body) -> F64:
+def _inside(body: ReliefBody) -> F64:
     rows, columns = np.nonzero(body.silhouette.inside)
     return body.silhouette.photo_xy(np.column_stack([columns, rows]).astype(np.float64))
 
 
-def _heights(body: Body, xy: F64) -> tuple[F64, F64, F64]:
+def _heights(body: ReliefBody, xy: F64) -> tuple[F64, F64, F64]:
     return tuple(body.sample(xy, side)[0] for side in (FRONT, BACK, MIDDLE))  # type: ignore
 
 
@@ -75,8 +75,8 @@ def test_an_object_that_need_not_stand_is_not_tilted(name):
 def test_a_prism_has_a_front_and_the_same_front_behind(points):
     """Turned half around: a box has four sides, a cylinder is as round behind."""
     view = View(CAMERA, 15.0)
-    outline = Silhouette.of(view.hull(points))
-    body = Body.of(outline, CAMERA, LiftSettings(horizon=view.horizon))
+    outline = ReliefSilhouette.of(view.hull(points))
+    body = ReliefBody.of(outline, CAMERA, LiftSettings(horizon=view.horizon))
     assert body.standing.prism is not None
     row = outline.shape[0] // 2
     columns = np.flatnonzero(outline.inside[row])[6:-6]
@@ -93,8 +93,8 @@ def test_something_beside_a_prism_is_round_again():
     rows, columns = np.nonzero(mask)
     y, x = np.mgrid[:480, :640] - np.array([rows.mean(), columns.max()])[:, None, None]
     ring = (np.abs(np.hypot(x, 0.8 * y) - 30) < 6) & (x > -2)
-    outline = Silhouette.of(mask | ring)
-    body = Body.of(outline, CAMERA, LiftSettings(horizon=view.horizon))
+    outline = ReliefSilhouette.of(mask | ring)
+    body = ReliefBody.of(outline, CAMERA, LiftSettings(horizon=view.horizon))
     assert body.standing.prism is not None
     at = np.array([[columns.max() + 30.5, rows.mean()]])
     front, back, _ = _heights(body, at)
@@ -106,13 +106,13 @@ def test_a_body_that_looks_the_same_left_and_right_is_as_thick_on_both_sides():
     mask = np.zeros((200, 200), bool)
     mask[40:180, 80:120] = True
     mask[60:76, 30:80] = mask[60:84, 120:170] = True
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     axis = MirrorAxis((1.0, 0.0), 100.0, 1.0, 1.0)
     camera = Camera.from_fov(200, 200)
     xy = np.array([[45.0, 68.0], [155.0, 68.0]])
     gaps = []
     for told in (None, axis):
-        body = Body.of(outline, camera, LiftSettings(is_standing=False), told)
+        body = ReliefBody.of(outline, camera, LiftSettings(is_standing=False), told)
         gaps.append(body.sample(xy, FRONT)[0] - body.sample(xy, BACK)[0])
     assert gaps[0][1] - gaps[0][0] > 3
     assert abs(gaps[1][1] - gaps[1][0]) < 0.5 * (gaps[0][1] - gaps[0][0])

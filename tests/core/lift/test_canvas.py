@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import Matte
-from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, Canvas
+from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, ReliefCanvas
 
 F32 = 1e-5
 HEIGHT, WIDTH = 3 * LEAST_SIDE + 1, 5 * LEAST_SIDE // 2
@@ -18,14 +18,14 @@ MATTE = Matte(
 
 
 def test_what_is_fine_enough_stays_as_it_is():
-    canvas = Canvas.of(MATTE, None, 1.9)
+    canvas = ReliefCanvas.of(MATTE, None, 1.9)
     assert canvas.step == 1
     assert canvas.foreground is MATTE.foreground and canvas.alpha is MATTE.alpha
 
 
 @pytest.mark.parametrize("step", [2, 3])
 def test_a_pixel_is_the_mean_of_its_block(step):
-    canvas = Canvas.of(MATTE, None, step + 0.5)
+    canvas = ReliefCanvas.of(MATTE, None, step + 0.5)
     assert canvas.step == step and tuple(canvas.corner) == (20, -30)
     block = np.s_[7 * step : 8 * step, 5 * step : 6 * step]
     assert canvas.alpha[7, 5] == pytest.approx(MATTE.alpha[block].mean(), abs=F32)
@@ -33,13 +33,13 @@ def test_a_pixel_is_the_mean_of_its_block(step):
 
 
 def test_a_small_picture_is_not_made_smaller():
-    assert max(Canvas.of(MATTE, None, 1000.0).alpha.shape) >= LEAST_SIDE
+    assert max(ReliefCanvas.of(MATTE, None, 1000.0).alpha.shape) >= LEAST_SIDE
 
 
 def test_it_holds_what_is_hidden_beside_the_matte():
     hidden = np.zeros((2000, 1500), bool)
     hidden[1300:1400, 900:1100] = True
-    canvas = Canvas.of(MATTE, hidden, 2.0)
+    canvas = ReliefCanvas.of(MATTE, hidden, 2.0)
     x, y = (np.array([1000, 1350]) - canvas.corner) / canvas.step
     assert canvas.alpha[int(y), int(x)] == 0 and canvas.whole[int(y), int(x)] == 1
     x, y = (np.array([100, 100]) - canvas.corner) / canvas.step

@@ -8,10 +8,10 @@ import pytest
 
 from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.document.model import LiftSettings, Matte
-from objectmorpher_core.lift.relief.canvas import Canvas
+from objectmorpher_core.lift.relief.canvas import ReliefCanvas
 from objectmorpher_core.lift.relief.colours import Colouring, colouring, fill_in, grown
 from objectmorpher_core.lift.relief.mirror import MirrorAxis
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.pipeline import lift_mask
 from tests import shapes
 
@@ -39,7 +39,9 @@ def _coloured(rgb: F32, is_mirrored: bool, hidden: Mask | None = None, axis=None
     inside = _away() < 80
     shown = inside if hidden is None else inside & ~hidden
     matte = Matte(0, 0, shown.astype(np.float32), rgb)
-    return colouring(Canvas.of(matte), Silhouette.of(inside), SPACING, is_mirrored, axis)
+    return colouring(
+        ReliefCanvas.of(matte), ReliefSilhouette.of(inside), SPACING, is_mirrored, axis
+    )
 
 
 def _at(colours: Colouring, xy: F64, is_back: bool) -> F32:
@@ -109,7 +111,7 @@ def test_the_size_of_the_photo_does_not_change_the_colours():
     large = cv2.resize(_green(), (3 * SIDE, 3 * SIDE))
     mask = cv2.resize(inside.astype(np.uint8), (3 * SIDE, 3 * SIDE)) > 0
     matte = Matte(0, 0, mask.astype(np.float32), np.asarray(large, np.float32))
-    other = colouring(Canvas.of(matte), Silhouette.of(mask), 3 * SPACING, True, None)
+    other = colouring(ReliefCanvas.of(matte), ReliefSilhouette.of(mask), 3 * SPACING, True, None)
     xy = _circle(50)
     assert np.abs(_at(small, xy, False) - _at(other, 3 * xy, False)).max() < 0.03
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.relief.body import FRONT, Body
+from objectmorpher_core.lift.relief.body import FRONT, ReliefBody
 from objectmorpher_core.lift.relief.cuts import REACH, find_cuts
 from objectmorpher_core.lift.relief.fusion import fused
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.spreading import spread
 from objectmorpher_research.training.shapes.sample import make_sample
 from tests.core.lift.test_fusion import SIDE, camera_of, truth
@@ -73,7 +73,9 @@ def body_with_arm():
         sample = make_sample(seed, families=("figures",))
         apart = (sample.depth - sample.thickness > 0.06) & sample.mask
         if sample.edge.sum() > 60 and apart.sum() > 400:
-            body = Body.of(Silhouette.of(sample.mask), camera_of(sample), LiftSettings())
+            body = ReliefBody.of(
+                ReliefSilhouette.of(sample.mask), camera_of(sample), LiftSettings()
+            )
             return sample, apart, body
     raise AssertionError("no figure has an arm before it")
 

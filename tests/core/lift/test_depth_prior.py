@@ -12,13 +12,13 @@ from objectmorpher_core import models
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import LiftedObject, LiftSettings
-from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
+from objectmorpher_core.lift import LiftSubject
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
 from objectmorpher_core.lift.relief.depth_look import box_around
-from objectmorpher_core.lift.relief.depth_prior import Seen, align, follow, membrane
+from objectmorpher_core.lift.relief.depth_prior import NetworkDepth, align, follow, membrane
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.rethicken import with_thickness
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes
@@ -48,13 +48,13 @@ def lifted(settings: LiftSettings, pixels: np.ndarray | None = None) -> LiftedOb
     return lift_mask(own, CAMERA, inside, "relief", settings)[1]
 
 
-def body(name: str = "ellipse", thickness: float = 1.0) -> Body:
-    outline = Silhouette.of(shapes.mask(name, WIDTH, HEIGHT))
-    return Body.of(outline, CAMERA, LiftSettings(thickness=thickness))
+def body(name: str = "ellipse", thickness: float = 1.0) -> ReliefBody:
+    outline = ReliefSilhouette.of(shapes.mask(name, WIDTH, HEIGHT))
+    return ReliefBody.of(outline, CAMERA, LiftSettings(thickness=thickness))
 
 
-def seen_from(inverse: F64) -> Seen:
-    return Seen(np.asarray(inverse, np.float32), (0, 0, WIDTH, HEIGHT))
+def seen_from(inverse: F64) -> NetworkDepth:
+    return NetworkDepth(np.asarray(inverse, np.float32), (0, 0, WIDTH, HEIGHT))
 
 
 def lumpy(name: str = "ellipse") -> F64:
@@ -222,8 +222,8 @@ def test_an_installed_network_looks_at_the_object_and_around_it(tmp_path: Path) 
     part = lumpy()[box[1] : box[3], box[0] : box[2]].astype(np.float32)
     install(tmp_path, constant(part))
     matte = build_matte(shapes.picture(inside), inside, 20)
-    subject = Subject(shapes.picture(inside), CAMERA, inside, matte)
-    told = ReliefLifter(lambda pixels, mask: Seen(part, box)).lift(subject, AS_SEEN, silent)
+    subject = LiftSubject(shapes.picture(inside), CAMERA, inside, matte)
+    told = ReliefLifter(lambda pixels, mask: NetworkDepth(part, box)).lift(subject, AS_SEEN, silent)
     assert same(told, ReliefLifter().lift(subject, AS_SEEN, silent))
     assert not same(told, ReliefLifter().lift(subject, ALONE, silent))
 

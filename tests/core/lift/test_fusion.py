@@ -10,13 +10,13 @@ import pytest
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
-from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 from objectmorpher_core.lift.relief.shape_look import SeenShape
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.segment.matting.matte import build_matte
 from objectmorpher_research.training import shape_eval
 from objectmorpher_research.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
@@ -40,11 +40,13 @@ def truth(sample: Sample, error: float = SURE) -> SeenShape:
     )  # fmt: skip
 
 
-def body_of(sample: Sample, **settings) -> Body:
-    return Body.of(Silhouette.of(sample.mask), camera_of(sample), LiftSettings(**settings))
+def body_of(sample: Sample, **settings) -> ReliefBody:
+    return ReliefBody.of(
+        ReliefSilhouette.of(sample.mask), camera_of(sample), LiftSettings(**settings)
+    )
 
 
-def surfaces(body: Body, sample: Sample) -> Surfaces:
+def surfaces(body: ReliefBody, sample: Sample) -> Surfaces:
     """In crop units."""
     found = surfaces_of(body, sample.mask)
     return Surfaces(found.front / SIDE, found.thickness / SIDE)
@@ -115,8 +117,8 @@ def test_a_ball_closes_at_its_outline_and_a_slab_ends_there():
     none, crop = np.zeros(mask.shape, np.float32), Crop(0, 0, SIDE, tangents)
     ball = SeenShape(crop, mask, half, 2 * half, 2 * half, out, none, sure, sure)
     slab = SeenShape(crop, mask, none, even, even, facing, none, sure, sure)
-    outline = Silhouette.of(mask)
-    body = Body.of(outline, camera, LiftSettings())
+    outline = ReliefSilhouette.of(mask)
+    body = ReliefBody.of(outline, camera, LiftSettings())
     rims = []
     for seen in (ball, slab):
         found = fused(body, seen, camera, 1.0, 1.0)
@@ -139,7 +141,7 @@ def test_the_lifter_takes_what_is_seen_and_the_photo_stays_the_photo():
     sample = make_sample(7, families=("boxes",))
     camera = camera_of(sample)
     matte = build_matte(sample.rgb, sample.mask, 12)
-    subject = Subject(sample.rgb, camera, sample.mask, matte)
+    subject = LiftSubject(sample.rgb, camera, sample.mask, matte)
     lifter = ReliefLifter(lambda *_: None, see=lambda *_: truth(sample))
     lifted = lifter.lift(subject, LiftSettings(3000), silent)
     at = camera.project(lifted.world_points(lifted.gaussians.means))

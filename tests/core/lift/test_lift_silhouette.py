@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.lift.relief.silhouette import GRID, Silhouette, lower_hull
+from objectmorpher_core.lift.relief.silhouette import GRID, ReliefSilhouette, lower_hull
 from tests import shapes
 
 EXACT = 1e-9
@@ -21,14 +21,14 @@ def _disc(radius: float, scale: float = 1.0) -> Mask:
 
 @masks
 def test_the_grid_and_the_photo_are_told_apart_and_together(name):
-    outline = Silhouette.of(shapes.mask(name))
+    outline = ReliefSilhouette.of(shapes.mask(name))
     xy = np.random.default_rng(0).uniform(-50, 200, (30, 2))
     assert np.abs(outline.photo_xy(outline.grid_xy(xy)) - xy).max() < EXACT
 
 
 def test_it_is_the_mask_itself_where_that_is_small():
     mask = shapes.mask("star")
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     assert outline.cell == 1
     rows, columns = np.nonzero(outline.inside)
     x, y = outline.photo_xy(np.column_stack([columns, rows]).astype(float)).T
@@ -40,7 +40,7 @@ def test_it_is_the_mask_itself_where_that_is_small():
 @pytest.mark.parametrize("side", [700, 1333, 2600])
 def test_a_large_mask_keeps_its_area_and_its_place(side):
     mask = shapes.mask("star", side, round(0.75 * side))
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     assert max(outline.shape) <= GRID + 3
     assert outline.inside.sum() * outline.cell**2 == pytest.approx(mask.sum(), rel=0.01)
     rows, columns = np.nonzero(outline.inside)
@@ -51,12 +51,12 @@ def test_a_large_mask_keeps_its_area_and_its_place(side):
 
 @masks
 def test_the_outermost_ring_is_outside(name):
-    inside = Silhouette.of(shapes.mask(name)).inside
+    inside = ReliefSilhouette.of(shapes.mask(name)).inside
     assert not (inside[0].any() or inside[-1].any() or inside[:, 0].any() or inside[:, -1].any())
 
 
 def test_the_depth_in_a_disc_is_the_way_to_its_rim():
-    outline = Silhouette.of(_disc(40))
+    outline = ReliefSilhouette.of(_disc(40))
     y, x = outline.cells[..., 1], outline.cells[..., 0]
     middle = (np.array(outline.shape) - 1) / 2
     expected = 40 - np.hypot(x - middle[1], y - middle[0])
@@ -66,7 +66,7 @@ def test_the_depth_in_a_disc_is_the_way_to_its_rim():
 def test_every_place_in_a_strip_has_the_strips_radius():
     mask = np.zeros((60, 240), bool)
     mask[20:41, 20:220] = True
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     inner = np.zeros_like(outline.inside)
     inner[2:-2, 15:-15] = True
     assert np.abs(outline.radius[inner & outline.inside] - 10.5).max() <= 0.5
@@ -74,7 +74,7 @@ def test_every_place_in_a_strip_has_the_strips_radius():
 
 @masks
 def test_a_disc_that_covers_a_place_is_no_smaller_than_the_way_to_the_outline(name):
-    outline = Silhouette.of(shapes.mask(name))
+    outline = ReliefSilhouette.of(shapes.mask(name))
     assert (outline.radius >= outline.depth - EXACT).all()
     assert outline.radius.max() <= outline.depth.max() + EXACT
 
@@ -84,7 +84,7 @@ def test_an_open_side_is_no_outline(turns):
     """A strip that leaves the photo is as deep at the frame as in its middle."""
     mask = np.zeros((200, 200), bool)
     mask[:150, 90:111] = True
-    outline = Silhouette.of(np.rot90(mask, turns))
+    outline = ReliefSilhouette.of(np.rot90(mask, turns))
     assert sum(outline.is_open) == 1
     depth = np.rot90(outline.depth, -turns)
     assert depth[1].max() == pytest.approx(10.5, abs=0.5)
@@ -92,7 +92,7 @@ def test_an_open_side_is_no_outline(turns):
 
 
 def test_the_contour_runs_along_the_rim_once():
-    outline = Silhouette.of(_disc(40))
+    outline = ReliefSilhouette.of(_disc(40))
     middles, offsets = outline.contour
     middle = middles.mean(0)
     assert np.abs(np.hypot(*(middles - middle).T) - 40).max() < 1.5  # px
@@ -102,7 +102,7 @@ def test_the_contour_runs_along_the_rim_once():
 
 
 def test_the_contour_of_a_ring_runs_around_its_hole_too():
-    middles, _ = Silhouette.of(shapes.mask("ring")).contour
+    middles, _ = ReliefSilhouette.of(shapes.mask("ring")).contour
     gap = np.hypot(*(middles - [80, 60]).T)
     assert (gap < 25).sum() > 60
     assert (gap > 40).sum() > 100
@@ -110,7 +110,7 @@ def test_the_contour_of_a_ring_runs_around_its_hole_too():
 
 def test_the_contour_runs_along_the_cut_where_the_object_leaves_the_photo():
     """There it is sawn off, not hollow."""
-    outline = Silhouette.of(shapes.mask("frame"))
+    outline = ReliefSilhouette.of(shapes.mask("frame"))
     middles, offsets = outline.contour
     grid = outline.grid_xy(middles)
     h, w = outline.shape
@@ -119,7 +119,7 @@ def test_the_contour_runs_along_the_cut_where_the_object_leaves_the_photo():
 
 
 def test_outward_is_away_from_a_disc():
-    outline = Silhouette.of(_disc(40))
+    outline = ReliefSilhouette.of(_disc(40))
     angle = np.linspace(0, 2 * np.pi, 37)
     away = np.column_stack([np.cos(angle), np.sin(angle)])
     middle = outline.photo_xy((np.array(outline.shape[::-1]) - 1)[None] / 2)
@@ -130,7 +130,7 @@ def test_outward_is_away_from_a_disc():
 
 
 def test_the_lower_outline_of_a_disc_is_its_lower_half():
-    x, y = Silhouette.of(_disc(40)).lower_outline
+    x, y = ReliefSilhouette.of(_disc(40)).lower_outline
     middle = 61 / 2 + 20
     assert (np.diff(x) > 0).all()
     expected = middle + np.sqrt(np.maximum(40**2 - (x - middle) ** 2, 0))
@@ -150,7 +150,7 @@ def test_a_hull_is_below_everything_and_bends_one_way():
 def test_one_pixel_is_a_silhouette():
     mask = np.zeros((30, 40), bool)
     mask[10, 20] = True
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     assert outline.inside.sum() == 1
     assert outline.depth.max() > 0
 
@@ -158,4 +158,4 @@ def test_one_pixel_is_a_silhouette():
 def test_a_hair_of_a_huge_photo_is_not_lost():
     mask = np.zeros((900, 2000), bool)
     mask[450, 100:1900] = True  # a seventh of a cell
-    assert Silhouette.of(mask).inside.any()
+    assert ReliefSilhouette.of(mask).inside.any()

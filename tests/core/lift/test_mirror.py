@@ -8,7 +8,7 @@ import pytest
 
 from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.document.model import Matte
-from objectmorpher_core.lift.relief.canvas import Canvas
+from objectmorpher_core.lift.relief.canvas import ReliefCanvas
 from objectmorpher_core.lift.relief.mirror import MirrorAxis, find_axis
 
 EXACT = 1e-9
@@ -44,7 +44,7 @@ def _turned(picture: F32, degrees: float) -> F32:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_symmetric_picture_has_its_axis(seed, degrees):
     alpha, rgb = _turned(_body(), degrees), _turned(_symmetric(_noise(seed)), degrees)
-    axis = find_axis(Canvas.of(Matte(100, 50, alpha, rgb)))
+    axis = find_axis(ReliefCanvas.of(Matte(100, 50, alpha, rgb)))
     assert axis.is_sure
     angle = np.degrees(np.arctan2(axis.normal[1], axis.normal[0]))
     assert angle == pytest.approx(degrees, abs=1)
@@ -54,7 +54,7 @@ def test_a_symmetric_picture_has_its_axis(seed, degrees):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_noise_has_no_axis_however_symmetric_its_outline(seed):
-    axis = find_axis(Canvas.of(Matte(0, 0, _body(), _noise(seed))))
+    axis = find_axis(ReliefCanvas.of(Matte(0, 0, _body(), _noise(seed))))
     assert axis.overlap > 0.85
     assert not axis.is_sure
 
@@ -65,7 +65,7 @@ def test_a_lopsided_outline_has_no_axis_however_plain_its_colours():
         np.float32
     )
     rgb = np.full((SIZE, SIZE, 3), 0.5, np.float32)
-    assert not find_axis(Canvas.of(Matte(0, 0, alpha, rgb))).is_sure
+    assert not find_axis(ReliefCanvas.of(Matte(0, 0, alpha, rgb))).is_sure
 
 
 def test_what_is_hidden_belongs_to_the_outline_but_its_colours_tell_nothing():
@@ -74,16 +74,16 @@ def test_what_is_hidden_belongs_to_the_outline_but_its_colours_tell_nothing():
     hidden = np.zeros((SIZE, SIZE), bool)
     hidden[100:, 140:] = alpha[100:, 140:] > 0.5
     alpha[hidden], rgb[hidden] = 0, [1, 0, 1]
-    assert not find_axis(Canvas.of(Matte(0, 0, alpha, rgb))).is_sure
-    axis = find_axis(Canvas.of(Matte(0, 0, alpha, rgb), hidden))
+    assert not find_axis(ReliefCanvas.of(Matte(0, 0, alpha, rgb))).is_sure
+    axis = find_axis(ReliefCanvas.of(Matte(0, 0, alpha, rgb), hidden))
     assert axis.is_sure
     assert axis.offset == pytest.approx(SIZE / 2, abs=0.02 * SIZE)
 
 
 def test_a_photo_of_another_size_has_the_same_axis():
-    one = find_axis(Canvas.of(Matte(0, 0, _body(), _symmetric(_noise(1)))))
+    one = find_axis(ReliefCanvas.of(Matte(0, 0, _body(), _symmetric(_noise(1)))))
     large = cv2.resize(_symmetric(_noise(1)), (3 * SIZE, 3 * SIZE))
-    three = find_axis(Canvas.of(Matte(0, 0, _body(3 * SIZE), np.asarray(large, np.float32))))
+    three = find_axis(ReliefCanvas.of(Matte(0, 0, _body(3 * SIZE), np.asarray(large, np.float32))))
     assert three.offset == pytest.approx(3 * one.offset, rel=0.01)
     assert three.normal == one.normal
 
@@ -100,6 +100,6 @@ def test_a_mirror_image_of_a_mirror_image_is_the_place_itself():
 @pytest.mark.parametrize("shape", [(1, 9), (9, 1), (3, 3)])
 def test_a_picture_of_few_pixels_has_an_answer(shape):
     axis = find_axis(
-        Canvas.of(Matte(0, 0, np.ones(shape, np.float32), np.ones((*shape, 3), np.float32)))
+        ReliefCanvas.of(Matte(0, 0, np.ones(shape, np.float32), np.ones((*shape, 3), np.float32)))
     )
     assert np.isfinite(axis.offset)

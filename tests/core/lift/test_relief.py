@@ -14,8 +14,8 @@ from objectmorpher_core.base.progress import Cancelled
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import LiftedObject, LiftSettings
 from objectmorpher_core.lift import BACKENDS, LiftError, load
-from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.thickness import FULLNESS, RIM_SLOPE
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import signed_distance
@@ -40,7 +40,7 @@ def _heights(scene: shapes.Scene) -> np.ndarray:
     lifted = scene.lifted
     assert lifted.middle is not None
     world = lifted.world_points(lifted.gaussians.means.astype(np.float64))
-    unit = 1 / Silhouette.of(scene.mask).extent  # world units per px: the object is 1 wide
+    unit = 1 / ReliefSilhouette.of(scene.mask).extent  # world units per px: the object is 1 wide
     return (lifted.middle[:, 0] - world[:, 2]) / unit
 
 
@@ -251,8 +251,8 @@ def test_a_box_has_walls_and_a_back_of_its_own():
 @pytest.mark.parametrize("name", [name for name in shapes.MASKS if name != "frame"])
 def test_what_is_round_has_hardly_any_walls(name):
     texture = shapes.scene(name, 3000).lifted.texture
-    outline = Silhouette.of(shapes.mask(name))
-    body = Body.of(outline, shapes.camera(), LiftSettings())
+    outline = ReliefSilhouette.of(shapes.mask(name))
+    body = ReliefBody.of(outline, shapes.camera(), LiftSettings())
     middles, _ = outline.contour
     size = shapes.mask(name).shape[::-1]
     middles = middles[((middles > 0) & (middles < size)).all(1)]  # not where the frame cuts it
@@ -319,6 +319,6 @@ def test_the_shape_is_the_same_far_from_and_near_the_start_of_a_huge_photo():
     small = shapes.mask("star")
     large = np.zeros((700, 900), bool)
     large[290:410, 370:530] = small
-    near, far = Silhouette.of(small), Silhouette.of(large)
+    near, far = ReliefSilhouette.of(small), ReliefSilhouette.of(large)
     assert np.array_equal(near.inside, far.inside)
     assert (far.left - near.left, far.top - near.top) == (370, 290)

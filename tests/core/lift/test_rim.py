@@ -4,11 +4,11 @@ import numpy as np
 import shapes
 
 from objectmorpher_core.lift.relief.rim import rim_lines
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 
 
 def test_a_line_runs_on_the_outline_whichever_way_it_goes_round():
-    lines = rim_lines(Silhouette.of(shapes.mask("ring", 320, 240)).inside)
+    lines = rim_lines(ReliefSilhouette.of(shapes.mask("ring", 320, 240)).inside)
     assert len(lines) == 2
     for line in lines:
         middle = line.xy.mean(0)

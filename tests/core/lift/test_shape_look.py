@@ -14,7 +14,7 @@ from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import Crop, planes_of
 from objectmorpher_core.lift.relief import shape_look
 from objectmorpher_core.lift.relief.fusion import fused
-from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeNet
+from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
 from objectmorpher_core.models import shipped
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment import dino_tokens
@@ -34,10 +34,10 @@ MOST = 12e6  # bytes
 
 
 @pytest.fixture(scope="module")
-def net() -> ShapeNet:
+def net() -> ShapeModel:
     if (reason := shape_look.missing()) is not None:
         pytest.skip(reason)
-    return ShapeNet(shipped.shape_network())
+    return ShapeModel(shipped.shape_network())
 
 
 @cache
@@ -45,7 +45,7 @@ def sample(seed: int) -> Sample:
     return make_sample(seed)
 
 
-def seen(net: ShapeNet, one: Sample) -> SeenShape:
+def seen(net: ShapeModel, one: Sample) -> SeenShape:
     crop = Crop(0, 0, len(one.mask), one.tangents)
     tokens = dino_tokens.shared().inner_tokens(one.rgb)
     return net.look(planes_of(one.rgb, one.mask, one.tangents), tokens, one.mask, crop)

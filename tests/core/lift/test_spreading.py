@@ -11,9 +11,15 @@ from scipy.spatial import cKDTree
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, Body
-from objectmorpher_core.lift.relief.silhouette import Silhouette
-from objectmorpher_core.lift.relief.spreading import BRIM, MIN_SPACING, PACKING, Surface, spread
+from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
+from objectmorpher_core.lift.relief.spreading import (
+    BRIM,
+    MIN_SPACING,
+    PACKING,
+    SurfacePoints,
+    spread,
+)
 from tests import shapes
 from tests.core.lift.standing_things import Box, View
 
@@ -23,20 +29,20 @@ masks = pytest.mark.parametrize("name", [*shapes.MASKS, "box"])
 
 
 @cache
-def _body(name: str) -> Body:
+def _body(name: str) -> ReliefBody:
     if name == "box":
         view = View(Camera.from_fov(320, 240), 15.0)
-        outline = Silhouette.of(view.hull(Box(view.ahead, angle=30.0).points))
-        return Body.of(outline, view.camera, LiftSettings(horizon=view.horizon))
-    return Body.of(Silhouette.of(shapes.mask(name)), shapes.camera(), LiftSettings())
+        outline = ReliefSilhouette.of(view.hull(Box(view.ahead, angle=30.0).points))
+        return ReliefBody.of(outline, view.camera, LiftSettings(horizon=view.horizon))
+    return ReliefBody.of(ReliefSilhouette.of(shapes.mask(name)), shapes.camera(), LiftSettings())
 
 
 @cache
-def _spread(name: str, count: int = 3000) -> tuple[Surface, float]:
+def _spread(name: str, count: int = 3000) -> tuple[SurfacePoints, float]:
     return spread(_body(name), count, BAND, np.random.default_rng(0))
 
 
-def _points(surface: Surface) -> F64:
+def _points(surface: SurfacePoints) -> F64:
     return np.column_stack([surface.xy, surface.height])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.arrays import F64, Mask
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.thickness import FULL_BODY, FULLNESS, RIM_SLOPE, Thickness
 from tests import shapes
 
@@ -29,7 +29,7 @@ def _disc(radius: float) -> Mask:
 
 
 def _half(mask: Mask, xy: F64) -> F64:
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     return Thickness.of(outline).sample(outline.grid_xy(xy), outline.cell)[0]
 
 
@@ -76,8 +76,8 @@ def test_a_wide_limb_is_thicker_than_a_narrow_one():
 @pytest.mark.parametrize("scale", [2, 5])
 def test_the_same_object_in_a_larger_photo_has_the_same_shape(name, scale):
     small, large = shapes.mask(name), shapes.mask(name, 160 * scale, 120 * scale)
-    y, x = np.nonzero(Silhouette.of(small).depth > 2)
-    outline = Silhouette.of(small)
+    y, x = np.nonzero(ReliefSilhouette.of(small).depth > 2)
+    outline = ReliefSilhouette.of(small)
     xy = outline.photo_xy(np.column_stack([x, y]).astype(np.float64))
     one, many = _half(small, xy), _half(large, scale * xy) / scale
     # Thin parts are finer on a finer grid: half a cell of a limb of six.
@@ -88,8 +88,8 @@ def test_the_same_object_in_a_larger_photo_has_the_same_shape(name, scale):
 @masks
 def test_the_mirror_image_has_the_mirrored_shape(name):
     mask = shapes.mask(name)
-    here = Thickness.of(Silhouette.of(mask))
-    there = Thickness.of(Silhouette.of(mask[:, ::-1]))
+    here = Thickness.of(ReliefSilhouette.of(mask))
+    there = Thickness.of(ReliefSilhouette.of(mask[:, ::-1]))
     assert np.abs(here.square - there.square[:, ::-1]).max() < 1e-6 * here.square.max()
     assert np.abs(here.crease - there.crease[:, ::-1]).max() < 1e-6 * here.crease.max()
 
@@ -97,7 +97,7 @@ def test_the_mirror_image_has_the_mirrored_shape(name):
 @masks
 def test_it_is_thin_at_the_outline_and_nothing_beyond(name):
     mask = shapes.mask(name)
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     thickness = Thickness.of(outline)
     middles, _ = outline.contour
     # but for the cut: the silhouette reaches past the photo's frame there
@@ -111,7 +111,7 @@ def test_it_is_thin_at_the_outline_and_nothing_beyond(name):
 
 @masks
 def test_no_rim_is_steeper_than_the_photo_can_show(name):
-    outline = Silhouette.of(shapes.mask(name))
+    outline = ReliefSilhouette.of(shapes.mask(name))
     y, x = np.nonzero(outline.inside)
     _, slope = Thickness.of(outline).sample(np.column_stack([x, y]).astype(float), outline.cell)
     assert np.linalg.norm(slope, axis=1).max() < 1.2 * FULLNESS * RIM_SLOPE
@@ -119,7 +119,7 @@ def test_no_rim_is_steeper_than_the_photo_can_show(name):
 
 @pytest.mark.parametrize("name", ["disc", "ellipse", "frame", "parts", "ring", "star"])
 def test_the_slope_is_that_of_the_thickness(name):
-    outline = Silhouette.of(shapes.mask(name))
+    outline = ReliefSilhouette.of(shapes.mask(name))
     thickness = Thickness.of(outline)
     y, x = np.nonzero(outline.depth > 3)
     at = np.column_stack([x, y]).astype(np.float64)
@@ -133,7 +133,10 @@ def test_the_slope_is_that_of_the_thickness(name):
 
 def test_parts_do_not_know_of_each_other():
     part = _disc(30)
-    alone, both = Thickness.of(Silhouette.of(part)), Silhouette.of(np.hstack([part, part]))
+    alone, both = (
+        Thickness.of(ReliefSilhouette.of(part)),
+        ReliefSilhouette.of(np.hstack([part, part])),
+    )
     pair = Thickness.of(both)
     side = alone.square.shape[1] - 6
     # A part of a larger whole is less flattened, and no thinner.
@@ -146,7 +149,7 @@ def test_parts_do_not_know_of_each_other():
 
 @pytest.mark.parametrize("factor", [0.3, 1.8])
 def test_times_is_exactly_so_much_thicker(factor):
-    outline = Silhouette.of(shapes.mask("star"))
+    outline = ReliefSilhouette.of(shapes.mask("star"))
     one = Thickness.of(outline)
     y, x = np.nonzero(outline.inside)
     at = np.column_stack([x, y]).astype(np.float64)
@@ -159,7 +162,7 @@ def test_times_is_exactly_so_much_thicker(factor):
 
 def test_the_mean_with_its_image_is_symmetric():
     mask = shapes.mask("star")
-    outline = Silhouette.of(mask)
+    outline = ReliefSilhouette.of(mask)
     thickness = Thickness.of(outline)
     image = outline.cells.copy()
     image[..., 0] = outline.shape[1] - 1 - image[..., 0]

@@ -7,8 +7,8 @@ import pytest
 
 from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.segment.pieces import correcting
-from objectmorpher_core.segment.pieces.answers import Answer, add_click
-from objectmorpher_core.segment.pieces.choice import Correction, Ground, correct
+from objectmorpher_core.segment.pieces.answers import PieceAnswer, add_click
+from objectmorpher_core.segment.pieces.choice import Correction, PieceGround, correct
 from objectmorpher_core.segment.pieces.pieces import Pieces
 
 GROUND, COAT, FACE, POLE = (120, 150, 90), (40, 40, 50), (210, 180, 160), (70, 70, 85)
@@ -39,7 +39,7 @@ def test_a_correction_may_be_what_the_other_click_leaves():
     is_man[coat] = is_man[face] = is_pole[pole] = 1
     man, thing = pieces.mean(is_man) > 0.5, pieces.mean(is_pole) > 0.5
     ask = Correction(Click(70, 95, False), man | thing, (pieces.at(210, 95),))
-    choice = correct(Ground(pieces, None), ask)
+    choice = correct(PieceGround(pieces, None), ask)
     regions = [region.pieces for region in choice.others]
     assert any(share(each, man) > 0.95 and share(each, thing) < 0.1 for each in regions)
 
@@ -53,7 +53,7 @@ def test_no_correction_holds_what_a_click_denies():
         click = Click(float(rng.uniform(20, 120)), float(rng.uniform(40, 150)), False)
         walls = tuple(rng.integers(0, pieces.count, 2))
         walls = tuple(int(wall) for wall in walls if wall != pieces.at(click.x, click.y))
-        choice = correct(Ground(pieces, None), Correction(click, allowed, walls))
+        choice = correct(PieceGround(pieces, None), Correction(click, allowed, walls))
         assert choice.pieces[pieces.at(click.x, click.y)]
         for region in choice.others:
             assert not region.pieces[list(walls)].any()
@@ -68,8 +68,8 @@ def test_what_a_click_cuts_off_stays_where_it_is_no_speck(width: int, stays: boo
     mask = np.zeros(image.shape[:2], bool)
     mask[left] = mask[middle] = mask[right] = True
     prompt = Prompt((Click(60, 75), Click(120, 75, False)))
-    ground = Ground(Pieces(image, None), None)
-    found = add_click(ground, image, Answer(mask, ()), prompt).mask
+    ground = PieceGround(Pieces(image, None), None)
+    found = add_click(ground, image, PieceAnswer(mask, ()), prompt).mask
     assert found[left].mean() > 0.9
     assert found[middle].mean() < 0.1
     assert (found[right].mean() > 0.8) == stays
@@ -86,7 +86,9 @@ def test_an_island_stays_when_a_click_is_elsewhere():
     mask = np.zeros(image.shape[:2], bool)
     mask[large] = mask[small] = True
     prompt = Prompt((Click(60, 70), Click(60, 110, False)))
-    found = add_click(Ground(Pieces(image, None), None), image, Answer(mask, ()), prompt).mask
+    found = add_click(
+        PieceGround(Pieces(image, None), None), image, PieceAnswer(mask, ()), prompt
+    ).mask
     assert found[part].mean() < 0.1
     assert found[small].all()
 
@@ -98,7 +100,9 @@ def test_a_strip_narrower_than_the_pieces_goes_without_what_it_runs_along(width:
     mask = np.zeros(image.shape[:2], bool)
     mask[body] = mask[strip] = True
     prompt = Prompt((Click(110, 80), Click(140 + width / 2, 80, False)))
-    found = add_click(Ground(Pieces(image, None), None), image, Answer(mask, ()), prompt).mask
+    found = add_click(
+        PieceGround(Pieces(image, None), None), image, PieceAnswer(mask, ()), prompt
+    ).mask
     assert found[strip].mean() < 0.5
     assert found[body].mean() > 0.98
 
@@ -112,7 +116,7 @@ def test_a_window_that_cuts_off_what_a_click_means_is_widened():
     prompt = Prompt((Click(110, 80), Click(142, 80, False)))
     short = np.zeros_like(mask)
     short[76:84, 140:144] = True
-    ground = Ground(Pieces(image, None), None)
+    ground = PieceGround(Pieces(image, None), None)
     window = correcting._around(short)
     assert window.bottom - window.top < 50
     found = correcting._finer(ground, image, mask, prompt, window)
@@ -125,7 +129,7 @@ def test_what_coarser_pieces_say_is_heard_and_holds_no_denied_piece():
     upper, lower = (slice(40, 90), slice(60, 180)), (slice(90, 140), slice(60, 180))
     image = picture((FACE, *upper), (COAT, *lower))
     pieces = Pieces(image, None)
-    ground, click = Ground(pieces, None), Click(120, 65)
+    ground, click = PieceGround(pieces, None), Click(120, 65)
     whole = np.zeros(image.shape[:2])
     whole[upper] = whole[lower] = 1
     guess = pieces.mean(whole) > 0.5

@@ -19,7 +19,7 @@ from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.models import ModelError, device, ledger
 from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.segment import SelectionError
-from objectmorpher_core.segment.sam.frame import Frame
+from objectmorpher_core.segment.sam.frame import SamFrame
 from objectmorpher_core.segment.sam.network import Asked, Masks
 from objectmorpher_core.segment.sam.segmenter import Sam, open_network
 from objectmorpher_core.segment.sam.view import at_level
@@ -165,7 +165,7 @@ def test_what_was_saved_is_loaded_and_asked_as_transformers_would(own_cache, fam
     import torch
 
     network, theirs = opened(family, own_cache)
-    frame = Frame((0, 0, 130, 90), network.side, network.is_padded)
+    frame = SamFrame((0, 0, 130, 90), network.side, network.is_padded)
     small = frame.picture(picture)
     features = network.encode(small)
     points = np.array([[20.25, 31.5], [40.0, 7.75]])
@@ -201,7 +201,7 @@ def test_sam_sees_and_answers_as_by_its_own_processor(own_cache, picture):
     from transformers.models.sam.image_processing_pil_sam import SamImageProcessorPil
 
     network, theirs = opened("sam", own_cache)
-    frame = Frame((0, 0, 130, 90), network.side, True)
+    frame = SamFrame((0, 0, 130, 90), network.side, True)
     processor = SamImageProcessorPil(
         size={"longest_edge": 64}, pad_size={"height": 64, "width": 64},
         mask_pad_size={"height": 32, "width": 32}, mask_size={"longest_edge": 32},
@@ -229,7 +229,7 @@ def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
     needs_torch()
     at = tiny_sams.write("sam2", own_cache / "sam2")
     network = open_network(models.use_folder("sam2", at).model)
-    small = Frame((0, 0, 130, 90), network.side, False).picture(picture)
+    small = SamFrame((0, 0, 130, 90), network.side, False).picture(picture)
     before = network.encode(small)
     config = json.loads((at / "config.json").read_text())
     config["model_type"] = "sam2_video"
@@ -243,7 +243,7 @@ def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
 def test_short_numbers_encode_nearly_the_same(own_cache, family, picture):
     needs_torch()
     network, _ = opened(family, own_cache)
-    small = Frame((0, 0, 130, 90), network.side, network.is_padded).picture(picture)
+    small = SamFrame((0, 0, 130, 90), network.side, network.is_padded).picture(picture)
     exact = network.encode(small)
     network._model = in_ways(network._model, Plan("cpu", "bfloat16", "whole"))
     rounded = network.encode(small)
@@ -260,7 +260,7 @@ def test_short_numbers_encode_nearly_the_same(own_cache, family, picture):
 @pytest.mark.parametrize("is_padded", [True, False])
 @pytest.mark.parametrize("box", [(0, 0, 130, 90), (10, 5, 60, 85)])
 def test_a_point_of_the_photo_is_where_its_picture_shows_it(is_padded, box):
-    frame = Frame(box, 64, is_padded)
+    frame = SamFrame(box, 64, is_padded)
     photo = np.zeros((90, 130, 3), np.uint8)
     cv2.circle(photo, (40, 50), 6, (255, 255, 255), -1)
     picture = frame.picture(photo)[..., 0].astype(float)
@@ -271,7 +271,7 @@ def test_a_point_of_the_photo_is_where_its_picture_shows_it(is_padded, box):
 
 @pytest.mark.parametrize("is_padded", [True, False])
 def test_logits_come_back_to_where_they_were(is_padded):
-    frame = Frame((10, 5, 110, 65), 256, is_padded)
+    frame = SamFrame((10, 5, 110, 65), 256, is_padded)
     y, x = np.mgrid[:60, :100].astype(np.float32) + 0.5
     logits = (5 - 0.5 * np.hypot(x - 60, y - 25)).astype(np.float32)
     back = frame.unfold(frame.fold(logits, 64), (100, 60))
@@ -484,7 +484,7 @@ def test_memory_that_runs_out_is_followed_by_the_next_tier(own_cache, picture, c
     network, _ = opened("sam2", own_cache)
     least, first = Plan("cpu", "float32", "cpu"), Plan("cpu", "bfloat16", "whole")
     network._model = in_ways(network._model, first, least)
-    small = Frame((0, 0, 130, 90), network.side, False).picture(picture)
+    small = SamFrame((0, 0, 130, 90), network.side, False).picture(picture)
     load, opened_as = network._load, []
 
     def full(plan: Plan):

@@ -17,7 +17,7 @@ from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_research.bench import gl
 from objectmorpher_research.bench.classic_gl import ClassicViewer
 from objectmorpher_research.bench.render import tiles_frame
-from objectmorpher_research.bench.scenes import Scene, cloud_scene, lift_scene
+from objectmorpher_research.bench.scenes import BenchScene, cloud_scene, lift_scene
 from objectmorpher_research.bench.timing import seconds
 
 CONTRACT = {"renderer", "gaussians", "width", "height", "sort_ms", "frame_ms"}  # DESIGN section 6
@@ -39,7 +39,7 @@ def context() -> Iterator[object]:
     context.release()
 
 
-def drawn(scene: Scene, frame: int = 0) -> Picture3D:
+def drawn(scene: BenchScene, frame: int = 0) -> Picture3D:
     """A frame by the tiles."""
     return tiles.render(scene.splats(frame), scene.texture, scene.camera, scene.puppet.camera)
 
@@ -78,7 +78,7 @@ def test_without_opengl_its_rows_are_left_out(caplog: pytest.LogCaptureFixture) 
 
 
 @pytest.mark.parametrize("scene", [cloud_scene(600, 96), lift_scene(600, 96)], ids=lambda s: s.name)
-def test_every_frame_of_the_drag_is_another_picture_and_shows_the_object(scene: Scene) -> None:
+def test_every_frame_of_the_drag_is_another_picture_and_shows_the_object(scene: BenchScene) -> None:
     first, middle = drawn(scene, 0), drawn(scene, len(scene.poses) // 2)
     assert first.alpha.mean() > 0.05
     assert np.abs(first.color - middle.color).max() > 0.2

@@ -18,7 +18,7 @@ from objectmorpher_core.pictures.image import encode_mask
 from objectmorpher_research.evaluation.measures import dino
 from objectmorpher_research.evaluation.paper.interaction_log import read_recorded
 from objectmorpher_research.study.design import CRITERIA
-from objectmorpher_research.study.store import Answer, Study, StudyStore
+from objectmorpher_research.study.store import PageAnswer, Study, StudyStore
 from tests.research.study.study_set import METHODS, SIZE, save, small, write_set
 
 needs_dino = pytest.mark.skipif(dino.missing() is not None, reason=str(dino.missing()))
@@ -40,7 +40,7 @@ def answer_all(folder: Path, people: int) -> None:
             ratings = item.check or (good, 3, 4)
             if number == people - 1 and item.check:
                 ratings = (1, 1, 1)
-            store.answer(key, k, Answer(ratings, 5.0 + k, "2026-01-01T00:00:00+00:00"))
+            store.answer(key, k, PageAnswer(ratings, 5.0 + k, "2026-01-01T00:00:00+00:00"))
 
 
 @needs_dino

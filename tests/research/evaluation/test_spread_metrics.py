@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_research.evaluation.error import EvaluationError
-from objectmorpher_research.evaluation.metrics import Choices, Opened, measure
+from objectmorpher_research.evaluation.metrics import Choices, OpenedMeasures, measure
 from objectmorpher_research.evaluation.pairs import find_pairs
 from objectmorpher_research.evaluation.spread_metrics import _job, _taken, take_there
 from tests import shapes
@@ -43,7 +43,9 @@ def test_measured_by_workers_in_any_order_is_measured_here(folders: tuple[Path, 
     for k in (2, 0, 1):
         job = json.loads(json.dumps(_job(k, pairs[k], choices, len(pairs))))
         answers[k] = json.loads(json.dumps(take_there(job)))
-    there = Opened(choices, len(pairs)).results([_taken(answers[k]) for k in range(len(pairs))])
+    there = OpenedMeasures(choices, len(pairs)).results(
+        [_taken(answers[k]) for k in range(len(pairs))]
+    )
     here = measure(pairs, choices)
     assert repr(there) == repr(here)  # nan is nan, too
     assert {"psnr", "ssim"} <= {score.metric for score in here.scores}

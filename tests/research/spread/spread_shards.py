@@ -16,11 +16,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from objectmorpher_research.training.composition import shards as disk
-from objectmorpher_research.training.composition.sources import Looking, find_pairs
+from objectmorpher_research.training.composition.sources import SourceReading, find_pairs
 from objectmorpher_research.training.composition.spread_shards import write_shards
-from objectmorpher_research.training.composition.triplet import How
+from objectmorpher_research.training.composition.triplet import TripletPlan
 
-HOW = How("auto", "relief", "telea", "same-pose", gaussians=2000)
+HOW = TripletPlan("auto", "relief", "telea", "same-pose", gaussians=2000)
 SIZE = 2
 
 
@@ -37,7 +37,7 @@ def main(source: Path, out: Path, notes: Path) -> None:
     )
     cluster.add_node(num_cpus=1, object_store_memory=100 << 20)
     cluster.wait_for_nodes()
-    parts = disk.shards_of(find_pairs(source, Looking(both_ways=False)), SIZE)
+    parts = disk.shards_of(find_pairs(source, SourceReading(both_ways=False)), SIZE)
     disk.begin(out, parts, HOW)
     killed: list[int] = []
     threading.Thread(target=kill_one, args=(notes, killed), daemon=True).start()

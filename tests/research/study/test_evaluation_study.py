@@ -20,7 +20,7 @@ from objectmorpher_research.study.chart import draw_chart
 from objectmorpher_research.study.design import CRITERIA, plan_items, williams_design
 from objectmorpher_research.study.figures import RULES, excluded_by, figures
 from objectmorpher_research.study.store import (
-    Answer,
+    PageAnswer,
     Participant,
     Study,
     StudyStore,
@@ -36,7 +36,7 @@ F64 = 1e-9
 def answered(person: Participant, rate, seconds: float = 9.0) -> Participant:
     """A participant who gives `rate(item)` to every result, and what checks ask."""
     answers = {
-        k: Answer(item.check or rate(item), seconds, "2026-01-01T00:00:00+00:00")
+        k: PageAnswer(item.check or rate(item), seconds, "2026-01-01T00:00:00+00:00")
         for k, item in enumerate(person.items)
     }
     return Participant(person.number, person.key_hash, person.items, answers)
@@ -89,8 +89,8 @@ def test_a_plan_is_the_seed_s_and_keeps_subjects_together():
 def test_answers_are_on_the_disk_when_they_are_given(tmp_path):
     store = StudyStore(tmp_path, Study(METHODS, seed=1))
     key, joined = store.join()
-    store.answer(key, 0, Answer((1, 2, 3), 4.5, "t"))
-    store.answer(key, 0, Answer((5, 2, 3), 4.5, "t"))  # thought better of it
+    store.answer(key, 0, PageAnswer((1, 2, 3), 4.5, "t"))
+    store.answer(key, 0, PageAnswer((5, 2, 3), 4.5, "t"))  # thought better of it
     (found,) = read_participants(tmp_path)
     assert found.answers[0].ratings == (5, 2, 3) and found.items == joined.items
     assert key not in "".join(p.read_text() for p in tmp_path.rglob("*.json"))
@@ -109,15 +109,15 @@ def test_another_study_does_not_mix_with_the_first(tmp_path):
 @pytest.mark.parametrize(
     ("item", "answer", "told"),
     [
-        (1, Answer((1, 2, 3), 1, "t"), "cannot be answered yet"),
-        (-1, Answer((1, 2, 3), 1, "t"), "cannot be answered yet"),
-        (99, Answer((1, 2, 3), 1, "t"), "cannot be answered yet"),
-        (0, Answer((1, 2), 1, "t"), "3 numbers from 1 to 5"),
-        (0, Answer((1, 2, 6), 1, "t"), "3 numbers from 1 to 5"),
-        (0, Answer((1, 2, True), 1, "t"), "3 numbers from 1 to 5"),
-        (0, Answer((1, 2, 2.0), 1, "t"), "3 numbers from 1 to 5"),  # type: ignore[arg-type]
-        (0, Answer((1, 2, 3), NAN, "t"), "a page takes"),
-        (0, Answer((1, 2, 3), -1, "t"), "a page takes"),
+        (1, PageAnswer((1, 2, 3), 1, "t"), "cannot be answered yet"),
+        (-1, PageAnswer((1, 2, 3), 1, "t"), "cannot be answered yet"),
+        (99, PageAnswer((1, 2, 3), 1, "t"), "cannot be answered yet"),
+        (0, PageAnswer((1, 2), 1, "t"), "3 numbers from 1 to 5"),
+        (0, PageAnswer((1, 2, 6), 1, "t"), "3 numbers from 1 to 5"),
+        (0, PageAnswer((1, 2, True), 1, "t"), "3 numbers from 1 to 5"),
+        (0, PageAnswer((1, 2, 2.0), 1, "t"), "3 numbers from 1 to 5"),  # type: ignore[arg-type]
+        (0, PageAnswer((1, 2, 3), NAN, "t"), "a page takes"),
+        (0, PageAnswer((1, 2, 3), -1, "t"), "a page takes"),
     ],
 )
 def test_what_is_no_answer_is_refused(tmp_path, item, answer, told):
@@ -127,7 +127,7 @@ def test_what_is_no_answer_is_refused(tmp_path, item, answer, told):
         store.answer(key, item, answer)
     assert not read_participants(tmp_path)[0].answers
     with pytest.raises(EvaluationError, match="no such participant"):
-        store.answer(key + "x", 0, Answer((1, 2, 3), 1, "t"))
+        store.answer(key + "x", 0, PageAnswer((1, 2, 3), 1, "t"))
 
 
 def test_several_people_answer_at_once(tmp_path):
@@ -136,7 +136,7 @@ def test_several_people_answer_at_once(tmp_path):
     def take_part(rating: int) -> None:
         key, joined = store.join()
         for k, item in enumerate(joined.items):
-            store.answer(key, k, Answer(item.check or (rating,) * 3, 3.0, "t"))
+            store.answer(key, k, PageAnswer(item.check or (rating,) * 3, 3.0, "t"))
 
     threads = [threading.Thread(target=take_part, args=(1 + n % 5,)) for n in range(6)]
     for thread in threads:
@@ -162,7 +162,7 @@ def test_who_does_not_count():
     assert excluded_by(part) == RULES[0]
     wrong = dict(some.answers)
     k = next(k for k, item in enumerate(whole.items) if item.check)
-    wrong[k] = Answer(tuple(1 + r % 5 for r in whole.items[k].check), 9, "t")
+    wrong[k] = PageAnswer(tuple(1 + r % 5 for r in whole.items[k].check), 9, "t")
     assert excluded_by(Participant(1, "h", whole.items, wrong)) == RULES[1]
     assert excluded_by(answered(whole, varied, seconds=1.0)) == RULES[2]
     assert excluded_by(answered(whole, lambda item: (3, 3, 3))) == RULES[3]
@@ -313,7 +313,7 @@ def test_a_damaged_file_is_one_sentence(tmp_path, text):
 def test_answers_that_no_page_gives_are_not_read(tmp_path):
     store = StudyStore(tmp_path, Study(METHODS))
     key, _ = store.join()
-    store.answer(key, 0, Answer((1, 2, 3), 1.0, "t"))
+    store.answer(key, 0, PageAnswer((1, 2, 3), 1.0, "t"))
     path: Path = tmp_path / "participants" / "0001.json"
     told = json.loads(path.read_text())
     for ratings in ([1, 2, 9], [1, 2], ["1", 2, 3]):

@@ -9,7 +9,7 @@ from objectmorpher_core.base.arrays import F64
 from objectmorpher_research.training.shapes.distance import distance, lowest, trace
 from objectmorpher_research.training.shapes.families import FAMILIES
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
-from objectmorpher_research.training.shapes.solid import THINNEST, Builder, Solid, turned
+from objectmorpher_research.training.shapes.solid import THINNEST, PrimitiveBuilder, Solid, turned
 
 SIDE = 56  # px of samples here
 SEEDS = range(5)
@@ -92,7 +92,7 @@ def _trace(solid: Solid, places: F64, way: F64) -> F64:
 
 
 def test_a_ball_is_met_where_it_is() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.ellipsoid([5, 7, 1], [2, 2, 2])
     solid = built.finish()
@@ -110,7 +110,7 @@ def test_a_ball_is_met_where_it_is() -> None:
 
 
 def test_a_part_behind_is_no_thickness_and_a_cavity_is_filled() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.box([0, 0, -1], [1, 1, 0.1])
     built.part(1)
@@ -130,7 +130,7 @@ def test_a_part_behind_is_no_thickness_and_a_cavity_is_filled() -> None:
 
 
 def test_a_lathe_is_solid_on_its_axis() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.lathe([0, 0, 0], np.array([[0.0, -1], [0.5, -1], [0.5, 1], [0, 1]]))
     solid = built.finish()
@@ -143,7 +143,7 @@ def test_a_lathe_is_solid_on_its_axis() -> None:
 
 
 def test_part_of_a_ring_has_its_middle_before() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.ring([0, 0, 0], 1.0, 0.1, 0.5)
     solid = built.finish()
@@ -157,7 +157,7 @@ def test_part_of_a_ring_has_its_middle_before() -> None:
 
 @pytest.mark.parametrize("bend", [0.0, 0.8, -0.8])
 def test_a_bent_sheet_lies_on_its_circle(bend: float) -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.sheet([0, 0, 0], [1.2, 0.7], 0.001, (0.0, 0.0, 0.0, 0.0), bend)
     solid = built.finish()
@@ -208,7 +208,7 @@ def test_balls_only_save_time(name: str) -> None:
 
 
 def test_a_tilted_box_is_found_by_its_own_axes() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     turn = turned(0.4, -0.7, 0.2)
     built.part(0)
     built.box([0, 0, 0], [1, 0.5, 0.2], 0.05, turn)
@@ -221,7 +221,7 @@ def test_a_tilted_box_is_found_by_its_own_axes() -> None:
 
 
 def test_a_part_begins_with_something_that_is_there() -> None:
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.box([0, 0, 0], [1, 1, 1], cut=True)
     with pytest.raises(ValueError, match="begins with something"):
@@ -230,7 +230,7 @@ def test_a_part_begins_with_something_that_is_there() -> None:
 
 def test_a_flat_ellipsoid_is_as_thick_as_it_is() -> None:
     """Its slope says nothing about distances inside: rays once left it far too late."""
-    built = Builder()
+    built = PrimitiveBuilder()
     built.part(0)
     built.ellipsoid([0, 0, 0], [1, 0.7, 0.02])
     solid = built.finish()

@@ -79,7 +79,7 @@ def test_stopped_and_resumed_it_is_where_it_was(arrays, tmp_path):
     folder = tmp_path / "samples"
     folder.mkdir()
     np.savez(folder / "00000000.npz", **arrays)
-    plan = train_shape.Plan(samples=COUNT, passes=3, size=2)
+    plan = train_shape.TrainingPlan(samples=COUNT, passes=3, size=2)
     state = train_shape._State.resumed(tmp_path, plan)
     for batch in train_shape._endless([folder / "00000000.npz"], plan, 0):
         state.learn(batch)
@@ -127,10 +127,10 @@ def test_training_goes_on_from_exported_weights(tmp_path):
     for name, value in net.state_dict().items():
         if value.is_floating_point():
             assert torch.allclose(again[name], value, rtol=1e-3, atol=1e-3), name
-    state = train_shape._State.resumed(tmp_path, train_shape.Plan(), again)
+    state = train_shape._State.resumed(tmp_path, train_shape.TrainingPlan(), again)
     assert torch.equal(state.net.state_dict()["tokens.weight"], again["tokens.weight"])
     with pytest.raises(ValueError, match="all families"):
-        train_shape.train(tmp_path, train_shape.Plan(held_out=("boxes",)), weights=path)
+        train_shape.train(tmp_path, train_shape.TrainingPlan(held_out=("boxes",)), weights=path)
     other = ShapeNet()
     other.tokens = torch.nn.Conv2d(WIDTH, 8, 1)
     with pytest.raises(ValueError, match="another network"):

@@ -17,18 +17,18 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, EditObject, Plate
 from objectmorpher_core.document.settings import Hint, Shadow
 
-from ...canvas.layer import Layer
+from ...canvas.layer import CanvasLayer
 from ...canvas.memo import same
 from ...system.texts import t
 from ...worker import job_functions
 from ...worker.job_error import JobError
-from ...worker.job_functions import Choice, Variant
+from ...worker.job_functions import BackendChoice, Variant
 from ..feedback import Action
 from ..tasks import PLATE
 from ..view import ToolName
 
 if TYPE_CHECKING:
-    from objectmorpher_core.compose.plate.repair import Patch
+    from objectmorpher_core.compose.plate.repair import PlatePatch
 
     from ..state import EditorState
     from ..tasks import Tasks
@@ -43,7 +43,7 @@ FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
 @dataclass(frozen=True, eq=False)
-class Offer:
+class TraceOffer:
     """An object's shadow and reflection in the photo, which it could take along."""
 
     document: Document  # in which they were looked for
@@ -78,7 +78,7 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
-        self._offer: Offer | None = None  # found in the photo, not taken along yet
+        self._offer: TraceOffer | None = None  # found in the photo, not taken along yet
 
     def forget(self) -> None:
         """Another document is opened."""
@@ -158,7 +158,7 @@ class Composing:
 
         editor.jobs.start(
             t("Filling in the background"), job_functions.inpaint, document.photo.pixels,
-            editor.derived.hidden(document), Choice(self.inpainter, seed, hints),
+            editor.derived.hidden(document), BackendChoice(self.inpainter, seed, hints),
             done=accept, failed=fail, cancelled=end, replaced=end, kind=PLATE,
         )  # fmt: skip
 
@@ -199,9 +199,9 @@ class Composing:
         if document is not None and same(masks, _masks(document)):
             editor.apply(label, edits.set_plate(edits.set_hints(document, hints), plate))
 
-    def _choice(self, seed: int) -> Choice:
+    def _choice(self, seed: int) -> BackendChoice:
         document = self._editor.document
-        return Choice(self.inpainter, seed, () if document is None else document.hints)
+        return BackendChoice(self.inpainter, seed, () if document is None else document.hints)
 
     # Repairing it
 
@@ -259,7 +259,7 @@ class Composing:
         assert stroke.box is not None
         patch = patch_of(document, stroke.coverage, stroke.box)
 
-        def accept(answer: tuple[Patch, str]) -> None:
+        def accept(answer: tuple[PlatePatch, str]) -> None:
             self._ready.append(lambda: self._take_repair(asked, *answer))
 
         def fail(error: JobError) -> None:
@@ -274,7 +274,7 @@ class Composing:
             self._choice(asked.seed + 1), done=accept, failed=fail, cancelled=drop, kind=REPAIR,
         )  # fmt: skip
 
-    def _take_repair(self, asked: Plate, patch: Patch, backend: str) -> None:
+    def _take_repair(self, asked: Plate, patch: PlatePatch, backend: str) -> None:
         """A repaired part; it is dropped where the background is another one by now."""
         from objectmorpher_core.compose.plate.repair import with_patch
 
@@ -286,7 +286,7 @@ class Composing:
         if self._waiting:
             self._ask_repair()
 
-    def painted_layer(self) -> Layer | None:
+    def painted_layer(self) -> CanvasLayer | None:
         """Return the painted area that is not filled in yet, as a tint over the canvas."""
         view = self._editor.view
         strokes = [s for s in (self._stroke, *self._waiting) if s is not None]
@@ -305,7 +305,7 @@ class Composing:
         ink = np.array(RESTORING if is_white else FILLING, np.float32)
         rgba = np.dstack([covered[..., None] * ink, covered * 255]).astype(np.uint8)
         box = (0.0, 0.0, float(size[0] * GRAIN), float(size[1] * GRAIN))
-        return Layer(box, rgba, is_coarse=True, is_tint=True)
+        return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
 
     # Joining the object to it
 
@@ -367,7 +367,9 @@ class Composing:
             shadow, plate = answer
             if shadow is not None and is_known:
                 shadow = replace(shadow, ground=told)
-            self._ready.append(lambda: self._show_offer(masks, Offer(document, k, shadow, plate)))
+            self._ready.append(
+                lambda: self._show_offer(masks, TraceOffer(document, k, shadow, plate))
+            )
 
         editor.jobs.start(
             t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
@@ -375,7 +377,7 @@ class Composing:
             kind=SHADOW,
         )  # fmt: skip
 
-    def _show_offer(self, masks: tuple[Mask | None, ...], offer: Offer) -> None:
+    def _show_offer(self, masks: tuple[Mask | None, ...], offer: TraceOffer) -> None:
         editor, document = self._editor, self._editor.committed
         if document is None or not same(masks, _masks(document)):
             return
@@ -406,7 +408,7 @@ class Composing:
         self._editor.message = None
 
     @property
-    def offer(self) -> Offer | None:
+    def offer(self) -> TraceOffer | None:
         """What would be taken along, as long as the document is the one in which it was found."""
         offer, editor = self._offer, self._editor
         if offer is None or offer.document is not editor.document or offer.k != editor.current:

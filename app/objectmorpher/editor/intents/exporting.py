@@ -18,9 +18,9 @@ from ..export_plan import (
     LENGTHS,
     LOSSLESS,
     NAMES,
+    ExportPlan,
     Format,
-    Motion,
-    Plan,
+    VideoMotion,
     What,
     format_of,
     is_folder,
@@ -43,7 +43,7 @@ class Draft:
     bits: int  # 0: the photo's own
     quality: int  # of JPEG
     webp_quality: int
-    motion: Motion
+    motion: VideoMotion
     seconds: float  # of a video
     folder: Path
     name: str  # as typed: a file name, or a whole path
@@ -71,8 +71,10 @@ class Exporting:
         last = Path(settings.export_folder)
         is_kept = file is None and settings.export_folder and last.is_dir()
         folder = file.parent if file else (last if is_kept else Path.home())
-        motion = next((m for m in Motion if m.value == settings.export_motion), Motion.MORPH)
-        motion = motion if self.why_no_motion(motion) is None else Motion.SWAY
+        motion = next(
+            (m for m in VideoMotion if m.value == settings.export_motion), VideoMotion.MORPH
+        )
+        motion = motion if self.why_no_motion(motion) is None else VideoMotion.SWAY
         seconds = min(max(settings.export_seconds, LENGTHS[0]), LENGTHS[1])
         draft = Draft(
             what, format, settings.export_bits, settings.quality, settings.webp_quality, motion,
@@ -100,11 +102,11 @@ class Exporting:
             return t("The background is not ready yet" if is_lifted else "Lift an object first")
         return None
 
-    def why_no_motion(self, motion: Motion) -> str | None:
+    def why_no_motion(self, motion: VideoMotion) -> str | None:
         """Why a video cannot show this now, or None."""
         document = self._editor.committed
         objects = () if document is None else document.objects
-        if motion is Motion.MORPH:
+        if motion is VideoMotion.MORPH:
             is_moved = any(item.is_moved for item in objects)
             return None if is_moved else t("Move or pose an object first")
         return self._why_no_shape()
@@ -133,7 +135,7 @@ class Exporting:
             replace(draft, webp_quality=quality) if is_whole else replace(draft, quality=quality)
         )
 
-    def choose_motion(self, motion: Motion) -> None:
+    def choose_motion(self, motion: VideoMotion) -> None:
         self._change(replace(self._draft, motion=motion))
 
     def choose_seconds(self, seconds: float) -> None:
@@ -253,7 +255,7 @@ class Exporting:
             self._replacing = path
             return
         self._remember(draft, path)
-        plan = Plan(
+        plan = ExportPlan(
             draft.what, path, self._editor.current, self.bits, self.quality, draft.motion,
             draft.seconds,
         )  # fmt: skip
@@ -274,7 +276,7 @@ class Exporting:
         else:
             is_whole = format in LOSSLESS_AT_100
             quality = settings.webp_quality if is_whole else settings.quality
-            self._start(Plan(what, path, quality=quality))
+            self._start(ExportPlan(what, path, quality=quality))
 
     @property
     def why_not_back(self) -> str | None:
@@ -289,7 +291,7 @@ class Exporting:
         if document is None or path is None:
             return
         editor.jobs.start(
-            t("Sending back"), write_export, document, Plan(_what_of(path), path),
+            t("Sending back"), write_export, document, ExportPlan(_what_of(path), path),
             done=lambda _: then(),
             failed=lambda error: editor.complain_of(
                 error.retried_by(lambda: self.send_back(then))
@@ -302,7 +304,7 @@ class Exporting:
         editor, document = self._editor, self._editor.committed
         if document is None:
             return
-        plan = Plan(what, Path("copied.png"), editor.current, bits=8)
+        plan = ExportPlan(what, Path("copied.png"), editor.current, bits=8)
         told = t("Copied the object") if what is What.CUTOUT else t("Copied the photo")
 
         def offer(png: bytes) -> None:
@@ -381,7 +383,7 @@ class Exporting:
             export_folder=str(path.parent.absolute()),
         )  # fmt: skip
 
-    def _start(self, plan: Plan) -> None:
+    def _start(self, plan: ExportPlan) -> None:
         editor, document = self._editor, self._editor.committed
         if document is None:
             return

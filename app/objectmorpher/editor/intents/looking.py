@@ -22,7 +22,7 @@ FILLS = 0.8  # x the photo's smaller side, that the object takes while one walks
 NEAREST = 0.9  # object diameters, from the camera to its centre
 
 
-class Looking:
+class LookingIntents:
     """The canvas while the Look tool walks around an object."""
 
     def __init__(self, editor: EditorState, landing: Landing) -> None:

@@ -38,7 +38,7 @@ READ_MASK = "read mask"
 
 
 @dataclass(frozen=True)
-class Change:
+class MaskChange:
     """A change of the whole selection, which the worker makes."""
 
     label: str
@@ -54,7 +54,7 @@ class Masking:
         self.painting: MaskPainting | None = None  # the stroke in progress
         self.trail: list[np.ndarray] = []  # where it went, canvas px (2,) each
         self._last: tuple[Photo, np.ndarray] | None = None  # where the last stroke ended, image px
-        self._waiting: list[Change] = []  # the first one is being made
+        self._waiting: list[MaskChange] = []  # the first one is being made
 
     @property
     def shown(self) -> Selection | None:
@@ -126,11 +126,11 @@ class Masking:
 
     def fill_holes(self) -> None:
         """A selection without holes."""
-        self._enqueue(Change(t("Fill holes"), mask_edit.fill_holes))
+        self._enqueue(MaskChange(t("Fill holes"), mask_edit.fill_holes))
 
     def remove_islands(self) -> None:
         """A selection without small pieces beside the large one."""
-        self._enqueue(Change(t("Remove islands"), mask_edit.remove_islands))
+        self._enqueue(MaskChange(t("Remove islands"), mask_edit.remove_islands))
 
     def invert(self) -> None:
         """Invert the selection. No click asked for the result, so its prompt is dropped."""
@@ -146,9 +146,9 @@ class Masking:
 
     def _change(self, label: str, function: Callable[..., Selection]) -> None:
         reach = self._editor.view.selecting.reach
-        self._enqueue(Change(label, partial(function, px=reach)))
+        self._enqueue(MaskChange(label, partial(function, px=reach)))
 
-    def _enqueue(self, change: Change) -> None:
+    def _enqueue(self, change: MaskChange) -> None:
         """One after the other: three presses grow the selection three times."""
         self._waiting.append(change)
         if len(self._waiting) == 1:
@@ -182,7 +182,7 @@ class Masking:
     def _forget(self) -> None:
         self._waiting.clear()
 
-    def _fail(self, error: JobError, change: Change) -> None:
+    def _fail(self, error: JobError, change: MaskChange) -> None:
         self._forget()
         self._editor.complain_of(error.retried_by(lambda: self._enqueue(change)))
 

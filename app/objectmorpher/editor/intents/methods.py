@@ -10,7 +10,7 @@ from objectmorpher_core import compose, lift, segment
 from objectmorpher_core.compose import refine
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.workers import file as worker_file
-from objectmorpher_core.lift.workers.file import Worker
+from objectmorpher_core.lift.workers.file import LiftWorker
 
 from ...system.texts import t
 from ...worker import job_functions
@@ -18,7 +18,7 @@ from ...worker.stages import by_stage
 from ..settings import AUTO
 
 if TYPE_CHECKING:
-    from objectmorpher_core.doctor import Stage
+    from objectmorpher_core.doctor import StageReport
 
     from ...server.address import Server
     from ...server.offers import Offer, Offers
@@ -38,7 +38,7 @@ NOT_FOR_CLICKS = ("subject",)  # segmenters
 
 
 @dataclass(frozen=True)
-class Method:
+class BackendOffer:
     """A backend of a stage."""
 
     name: str
@@ -55,7 +55,7 @@ class Methods:
         self._editor = editor
         self._computing, self._tasks = computing, tasks
         computing.changed = self.forget
-        self._stages: dict[str, Stage] = {}  # empty until looked at
+        self._stages: dict[str, StageReport] = {}  # empty until looked at
         self._is_asked = self._is_told = False
         self._served: tuple[Server, Offers] | None = None  # with no offers until it answers
 
@@ -70,7 +70,7 @@ class Methods:
         self._look()
         return self._is_told
 
-    def of(self, stage: str) -> tuple[Method, ...]:
+    def of(self, stage: str) -> tuple[BackendOffer, ...]:
         """Return all backends of a stage, "auto" first; before a check all seem able to run."""
         self._look()
         offer, found = self._offer(stage), self._stages.get(stage)
@@ -80,7 +80,7 @@ class Methods:
         names += [name for name in (*able, *why_not) if name not in (*names, *NOT_FOR_CLICKS)]
         if self.chosen(stage) not in names:  # a model's own id, written into the settings file
             names.append(self.chosen(stage))
-        return tuple(Method(name, why_not.get(name)) for name in names)
+        return tuple(BackendOffer(name, why_not.get(name)) for name in names)
 
     def taken(self, stage: str) -> str:
         """The backend that "auto" is; empty while that is not known, or where none can run."""
@@ -153,7 +153,7 @@ class Methods:
             kind=LOOK, is_quiet=True,
         )  # fmt: skip
 
-    def _take(self, stages: tuple[Stage, ...]) -> None:
+    def _take(self, stages: tuple[StageReport, ...]) -> None:
         self._stages, self._is_told = by_stage(stages), True
 
     def _give_up(self) -> None:
@@ -174,7 +174,7 @@ class WorkerState:
     """The state of a worker."""
 
     name: str
-    worker: Worker | None  # None: its file is of no use
+    worker: LiftWorker | None  # None: its file is of no use
     is_accepted: bool = False
     why_not: str | None = None  # why it cannot run now: one sentence
 

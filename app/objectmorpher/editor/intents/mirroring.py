@@ -22,7 +22,7 @@ PIECES = 16  # of the line that shows the plane
 PARTNER = 0.06  # x diameter: a handle so near to the mirrored point is the partner
 
 
-class Mirroring:
+class MirrorIntents:
     """The mirror plane of the current object, while it is dragged with symmetry."""
 
     def __init__(self, editor: EditorState) -> None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from objectmorpher_core import model_sets, models
 from objectmorpher_core.base.installation import is_frozen
 from objectmorpher_core.base.progress import Progress
-from objectmorpher_core.model_sets import Offer
-from objectmorpher_core.models import Added, HubModel, HubState, State, Weight, shipped
+from objectmorpher_core.model_sets import SetOffer
+from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, shipped
 
 from ...system.texts import t
 from ...worker import job_functions
@@ -56,12 +56,12 @@ class Models:
     ) -> None:
         self._editor = editor
         self._methods, self._shaping, self._tasks = methods, shaping, tasks
-        self.states: tuple[State, ...] = ()  # empty until they were looked at
+        self.states: tuple[CacheState, ...] = ()  # empty until they were looked at
         self.added: tuple[Added, ...] = ()  # what users bring, likewise
         self.hub = HubModels(editor, self)  # those of several files
         self.workers = Workers(editor, methods)  # programs of the user's
         self.is_open = False  # the window shows the list
-        self.offers: tuple[Offer, ...] = ()  # of sets, on this machine
+        self.offers: tuple[SetOffer, ...] = ()  # of sets, on this machine
         self._loading = ""
         self._waiting: dict[str, Callable[[], None]] = {}  # id -> how it is begun
 
@@ -136,7 +136,7 @@ class Models:
         """It is not begun after all."""
         self._waiting.pop(id, None)
 
-    def download_set(self, offer: Offer) -> None:
+    def download_set(self, offer: SetOffer) -> None:
         """Gets all that is missing of a set; the user has clicked the button that says so."""
 
         def fetch(progress: Progress) -> Path:
@@ -145,7 +145,7 @@ class Models:
 
         self.run(offer.set.id, offer.set.id, fetch)
 
-    def why_not_set(self, offer: Offer) -> str | None:
+    def why_not_set(self, offer: SetOffer) -> str | None:
         """Why it cannot be downloaded."""
         return next((why for s in offer.steps if (why := self.hub.why_not(s.model))), None)
 
@@ -208,7 +208,9 @@ class Models:
         )  # fmt: skip
 
 
-Looked = tuple[tuple[State, ...], tuple[Added, ...], tuple[HubState, ...], tuple[Offer, ...]]
+Looked = tuple[
+    tuple[CacheState, ...], tuple[Added, ...], tuple[HubState, ...], tuple[SetOffer, ...]
+]
 
 
 def _looked() -> Looked:
@@ -217,7 +219,7 @@ def _looked() -> Looked:
     return single, tuple(models.added(kind.id) for kind in models.KINDS), several, _offers()
 
 
-def _offers() -> tuple[Offer, ...]:
+def _offers() -> tuple[SetOffer, ...]:
     """None where the environment asks for a device that is not there."""
     try:
         return model_sets.offers()

@@ -12,7 +12,7 @@ from objectmorpher_core.document.model import Placement
 from objectmorpher_core.document.placement import (
     Ground,
     GroundError,
-    Hold,
+    HeldPoint,
     centre_of,
     ground_under,
     turned,
@@ -54,7 +54,7 @@ class Placing:
 
     # Holding it
 
-    def hold(self, canvas_xy: np.ndarray | None = None) -> Hold:
+    def hold(self, canvas_xy: np.ndarray | None = None) -> HeldPoint:
         """The object held by its surface at canvas px, or by its centre; on the ground by what
         it stands on."""
         editor = self._editor
@@ -66,10 +66,10 @@ class Placing:
             placement = self.stood(placement)
             centre = centre_of(placement, lifted, camera)
             contact = ground.lowest(centre + self._offsets(placement))
-            return Hold(placement, lifted, camera, contact, ground)
+            return HeldPoint(placement, lifted, camera, contact, ground)
         seen = None if canvas_xy is None else self._posing.surface_at(canvas_xy)
         point = self.centre() if seen is None else seen.world
-        return Hold(placement, lifted, camera, np.asarray(point, np.float64))
+        return HeldPoint(placement, lifted, camera, np.asarray(point, np.float64))
 
     def move_to(self, placement: Placement) -> None:
         """Previews the whole object elsewhere."""

@@ -16,7 +16,7 @@ from objectmorpher_core.document.pose import turn_at
 
 from ...canvas.derived import Spot
 from ...system.texts import t
-from .mirroring import Mirroring
+from .mirroring import MirrorIntents
 
 if TYPE_CHECKING:
     from objectmorpher_core.deform.puppet import SurfacePoint
@@ -38,7 +38,7 @@ class Posing:
 
     def __init__(self, editor: EditorState) -> None:
         self._editor = editor
-        self.mirroring = Mirroring(editor)
+        self.mirroring = MirrorIntents(editor)
         self.readout = ""  # of the turn in progress: "34°"
         self._selected: tuple[int, ...] = ()
         self._solved: Document | None = None  # the preview, if its pose was solved for

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 REFINE = "refine"  # kind of job
 
 
-class Refining:
+class RefiningIntents:
     """The refinement of the whole edit."""
 
     def __init__(self, editor: EditorState, methods: Methods) -> None:
@@ -50,7 +50,7 @@ class Refining:
 
     def _ask(self, seed: int) -> None:
         """What is to be seen of the edit is cut out here; the network may be on a server."""
-        from objectmorpher_core.scripting.runner import Refining as How
+        from objectmorpher_core.scripting.runner import RefineOptions as How
 
         editor, asked = self._editor, self._editor.committed
         if asked is None:

@@ -29,7 +29,7 @@ TOGETHER = 2.0  # x the straight distance: parts that are nearer along the surfa
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class MovedPart:
     """A part of the object that moves in a way of its own."""
 
     kind: PoseMode
@@ -54,21 +54,21 @@ class Rigging:
         thing = self._editor.object
         return Rig() if thing is None else thing.rig
 
-    def regions(self) -> tuple[Region, ...]:
+    def regions(self) -> tuple[MovedPart, ...]:
         """Return all marks in the order of the panel."""
         rig, found = self.rig, []
         if rig.held is not None:
-            found.append(Region(PoseMode.FREEZE, rig.held))
+            found.append(MovedPart(PoseMode.FREEZE, rig.held))
         if rig.stiffness is not None:
             for value in np.unique(rig.stiffness[rig.stiffness != USUAL]):
                 nodes = np.flatnonzero(rig.stiffness == value).astype(np.int32)
-                found.append(Region(PoseMode.STIFFEN, nodes, float(value)))
+                found.append(MovedPart(PoseMode.STIFFEN, nodes, float(value)))
         for b, body in enumerate(rig.bodies):
-            found.append(Region(PoseMode.BODY, body, body=b))
+            found.append(MovedPart(PoseMode.BODY, body, body=b))
         for s, seam in enumerate(rig.seams):
             kind = PoseMode.GLUE if seam.is_glued else PoseMode.CUT
             both = np.concatenate([seam.first, seam.second])
-            found.append(Region(kind, both, seam=s))
+            found.append(MovedPart(kind, both, seam=s))
         return tuple(found)
 
     def near(self, way: F64) -> I32:
@@ -158,7 +158,7 @@ class Rigging:
         if len(kept) < len(self.rig.seams):
             self._set(t("Erase"), replace(self.rig, seams=kept))
 
-    def remove(self, region: Region) -> None:
+    def remove(self, region: MovedPart) -> None:
         """Takes back what was said about a region."""
         rig = self.rig
         if region.kind is PoseMode.FREEZE:

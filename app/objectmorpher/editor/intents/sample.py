@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .selection import Selection
 
 
-class Sample:
+class SampleOpening:
     """Opens, selects and lifts; the artist may go on at any time, and then it does no more."""
 
     def __init__(

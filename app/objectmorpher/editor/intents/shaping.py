@@ -26,13 +26,13 @@ from objectmorpher_core.document.model import (
     Placement,
 )
 
-from ...canvas.layer import Layer
+from ...canvas.layer import CanvasLayer
 from ...system.texts import t
 from ...worker import job_functions
 from ..view import Painted
 
 if TYPE_CHECKING:
-    from objectmorpher_core.lift.registration.importing import Import, Scene
+    from objectmorpher_core.lift.registration.importing import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
 
     from ..state import EditorState
@@ -208,7 +208,7 @@ class Shaping:
         covered = self._stroke.coverage >= 0.5
         return now & ~covered if self._is_inverse else now | covered
 
-    def painted_layer(self) -> Layer | None:
+    def painted_layer(self) -> CanvasLayer | None:
         """Return the painted hints about the shape, as a tint over the canvas."""
         editor, document = self._editor, self._editor.document
         painted = editor.view.selecting.painted
@@ -234,7 +234,7 @@ class Shaping:
         strength = alpha * (TINT / 255)
         rgba = np.dstack([ink * strength, 255 * strength]).astype(np.uint8)
         box = (0.0, 0.0, float(shape[0] * GRAIN), float(shape[1] * GRAIN))
-        return Layer(box, rgba, is_coarse=True, is_tint=True)
+        return CanvasLayer(box, rgba, is_coarse=True, is_tint=True)
 
     # Objects out of files
 
@@ -304,9 +304,9 @@ class Shaping:
             done=accept, failed=editor.complain_of, kind=IMPORT,
         )  # fmt: skip
 
-    def _scene(self) -> Scene | None:
+    def _scene(self) -> ImportTarget | None:
         """The photo and the mask that an object stands for."""
-        from objectmorpher_core.lift.registration.importing import Scene
+        from objectmorpher_core.lift.registration.importing import ImportTarget
 
         editor, document = self._editor, self._editor.document
         thing = editor.object
@@ -315,7 +315,7 @@ class Shaping:
         photo = document.photo
         is_alone = not any(o.lifted for o in document.objects if o is not thing)
         is_guess = photo.camera == Camera.from_fov(*photo.size)
-        return Scene(photo.pixels, photo.camera, thing.selection, is_alone and is_guess)
+        return ImportTarget(photo.pixels, photo.camera, thing.selection, is_alone and is_guess)
 
     def _take_import(
         self, k: int, fitting: Fitting, matte: Matte, lifted: LiftedObject, label: str

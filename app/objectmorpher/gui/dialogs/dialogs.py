@@ -17,7 +17,7 @@ from ...editor.opening import OBJECT_ENDINGS
 from ...system.texts import t
 from ..widgets.modal import is_confirmed, is_dismissed, modal
 from ..widgets.theme import FIELD, PRIMARY, theme
-from ..widgets.widgets import Kind, button
+from ..widgets.widgets import Emphasis, button
 from .export_dialog import draw_export
 from .file_chooser import FileChooser
 from .models_dialog import draw_models
@@ -102,7 +102,7 @@ class Dialogs:
     def _draw_answers(self, filing: Filing) -> None:
         answer = None
         top = imgui.get_cursor_pos_y()
-        if button(t("Save session"), Kind.PRIMARY, width=132) or is_confirmed():
+        if button(t("Save session"), Emphasis.PRIMARY, width=132) or is_confirmed():
             answer = filing.answer_save
         lower = top + theme.pt((PRIMARY - FIELD) / 2)  # in the middle of the taller button
         imgui.same_line()

@@ -8,16 +8,16 @@ from typing import TypeVar
 from imgui_bundle import imgui
 
 from ...editor.editor import Editor
-from ...editor.export_plan import LENGTHS, Motion, What
+from ...editor.export_plan import LENGTHS, VideoMotion, What
 from ...editor.filing import Dialog
 from ...editor.intents.exporting import Exporting
 from ...system.texts import t
 from ..widgets.modal import is_confirmed, is_dismissed, modal
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import FIELD, PRIMARY, theme
 from ..widgets.widgets import (
     FILL,
-    Kind,
+    Emphasis,
     bold_text,
     button,
     fitted,
@@ -81,7 +81,7 @@ def _draw_how(exporting: Exporting) -> None:
     _draw_format(exporting)
     if exporting.has_bits:
         _name(t("Depth"))
-        depths = tuple(Choice(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
+        depths = tuple(Segment(bits, t("{bits} bit", bits=bits)) for bits in DEPTHS)
         bits = segmented("bits", depths, exporting.bits)
         if bits != exporting.bits:
             exporting.choose_bits(0 if bits == exporting.own_bits else bits)
@@ -106,7 +106,7 @@ def _draw_format(exporting: Exporting) -> None:
         named = tuple((f, f.value, exporting.why_no_format(f)) for f in exporting.formats)
         format = _choice("format", named, chosen) or chosen
     else:
-        choices = tuple(Choice(format, format.value) for format in exporting.formats)
+        choices = tuple(Segment(format, format.value) for format in exporting.formats)
         format = segmented("format", choices, chosen)
     if format is not chosen:
         exporting.choose_format(format)
@@ -118,8 +118,8 @@ def _draw_motion(exporting: Exporting) -> None:
     assert draft is not None
     _name(t("Motion"))
     choices = tuple(
-        Choice(motion, t(motion.value), why_not=exporting.why_no_motion(motion))
-        for motion in Motion
+        Segment(motion, t(motion.value), why_not=exporting.why_no_motion(motion))
+        for motion in VideoMotion
     )
     motion = segmented("motion", choices, draft.motion)
     if motion is not draft.motion:
@@ -182,7 +182,7 @@ def _draw_foot(exporting: Exporting, is_entered: bool) -> None:
     room = imgui.get_content_region_avail().x - 2 * imgui.get_style().frame_padding.x
     with bold_text():
         label = f"{fitted(exporting.label, room)}###go"
-    is_pressed = button(label, Kind.PRIMARY, problem)
+    is_pressed = button(label, Emphasis.PRIMARY, problem)
     if is_cancelled or is_dismissed():
         exporting.close()
     elif is_pressed or is_entered or is_confirmed():

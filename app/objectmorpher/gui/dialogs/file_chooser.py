@@ -11,7 +11,7 @@ from ...editor.filing import Dialog
 from ...system.texts import t
 from ..widgets.modal import is_dismissed, modal
 from ..widgets.theme import Icon, theme
-from ..widgets.widgets import FILL, Kind, button, icon_button, note, shortened, shown_path
+from ..widgets.widgets import FILL, Emphasis, button, icon_button, note, shortened, shown_path
 
 WIDTH, HEIGHT = 640.0, 480.0  # points
 ROW = 28.0
@@ -133,7 +133,7 @@ class FileChooser:
         imgui.same_line()
         imgui.set_cursor_pos_y(imgui.get_window_height() - theme.pt(60))
         why_not = None if self._name else t("Type a name or choose a file")
-        return button(verb, Kind.PRIMARY, why_not, width=120), is_cancelled
+        return button(verb, Emphasis.PRIMARY, why_not, width=120), is_cancelled
 
     def _typed(self) -> Path:
         return self._folder / Path(self._name.strip()).expanduser()

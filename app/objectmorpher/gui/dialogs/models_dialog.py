@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from objectmorpher_core.model_sets import Offer
-from objectmorpher_core.models import Added, HubState, State
+from objectmorpher_core.model_sets import SetOffer
+from objectmorpher_core.models import Added, CacheState, HubState
 
 from ...editor.editor import Editor
 from ...editor.filing import Dialog
@@ -13,10 +13,10 @@ from ...editor.intents.methods import WorkerState
 from ...editor.intents.models import DOWNLOAD, has_torch, names_of
 from ...system.texts import sentence, t
 from ..widgets.modal import PADDING, is_dismissed, modal
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import (
-    Kind,
+    Emphasis,
     bold_text,
     button,
     checkbox,
@@ -78,7 +78,7 @@ SETS = {
 }
 
 
-def _draw_set(editor: Editor, offer: Offer) -> None:
+def _draw_set(editor: Editor, offer: SetOffer) -> None:
     """A set of models: whether it fits, what it takes, and the button that gets all of it."""
     name, gain = SETS[offer.set.id]
     rule()
@@ -102,7 +102,7 @@ def _draw_set(editor: Editor, offer: Offer) -> None:
     imgui.pop_id()
 
 
-def _fit_of(offer: Offer) -> str:
+def _fit_of(offer: SetOffer) -> str:
     """Whether it runs here, and about how long an edit then takes."""
     gpu = f"{offer.card.gpu / 2**30:.0f} GB"
     if not offer.card.gpu:
@@ -134,7 +134,7 @@ def _download_button(editor: Editor, id: str, why_not: str | None) -> bool:
         if button(t("Waiting, cancel"), width=BUTTON):
             models.forget_waiting(id)
         return False
-    return button(t("Download"), Kind.PLAIN, why_not, width=BUTTON)
+    return button(t("Download"), Emphasis.PLAIN, why_not, width=BUTTON)
 
 
 def _draw_installed() -> None:
@@ -146,7 +146,7 @@ def _draw_installed() -> None:
     imgui.text_colored(theme.vec("secondary"), t("Installed"))
 
 
-def _draw_model(editor: Editor, state: State) -> None:
+def _draw_model(editor: Editor, state: CacheState) -> None:
     weight, names = state.weight, names_of(state.weight.id)
     rule()
     imgui.push_id(weight.id)
@@ -193,7 +193,7 @@ def _draw_added(editor: Editor, own: Added) -> None:
     imgui.pop_id()
 
 
-def _draw_state(editor: Editor, state: State) -> None:
+def _draw_state(editor: Editor, state: CacheState) -> None:
     """Installed, on its way with Cancel, or the button that gets it."""
     id = state.weight.id
     if state.state == "ok" and not _is_coming(editor, id):
@@ -306,7 +306,7 @@ def _draw_family(editor: Editor, family: str) -> None:
     if len(sizes) > 1:
         gap(4)
         imgui.begin_child("##sizes", theme.size(WIDE, 28))
-        choices = [Choice(s.model.id, t(SIZES[s.model.id])) for s in reversed(sizes)]
+        choices = [Segment(s.model.id, t(SIZES[s.model.id])) for s in reversed(sizes)]
         chosen = segmented(family, choices, shown.model.id)
         imgui.end_child()
         if chosen != shown.model.id:
@@ -387,8 +387,8 @@ def _draw_worker(editor: Editor, state: WorkerState) -> None:
         imgui.text_unformatted(state.name)
     imgui.same_line(imgui.get_window_width() - theme.pt(20 + BUTTON))
     if workers.is_chosen(state.name):
-        button(t("Lifts now"), Kind.PLAIN, t("It is chosen"), width=BUTTON)
-    elif button(t("Lift with it"), Kind.PLAIN, _why_not(state), width=BUTTON):
+        button(t("Lifts now"), Emphasis.PLAIN, t("It is chosen"), width=BUTTON)
+    elif button(t("Lift with it"), Emphasis.PLAIN, _why_not(state), width=BUTTON):
         workers.choose(state.name)
     if worker is None:
         note(f"{sentence(state.why_not or '')}.")

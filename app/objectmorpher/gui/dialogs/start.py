@@ -17,7 +17,7 @@ from ...system.resources import resource
 from ...system.texts import t
 from ..widgets.panes import FLAGS, START
 from ..widgets.theme import FIELD, TITLE_SIZE, Icon, theme
-from ..widgets.widgets import Kind, bold_text, button, drawn_button, fitted, small_text, tooltip
+from ..widgets.widgets import Emphasis, bold_text, button, drawn_button, fitted, small_text, tooltip
 from ..window.landmarks import mark
 from ..window.layout import Rect
 
@@ -83,7 +83,7 @@ class StartScreen:
         imgui.set_cursor_screen_pos(
             ImVec2(low.x + (column - theme.pt(160)) / 2, low.y + theme.pt(172))
         )
-        if button(t("Open a photo…"), Kind.PRIMARY, width=160):
+        if button(t("Open a photo…"), Emphasis.PRIMARY, width=160):
             run(editor, "open")
         imgui.set_cursor_screen_pos(ImVec2(low.x, high.y))
         imgui.dummy(ImVec2(column, 0))
@@ -143,7 +143,7 @@ class StartScreen:
         for path in recent:
             name = fitted(path.name, column - theme.pt(56))
             across = imgui.calc_text_size(f"{Icon.FILE}   {name}").x / theme.scale + 16
-            if button(f"{Icon.FILE}   {name}##{path}", Kind.QUIET, width=max(across, 320)):
+            if button(f"{Icon.FILE}   {name}##{path}", Emphasis.QUIET, width=max(across, 320)):
                 if path.exists():
                     editor.filing.open(path)
                 else:

@@ -17,7 +17,7 @@ ACCENT = "#5AA9FF"  # of marks on the photo, in either theme
 WARM = "#F2695C"
 
 
-class Canvas:
+class CanvasPainter:
     """Draws on the canvas of one frame. Places are image px or window positions (ImVec2)."""
 
     def __init__(self, editor: Editor, rect: Rect, pixel_ratio: float) -> None:

@@ -10,7 +10,7 @@ from ...editor.editor import Editor
 from ...editor.view import Popup, PoseMode, Shown, ToolName
 from ...system.texts import t
 from ..widgets.theme import theme
-from ..widgets.widgets import Kind, bold_text, button
+from ..widgets.widgets import Emphasis, bold_text, button
 from ..window.landmarks import mark
 from ..window.layout import Rect
 
@@ -45,12 +45,12 @@ def draw_card(editor: Editor, rect: Rect) -> None:
     _draw_line(t("Wheel while dragging"), t("brings it nearer, or takes it farther"))
     _draw_line(t("Ctrl-drag"), t("turns the point"))
     imgui.dummy(theme.size(0, 2))
-    if button(t("Got it"), Kind.PRIMARY_SMALL, width=88):
+    if button(t("Got it"), Emphasis.PRIMARY_SMALL, width=88):
         dismissed = (*editor.settings.dismissed, POSING)
         editor.settings = replace(editor.settings, dismissed=dismissed)
     mark(t("Got it"))
     imgui.same_line(0, theme.pt(8))
-    if button(t("Read more"), Kind.QUIET, width=104):
+    if button(t("Read more"), Emphasis.QUIET, width=104):
         view.help_page, view.popup = "bend", Popup.HELP
     imgui.end()
 

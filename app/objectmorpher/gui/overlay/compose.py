@@ -11,12 +11,12 @@ from ...editor.intents.landing import Of
 from ...editor.view import Composed
 from ...system.texts import t
 from ..widgets.theme import theme
-from .canvas import ACCENT, WHITE, Canvas
+from .canvas import ACCENT, WHITE, CanvasPainter
 
 BARB = 10.0  # points, of an arrow
 
 
-def draw_compose(canvas: Canvas) -> None:
+def draw_compose(canvas: CanvasPainter) -> None:
     """Draw the Compose tool's brush and note over the photo."""
     editor = canvas.editor
     if (offer := editor.composing.offer) is not None:
@@ -39,7 +39,7 @@ def draw_compose(canvas: Canvas) -> None:
             _draw_hint(canvas, editor.hinting.dragged, 1.0)
 
 
-def _draw_owner(canvas: Canvas) -> None:
+def _draw_owner(canvas: CanvasPainter) -> None:
     """What is under the pointer: the photo, the filled-in background, or which object."""
     editor, document = canvas.editor, canvas.editor.document
     if editor.pointer is None or document is None or editor.hand.is_busy:
@@ -60,7 +60,7 @@ def _draw_owner(canvas: Canvas) -> None:
     canvas.label(text, at.x + theme.pt(14), at.y + theme.pt(14))
 
 
-def _draw_hint(canvas: Canvas, hint: Hint, alpha: float) -> None:
+def _draw_hint(canvas: CanvasPainter, hint: Hint, alpha: float) -> None:
     """A full circle around what is taken, a dashed one where it is wanted, an arrow between."""
     source, to = canvas.at(np.array([hint.source, hint.to]))
     radius = hint.radius * canvas.editor.view.zoom / canvas.ratio

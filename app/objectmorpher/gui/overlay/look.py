@@ -9,13 +9,13 @@ from ...editor.view import PIXELS_FROM
 from ...system.texts import t
 from ...tools.place_tool import wrapped
 from ..widgets.theme import theme
-from .canvas import DARK, WHITE, Canvas
+from .canvas import DARK, WHITE, CanvasPainter
 
 DARKNESS, LIGHTNESS = 0.28, 0.16  # alpha of the pixel grid's lines, at their strongest
 FAINTEST = 0.4  # x that, where the grid begins to show
 
 
-def draw_look(canvas: Canvas) -> None:
+def draw_look(canvas: CanvasPainter) -> None:
     """Draw the note that the object is seen from elsewhere."""
     editor, rect = canvas.editor, canvas.rect
     orbit = editor.looking.orbit
@@ -25,7 +25,7 @@ def draw_look(canvas: Canvas) -> None:
         canvas.label(text, rect.x + theme.pt(12), rect.y + theme.pt(12))
 
 
-def draw_pixel_grid(canvas: Canvas) -> None:
+def draw_pixel_grid(canvas: CanvasPainter) -> None:
     """Hairlines between the photo's pixels, dark and light, so that they are seen on any photo."""
     editor, view = canvas.editor, canvas.editor.view
     size = editor.photo_size
@@ -49,7 +49,7 @@ def draw_pixel_grid(canvas: Canvas) -> None:
 # Before and after.
 
 
-def draw_comparison(canvas: Canvas) -> None:
+def draw_comparison(canvas: CanvasPainter) -> None:
     """The line between before and after, or what else than the edit alone is shown."""
     view, rect = canvas.editor.view, canvas.rect
     top = rect.y + theme.pt(12)

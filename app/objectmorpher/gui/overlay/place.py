@@ -13,7 +13,7 @@ from ...system.texts import t
 from ...tools.gizmo import TURNS, Arrow, Gizmo, Ring, gizmo
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
-from .canvas import ACCENT, DARK, WHITE, Canvas
+from .canvas import ACCENT, DARK, WHITE, CanvasPainter
 from .select import draw_other
 
 MARKED = {"yaw": 3.8, "pitch": -0.9, "roll": 3.9}  # rad, on the front of each ring, off the others
@@ -26,7 +26,7 @@ BELOW = 22.0  # points from there to how far the object is to be believed
 TRUST = {"fine": "#70A020", "look closely": "#E0A030", "guesswork": "#E05040"}
 
 
-def draw_frame(canvas: Canvas) -> None:
+def draw_frame(canvas: CanvasPainter) -> None:
     """Draw the Place tool's frame."""
     editor = canvas.editor
     shown = gizmo(editor)
@@ -68,13 +68,13 @@ def _runs(ring: Ring, is_wanted: bool) -> list[np.ndarray]:
     return [angles[first] + (angles[1] - angles[0]) * np.arange(count + 1)] if count else []
 
 
-def _draw_back(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+def _draw_back(canvas: CanvasPainter, shown: Gizmo, name: str, color: str) -> None:
     for angles in _runs(shown.rings[name], False):
         for points in _around(shown, shown.rings[name].seen(angles)):
             canvas.polyline(canvas.on_canvas(points), color, 1.0, is_closed=False, alpha=0.5)
 
 
-def _draw_front(canvas: Canvas, shown: Gizmo, name: str, color: str) -> None:
+def _draw_front(canvas: CanvasPainter, shown: Gizmo, name: str, color: str) -> None:
     for angles in _runs(shown.rings[name], True):
         for points in _around(shown, shown.rings[name].seen(angles)):
             canvas.polyline(canvas.on_canvas(points), color, 2.0, is_closed=False)
@@ -88,7 +88,7 @@ def _around(shown: Gizmo, points: np.ndarray) -> list[np.ndarray]:
     return [piece for piece, outside in pieces if outside[0] and len(piece) > 1]
 
 
-def _draw_arrow(canvas: Canvas, arrow: Arrow, color: str) -> None:
+def _draw_arrow(canvas: CanvasPainter, arrow: Arrow, color: str) -> None:
     """Its sides run towards the centre, as those of a road to where it vanishes."""
     scale = canvas.editor.view.scale
     slope, head = SHAFT * scale / arrow.near, HEAD * scale
@@ -110,7 +110,7 @@ def _draw_arrow(canvas: Canvas, arrow: Arrow, color: str) -> None:
         canvas.draw.add_convex_poly_filled(shape, theme.u32(color))
 
 
-def _draw_horizon(canvas: Canvas, row: float, is_hovered: bool) -> None:
+def _draw_horizon(canvas: CanvasPainter, row: float, is_hovered: bool) -> None:
     """A dashed line from edge to edge, with its name and a grip."""
     width = float(canvas.editor.view.width)
     start, end = canvas.on_canvas(np.array([[0.0, row], [width, row]]))
@@ -120,14 +120,14 @@ def _draw_horizon(canvas: Canvas, row: float, is_hovered: bool) -> None:
     canvas.label(t("Horizon"), start.x + theme.pt(12), start.y + theme.pt(6))
 
 
-def _draw_centre(canvas: Canvas, shown: Gizmo) -> None:
+def _draw_centre(canvas: CanvasPainter, shown: Gizmo) -> None:
     centre, arm = canvas.on_canvas(shown.centre)[0], theme.pt(6)
     for dx, dy in ((arm, 0.0), (0.0, arm)):
         a, b = ImVec2(centre.x - dx, centre.y - dy), ImVec2(centre.x + dx, centre.y + dy)
         canvas.line(a, b, WHITE, alpha=1.0)
 
 
-def _draw_value(canvas: Canvas, part: str | None) -> None:
+def _draw_value(canvas: CanvasPainter, part: str | None) -> None:
     """Beside the pointer: what a drag has come to, or what a ring turns."""
     editor = canvas.editor
     placement, pointer = editor.placing.placement, editor.pointer
@@ -147,7 +147,7 @@ def _draw_value(canvas: Canvas, part: str | None) -> None:
             _draw_trust(canvas, at)
 
 
-def _draw_trust(canvas: Canvas, at: ImVec2) -> None:
+def _draw_trust(canvas: CanvasPainter, at: ImVec2) -> None:
     """Below the value: how far the turned object is to be believed."""
     from objectmorpher_core.raster.trust import trust_in
 

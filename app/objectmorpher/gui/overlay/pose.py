@@ -14,7 +14,7 @@ from ...tools.pose_tool import RING, RING_PART
 from ..widgets.fade import fades
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
-from .canvas import ACCENT, DARK, WHITE, Canvas
+from .canvas import ACCENT, DARK, WHITE, CanvasPainter
 from .rig import draw_brush, draw_regions
 from .select import draw_other, draw_rubber
 
@@ -25,7 +25,7 @@ MOVES = 0.02  # of the handle's way: what follows less is not marked
 COLD, HOT = np.array([0.27, 0.42, 0.82]), np.array([1.0, 0.86, 0.2])  # of the influence
 
 
-def draw_pose(canvas: Canvas) -> None:
+def draw_pose(canvas: CanvasPainter) -> None:
     """Draw the Pose tool's handles."""
     editor = canvas.editor
     document, thing = editor.document, editor.object
@@ -53,7 +53,7 @@ def draw_pose(canvas: Canvas) -> None:
         draw_rubber(canvas)
 
 
-def _draw_handles(canvas: Canvas, thing: EditObject) -> None:
+def _draw_handles(canvas: CanvasPainter, thing: EditObject) -> None:
     """Anchors, how far the points went, the handles, the ring."""
     editor = canvas.editor
     document = editor.document
@@ -89,14 +89,14 @@ def _apart(places: list[ImVec2], points: float = APART) -> list[ImVec2]:
     return list(cells.values())
 
 
-def _draw_mirror(canvas: Canvas) -> None:
+def _draw_mirror(canvas: CanvasPainter) -> None:
     """Where the mirror plane meets the object."""
     way = canvas.editor.posing.mirroring.outline()
     if len(way) > 1:
         canvas.dashes(canvas.at(way), WHITE, is_closed=False)
 
 
-def _draw_influence(canvas: Canvas, handle: int) -> None:
+def _draw_influence(canvas: CanvasPainter, handle: int) -> None:
     """How much each control point goes along: larger and warmer dots."""
     editor = canvas.editor
     assert editor.document is not None
@@ -113,7 +113,7 @@ def _draw_influence(canvas: Canvas, handle: int) -> None:
         canvas.draw.add_circle_filled(at, radius, color, 12)
 
 
-def draw_control_points(canvas: Canvas) -> None:
+def draw_control_points(canvas: CanvasPainter) -> None:
     """The control points and their strongest links."""
     editor = canvas.editor
     assert editor.document is not None
@@ -129,7 +129,7 @@ def draw_control_points(canvas: Canvas) -> None:
         canvas.dot(at, 1.8, alpha=0.8)
 
 
-def _draw_hint_points(canvas: Canvas, share: float) -> None:
+def _draw_hint_points(canvas: CanvasPainter, share: float) -> None:
     """The control points, quietly, while there is no handle: here is something to drag."""
     editor = canvas.editor
     assert editor.document is not None
@@ -138,7 +138,7 @@ def _draw_hint_points(canvas: Canvas, share: float) -> None:
         canvas.dot(at, 1.7, alpha=0.9 * share)
 
 
-def _draw_surface_point(canvas: Canvas) -> None:
+def _draw_surface_point(canvas: CanvasPainter) -> None:
     """Where a click would take the surface."""
     editor = canvas.editor
     surface = editor.hover.surface
@@ -152,7 +152,7 @@ def _draw_surface_point(canvas: Canvas) -> None:
     canvas.draw.add_circle_filled(at, theme.pt(1.6), theme.u32(WHITE))
 
 
-def _draw_pull(canvas: Canvas, start: ImVec2, end: ImVec2) -> None:
+def _draw_pull(canvas: CanvasPainter, start: ImVec2, end: ImVec2) -> None:
     """From where the point was in the photo to where it must be."""
     if np.hypot(end.x - start.x, end.y - start.y) < theme.pt(3):
         return
@@ -162,7 +162,7 @@ def _draw_pull(canvas: Canvas, start: ImVec2, end: ImVec2) -> None:
 
 
 def _draw_handle(
-    canvas: Canvas, at: ImVec2, is_pin: bool, is_selected: bool, is_hovered: bool
+    canvas: CanvasPainter, at: ImVec2, is_pin: bool, is_selected: bool, is_hovered: bool
 ) -> None:
     if is_selected:
         canvas.ring(at, 12, ACCENT)
@@ -181,7 +181,7 @@ LEAST_DEPTH = 0.015  # diameters: less shows no scale
 TICK = 5.0  # points, half the tick's width
 
 
-def draw_ring(canvas: Canvas, at: ImVec2) -> None:
+def draw_ring(canvas: CanvasPainter, at: ImVec2) -> None:
     """Around the handle at a window position."""
     editor = canvas.editor
     numbers = editor.handle_numbers.read()
@@ -199,7 +199,7 @@ def draw_ring(canvas: Canvas, at: ImVec2) -> None:
         canvas.label(editor.posing.readout, at.x, at.y - radius - theme.pt(36), side=0.5)
 
 
-def _draw_arc(canvas: Canvas, at: ImVec2, turn: float) -> None:
+def _draw_arc(canvas: CanvasPainter, at: ImVec2, turn: float) -> None:
     """From the top, clockwise, as far as the handle is turned."""
     radius = theme.pt(RING)
     end = np.radians(np.clip(turn, -360, 360))
@@ -213,7 +213,7 @@ def _draw_arc(canvas: Canvas, at: ImVec2, turn: float) -> None:
     canvas.draw.add_circle_filled(knob, theme.pt(4), theme.u32(WHITE))
 
 
-def _draw_depth(canvas: Canvas, at: ImVec2, depth: float) -> None:
+def _draw_depth(canvas: CanvasPainter, at: ImVec2, depth: float) -> None:
     """A scale at the right: up is farther away."""
     x = at.x + theme.pt(RING + 10)
     reach = theme.pt(SCALE * FARTHEST)

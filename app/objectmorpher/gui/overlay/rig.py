@@ -7,10 +7,10 @@ from imgui_bundle import ImVec2
 
 from objectmorpher_core.base.arrays import F64, I32
 
-from ...editor.intents.rigging import Region
+from ...editor.intents.rigging import MovedPart
 from ...editor.view import BRUSHES, PoseMode
 from ..widgets.theme import theme
-from .canvas import ACCENT, DARK, WARM, WHITE, Canvas
+from .canvas import ACCENT, DARK, WARM, WHITE, CanvasPainter
 
 YELLOW = "#F2B84B"
 STEP = 7.0  # points between hatch lines
@@ -23,7 +23,7 @@ HATCHES: dict[PoseMode, tuple[tuple[float, ...], str]] = {  # angles of the line
 }
 
 
-def draw_regions(canvas: Canvas) -> None:
+def draw_regions(canvas: CanvasPainter) -> None:
     """On the side that is seen."""
     editor = canvas.editor
     document = editor.document
@@ -35,7 +35,7 @@ def draw_regions(canvas: Canvas) -> None:
             _draw_seam(canvas, region)
 
 
-def draw_brush(canvas: Canvas) -> None:
+def draw_brush(canvas: CanvasPainter) -> None:
     """Draw the marks of the stroke in progress, and the brush itself."""
     editor = canvas.editor
     mode, rigging = editor.view.pose.mode, editor.rigging
@@ -52,7 +52,7 @@ def draw_brush(canvas: Canvas) -> None:
         canvas.brush()
 
 
-def _visible(canvas: Canvas, nodes: I32) -> F64:
+def _visible(canvas: CanvasPainter, nodes: I32) -> F64:
     """Where these control points are seen, (n, 2) window units; those behind are left out."""
     editor = canvas.editor
     assert editor.document is not None
@@ -62,7 +62,7 @@ def _visible(canvas: Canvas, nodes: I32) -> F64:
     return xy / canvas.ratio + (canvas.rect.x, canvas.rect.y)
 
 
-def _draw_hatched(canvas: Canvas, kind: PoseMode, nodes: I32) -> None:
+def _draw_hatched(canvas: CanvasPainter, kind: PoseMode, nodes: I32) -> None:
     editor = canvas.editor
     assert editor.document is not None
     spacing = editor.cache.facts.spacing(editor.document, editor.current)
@@ -79,7 +79,7 @@ def _draw_hatched(canvas: Canvas, kind: PoseMode, nodes: I32) -> None:
             canvas.draw.add_line(start, end, light, 1.2 * theme.scale)
 
 
-def _draw_seam(canvas: Canvas, region: Region) -> None:
+def _draw_seam(canvas: CanvasPainter, region: MovedPart) -> None:
     """A cut: crosses along it; glue: lines from side to side."""
     rigging = canvas.editor.rigging
     seam = rigging.rig.seams[region.seam]

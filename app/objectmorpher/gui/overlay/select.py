@@ -8,13 +8,13 @@ from imgui_bundle import ImVec2
 from ...tools.mask_tool import erases
 from ..widgets.fade import fades
 from ..widgets.theme import theme
-from .canvas import ACCENT, DARK, WARM, WHITE, Canvas
+from .canvas import ACCENT, DARK, WARM, WHITE, CanvasPainter
 
 DOTS = 6.0  # points between the dots of a dotted line
 DOT = 1.4  # points, their radius
 
 
-def draw_selection(canvas: Canvas) -> None:
+def draw_selection(canvas: CanvasPainter) -> None:
     """Draw the Select tool's selection and clicks."""
     editor = canvas.editor
     draw_edge(canvas)
@@ -40,7 +40,7 @@ def draw_selection(canvas: Canvas) -> None:
         _draw_lasso(canvas, editor.selection.path)
 
 
-def draw_edge(canvas: Canvas) -> None:
+def draw_edge(canvas: CanvasPainter) -> None:
     """The outline of what is selected, where that is seen now."""
     editor, document = canvas.editor, canvas.editor.document
     if editor.mask is None or document is None:
@@ -51,13 +51,13 @@ def draw_edge(canvas: Canvas) -> None:
         canvas.polyline(canvas.at(outline), ACCENT)
 
 
-def draw_left_out(canvas: Canvas) -> None:
+def draw_left_out(canvas: CanvasPainter) -> None:
     """Dotted lines around what is offered to be added to the selection."""
     for outline in canvas.editor.leaving_out.outlines:
         _draw_dots(canvas, outline, WHITE, 1.0)
 
 
-def _draw_dots(canvas: Canvas, outline: np.ndarray, color: str, share: float) -> None:
+def _draw_dots(canvas: CanvasPainter, outline: np.ndarray, color: str, share: float) -> None:
     """A dotted closed line (N, 2) image px: what a click would select, add or take away."""
     corners = canvas.editor.view.canvas_from_image(np.vstack([outline, outline[:1]]))
     along = np.concatenate([[0.0], np.linalg.norm(np.diff(corners, axis=0), axis=1).cumsum()])
@@ -67,7 +67,7 @@ def _draw_dots(canvas: Canvas, outline: np.ndarray, color: str, share: float) ->
         canvas.dot(at, DOT, 0.9 * share, color)
 
 
-def draw_rubber(canvas: Canvas) -> None:
+def draw_rubber(canvas: CanvasPainter) -> None:
     """The box that is being drawn."""
     assert canvas.editor.rubber is not None
     x0, y0, x1, y1 = canvas.editor.rubber
@@ -76,7 +76,7 @@ def draw_rubber(canvas: Canvas) -> None:
     canvas.draw.add_rect(low, high, theme.u32(ACCENT), thickness=theme.pt(1.5))
 
 
-def _draw_lasso(canvas: Canvas, path: list[np.ndarray]) -> None:
+def _draw_lasso(canvas: CanvasPainter, path: list[np.ndarray]) -> None:
     """The line that is being drawn around something, canvas px (2,) each; its end is dashed."""
     points = canvas.on_canvas(np.array(path))
     if len(points) > 1:
@@ -84,7 +84,7 @@ def _draw_lasso(canvas: Canvas, path: list[np.ndarray]) -> None:
         canvas.dashes([points[-1], points[0]], is_closed=False)
 
 
-def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
+def _draw_click(canvas: CanvasPainter, at: ImVec2, is_foreground: bool) -> None:
     """A disc with + or -: shape and colour both tell."""
     canvas.disc(at, 6, ACCENT if is_foreground else WARM)
     arm, dark, width = theme.pt(3), theme.u32(DARK), theme.pt(2)
@@ -96,7 +96,7 @@ def _draw_click(canvas: Canvas, at: ImVec2, is_foreground: bool) -> None:
 # The selection's edge while it is painted, and the brush.
 
 
-def draw_mask(canvas: Canvas) -> None:
+def draw_mask(canvas: CanvasPainter) -> None:
     """Draw the Mask tool's brush. During a stroke only the veil shows the edge, at once.
 
     Over an edit, which has no veil, a band shows where the brush went.
@@ -111,7 +111,7 @@ def draw_mask(canvas: Canvas) -> None:
         canvas.brush(erases(editor, editor.pointer))
 
 
-def _draw_trail(canvas: Canvas) -> None:
+def _draw_trail(canvas: CanvasPainter) -> None:
     """The band that a stroke in progress has covered."""
     masking, view = canvas.editor.masking, canvas.editor.view
     assert masking.painting is not None
@@ -127,7 +127,7 @@ def _draw_trail(canvas: Canvas) -> None:
 # The object under the pointer that a click would make the current one.
 
 
-def draw_other(canvas: Canvas) -> None:
+def draw_other(canvas: CanvasPainter) -> None:
     """A dashed box around it, and its name."""
     editor, other = canvas.editor, canvas.editor.hover.other
     document = editor.document

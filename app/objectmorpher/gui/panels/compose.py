@@ -27,14 +27,14 @@ from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
 from ..widgets.method_choice import draw_method
 from ..widgets.pictures import pictures
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import RADIUS, theme
 from ..widgets.widgets import (
     GAP,
     LABEL_WIDTH,
     SIDE,
-    Change,
-    Kind,
+    Emphasis,
+    FieldChange,
     Number,
     button,
     checkbox,
@@ -92,7 +92,7 @@ def _draw_background(editor: Editor) -> None:
 def _draw_brush(editor: Editor) -> None:
     """What a drag on the background does."""
     compose_view = editor.view.compose
-    choices = tuple(Choice(way, t(way.value)) for way in Composed)
+    choices = tuple(Segment(way, t(way.value)) for way in Composed)
     compose_view.drag = segmented("composed", choices, compose_view.drag)
     if compose_view.drag is Composed.TAKE:
         draw_radius(editor)
@@ -173,7 +173,7 @@ def _draw_shadow(editor: Editor) -> None:
 def _draw_offer(editor: Editor) -> None:
     """What is outlined on the photo goes along, or stays."""
     note(t("The photo shows outlined what would go along."))
-    if button(t("Take it along"), Kind.PRIMARY_SMALL, width=-1):
+    if button(t("Take it along"), Emphasis.PRIMARY_SMALL, width=-1):
         editor.composing.accept_shadow()
     if button(t("Leave it in the photo"), width=-1):
         editor.composing.refuse_shadow()
@@ -200,7 +200,7 @@ def _draw_direction(editor: Editor) -> None:
     mark(t("Falls to"))
     is_done = imgui.is_item_deactivated_after_edit()
     if is_changed or is_done:
-        change = Change(wrapped(turned), is_changed, is_done)
+        change = FieldChange(wrapped(turned), is_changed, is_done)
         changed = replace(shadow, direction=change.value)
         _take(editor, change, lambda: editor.composing.preview_shadow(changed), t("Turn shadow"))
     imgui.set_cursor_pos_y(top + theme.pt(SIDE + 4))
@@ -213,7 +213,7 @@ def _draw_light(editor: Editor) -> None:
         note(f"{reason}.")
         return
     assert editor.object is not None
-    choices = tuple(Choice(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
+    choices = tuple(Segment(name, t(REFINERS.get(name, name))) for name in compose.REFINERS)
     editor.composing.choose_refiner(segmented("refiner", choices, editor.composing.refiner))
     if editor.composing.refiner == "none":
         note(t("Harmonise gives the object the light of its new place and of how it is turned."))
@@ -243,7 +243,7 @@ def _draw_edge(editor: Editor) -> None:
     note(t("How wide the edit fades into the photo."))
 
 
-def _take(editor: Editor, change: Change, preview: Callable[[], None], label: str) -> None:
+def _take(editor: Editor, change: FieldChange, preview: Callable[[], None], label: str) -> None:
     """Shows a change, and makes it a step when it is complete."""
     if change.is_changed:
         preview()

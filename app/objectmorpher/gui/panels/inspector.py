@@ -12,7 +12,7 @@ from ...editor.view import ToolName
 from ...system.texts import t
 from ..widgets.panes import INSPECTOR, edge, pane
 from ..widgets.theme import FOLDED, PRIMARY, Icon, theme
-from ..widgets.widgets import Kind, button, icon_button, rule
+from ..widgets.widgets import Emphasis, button, icon_button, rule
 from ..window.layout import Rect
 from .compose import draw_compose
 from .history_list import draw_history
@@ -70,8 +70,8 @@ def _draw_foot(editor: Editor, rect: Rect, foot: float) -> None:
     imgui.set_cursor_pos(ImVec2(theme.pt(12), rect.height - foot + theme.pt(12)))
     label, command = next_step(editor)
     if command is None:
-        button(label, Kind.WAITING)
-    elif button(label, Kind.PRIMARY, why_not=why_not(editor, command)):
+        button(label, Emphasis.WAITING)
+    elif button(label, Emphasis.PRIMARY, why_not=why_not(editor, command)):
         run(editor, command)
 
 

@@ -11,7 +11,7 @@ from ...commands import COMMANDS, keys_of, run, why_not
 from ...editor.editor import Editor
 from ...editor.view import Shown
 from ...system.texts import t
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import (
     Number,
@@ -125,12 +125,12 @@ def draw_shape(editor: Editor) -> None:
 def _draw_kind(editor: Editor) -> None:
     """What the object is, and what it was recognised as."""
     choices = (
-        Choice("auto", t("Auto"), t("What its outline and the learned shape say")),
-        Choice("round", t("Round"), t("Turned about an axis: a cup, a plate, a bottle, a ball")),
-        Choice("flat", t("Flat"), t("A thin sheet: a leaf, a poster, a butterfly, a drawing")),
-        Choice("box", t("Box"), t("Six flat sides at right angles")),
-        Choice("tube", t("Tube"), t("Every cross-section is a circle: a branch, a limb, a hose")),
-        Choice("free", t("Free"), t("Nothing in particular")),
+        Segment("auto", t("Auto"), t("What its outline and the learned shape say")),
+        Segment("round", t("Round"), t("Turned about an axis: a cup, a plate, a bottle, a ball")),
+        Segment("flat", t("Flat"), t("A thin sheet: a leaf, a poster, a butterfly, a drawing")),
+        Segment("box", t("Box"), t("Six flat sides at right angles")),
+        Segment("tube", t("Tube"), t("Every cross-section is a circle: a branch, a limb, a hose")),
+        Segment("free", t("Free"), t("Nothing in particular")),
     )
     note(t("Kind"))
     kind = segmented("kind", choices, editor.shaping.settings.kind)
@@ -167,11 +167,11 @@ def _draw_trust(editor: Editor) -> None:
 
 def _draw_back(editor: Editor) -> None:
     choices = (
-        Choice(
+        Segment(
             "auto", t("Auto"), t("As the object looks: mirrored where it is seen from the side")
         ),
-        Choice("mirrored", t("Mirrored"), t("The other side looks like this one")),
-        Choice("continued", t("Continued"), t("The rim goes on to the other side")),
+        Segment("mirrored", t("Mirrored"), t("The other side looks like this one")),
+        Segment("continued", t("Continued"), t("The rim goes on to the other side")),
     )
     note(t("Other side"))
     back = segmented("back", choices, editor.shaping.settings.back)
@@ -180,10 +180,10 @@ def _draw_back(editor: Editor) -> None:
 
 
 def _draw_symmetry(editor: Editor) -> None:
-    choices: tuple[Choice[bool | None], ...] = (
-        Choice(None, t("Auto"), t("Left and right are taken to be alike where they look so")),
-        Choice(True, t("Symmetric"), t("Left and right are alike: what is hidden is mirrored")),
-        Choice(False, t("Not"), t("Left and right have nothing to do with each other")),
+    choices: tuple[Segment[bool | None], ...] = (
+        Segment(None, t("Auto"), t("Left and right are taken to be alike where they look so")),
+        Segment(True, t("Symmetric"), t("Left and right are alike: what is hidden is mirrored")),
+        Segment(False, t("Not"), t("Left and right have nothing to do with each other")),
     )
     note(t("Symmetry"))
     chosen = segmented("symmetry", choices, editor.shaping.settings.is_symmetric)
@@ -216,7 +216,7 @@ def _draw_poses(editor: Editor) -> None:
     if fitting is not None and len(fitting.found.registration.proposals) > 1:
         proposals = fitting.found.registration.proposals
         choices = tuple(
-            Choice(
+            Segment(
                 proposal, f"{100 * proposal.iou:.0f} %",
                 t("Its outline agrees by {share} %, its colours differ by {error} %",
                   share=f"{100 * proposal.iou:.1f}", error=f"{100 * proposal.colour_error:.1f}"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...editor.editor import Editor
 from ...editor.view import Painted
 from ...system.texts import t
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon
 from ..widgets.widgets import command_button, gap, heading, note
 from .brush import draw_brush_fields
@@ -30,28 +30,28 @@ def draw_mask(editor: Editor) -> None:
     draw_command(editor, "clear")
 
 
-def _kinds() -> tuple[Choice[Painted], ...]:
+def _kinds() -> tuple[Segment[Painted], ...]:
     return (
-        Choice(Painted.SELECTION, t("Selection"), t("What belongs to the object")),
-        Choice(Painted.DEPTH, t("Depth"), t("Which parts of it are nearer than it looks")),
-        Choice(Painted.HIDDEN, t("Hidden"), t("Where it goes on behind something else")),
+        Segment(Painted.SELECTION, t("Selection"), t("What belongs to the object")),
+        Segment(Painted.DEPTH, t("Depth"), t("Which parts of it are nearer than it looks")),
+        Segment(Painted.HIDDEN, t("Hidden"), t("Where it goes on behind something else")),
     )
 
 
-def _ways(painted: Painted) -> tuple[Choice[bool], Choice[bool]]:
+def _ways(painted: Painted) -> tuple[Segment[bool], Segment[bool]]:
     if painted is Painted.DEPTH:
         return (
-            Choice(False, t("Nearer"), t("The brush brings a part nearer"), icon=Icon.UP),
-            Choice(True, t("Farther"), t("The brush pushes a part back"), icon=Icon.DOWN),
+            Segment(False, t("Nearer"), t("The brush brings a part nearer"), icon=Icon.UP),
+            Segment(True, t("Farther"), t("The brush pushes a part back"), icon=Icon.DOWN),
         )
     if painted is Painted.HIDDEN:
         return (
-            Choice(False, t("Paint"), t("The object goes on here, unseen"), icon=Icon.BRUSH),
-            Choice(True, t("Erase"), t("It does not go on here"), icon=Icon.ERASE),
+            Segment(False, t("Paint"), t("The object goes on here, unseen"), icon=Icon.BRUSH),
+            Segment(True, t("Erase"), t("It does not go on here"), icon=Icon.ERASE),
         )
     return (
-        Choice(False, t("Paint"), t("The brush adds to the selection"), icon=Icon.BRUSH),
-        Choice(True, t("Erase"), t("The brush takes away from the selection"), icon=Icon.ERASE),
+        Segment(False, t("Paint"), t("The brush adds to the selection"), icon=Icon.BRUSH),
+        Segment(True, t("Erase"), t("The brush takes away from the selection"), icon=Icon.ERASE),
     )
 
 

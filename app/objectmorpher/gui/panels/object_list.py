@@ -12,7 +12,7 @@ from ...editor.editor import Editor
 from ...system.texts import t
 from ..widgets.theme import SMALL_SIZE, Icon, theme
 from ..widgets.widgets import (
-    Kind,
+    Emphasis,
     button,
     drawn_button,
     end_row,
@@ -62,7 +62,7 @@ def draw_objects(editor: Editor) -> None:
         _drag_row(editor, top)
     if editor.object is not None and (editor.is_lifted or editor.object.stays_in_front):
         imgui.push_style_color(imgui.Col_.text, theme.vec("secondary"))
-        if button(f"{Icon.PLUS}  {t('Another object')}", Kind.QUIET):
+        if button(f"{Icon.PLUS}  {t('Another object')}", Emphasis.QUIET):
             run(editor, "another")
         imgui.pop_style_color()
 

@@ -13,10 +13,10 @@ from objectmorpher_core.document.model import EditObject
 from ...canvas.painter import shown_now
 from ...editor.editor import Editor
 from ...editor.intents.posing import Numbers
-from ...editor.intents.rigging import Region
+from ...editor.intents.rigging import MovedPart
 from ...editor.view import BRUSHES, PoseMode, Shown
 from ...system.texts import t
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import (
     BETWEEN,
@@ -71,13 +71,13 @@ def draw_pose(editor: Editor) -> None:
 def _draw_material(editor: Editor, thing: EditObject) -> None:
     heading(t("Rigidity"))
     now, held = rigidity_of(thing.deform), stays_of(thing)
-    presets: tuple[Choice[Rigidity | None], ...] = tuple(Choice(r, t(NAMES[r])) for r in Rigidity)
+    presets: tuple[Segment[Rigidity | None], ...] = tuple(Segment(r, t(NAMES[r])) for r in Rigidity)
     chosen = segmented("rigidity", presets, now)
     if chosen is not None and chosen is not now:
         editor.rigging.set_rigidity(chosen)
     gap(8)
     heading(t("What stays"))
-    kinds = tuple(Choice(s, t(STAYS[s]), t(WHAT_STAYS[s])) for s in Stays)
+    kinds = tuple(Segment(s, t(STAYS[s]), t(WHAT_STAYS[s])) for s in Stays)
     stays = segmented("stays", kinds, held)
     if stays is not held:
         editor.posing.set_stays(stays)
@@ -248,7 +248,7 @@ NOTES = {
 def draw_modes(editor: Editor) -> None:
     """The row of what dragging does, and its settings."""
     view = editor.view.pose
-    modes = tuple(Choice(mode, ICONS[mode], t(mode.value)) for mode in PoseMode)
+    modes = tuple(Segment(mode, ICONS[mode], t(mode.value)) for mode in PoseMode)
     view.mode = segmented("mode", modes, view.mode)
     if view.mode is PoseMode.DRAG:
         return
@@ -276,7 +276,7 @@ def draw_regions(editor: Editor) -> None:
         _draw_region(editor, region, row, _name(region, numbers[region.kind]))
 
 
-def _name(region: Region, number: int) -> str:
+def _name(region: MovedPart, number: int) -> str:
     if region.kind is PoseMode.FREEZE:
         return t("Frozen")
     if region.kind is PoseMode.STIFFEN:
@@ -289,7 +289,7 @@ def _name(region: Region, number: int) -> str:
     return t(names[region.kind], number=number)
 
 
-def _draw_region(editor: Editor, region: Region, row: int, name: str) -> None:
+def _draw_region(editor: Editor, region: MovedPart, row: int, name: str) -> None:
     start = imgui.get_cursor_screen_pos()
     width, height = imgui.get_content_region_avail().x, theme.pt(ROW)
     draw = imgui.get_window_draw_list()

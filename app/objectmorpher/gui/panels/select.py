@@ -9,7 +9,7 @@ from ...editor.editor import Editor
 from ...editor.view import SelectMode
 from ...system.texts import t
 from ..dialogs.models_dialog import draw_offer
-from ..widgets.segmented import Choice, segmented
+from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon
 from ..widgets.widgets import checkbox, gap, heading, note, tooltip
 from .edge import draw_command, draw_edge, draw_refinement_note
@@ -30,19 +30,21 @@ def draw_select(editor: Editor) -> None:
     draw_edge(editor)
 
 
-def _modes() -> tuple[Choice[SelectMode], ...]:
+def _modes() -> tuple[Segment[SelectMode], ...]:
     return (
-        Choice(SelectMode.CLICK, t("Click"), t("Click what belongs to the object"), icon=Icon.WAND),
-        Choice(SelectMode.BOX, t("Box"), t("Drag a box around the object"), icon=Icon.BOX),
-        Choice(SelectMode.LASSO, t("Lasso"), t("Draw a line around it"), icon=Icon.LASSO),
+        Segment(
+            SelectMode.CLICK, t("Click"), t("Click what belongs to the object"), icon=Icon.WAND
+        ),
+        Segment(SelectMode.BOX, t("Box"), t("Drag a box around the object"), icon=Icon.BOX),
+        Segment(SelectMode.LASSO, t("Lasso"), t("Draw a line around it"), icon=Icon.LASSO),
     )
 
 
-def _levels() -> tuple[Choice[str], ...]:
+def _levels() -> tuple[Segment[str], ...]:
     return (
-        Choice("part", t("Part"), t("A click means the part that it is on")),
-        Choice("object", t("Object"), t("A click means the whole object")),
-        Choice("group", t("Group"), t("A click means the object and what belongs to it")),
+        Segment("part", t("Part"), t("A click means the part that it is on")),
+        Segment("object", t("Object"), t("A click means the whole object")),
+        Segment("group", t("Group"), t("A click means the object and what belongs to it")),
     )
 
 

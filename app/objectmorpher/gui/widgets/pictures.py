@@ -11,7 +11,7 @@ from ...render.textures import PictureTexture
 KEPT = 24  # pictures, the least recently drawn go first
 
 
-class Pictures:
+class Textures:
     """The window's pictures by the identity of their pixels. One instance, `pictures`."""
 
     def __init__(self) -> None:
@@ -35,4 +35,4 @@ class Pictures:
         return imgui.ImTextureRef(found[1].glo)
 
 
-pictures = Pictures()
+pictures = Textures()

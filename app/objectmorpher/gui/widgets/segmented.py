@@ -17,7 +17,7 @@ INSET = 2.0  # points between the row's edge and the chosen part
 
 
 @dataclass(frozen=True)
-class Choice(Generic[T]):
+class Segment(Generic[T]):
     """One of several values. `why_not` greys it out and is its tooltip."""
 
     value: T
@@ -27,7 +27,7 @@ class Choice(Generic[T]):
     icon: str = ""
 
 
-def segmented(name: str, choices: Sequence[Choice[T]], chosen: T) -> T:
+def segmented(name: str, choices: Sequence[Segment[T]], chosen: T) -> T:
     """Draw values side by side, as wide as there is room, and return the chosen one."""
     start = imgui.get_cursor_screen_pos()
     across = imgui.get_content_region_avail().x
@@ -54,7 +54,7 @@ def segmented(name: str, choices: Sequence[Choice[T]], chosen: T) -> T:
 
 
 def _draw_part(
-    low: ImVec2, size: ImVec2, choice: Choice, is_chosen: bool, is_hovered: bool
+    low: ImVec2, size: ImVec2, choice: Segment, is_chosen: bool, is_hovered: bool
 ) -> None:
     draw, inset = imgui.get_window_draw_list(), theme.pt(INSET)
     if is_chosen or is_hovered:

@@ -25,7 +25,7 @@ STEPPER = 24.0  # points, width of a field's - and + buttons
 FILL = -1e-6  # width of what ends where the panel's content ends; with -1 it ends a pixel before
 
 
-class Kind(Enum):
+class Emphasis(Enum):
     """How much attention a button asks for."""
 
     PRIMARY = "primary"
@@ -81,10 +81,10 @@ def _place_tooltip() -> None:
 
 
 def button(
-    label: str, kind: Kind = Kind.PLAIN, why_not: str | None = None, width: float = -1.0
+    label: str, kind: Emphasis = Emphasis.PLAIN, why_not: str | None = None, width: float = -1.0
 ) -> bool:
     """A text button; `why_not` greys it out and is its tooltip. `width` in points, -1 fills."""
-    is_tall = kind in (Kind.PRIMARY, Kind.WAITING)
+    is_tall = kind in (Emphasis.PRIMARY, Emphasis.WAITING)
     height = PRIMARY if is_tall else FIELD
     across = theme.pt(width) if width > 0 else FILL
     roles = _ROLES[kind]
@@ -108,11 +108,11 @@ def button(
 
 
 _ROLES = {
-    Kind.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
-    Kind.PRIMARY_SMALL: ("accent", "accent_hovered", "accent", "on_accent"),
-    Kind.WAITING: ("raised", "raised", "raised", "secondary"),
-    Kind.PLAIN: ("raised", "hovered", "pressed", "text"),
-    Kind.QUIET: ("none", "hovered", "pressed", "text"),
+    Emphasis.PRIMARY: ("accent", "accent_hovered", "accent", "on_accent"),
+    Emphasis.PRIMARY_SMALL: ("accent", "accent_hovered", "accent", "on_accent"),
+    Emphasis.WAITING: ("raised", "raised", "raised", "secondary"),
+    Emphasis.PLAIN: ("raised", "hovered", "pressed", "text"),
+    Emphasis.QUIET: ("none", "hovered", "pressed", "text"),
 }
 
 
@@ -215,7 +215,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Change:
+class FieldChange:
     """What happened to a field in this frame."""
 
     value: float
@@ -223,16 +223,16 @@ class Change:
     is_done: bool = False  # the change is complete: one step for undo
 
 
-def number_field(number: Number, value: float) -> Change:
+def number_field(number: Number, value: float) -> FieldChange:
     """Name, value that can be dragged, typed (click) and stepped; double-click the name: reset."""
     is_nothing = not any(digit in "123456789" for digit in number.format % value)
     shown = 0.0 if is_nothing else value  # not "-0.00"
-    changed = Change(value)
+    changed = FieldChange(value)
     imgui.push_id(number.name)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec("secondary"), number.name)
     if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
-        changed = Change(number.rest, is_changed=value != number.rest, is_done=True)
+        changed = FieldChange(number.rest, is_changed=value != number.rest, is_done=True)
     tooltip(t("Double-click resets it"))
     imgui.same_line(theme.pt(LABEL_WIDTH))
     field = imgui.get_content_region_avail().x - 2 * theme.pt(STEPPER + 2)
@@ -243,14 +243,14 @@ def number_field(number: Number, value: float) -> Change:
     )
     mark(number.name)
     if is_changed or imgui.is_item_deactivated_after_edit():
-        changed = Change(new, is_changed, imgui.is_item_deactivated_after_edit())
+        changed = FieldChange(new, is_changed, imgui.is_item_deactivated_after_edit())
     for sign, icon in ((-1, Icon.MINUS), (1, Icon.PLUS)):
         imgui.same_line(0, theme.pt(2))
         if _stepper(icon):
             stepped = value + sign * number.step
             if number.low < number.high:
                 stepped = min(max(stepped, number.low), number.high)
-            changed = Change(stepped, True, True)
+            changed = FieldChange(stepped, True, True)
     imgui.pop_id()
     return changed
 
@@ -327,20 +327,20 @@ SIDE = 60.0  # points
 KNOB = 5.0
 
 
-def dial(name: str, degrees: float, hint: str) -> Change:
+def dial(name: str, degrees: float, hint: str) -> FieldChange:
     """The direction in degrees, 0 to the right and 90 down, in (-180, 180]."""
     start, side = imgui.get_cursor_screen_pos(), theme.pt(SIDE)
     imgui.invisible_button(f"##{name}", ImVec2(side, side))
     is_active = imgui.is_item_active()
     is_hovered = imgui.is_item_hovered() or is_active
     centre = ImVec2(start.x + side / 2, start.y + side / 2)
-    changed = Change(degrees, is_done=imgui.is_item_deactivated())
+    changed = FieldChange(degrees, is_done=imgui.is_item_deactivated())
     if is_active:
         mouse = imgui.get_mouse_pos()
         aimed = math.degrees(math.atan2(mouse.y - centre.y, mouse.x - centre.x))
         if imgui.get_io().key_shift:
             aimed = round(aimed / SNAP) * SNAP
-        changed = Change(aimed, is_changed=aimed != degrees)
+        changed = FieldChange(aimed, is_changed=aimed != degrees)
         degrees = aimed
     draw, radius = imgui.get_window_draw_list(), side / 2 - theme.pt(2)
     draw.add_circle_filled(centre, radius, theme.u32("hovered" if is_hovered else "raised"), 48)

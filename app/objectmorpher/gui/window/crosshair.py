@@ -6,7 +6,7 @@ from imgui_bundle import ImVec2
 
 from ...editor.editor import Editor
 from ...tools.pointer import Button, Pointer
-from ..overlay.canvas import DARK, WHITE, Canvas
+from ..overlay.canvas import DARK, WHITE, CanvasPainter
 from ..widgets.theme import theme
 from .landmarks import mark_on_canvas
 from .layout import Rect
@@ -71,7 +71,7 @@ class Crosshair:
         """Four lines around the place, and a square while it holds something."""
         if self._xy is None or editor.document is None:
             return
-        canvas = Canvas(editor, rect, pixel_ratio)
+        canvas = CanvasPainter(editor, rect, pixel_ratio)
         at = canvas.on_canvas(self.pointer().xy)[0]
         near, far = theme.pt(HOLE), theme.pt(ARM)
         for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):

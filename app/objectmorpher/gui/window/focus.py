@@ -11,7 +11,7 @@ MENU = "##MainMenuBar"  # ImGui's name of it
 ANY_POPUP = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
 
 
-class Focus:
+class KeyboardFocus:
     """Tab and F6 leave the photo for the panels, Esc and the mouse come back to it."""
 
     def __init__(self) -> None:

@@ -19,11 +19,11 @@ from ...editor.shortcuts import Shortcuts
 from ...editor.view import ToolName
 from ...system.texts import t
 from ...tools import navigate
-from ...tools.pointer import Button, Pointer, Shape
+from ...tools.pointer import Button, Pointer, PointerShape
 from ...tools.pose_strokes import DEPTH_STEP
 from ...tools.registry import TOOLS, Tool
 from .crosshair import FAR, STRIDE, Crosshair
-from .focus import ANY_POPUP, Focus
+from .focus import ANY_POPUP, KeyboardFocus
 from .layout import Rect
 
 log = logging.getLogger(__name__)
@@ -40,8 +40,8 @@ class Input:
 
     def __init__(self, shortcuts: Shortcuts) -> None:
         self._shortcuts = shortcuts
-        self.shape = Shape.ARROW
-        self.crosshair, self.focus = Crosshair(), Focus()
+        self.shape = PointerShape.ARROW
+        self.crosshair, self.focus = Crosshair(), KeyboardFocus()
         self._waiting: list[tuple[int, str]] = []  # ImGui's number of the event, and the chord
         self._pressed: list[str] = []  # chords since the last frame, in their order
         self._last: tuple[float, float] | None = None
@@ -83,7 +83,7 @@ class Input:
         elif editor.document is not None and is_over:
             self._begin(editor, pointer)
         else:
-            self.shape = Shape.ARROW
+            self.shape = PointerShape.ARROW
             editor.hover, self._hovered = Hover(), None
 
     def hint(self, editor: Editor) -> str:
@@ -211,9 +211,9 @@ class Input:
                     editor.hand.move(replace(pointer, is_down=False))
                 return
         if pointer.space:
-            self.shape = Shape.HAND
+            self.shape = PointerShape.HAND
         elif navigate.is_on_split(editor, pointer):
-            self.shape = Shape.SPLIT
+            self.shape = PointerShape.SPLIT
         else:
             self._hover(tool, editor, pointer)
 

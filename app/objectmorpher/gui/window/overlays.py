@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
 from ...editor.view import ToolName
-from ..overlay.canvas import Canvas
+from ..overlay.canvas import CanvasPainter
 from ..overlay.card import draw_card
 from ..overlay.compose import draw_compose
 from ..overlay.legend import Legend
@@ -21,7 +21,7 @@ from ..overlay.select import draw_left_out, draw_mask, draw_selection
 from .landmarks import mark_on_canvas
 from .layout import Rect
 
-DRAWN: dict[ToolName, Callable[[Canvas], None]] = {
+DRAWN: dict[ToolName, Callable[[CanvasPainter], None]] = {
     ToolName.SELECT: draw_selection,
     ToolName.MASK: draw_mask,
     ToolName.POSE: draw_pose,
@@ -33,7 +33,7 @@ DRAWN: dict[ToolName, Callable[[Canvas], None]] = {
 
 def draw_overlays(editor: Editor, rect: Rect, pixel_ratio: float) -> None:
     """Over the photo; `rect`: the canvas, `pixel_ratio`: canvas px per window unit."""
-    view, canvas = editor.view, Canvas(editor, rect, pixel_ratio)
+    view, canvas = editor.view, CanvasPainter(editor, rect, pixel_ratio)
     end = ImVec2(rect.x + rect.width, rect.y + rect.height)
     canvas.draw.push_clip_rect(ImVec2(rect.x, rect.y), end, True)
     if editor.photo_size is not None:

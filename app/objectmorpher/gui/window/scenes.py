@@ -7,7 +7,7 @@ from dataclasses import replace
 from objectmorpher_core.document.model import Document
 
 from ...canvas.frame import BARE, Frame, build_frame
-from ...canvas.layer import Layer, is_front
+from ...canvas.layer import CanvasLayer, is_front
 from ...canvas.painter import shown_now
 from ...editor.editor import Editor
 from ...editor.intents.landing import OF_THE_PHOTO
@@ -117,11 +117,11 @@ def _paper(shown: Shown) -> tuple[tuple[float, float, float], tuple[float, float
     return panel, theme.rgb("raised") if is_plain else panel
 
 
-def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | Layer, ...]:
+def splat_objects(document: Document, frame: Frame) -> tuple[SplatObject | CanvasLayer, ...]:
     """What the GPU is to draw of a frame, back to front."""
-    found: list[SplatObject | Layer] = []
+    found: list[SplatObject | CanvasLayer] = []
     for own in frame.objects:
-        if isinstance(own, Layer):
+        if isinstance(own, CanvasLayer):
             found.append(own)
             continue
         part, look = own.part, own.lit

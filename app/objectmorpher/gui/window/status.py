@@ -7,7 +7,7 @@ import time
 from imgui_bundle import ImVec2, imgui
 
 from ...editor.editor import Editor
-from ...editor.feedback import Message
+from ...editor.feedback import StatusMessage
 from ...editor.intents.models import DOWNLOAD
 from ...system.report import without_names
 from ...system.texts import t
@@ -142,7 +142,7 @@ def _whole_parts(hint: str, room: float) -> str:
     return " ".join(words) + "…" if words else ""
 
 
-def _draw_buttons(editor: Editor, message: Message) -> None:
+def _draw_buttons(editor: Editor, message: StatusMessage) -> None:
     """What can be done about the message: what mends it first."""
     imgui.push_style_var(imgui.StyleVar_.frame_padding, theme.size(8, 2))
     imgui.same_line(0, theme.pt(12))

@@ -26,7 +26,7 @@ from ...render.renderer import Renderer
 from ...system.freed_memory import set_aside
 from ...system.motion import motion
 from ...system.texts import ENGLISH, t, use_language
-from ...tools.pointer import Shape
+from ...tools.pointer import PointerShape
 from ..dialogs.dialogs import Dialogs
 from ..dialogs.popups import Popups
 from ..dialogs.start import StartScreen
@@ -75,13 +75,13 @@ KEY_NAMES = {
 }
 ONCE = (glfw.KEY_ENTER, glfw.KEY_KP_ENTER, glfw.KEY_SPACE)  # held down, they do it once
 CURSORS = {
-    Shape.ARROW: glfw.ARROW_CURSOR,
-    Shape.CROSS: glfw.CROSSHAIR_CURSOR,
-    Shape.HAND: glfw.POINTING_HAND_CURSOR,
-    Shape.MOVE: glfw.RESIZE_ALL_CURSOR,
-    Shape.TURN: glfw.POINTING_HAND_CURSOR,
-    Shape.SIZE: glfw.RESIZE_NWSE_CURSOR,
-    Shape.SPLIT: glfw.RESIZE_EW_CURSOR,
+    PointerShape.ARROW: glfw.ARROW_CURSOR,
+    PointerShape.CROSS: glfw.CROSSHAIR_CURSOR,
+    PointerShape.HAND: glfw.POINTING_HAND_CURSOR,
+    PointerShape.MOVE: glfw.RESIZE_ALL_CURSOR,
+    PointerShape.TURN: glfw.POINTING_HAND_CURSOR,
+    PointerShape.SIZE: glfw.RESIZE_NWSE_CURSOR,
+    PointerShape.SPLIT: glfw.RESIZE_EW_CURSOR,
 }
 
 

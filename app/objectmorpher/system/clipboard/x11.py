@@ -58,7 +58,7 @@ class PropertyNotify(Structure):
     ]  # fmt: skip
 
 
-class Event(Union):
+class XEvent(Union):
     """Xlib's XEvent."""
 
     _fields_ = [
@@ -95,8 +95,8 @@ class Client:
             ("XGetWindowProperty", c_int, [c_void_p, c_ulong, c_ulong, c_long, c_long, c_int,
                                            c_ulong, *[POINTER(c_ulong)] * 1, POINTER(c_int),
                                            *[POINTER(c_ulong)] * 2, POINTER(c_void_p)]),
-            ("XSendEvent", c_int, [c_void_p, c_ulong, c_int, c_long, POINTER(Event)]),
-            ("XNextEvent", c_int, [c_void_p, POINTER(Event)]),
+            ("XSendEvent", c_int, [c_void_p, c_ulong, c_int, c_long, POINTER(XEvent)]),
+            ("XNextEvent", c_int, [c_void_p, POINTER(XEvent)]),
             ("XPending", c_int, [c_void_p]), ("XFlush", c_int, [c_void_p]),
             ("XConnectionNumber", c_int, [c_void_p]), ("XFree", c_int, [c_void_p]),
             ("XGetAtomName", c_void_p, [c_void_p, c_ulong]),
@@ -117,14 +117,14 @@ class Client:
     def atom(self, name: str) -> int:
         return self.x.XInternAtom(self.display, name.encode(), 0)
 
-    def event(self, end: float = float("inf")) -> Event | None:
+    def event(self, end: float = float("inf")) -> XEvent | None:
         """Return the next event, or None where none comes before the time `end`."""
         while not self.x.XPending(self.display):
             left = None if end == float("inf") else end - time.monotonic()
             if left is not None and left <= 0:
                 return None
             select.select([self.x.XConnectionNumber(self.display)], [], [], left)
-        event = Event()
+        event = XEvent()
         self.x.XNextEvent(self.display, byref(event))
         return event
 
@@ -230,7 +230,7 @@ class Client:
             waiting[request.requestor, place] = 0
         else:
             place = 0
-        event = Event()
+        event = XEvent()
         event.notify = SelectionNotify(
             SELECTION_NOTIFY, 0, 1, self.display, request.requestor, request.selection,
             request.target, place, request.time,

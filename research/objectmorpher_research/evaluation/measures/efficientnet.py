@@ -27,7 +27,7 @@ NORM = ("weight", "bias", "running_mean", "running_var")
 
 
 @dataclass(frozen=True)
-class Block:
+class InvertedResidual:
     """An inverted residual: widened, filtered channel by channel, narrowed."""
 
     before: int  # channels
@@ -37,13 +37,15 @@ class Block:
     expansion: int = EXPANSION
 
 
-def _stage(before: int, after: int, size: int, stride: int, count: int) -> tuple[Block, ...]:
-    again = (Block(after, after, size, 1),) * (count - 1)
-    return Block(before, after, size, stride), *again
+def _stage(
+    before: int, after: int, size: int, stride: int, count: int
+) -> tuple[InvertedResidual, ...]:
+    again = (InvertedResidual(after, after, size, 1),) * (count - 1)
+    return InvertedResidual(before, after, size, stride), *again
 
 
 BLOCKS = (
-    Block(STEM, 16, 3, 1, expansion=1),
+    InvertedResidual(STEM, 16, 3, 1, expansion=1),
     *_stage(16, 24, 3, 2, 2), *_stage(24, 40, 5, 2, 2), *_stage(40, 80, 3, 2, 3),
     *_stage(80, 112, 5, 1, 3), *_stage(112, 192, 5, 2, 4), *_stage(192, 320, 3, 1, 1),
 )  # fmt: skip
@@ -97,7 +99,7 @@ class EfficientNetFeatures:
             x = self._block(x, block, f"_blocks.{k}")
         return relu6(self._convolution(x, "_conv_head", "_bn1"))
 
-    def _block(self, x: Any, block: Block, at: str) -> Any:
+    def _block(self, x: Any, block: InvertedResidual, at: str) -> Any:
         from torch.nn.functional import relu6
 
         inner = x

@@ -20,7 +20,7 @@ from objectmorpher_core.base.arrays import F32, F64, RGB
 from objectmorpher_core.models.onnx_session import open_session
 
 from ..error import EvaluationError
-from .onnx_build import Graph
+from .onnx_build import OnnxGraph
 from .regions import Region, check_pair, weighted_mean
 
 WEIGHT = "hed-vgg"
@@ -80,7 +80,7 @@ def vgg_graph(arrays: Mapping[str, F32]) -> bytes:
 
     The pooling keeps a last odd row and column, as HED's does. Raises EvaluationError.
     """
-    graph, x, before, told = Graph(), IMAGES, 3, []
+    graph, x, before, told = OnnxGraph(), IMAGES, 3, []
     for block, widths in enumerate(BLOCKS, 1):
         if block > 1:
             halves = {"kernel_shape": (2, 2), "strides": (2, 2), "ceil_mode": 1}

@@ -14,7 +14,7 @@ import numpy as np
 from objectmorpher_core.base.arrays import RGB
 
 from ..error import EvaluationError
-from .plain_convolutions import ALEX_LAYERS, VGG_LAYERS, Layer, features, shapes
+from .plain_convolutions import ALEX_LAYERS, VGG_LAYERS, Convolution, features, shapes
 from .regions import Region, check_pair, weighted_mean
 from .trunk_files import read
 
@@ -30,7 +30,7 @@ class Lpips:
     def __init__(self, net: str, trunk: Path, heads: Path) -> None:
         """`net` "alex" or "vgg". Raises EvaluationError where a file does not fit."""
         self._smallest = SMALLEST[net]
-        self._layers: tuple[Layer, ...] = {"alex": ALEX_LAYERS, "vgg": VGG_LAYERS}[net]
+        self._layers: tuple[Convolution, ...] = {"alex": ALEX_LAYERS, "vgg": VGG_LAYERS}[net]
         self._tensors = read(trunk, shapes(self._layers))
         told = [layer for layer in self._layers if layer.is_told]
         names = {f"lin{k}.model.1.weight": (1, t.channels[1], 1, 1) for k, t in enumerate(told)}

@@ -20,7 +20,7 @@ AXES = ("n", "c", "h", "w")  # of any size
 
 
 @dataclass
-class Graph:
+class OnnxGraph:
     """Nodes in the order in which they are added; each gives the tensor called as it is."""
 
     _nodes: list[bytes] = field(default_factory=list)

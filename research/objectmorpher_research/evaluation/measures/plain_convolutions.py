@@ -12,7 +12,7 @@ from .trunk_files import Shapes, Tensors
 
 
 @dataclass(frozen=True)
-class Layer:
+class Convolution:
     """A convolution and its rectifier; the pooling before it, if any."""
 
     index: int  # in torchvision's `features`
@@ -29,22 +29,25 @@ class Layer:
 
 
 ALEX_LAYERS = (
-    Layer(0, (3, 64), size=11, stride=4, padding=2, is_told=True),
-    Layer(3, (64, 192), size=5, padding=2, pool=3, is_told=True),
-    Layer(6, (192, 384), pool=3, is_told=True),
-    Layer(8, (384, 256), is_told=True),
-    Layer(10, (256, 256), is_told=True),
+    Convolution(0, (3, 64), size=11, stride=4, padding=2, is_told=True),
+    Convolution(3, (64, 192), size=5, padding=2, pool=3, is_told=True),
+    Convolution(6, (192, 384), pool=3, is_told=True),
+    Convolution(8, (384, 256), is_told=True),
+    Convolution(10, (256, 256), is_told=True),
 )
 VGG_LAYERS = (
-    Layer(0, (3, 64)), Layer(2, (64, 64), is_told=True),
-    Layer(5, (64, 128), pool=2), Layer(7, (128, 128), is_told=True),
-    Layer(10, (128, 256), pool=2), Layer(12, (256, 256)), Layer(14, (256, 256), is_told=True),
-    Layer(17, (256, 512), pool=2), Layer(19, (512, 512)), Layer(21, (512, 512), is_told=True),
-    Layer(24, (512, 512), pool=2), Layer(26, (512, 512)), Layer(28, (512, 512), is_told=True),
+    Convolution(0, (3, 64)), Convolution(2, (64, 64), is_told=True),
+    Convolution(5, (64, 128), pool=2), Convolution(7, (128, 128), is_told=True),
+    Convolution(10, (128, 256), pool=2), Convolution(12, (256, 256)),
+    Convolution(14, (256, 256), is_told=True),
+    Convolution(17, (256, 512), pool=2), Convolution(19, (512, 512)),
+    Convolution(21, (512, 512), is_told=True),
+    Convolution(24, (512, 512), pool=2), Convolution(26, (512, 512)),
+    Convolution(28, (512, 512), is_told=True),
 )  # fmt: skip
 
 
-def shapes(layers: Sequence[Layer]) -> Shapes:
+def shapes(layers: Sequence[Convolution]) -> Shapes:
     """Return the shapes of the state dict."""
     found: dict[str, tuple[int, ...]] = {}
     for layer in layers:
@@ -54,7 +57,7 @@ def shapes(layers: Sequence[Layer]) -> Shapes:
     return found
 
 
-def features(layers: Sequence[Layer], tensors: Tensors, pixels: Any) -> list[Any]:
+def features(layers: Sequence[Convolution], tensors: Tensors, pixels: Any) -> list[Any]:
     """Return [(n, channels, h, w)] of the named layers, for (n, 3, H, W)."""
     from torch.nn.functional import conv2d, max_pool2d, relu
 

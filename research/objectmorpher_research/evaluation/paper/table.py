@@ -18,8 +18,8 @@ from ..bootstrap import Estimate, mean_with_interval
 from ..error import EvaluationError
 from ..measures.mmd import Subsets
 from ..metrics import WHOLE, Choices, Lacking, measure
-from ..pairs import Pair, read_pixels
-from ..subjects.subject import Result, Subject, methods_of
+from ..pairs import MaskedPair, read_pixels
+from ..subjects.subject import EvaluatedEdit, MethodResult, methods_of
 from .interaction_log import Recorded, read_frames, read_recorded
 
 NOTHING = "(nothing done)"
@@ -36,7 +36,7 @@ COLUMNS = {
 
 
 @dataclass(frozen=True)
-class Row:
+class MethodRow:
     """A method."""
 
     method: str
@@ -50,18 +50,18 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class PaperTable:
     """All methods, the row of doing nothing first."""
 
     subjects: int
-    rows: tuple[Row, ...]
+    rows: tuple[MethodRow, ...]
     lacking: tuple[Lacking, ...]
     weights: Mapping[str, str]  # sha256 by file
     resized: tuple[str, ...]  # "METHOD: SUBJECT" whose result has another size than the photo
 
 
 @dataclass(frozen=True)
-class _Result(Pair):
+class _Result(MaskedPair):
     """A photo and what became of it, which is brought to the photo's size where it has another."""
 
     def read(self) -> tuple[RGB, RGB, F64 | None]:
@@ -72,23 +72,23 @@ class _Result(Pair):
 
 
 def measure_paper(
-    subjects: Sequence[Subject],
+    subjects: Sequence[EvaluatedEdit],
     weights: Path | None = None,
     seed: int = 0,
     progress: Progress = silent,
-) -> Table:
+) -> PaperTable:
     """The table of all methods that have a result. Raises EvaluationError: one sentence."""
     methods = methods_of(tuple(subjects))
     if not methods:
         raise EvaluationError("there is no result of any method")
     choices = Choices(tuple(COLUMNS.values()), weights, Subsets(seed=seed), is_lenient=True)
-    rows: list[Row] = []
+    rows: list[MethodRow] = []
     lacking: dict[str, Lacking] = {}
     hashes: dict[str, str] = {}
     for k, method in enumerate((NOTHING, *methods)):
         step = part(progress, k / (len(methods) + 1), (k + 1) / (len(methods) + 1))
         of = {
-            s.name: Result(s.image) if method == NOTHING else s.results[method]
+            s.name: MethodResult(s.image) if method == NOTHING else s.results[method]
             for s in subjects
             if method == NOTHING or method in s.results
         }
@@ -101,11 +101,15 @@ def measure_paper(
         scores = {column: score.estimate for column, score in taken.items()}
         each = {column: score.each for column, score in taken.items() if score.each}
         recorded = [_recorded(r) for r in of.values() if r.log is not None or r.frames is not None]
-        rows.append(Row(method, tuple(of), scores, each, *_timing(recorded, seed), len(recorded)))
-    return Table(len(subjects), tuple(rows), tuple(lacking.values()), hashes, _resized(subjects))
+        rows.append(
+            MethodRow(method, tuple(of), scores, each, *_timing(recorded, seed), len(recorded))
+        )
+    return PaperTable(
+        len(subjects), tuple(rows), tuple(lacking.values()), hashes, _resized(subjects)
+    )
 
 
-def _recorded(result: Result) -> Recorded:
+def _recorded(result: MethodResult) -> Recorded:
     """What the log tells; how our window answered wins over a drag that was made again."""
     found = Recorded((), None) if result.log is None else read_recorded(result.log)
     if result.frames is None:
@@ -126,7 +130,7 @@ def _timing(
     )
 
 
-def _resized(subjects: Sequence[Subject]) -> tuple[str, ...]:
+def _resized(subjects: Sequence[EvaluatedEdit]) -> tuple[str, ...]:
     """Whose results have another size than the photo. Reads headers only, by Pillow."""
     from PIL import Image
 

@@ -24,7 +24,7 @@ from objectmorpher_core.pipeline import run_script
 from objectmorpher_core.raster import tiles
 
 from ..error import EvaluationError
-from ..subjects.subject import Subject
+from ..subjects.subject import EvaluatedEdit
 from .interaction_log import BEGIN, COMPUTING, END, FEEDBACK, INPUT, Event
 
 STEPS = 30  # moves of the drag, as in half a second at 60 Hz
@@ -40,7 +40,7 @@ class Timed:
     events: tuple[Event, ...]
 
 
-def run_subject(subject: Subject, progress: Progress = silent) -> Timed:
+def run_subject(subject: EvaluatedEdit, progress: Progress = silent) -> Timed:
     """Edits the subject as its guidance says. Raises EvaluationError and the stages' errors."""
     item = subject.guidance.item
     if item is None:

@@ -21,14 +21,14 @@ import numpy as np
 from objectmorpher_core.scripting.script import XY, BatchItem, EditScript, HandleMove
 
 from ..error import EvaluationError
-from .guidance import Guidance, from_item
+from .guidance import EditGuidance, from_item
 from .plain_pickle import read_plain
-from .subject import Subject
+from .subject import EvaluatedEdit
 
 IMAGE, META = "original_image.png", "meta_data.pkl"
 
 
-def subjects(folder: Path) -> tuple[Subject, ...]:
+def subjects(folder: Path) -> tuple[EvaluatedEdit, ...]:
     """Return all samples below the folder, if it is such a folder. Raises EvaluationError."""
     found = []
     for depth in ("*", "*/*"):
@@ -37,11 +37,11 @@ def subjects(folder: Path) -> tuple[Subject, ...]:
             if not image.is_file():
                 raise EvaluationError(f"{meta.parent} has no {IMAGE}")
             name = meta.parent.relative_to(folder).as_posix()
-            found.append(Subject(name, image, _guidance(meta)))
+            found.append(EvaluatedEdit(name, image, _guidance(meta)))
     return tuple(found)
 
 
-def _guidance(path: Path) -> Guidance:
+def _guidance(path: Path) -> EditGuidance:
     try:
         meta = read_plain(path.read_bytes())
         if not isinstance(meta, dict):

@@ -22,22 +22,24 @@ from objectmorpher_core.pictures.image import READ_ENDINGS
 from ..error import EvaluationError
 from ..pairs import pictures_in
 from . import dragbench, geobench
-from .guidance import Guidance, read_guidance
-from .subject import Result, Subject
+from .guidance import EditGuidance, read_guidance
+from .subject import EvaluatedEdit, MethodResult
 
 IMAGE, GUIDANCE, RESULTS = "image", "guidance", "results"  # names in a subject's folder
 FRAMES = ".frames.json"  # ending
 DRAGGED = "dragged_image"  # in DragBench's results
 
 
-def read_subjects(folder: Path, methods: Mapping[str, Path] | None = None) -> tuple[Subject, ...]:
+def read_subjects(
+    folder: Path, methods: Mapping[str, Path] | None = None
+) -> tuple[EvaluatedEdit, ...]:
     """Read all subjects of a folder, by name, with the results in the folders of `methods`.
 
     Raises EvaluationError: one sentence.
     """
     if not folder.is_dir():
         raise EvaluationError(f"there is no folder {folder}")
-    found: tuple[Subject, ...] = ()
+    found: tuple[EvaluatedEdit, ...] = ()
     for read in (own_subjects, geobench.subjects, dragbench.subjects):
         if found := read(folder):
             break
@@ -50,17 +52,21 @@ def read_subjects(folder: Path, methods: Mapping[str, Path] | None = None) -> tu
     return tuple(sorted(found, key=lambda subject: subject.name))
 
 
-def own_subjects(folder: Path) -> tuple[Subject, ...]:
+def own_subjects(folder: Path) -> tuple[EvaluatedEdit, ...]:
     """Read the subjects of our own layout; none where the folder has another one."""
     found = []
     for where in sorted(path for path in folder.iterdir() if path.is_dir()):
         image = picture_called(where / IMAGE)
         if image is not None:
-            found.append(Subject(where.name, image, _guidance(where), _results(where / RESULTS)))
+            found.append(
+                EvaluatedEdit(where.name, image, _guidance(where), _results(where / RESULTS))
+            )
     return tuple(found)
 
 
-def with_results(subjects: tuple[Subject, ...], method: str, folder: Path) -> tuple[Subject, ...]:
+def with_results(
+    subjects: tuple[EvaluatedEdit, ...], method: str, folder: Path
+) -> tuple[EvaluatedEdit, ...]:
     """The subjects with the results of a method that lie in a folder of its own."""
     if not folder.is_dir():
         raise EvaluationError(f"there is no folder {folder}")
@@ -90,21 +96,21 @@ def picture_called(base: Path) -> Path | None:
     return None
 
 
-def _result(picture: Path) -> Result:
+def _result(picture: Path) -> MethodResult:
     """The picture, and what was recorded while it was made."""
     logs = (picture.with_suffix(ending) for ending in (".jsonl", ".json"))
     frames = picture.with_suffix(FRAMES)
     log = next((path for path in logs if path.is_file()), None)
-    return Result(picture, log, frames if frames.is_file() else None)
+    return MethodResult(picture, log, frames if frames.is_file() else None)
 
 
-def _guidance(where: Path) -> Guidance:
+def _guidance(where: Path) -> EditGuidance:
     script = where / f"{GUIDANCE}.json"
-    guidance = read_guidance(script) if script.is_file() else Guidance()
+    guidance = read_guidance(script) if script.is_file() else EditGuidance()
     return replace(guidance, picture=picture_called(where / GUIDANCE))
 
 
-def _results(folder: Path) -> dict[str, Result]:
+def _results(folder: Path) -> dict[str, MethodResult]:
     if not folder.is_dir():
         return {}
     return {method: _result(path) for method, path in pictures_in(folder).items()}

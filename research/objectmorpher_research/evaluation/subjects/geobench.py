@@ -21,15 +21,15 @@ from objectmorpher_core.pictures.image import ImageError, read_picture
 from objectmorpher_core.scripting.script import BatchItem, EditScript
 
 from ..error import EvaluationError
-from .guidance import Guidance, from_item
-from .subject import Subject
+from .guidance import EditGuidance, from_item
+from .subject import EvaluatedEdit
 
 ANNOTATIONS = "annotations.json"
 SIDE = 512  # px of the pictures that edit_param means
 NUMBERS = 9
 
 
-def subjects(folder: Path) -> tuple[Subject, ...]:
+def subjects(folder: Path) -> tuple[EvaluatedEdit, ...]:
     """Return all edits of the annotations, if there are any. Raises EvaluationError."""
     path = folder / ANNOTATIONS
     if not path.is_file():
@@ -50,7 +50,9 @@ def subjects(folder: Path) -> tuple[Subject, ...]:
     return tuple(_subject(folder, name, told, sizes) for name, told in edits)
 
 
-def _subject(folder: Path, name: str, told: Any, sizes: dict[Path, tuple[int, int]]) -> Subject:
+def _subject(
+    folder: Path, name: str, told: Any, sizes: dict[Path, tuple[int, int]]
+) -> EvaluatedEdit:
     if not isinstance(told, dict) or ".." in PurePosixPath(name).parts:
         raise EvaluationError(f"{folder / ANNOTATIONS}: {name} is no edit")
     image = _below(folder, told.get("ori_img_path"), name)
@@ -61,17 +63,19 @@ def _subject(folder: Path, name: str, told: Any, sizes: dict[Path, tuple[int, in
     guidance = _guidance(_numbers(folder, name, told), mask, sizes[image])
     if isinstance(words, str) and words:
         guidance = replace(guidance, words=words)
-    return Subject(name, image, guidance)
+    return EvaluatedEdit(name, image, guidance)
 
 
-def _guidance(numbers: list[float], mask: Path, size: tuple[int, int]) -> Guidance:
+def _guidance(numbers: list[float], mask: Path, size: tuple[int, int]) -> EditGuidance:
     dx, dy, dz, rx, ry, rz, sx, sy, _ = numbers
     if dz or rx or ry:
-        return Guidance(reason="it is out of the picture's plane, and its signs are not published")
+        return EditGuidance(
+            reason="it is out of the picture's plane, and its signs are not published"
+        )
     if not math.isclose(sx, sy):
-        return Guidance(reason="it stretches the object along the picture's axes")
+        return EditGuidance(reason="it stretches the object along the picture's axes")
     if sx <= 0:
-        return Guidance(reason="its scale is not above zero")
+        return EditGuidance(reason="its scale is not above zero")
     script = EditScript(mask=str(mask))
     if dx or dy:
         script = replace(script, move=(dx * size[0] / SIDE, dy * size[1] / SIDE, 0.0))

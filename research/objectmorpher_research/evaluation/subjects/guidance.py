@@ -24,7 +24,7 @@ TEXT = "text"  # key of guidance.json beside those of an edit script
 
 
 @dataclass(frozen=True)
-class Guidance:
+class EditGuidance:
     """An edit that is asked of every method."""
 
     arrows: tuple[Arrow, ...] = ()
@@ -39,7 +39,7 @@ class Guidance:
         return bool(self.arrows or self.words or self.picture)
 
 
-def read_guidance(path: Path) -> Guidance:
+def read_guidance(path: Path) -> EditGuidance:
     """Read a JSON file: an edit script, whose files are beside it, and perhaps a "text".
 
     Raises EvaluationError: one sentence.
@@ -56,11 +56,11 @@ def read_guidance(path: Path) -> Guidance:
     return from_item(_beside(item, path.parent), text)
 
 
-def from_item(item: BatchItem, text: str = "") -> Guidance:
+def from_item(item: BatchItem, text: str = "") -> EditGuidance:
     """Read an edit script; without a `text` its placement is put into words."""
     words = text or " ".join(words_of(script) for script in _scripts(item))
     arrows = tuple(arrow for script in _scripts(item) for arrow in arrows_of(script))
-    return Guidance(arrows, words.strip(), item=item, reason="")
+    return EditGuidance(arrows, words.strip(), item=item, reason="")
 
 
 def arrows_of(script: EditScript) -> tuple[Arrow, ...]:

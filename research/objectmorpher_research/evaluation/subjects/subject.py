@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .guidance import Guidance
+from .guidance import EditGuidance
 
 
 @dataclass(frozen=True)
-class Result:
+class MethodResult:
     """A method's result for a subject."""
 
     picture: Path
@@ -19,15 +19,15 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Subject:
+class EvaluatedEdit:
     """A photo and an edit of it."""
 
     name: str  # may hold slashes
     image: Path
-    guidance: Guidance
-    results: Mapping[str, Result] = field(default_factory=dict)  # by method
+    guidance: EditGuidance
+    results: Mapping[str, MethodResult] = field(default_factory=dict)  # by method
 
 
-def methods_of(subjects: tuple[Subject, ...]) -> tuple[str, ...]:
+def methods_of(subjects: tuple[EvaluatedEdit, ...]) -> tuple[str, ...]:
     """The names of all methods that have a result."""
     return tuple(sorted({method for subject in subjects for method in subject.results}))

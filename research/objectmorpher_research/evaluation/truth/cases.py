@@ -11,9 +11,9 @@ import numpy as np
 from objectmorpher_core.base.arrays import F64, RGB, Mask
 from objectmorpher_core.base.camera import Camera
 
-from .materials import SURFACES, Material
-from .motions import RIGID, Motion, Rigid, grips
-from .settings import FIELDS, HEIGHT, WIDTH, Lamp, Setting, Stage, View
+from .materials import SURFACES, SolidMaterial
+from .motions import RIGID, Rigid, TruthEdit, grips
+from .settings import FIELDS, HEIGHT, WIDTH, Lamp, Setting, SolidView, TruthStage
 
 RIM = 4  # px within the silhouette, in which nobody takes hold
 RIGID_POINTS = 6  # that are shown of a rigid motion
@@ -23,7 +23,7 @@ STILL = 0.75  # px, a point that moves less is a pin
 
 
 @dataclass(frozen=True, eq=False)
-class Guidance:
+class TruthGuidance:
     """The guidance of every method: points of the thing and where they must be seen.
 
     Of a thing that moves as a whole also how, as one would type it: in degrees, as a factor.
@@ -41,7 +41,7 @@ class Guidance:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class TruthCase:
     """A photo, an edit, and the truth after it."""
 
     name: str
@@ -49,7 +49,7 @@ class Case:
     photo: RGB  # (H, W, 3)
     mask: Mask  # (H, W) the thing's
     camera: Camera
-    guidance: Guidance
+    guidance: TruthGuidance
     truth: RGB  # (H, W, 3) the result
     plate: RGB | None  # (H, W, 3) what is behind the thing; None: nobody knows
     shown: F64  # (H, W) the thing's true coverage after the edit
@@ -58,12 +58,12 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class PlannedCase:
     """A case that can be made."""
 
     number: int
     setting: Setting
-    motion: Motion
+    motion: TruthEdit
 
     @property
     def name(self) -> str:
@@ -98,7 +98,7 @@ PLACES = ("coffee", "china", "astronaut", "flower", "chelsea", "rocket")
 LYING = {"plank": 12.0, "banana": -15.0, "bottle": 8.0}  # degrees of roll, of some
 
 
-def wanted_cases(seed: int = 0, is_quick: bool = False) -> tuple[Wanted, ...]:
+def wanted_cases(seed: int = 0, is_quick: bool = False) -> tuple[PlannedCase, ...]:
     """Return all cases of a seed: 63, or 11 of them."""
     result, number = [], 0
     for category, things in PLAN.items():
@@ -107,8 +107,8 @@ def wanted_cases(seed: int = 0, is_quick: bool = False) -> tuple[Wanted, ...]:
             if is_quick and k not in QUICK.get(category, ()):
                 continue
             solid, _, limb = thing.partition(":")
-            motion = Motion(category, amount, limb.rstrip("*"), limb.endswith("*"))
-            result.append(Wanted(number, setting_of(solid, category in RIGID, seed), motion))
+            motion = TruthEdit(category, amount, limb.rstrip("*"), limb.endswith("*"))
+            result.append(PlannedCase(number, setting_of(solid, category in RIGID, seed), motion))
     return tuple(result)
 
 
@@ -120,7 +120,7 @@ def setting_of(solid: str, is_first: bool, seed: int) -> Setting:
     tint = tuple(float(v) for v in rng.uniform(0.55, 1.0, 3))
     shine = float(rng.choice([0.0, 0.0, 0.25]))
     scale = float(rng.uniform(220, 420))
-    material = Material(surface, scale, tint, shine, int(rng.integers(8)))  # type: ignore[arg-type]
+    material = SolidMaterial(surface, scale, tint, shine, int(rng.integers(8)))  # type: ignore[arg-type]
     yaw, pitch = float(rng.uniform(15, 35) * rng.choice([-1, 1])), float(rng.uniform(6, 16))
     if solid in ("star", "banana", "plank"):  # flat or thin: seen from the front
         yaw *= 0.5
@@ -136,13 +136,13 @@ def setting_of(solid: str, is_first: bool, seed: int) -> Setting:
 
 
 @lru_cache(maxsize=2)
-def staged(setting: Setting) -> tuple[Stage, View]:
+def staged(setting: Setting) -> tuple[TruthStage, SolidView]:
     """A setting and its photo's view."""
-    stage = Stage(setting)
+    stage = TruthStage(setting)
     return stage, stage.draw(stage.body().points)
 
 
-def make_case(wanted: Wanted) -> Case:
+def make_case(wanted: PlannedCase) -> TruthCase:
     """Draws the photo and the truth."""
     stage, rest = staged(wanted.setting)
     motion = wanted.motion
@@ -151,14 +151,16 @@ def make_case(wanted: Wanted) -> Case:
     mask = rest.alpha > 0.5
     covered = (rest.alpha > 0) | (after.alpha > 0)
     near = cv2.dilate(covered.astype(np.uint8), np.ones((2 * AROUND + 1, 2 * AROUND + 1)))
-    return Case(
+    return TruthCase(
         wanted.name, motion.category, rest.over(stage.plate), mask, stage.camera,
         _guidance(stage, rest, after, world, motion), after.over(stage.plate), stage.plate,
         after.alpha, near.astype(np.float64),
     )  # fmt: skip
 
 
-def _guidance(stage: Stage, rest: View, after: View, world: F64, motion: Motion) -> Guidance:
+def _guidance(
+    stage: TruthStage, rest: SolidView, after: SolidView, world: F64, motion: TruthEdit
+) -> TruthGuidance:
     body = stage.body(motion.limb)
     xy = inner_pixels(rest.alpha > 0.5)
     corners, weights = stage.surface_points(xy, rest)
@@ -176,10 +178,10 @@ def _guidance(stage: Stage, rest: View, after: View, world: F64, motion: Motion)
             picked += list(rest_of_it[spread_out(xy[rest_of_it], pins)])
         chosen = _apart(xy, picked)
     at, to = stage.camera.project(before[chosen]), stage.camera.project(there[chosen])
-    return Guidance(at, to, there[chosen, 2] / before[chosen, 2] - 1, motion.rigid)
+    return TruthGuidance(at, to, there[chosen, 2] / before[chosen, 2] - 1, motion.rigid)
 
 
-def _of_parts(parts: tuple[int, ...], corners: np.ndarray, stage: Stage) -> Mask:
+def _of_parts(parts: tuple[int, ...], corners: np.ndarray, stage: TruthStage) -> Mask:
     return np.isin(stage.solid.parts[corners[:, 0]], parts)
 
 

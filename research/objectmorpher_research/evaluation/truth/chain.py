@@ -35,8 +35,8 @@ from objectmorpher_core.pipeline import lift_mask, open_photo
 from objectmorpher_core.scripting.runner import with_plate
 from objectmorpher_core.scripting.script import EditScript
 
-from .cases import Case, Guidance
-from .outcome import Outcome
+from .cases import TruthCase, TruthGuidance
+from .outcome import EditOutcome
 
 OWN, CARD, PLAIN = "own", "card", "plain"  # what is lifted
 LIFTS = {
@@ -106,7 +106,7 @@ class Chain:
             self._puppets[key] = Puppet(item.lifted, item.deform, document.photo.camera)
         return self._puppets[key]
 
-    def moved(self, case: Case, way: Way = Way()) -> tuple[Document, Puppet, F64]:
+    def moved(self, case: TruthCase, way: Way = Way()) -> tuple[Document, Puppet, F64]:
         """The document after the edit, and where the guidance's points are in its object (n, 3)."""
         document = self.document(way)
         puppet = self.puppet(document, way)
@@ -116,15 +116,15 @@ class Chain:
         document = edits.set_shadow(edits.set_plate(document, plate), 0, shadow)
         return edits.harmonised(document, 0, way.is_harmonised), puppet, points
 
-    def apply(self, case: Case, way: Way = Way()) -> Outcome:
+    def apply(self, case: TruthCase, way: Way = Way()) -> EditOutcome:
         """The edited photo."""
         document, puppet, points = self.moved(case, way)
         result = composite(document, {0: puppet})
         pose, place = document.objects[0].pose, document.objects[0].placement
         reached = np.array([puppet.picture_of(p, pose, place) for p in points])
-        return Outcome(_bytes(result.pixels), coverage(result, document), reached)
+        return EditOutcome(_bytes(result.pixels), coverage(result, document), reached)
 
-    def plate(self, case: Case) -> RGB:
+    def plate(self, case: TruthCase) -> RGB:
         """(H, W, 3) the photo without the object, that every method puts its result on."""
         document, _, _ = self.moved(case)
         plate = document.plate
@@ -148,7 +148,7 @@ class Chain:
         return self._plates[leaves]
 
     def _steered(
-        self, document: Document, puppet: Puppet, points: F64, guidance: Guidance, way: Way
+        self, document: Document, puppet: Puppet, points: F64, guidance: TruthGuidance, way: Way
     ) -> Document:
         if guidance.rigid is not None:
             return edits.set_placement(document, 0, _placed(puppet, points, guidance))
@@ -176,7 +176,7 @@ def _settings(way: Way) -> DeformSettings:
     return DeformSettings(mode=way.deform, links=way.links, is_faithful=way.is_faithful)
 
 
-def _picked(puppet: Puppet, document: Document, guidance: Guidance) -> F64:
+def _picked(puppet: Puppet, document: Document, guidance: TruthGuidance) -> F64:
     """(n, 3) the points of the surface that are taken hold of, object frame."""
     matte = document.objects[0].matte
     assert matte is not None
@@ -189,7 +189,7 @@ def _picked(puppet: Puppet, document: Document, guidance: Guidance) -> F64:
     return np.array(found)
 
 
-def _placed(puppet: Puppet, points: F64, guidance: Guidance) -> Placement:
+def _placed(puppet: Puppet, points: F64, guidance: TruthGuidance) -> Placement:
     """The motion as it was typed, then moved until the points are seen where they must be."""
     rigid, lifted = guidance.rigid, puppet.lifted
     assert rigid is not None

@@ -17,9 +17,9 @@ from objectmorpher_core.base.arrays import F64, I32, RGB
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document.model import Matte
 
-from .cases import Case, Guidance
-from .layer import Sheet, draw_sheet
-from .outcome import Outcome
+from .cases import TruthCase, TruthGuidance
+from .layer import TexturedMesh, draw_sheet
+from .outcome import EditOutcome
 
 CELLS = 32  # of the warp's grid along the cut-out's longer side
 LEAST_CELL = 4.0  # px
@@ -28,35 +28,37 @@ STIFF = 1e4  # x the links' weight, that holds the points where they must be
 STILL = 1e-4  # px, at which the warp has settled
 
 
-def do_nothing(case: Case) -> Outcome:
+def do_nothing(case: TruthCase) -> EditOutcome:
     """The photo as it is."""
-    return Outcome(case.photo, case.mask.astype(np.float64), case.guidance.at)
+    return EditOutcome(case.photo, case.mask.astype(np.float64), case.guidance.at)
 
 
-def paste(case: Case, matte: Matte, plate: RGB) -> Outcome:
+def paste(case: TruthCase, matte: Matte, plate: RGB) -> EditOutcome:
     """The cut-out moved, turned in the plane and scaled as fits the points best."""
     motion = fitted_similarity(case.guidance)
     x0, y0, x1, y1 = (float(v) for v in matte.box)
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-    sheet = Sheet(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    sheet = TexturedMesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     return _drawn(sheet, motion.at(corners), case, matte, plate, motion.at(case.guidance.at))
 
 
-def warp(case: Case, matte: Matte, plate: RGB) -> Outcome:
+def warp(case: TruthCase, matte: Matte, plate: RGB) -> EditOutcome:
     """The cut-out warped so that its points are where they must be, as rigidly as it can be."""
     guidance, grid = case.guidance, _grid(case, matte)
     start = fitted_similarity(guidance)
     size = start.scale if guidance.rigid is not None else 1.0  # what is told of the whole thing
     moved = _arap(grid, guidance, start.at(grid.points), size)
     reached = grid.weights(guidance.at) @ moved
-    sheet = Sheet(grid.points, grid.faces)
+    sheet = TexturedMesh(grid.points, grid.faces)
     return _drawn(sheet, moved, case, matte, plate, reached)
 
 
-def _drawn(sheet: Sheet, at: F64, case: Case, matte: Matte, plate: RGB, reached: F64) -> Outcome:
+def _drawn(
+    sheet: TexturedMesh, at: F64, case: TruthCase, matte: Matte, plate: RGB, reached: F64
+) -> EditOutcome:
     height, width = case.mask.shape
     layer = draw_sheet(sheet, at, np.ones(len(at)), matte, (width, height))
-    return Outcome(layer.over(plate, case.photo, matte), layer.alpha, reached)
+    return EditOutcome(layer.over(plate, case.photo, matte), layer.alpha, reached)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,7 @@ class Similarity:
         return float(np.sqrt(abs(np.linalg.det(self.matrix))))
 
 
-def fitted_similarity(guidance: Guidance) -> Similarity:
+def fitted_similarity(guidance: TruthGuidance) -> Similarity:
     """The one that takes the points nearest to where they must be, by least squares."""
     at, to = guidance.at, guidance.to
     a, b = at - at.mean(0), to - to.mean(0)
@@ -88,7 +90,7 @@ def fitted_similarity(guidance: Guidance) -> Similarity:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class WarpGrid:
     """Squares, each cut into two triangles, that hold the cut-out."""
 
     points: F64  # (V, 2) px
@@ -114,7 +116,7 @@ def _cross(u: F64, v: F64) -> F64:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
-def _grid(case: Case, matte: Matte) -> Grid:
+def _grid(case: TruthCase, matte: Matte) -> WarpGrid:
     height, width = case.mask.shape
     covered = crop(matte.alpha, matte.box, (0, 0, width, height)) > 0
     rows, columns = np.nonzero(covered)
@@ -138,10 +140,10 @@ def _grid(case: Case, matte: Matte) -> Grid:
     links = np.searchsorted(kept, links)
     places = np.column_stack([kept % (m + 1), kept // (m + 1)]).astype(np.float64)
     points = places * cell + [x0, y0]
-    return Grid(points, faces.reshape(-1, 3).astype(np.int32), links.astype(np.int32))
+    return WarpGrid(points, faces.reshape(-1, 3).astype(np.int32), links.astype(np.int32))
 
 
-def _arap(grid: Grid, guidance: Guidance, start: F64, size: float) -> F64:
+def _arap(grid: WarpGrid, guidance: TruthGuidance, start: F64, size: float) -> F64:
     """(V, 2) where the grid's points go; `size` times as large as it is."""
     count, (i, j) = len(grid.points), grid.links.T
     edges = size * (grid.points[j] - grid.points[i])

@@ -18,7 +18,7 @@ SHRUNK = 0.85  # of its area, below which colours are means over a pixel and no 
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
+class CutOut:
     """Straight colours and coverage of a thing; both of the whole picture."""
 
     color: F64  # (H, W, 3) in [0, 1]
@@ -35,7 +35,7 @@ class Layer:
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class TexturedMesh:
     """Triangles that carry the photo."""
 
     uv: F64  # (V, 2) px of the photo
@@ -45,24 +45,26 @@ class Sheet:
     painted: int = 0  # faces that carry the photo, when others are plain
 
 
-def draw_sheet(sheet: Sheet, at: F64, depth: F64, matte: Matte, size: tuple[int, int]) -> Layer:
+def draw_sheet(
+    sheet: TexturedMesh, at: F64, depth: F64, matte: Matte, size: tuple[int, int]
+) -> CutOut:
     """The triangles with their corners at px (V, 2) and depths (V,); `size`: width, height."""
     hits = rasterise(at, depth, sheet.faces, size)
     if _is_shrunk(sheet, at):
         color, alpha = _samples(sheet, hits, matte)
         alpha_mean = pixel_means(alpha[..., None])
         color = pixel_means(color * alpha[..., None]) / np.maximum(alpha_mean, 1e-9)
-        return Layer(color, alpha_mean[..., 0])
+        return CutOut(color, alpha_mean[..., 0])
     middle = hits.middles()
     color, _ = _samples(sheet, middle, matte)
     whole, alpha = _samples(sheet, hits, matte)
     mean = pixel_means(alpha[..., None])
     rim = (middle.face < 0)[..., None]
     blurred = pixel_means(whole * alpha[..., None]) / np.maximum(mean, 1e-9)
-    return Layer(np.where(rim, blurred, color), mean[..., 0])
+    return CutOut(np.where(rim, blurred, color), mean[..., 0])
 
 
-def _is_shrunk(sheet: Sheet, at: F64) -> bool:
+def _is_shrunk(sheet: TexturedMesh, at: F64) -> bool:
     def area(corners: F64) -> float:
         a, b, c = (corners[sheet.faces[:, k]] for k in range(3))
         u, v = b - a, c - a
@@ -71,7 +73,7 @@ def _is_shrunk(sheet: Sheet, at: F64) -> bool:
     return area(at) < SHRUNK * area(sheet.uv)
 
 
-def _samples(sheet: Sheet, hits: Hits, matte: Matte) -> tuple[F64, F64]:
+def _samples(sheet: TexturedMesh, hits: Hits, matte: Matte) -> tuple[F64, F64]:
     """Colours (h, w, 3) and coverage (h, w) of every sample."""
     hit = hits.face >= 0
     uv = interpolated(sheet.uv, sheet.faces, hits) - [matte.left + 0.5, matte.top + 0.5]

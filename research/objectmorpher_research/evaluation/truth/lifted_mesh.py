@@ -17,14 +17,14 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.compose.composite import composite
 from objectmorpher_core.compose.light.harmonize import lit
 from objectmorpher_core.document.model import LiftedObject, Matte
-from objectmorpher_core.lift import Subject
-from objectmorpher_core.lift.relief.body import BACK, FRONT, Body
+from objectmorpher_core.lift import LiftSubject
+from objectmorpher_core.lift.relief.body import BACK, FRONT, ReliefBody
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
 
-from .cases import Case
+from .cases import TruthCase
 from .chain import LIFTS, OWN, Chain
-from .layer import Layer, Sheet, draw_sheet
-from .outcome import Outcome
+from .layer import CutOut, TexturedMesh, draw_sheet
+from .outcome import EditOutcome
 
 STEP = 3.0  # px between the front's vertices
 FINE = 4  # x, that the outline is magnified to be found between pixels
@@ -36,10 +36,10 @@ class BodyMesh:
 
     points: F64  # (V, 3) object frame
     normals: F64  # (V, 3) outward, unit
-    sheet: Sheet
+    sheet: TexturedMesh
 
 
-def draw_mesh(chain: Chain, case: Case, matte: Matte, plate: RGB) -> Outcome:
+def draw_mesh(chain: Chain, case: TruthCase, matte: Matte, plate: RGB) -> EditOutcome:
     """The edit with the mesh."""
     document, puppet, grips = chain.moved(case)
     mesh = _mesh(case, matte, puppet.lifted)
@@ -62,14 +62,14 @@ def draw_mesh(chain: Chain, case: Case, matte: Matte, plate: RGB) -> Outcome:
         if look.grain is not None:
             color = look.grain.grained(color, alpha, 0, 0)
         straight = np.asarray(color, np.float64) / np.maximum(layer.alpha, 1e-6)[..., None]
-        layer = Layer(np.where(layer.alpha[..., None] > 0, straight, 0), layer.alpha)
+        layer = CutOut(np.where(layer.alpha[..., None] > 0, straight, 0), layer.alpha)
     pixels = layer.over(plate, case.photo, matte)
     reached = [puppet.picture_of(p, item.pose, item.placement) for p in grips]
-    return Outcome(pixels, layer.alpha, np.array(reached))
+    return EditOutcome(pixels, layer.alpha, np.array(reached))
 
 
-def _mesh(case: Case, matte: Matte, lifted: LiftedObject) -> BodyMesh:
-    subject = Subject(case.photo, case.camera, case.mask, matte)
+def _mesh(case: TruthCase, matte: Matte, lifted: LiftedObject) -> BodyMesh:
+    subject = LiftSubject(case.photo, case.camera, case.mask, matte)
     body = ReliefLifter().body(subject, LIFTS[OWN])
     outline, inner, loops = _vertices(case.mask)
     xy = np.concatenate([outline, inner])
@@ -86,7 +86,7 @@ def _mesh(case: Case, matte: Matte, lifted: LiftedObject) -> BodyMesh:
     points = lifted.object_points(rows)
     uv = np.concatenate([xy, xy, outline, outline])
     colours = _nearest_colours(points, lifted)
-    sheet = Sheet(uv, everything, True, colours, len(faces))
+    sheet = TexturedMesh(uv, everything, True, colours, len(faces))
     return BodyMesh(points, _normals(points, everything), sheet)
 
 
@@ -127,7 +127,7 @@ def _wall(loops: list[I32]) -> I32:
     return np.concatenate(faces)
 
 
-def _world(body: Body, camera: Camera, xy: F64, side: float) -> F64:
+def _world(body: ReliefBody, camera: Camera, xy: F64, side: float) -> F64:
     """(n, 3) of the front or the back at px (n, 2); see `relief._assemble`."""
     depth = camera.focal / body.silhouette.extent
     height, _ = body.sample(xy, side)

@@ -26,7 +26,7 @@ MISSING = (
 
 
 @dataclass(frozen=True)
-class Material:
+class SolidMaterial:
     """A photo laid around a solid from three sides, or marble through and through."""
 
     surface: str  # of SURFACES, or "marble"

@@ -9,46 +9,46 @@ from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.document.model import Matte
 
 from . import flat_methods
-from .cases import Case
+from .cases import TruthCase
 from .chain import CARD, PLAIN, Chain, Way
 from .lifted_mesh import draw_mesh
-from .outcome import Outcome
+from .outcome import EditOutcome
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
     """The input that all methods of a case share: case, cut-out of the mask, plate, chain."""
 
-    case: Case
+    case: TruthCase
     matte: Matte
     plate: RGB
     chain: Chain
 
 
 @dataclass(frozen=True)
-class Method:
+class EditMethod:
     """A method of making an edit."""
 
     name: str
     told: str  # what it is, for the report
-    apply: Callable[[Given], Outcome]
+    apply: Callable[[Given], EditOutcome]
     only_bends: bool = False  # otherwise the same as ours where the thing moves as a whole
 
 
 OURS = "ours"
 
 
-def _chain(name: str, told: str, way: Way, only_bends: bool = False) -> Method:
-    return Method(name, told, lambda given: given.chain.apply(given.case, way), only_bends)
+def _chain(name: str, told: str, way: Way, only_bends: bool = False) -> EditMethod:
+    return EditMethod(name, told, lambda given: given.chain.apply(given.case, way), only_bends)
 
 
-def _by_name(*methods: Method) -> Mapping[str, Method]:
+def _by_name(*methods: EditMethod) -> Mapping[str, EditMethod]:
     return {method.name: method for method in methods}
 
 
 _OURS = _chain(OURS, "the product: lifted, deformed by ARAP, harmonised", Way())
 _UNHARMONISED = _chain("no-harmonise", "without harmonise", Way(is_harmonised=False))
-_MESH = Method(
+_MESH = EditMethod(
     "mesh", "a textured mesh of the lifted body instead of Gaussians",
     lambda given: draw_mesh(given.chain, given.case, given.matte, given.plate),
 )  # fmt: skip
@@ -57,12 +57,12 @@ _EUCLIDEAN = _chain("euclidean", "Euclidean links", Way(links="euclidean"), True
 
 METHODS = _by_name(
     _OURS,
-    Method("nothing", "the photo as it is", lambda given: flat_methods.do_nothing(given.case)),
-    Method(
+    EditMethod("nothing", "the photo as it is", lambda given: flat_methods.do_nothing(given.case)),
+    EditMethod(
         "paste", "best 2-D similarity of the cut-out",
         lambda given: flat_methods.paste(given.case, given.matte, given.plate),
     ),
-    Method(
+    EditMethod(
         "warp", "2-D as-rigid-as-possible warp of the cut-out",
         lambda given: flat_methods.warp(given.case, given.matte, given.plate),
     ),
@@ -75,7 +75,7 @@ METHODS = _by_name(
 )  # fmt: skip
 
 STEPS = (1, 2, 4, 8, 16, 64)
-ABLATIONS: Mapping[str, Mapping[str, Method]] = {
+ABLATIONS: Mapping[str, Mapping[str, EditMethod]] = {
     "mesh": _by_name(_OURS, _MESH),
     "harmonise": _by_name(_OURS, _UNHARMONISED),
     "links": _by_name(_OURS, _EUCLIDEAN),

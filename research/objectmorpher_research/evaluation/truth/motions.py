@@ -24,7 +24,7 @@ class Rigid:
 
 
 @dataclass(frozen=True)
-class Motion:
+class TruthEdit:
     """An edit of one category; `amount` in degrees, as a factor, or as a share of the distance."""
 
     category: str
@@ -45,7 +45,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PlacedSolid:
     """A solid where it stands in the world."""
 
     points: F64  # (V, 3) world
@@ -68,7 +68,7 @@ class Body:
         return int(self.extent[1] >= self.extent[0])
 
 
-def moved(motion: Motion, body: Body) -> F64:
+def moved(motion: TruthEdit, body: PlacedSolid) -> F64:
     """(V, 3) where its points go, world."""
     centre, around = body.centre, body.points - body.centre
     if (rigid := motion.rigid) is not None:
@@ -108,7 +108,7 @@ def _twisted(around: F64, along: int, length: float, degrees: float) -> F64:
     return result
 
 
-def _raised(motion: Motion, body: Body) -> F64:
+def _raised(motion: TruthEdit, body: PlacedSolid) -> F64:
     assert body.limb is not None
     parts, pivot, tip = body.limb
     axis = np.array([0.0, 0.0, 1.0])
@@ -122,7 +122,7 @@ def _raised(motion: Motion, body: Body) -> F64:
     return result
 
 
-def grips(motion: Motion, body: Body) -> tuple[F64, int]:
+def grips(motion: TruthEdit, body: PlacedSolid) -> tuple[F64, int]:
     """Return the grips (n, 3), world, and how many more points stay in place.
 
     What is seen there in the picture is meant. Points in a line would not tell whether the thing

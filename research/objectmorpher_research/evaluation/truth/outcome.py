@@ -8,7 +8,7 @@ from objectmorpher_core.base.arrays import F64, RGB
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class EditOutcome:
     """A result, and where the thing is in it."""
 
     pixels: RGB  # (H, W, 3)

@@ -14,10 +14,10 @@ import numpy as np
 from objectmorpher_core.base.arrays import RGB
 from objectmorpher_core.pictures.image import Picture, encode_picture, read_picture
 
-from .methods import Method
-from .running import Row
+from .methods import EditMethod
+from .running import CaseRow
 from .scores import FIGURES
-from .tables import COSTS, Table, interval, short
+from .tables import COSTS, TruthTable, interval, short
 
 MEANINGS = {
     "psnr": "PSNR inside the edit region, dB; higher is better",
@@ -42,7 +42,9 @@ figure{display:inline-block;margin:3px;font-size:12px;text-align:center}
 figcaption{max-width:190px}h3{margin:18px 0 2px}"""
 
 
-def report(folder: Path, rows: Sequence[Row], table: Table, methods: Mapping[str, Method]) -> str:
+def report(
+    folder: Path, rows: Sequence[CaseRow], table: TruthTable, methods: Mapping[str, EditMethod]
+) -> str:
     """The page."""
     parts = [f"<!doctype html><meta charset='utf-8'><title>Truth</title><style>{STYLE}</style>"]
     cases = len({row.case for row in rows})
@@ -60,7 +62,7 @@ def report(folder: Path, rows: Sequence[Row], table: Table, methods: Mapping[str
     return "\n".join(parts)
 
 
-def _table(table: Table, figure: str) -> str:
+def _table(table: TruthTable, figure: str) -> str:
     head = "".join(f"<th>{html.escape(c)}</th>" for c in table.categories)
     lines = [f"<h3>{html.escape(MEANINGS.get(figure, figure))}</h3><table><tr><th></th>{head}</tr>"]
     for name in table.methods:
@@ -72,7 +74,7 @@ def _table(table: Table, figure: str) -> str:
     return "".join(lines) + "</table>"
 
 
-def _case(home: Path, rows: Sequence[Row]) -> str:
+def _case(home: Path, rows: Sequence[CaseRow]) -> str:
     region = _picture(home / "region.png")
     captions = {"photo": "photo", "truth": "truth"}
     captions |= {

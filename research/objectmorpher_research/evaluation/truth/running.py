@@ -22,12 +22,12 @@ from objectmorpher_core.pictures.image import Picture, encode_mask, encode_pictu
 
 from ..error import EvaluationError
 from ..measures import dino
-from .cases import Case, Wanted, make_case, wanted_cases
+from .cases import PlannedCase, TruthCase, make_case, wanted_cases
 from .chain import Chain
-from .methods import OURS, Given, Method
+from .methods import OURS, EditMethod, Given
 from .motions import RIGID
-from .outcome import Outcome
-from .scores import Score, score
+from .outcome import EditOutcome
+from .scores import TruthScore, score
 from .stereo import NAME as STEREO
 from .stereo import stereo_case
 
@@ -37,13 +37,13 @@ MIB = 1 << 20
 
 
 @dataclass(frozen=True)
-class Row:
+class CaseRow:
     """One method on one case."""
 
     case: str
     category: str
     method: str
-    score: Score
+    score: TruthScore
     seconds: float  # beyond what all methods share: the lift and the plate
     cpu: float  # of all cores together
     shared: float  # seconds of the default lift and the plate
@@ -51,12 +51,12 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Job:
+class CaseJob:
     """Cases of one photo."""
 
     folder: Path
-    wanted: tuple[Wanted, ...]  # empty: the stereo pair
-    methods: tuple[Method, ...]
+    wanted: tuple[PlannedCase, ...]  # empty: the stereo pair
+    methods: tuple[EditMethod, ...]
     seed: int
 
     @property
@@ -74,15 +74,15 @@ class Job:
 
 def run(
     folder: Path,
-    methods: Mapping[str, Method],
+    methods: Mapping[str, EditMethod],
     seed: int = 0,
     is_quick: bool = False,
     progress: Progress = silent,
-) -> list[Row]:
+) -> list[CaseRow]:
     """Every method on every case. Raises EvaluationError: one sentence."""
     claim(folder, seed)
     jobs = jobs_of(folder, methods, seed, is_quick)
-    rows: list[Row] = []
+    rows: list[CaseRow] = []
     for k, job in enumerate(jobs):
         progress(k / len(jobs), job.name)
         rows += run_photo(job)
@@ -91,23 +91,23 @@ def run(
 
 
 def jobs_of(
-    folder: Path, methods: Mapping[str, Method], seed: int = 0, is_quick: bool = False
-) -> list[Job]:
+    folder: Path, methods: Mapping[str, EditMethod], seed: int = 0, is_quick: bool = False
+) -> list[CaseJob]:
     """Return a job for each photo; they may be done in any order, and on several machines."""
     found = wanted_cases(seed, is_quick)
     by_photo = sorted(found, key=lambda w: (repr(w.setting), w.number))
     jobs = [
-        Job(folder, tuple(own), tuple(methods.values()), seed)
+        CaseJob(folder, tuple(own), tuple(methods.values()), seed)
         for _, own in groupby(by_photo, key=lambda w: w.setting)
     ]
-    return [*jobs, Job(folder, (), tuple(methods.values()), seed)]
+    return [*jobs, CaseJob(folder, (), tuple(methods.values()), seed)]
 
 
-def run_photo(job: Job) -> list[Row]:
+def run_photo(job: CaseJob) -> list[CaseRow]:
     """Run all methods on the cases of one photo; what is in the folder is not computed again."""
     network = dino.Dino() if dino.missing() is None else None
     chain: Chain | None = None
-    rows: list[Row] = []
+    rows: list[CaseRow] = []
     for name, category, make in _cases(job):
         home = job.folder / "cases" / name
         done = _kept_rows(job, name, category)
@@ -120,7 +120,7 @@ def run_photo(job: Job) -> list[Row]:
         given = Given(case, chain.lift()[0], chain.plate(case), chain)
         shared = time.perf_counter() - begun
         _write_case(home, case)
-        own: dict[str, Row] = {}
+        own: dict[str, CaseRow] = {}
         for method in job.methods:
             if method.name not in done:
                 continue
@@ -140,7 +140,7 @@ def run_photo(job: Job) -> list[Row]:
     return rows
 
 
-def _cases(job: Job) -> Iterator[tuple[str, str, Callable[[], Case]]]:
+def _cases(job: CaseJob) -> Iterator[tuple[str, str, Callable[[], TruthCase]]]:
     if not job.wanted:
         yield STEREO, VIEW, stereo_case
     for wanted in job.wanted:
@@ -148,18 +148,20 @@ def _cases(job: Job) -> Iterator[tuple[str, str, Callable[[], Case]]]:
 
 
 def _measured(
-    given: Given, method: Method, shared: float, network: dino.Dino | None
-) -> tuple[Row, Outcome]:
+    given: Given, method: EditMethod, shared: float, network: dino.Dino | None
+) -> tuple[CaseRow, EditOutcome]:
     _forget_peak()
     begun, worked = time.perf_counter(), time.process_time()
     outcome = method.apply(given)
     seconds, cpu = time.perf_counter() - begun, time.process_time() - worked
     memory, case = _peak(), given.case
     found = score(case, outcome, network)
-    return Row(case.name, case.category, method.name, found, seconds, cpu, shared, memory), outcome
+    return CaseRow(
+        case.name, case.category, method.name, found, seconds, cpu, shared, memory
+    ), outcome
 
 
-def _kept_rows(job: Job, case: str, category: str) -> dict[str, Row | None]:
+def _kept_rows(job: CaseJob, case: str, category: str) -> dict[str, CaseRow | None]:
     """The methods that are to be run on a case; None of those that were not yet."""
     names = {m.name for m in job.methods}
     is_same = category in (*RIGID, VIEW) and OURS in names  # as ours, for what only bends
@@ -171,17 +173,17 @@ def _kept_rows(job: Job, case: str, category: str) -> dict[str, Row | None]:
     }
 
 
-def _is_whole(rows: Mapping[str, Row | None]) -> bool:
+def _is_whole(rows: Mapping[str, CaseRow | None]) -> bool:
     return None not in rows.values()
 
 
-def _kept(path: Path, case: str, category: str) -> Row | None:
+def _kept(path: Path, case: str, category: str) -> CaseRow | None:
     if not path.exists():
         return None
     try:
         told = json.loads(path.read_text("utf-8"))
         extra = [told.pop(key) for key in ("seconds", "cpu", "shared", "memory")]
-        return Row(case, category, path.stem, Score(**told), *extra)
+        return CaseRow(case, category, path.stem, TruthScore(**told), *extra)
     except (ValueError, KeyError, TypeError) as error:
         raise EvaluationError(f"{path} does not hold a case's figures: delete it") from error
 
@@ -203,7 +205,7 @@ def claim(folder: Path, seed: int) -> None:
     write_all({path: (json.dumps(told) + "\n").encode()})
 
 
-def _write_case(home: Path, case: Case) -> None:
+def _write_case(home: Path, case: TruthCase) -> None:
     home.mkdir(parents=True, exist_ok=True)
     guidance, rigid = case.guidance, case.guidance.rigid
     points = [

@@ -11,8 +11,8 @@ from objectmorpher_core.base.arrays import F64, RGB
 
 from ..measures.dino import Dino
 from ..measures.fidelity import psnr, ssim
-from .cases import Case
-from .outcome import Outcome
+from .cases import TruthCase
+from .outcome import EditOutcome
 
 CONTEXT = 14  # px around the region that measures may look at: a patch of DINOv2's
 PSNR_CAP = 60.0  # dB, of what is equal to the last bit, so that means exist
@@ -20,7 +20,7 @@ FIGURES = ("psnr", "ssim", "dinov2", "iou", "reach", "outside", "changed")
 
 
 @dataclass(frozen=True)
-class Score:
+class TruthScore:
     """The scores of one outcome."""
 
     psnr: float  # dB, inside the region
@@ -32,7 +32,7 @@ class Score:
     changed: float  # share of the pixels outside that differ from the photo
 
 
-def score(case: Case, outcome: Outcome, network: Dino | None) -> Score:
+def score(case: TruthCase, outcome: EditOutcome, network: Dino | None) -> TruthScore:
     """Return all figures."""
     window = _window(case.region)
     inside, outer = case.region[window], case.region < 0.5
@@ -42,7 +42,7 @@ def score(case: Case, outcome: Outcome, network: Dino | None) -> Score:
     larger = np.maximum(outcome.alpha, case.shown).sum()
     seen = network.perceptual(a, b, (inside,))[0] if network is not None else float("nan")
     differs = (outcome.pixels != case.photo).any(-1) & outer
-    return Score(
+    return TruthScore(
         min(psnr(a, b, (inside,))[0], PSNR_CAP), ssim(a, b, (inside,))[0], seen,
         float(smaller / larger),
         float(np.linalg.norm(outcome.reached - case.guidance.to, axis=1).mean()),
@@ -52,7 +52,7 @@ def score(case: Case, outcome: Outcome, network: Dino | None) -> Score:
 
 
 @lru_cache(maxsize=2)
-def _cut(case: Case) -> RGB:
+def _cut(case: TruthCase) -> RGB:
     """The truth about the region; the same array each time, whose features are then known."""
     return case.truth[_window(case.region)]
 

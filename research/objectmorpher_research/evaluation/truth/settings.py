@@ -10,10 +10,10 @@ from objectmorpher_core.base.arrays import F64, I32, RGB, Mask
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix
 
-from .materials import GAMMA, Material, background
-from .motions import Body, Motion, moved
+from .materials import GAMMA, SolidMaterial, background
+from .motions import PlacedSolid, TruthEdit, moved
 from .rasterise import SAMPLES, Hits, interpolated, pixel_means, rasterise
-from .solids import Solid, make
+from .solids import TruthSolid, make
 
 WIDTH, HEIGHT = 480, 400  # px
 FIELDS = (38.0, 50.0, 62.0)  # degrees of view, told to every method as EXIF tells it
@@ -44,7 +44,7 @@ class Setting:
     """A made photo of a solid."""
 
     solid: str
-    material: Material
+    material: SolidMaterial
     side: tuple[float, float, float]  # degrees: yaw, pitch, roll at which it is photographed
     place: str  # of BACKGROUNDS
     lamp: Lamp
@@ -58,7 +58,7 @@ class Setting:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SolidView:
     """A solid as the camera sees it; colours are straight sRGB."""
 
     color: F64  # (H, W, 3) in [0, 1]
@@ -72,19 +72,19 @@ class View:
         return np.asarray(np.clip(whole + 0.5, 0, 255), np.uint8)
 
 
-class Stage:
+class TruthStage:
     """A setting built up: photographs the solid at rest and after edits."""
 
     def __init__(self, setting: Setting) -> None:
         self.setting, self.camera = setting, setting.camera
-        self.solid: Solid = make(setting.solid)
+        self.solid: TruthSolid = make(setting.solid)
         self.plate = background(setting.place, WIDTH, HEIGHT)
         turn = turn_matrix(*setting.side)
         depth = self.camera.focal / (setting.share * HEIGHT)
         self._turn, self._centre = turn, self.camera.unproject(np.array(setting.at), depth)
         self._normals = self.solid.normals(self.solid.vertices)  # at rest, its own frame
 
-    def body(self, limb: str = "") -> Body:
+    def body(self, limb: str = "") -> PlacedSolid:
         """Return the placed body."""
 
         def placed(points: F64) -> F64:
@@ -92,13 +92,13 @@ class Stage:
 
         found = self.solid.limbs[limb] if limb else None
         told = (found.parts, placed(found.pivot), placed(found.tip)) if found else None
-        return Body(placed(self.solid.vertices), self.solid.parts, told)
+        return PlacedSolid(placed(self.solid.vertices), self.solid.parts, told)
 
-    def moved(self, motion: Motion) -> F64:
+    def moved(self, motion: TruthEdit) -> F64:
         """(V, 3) world"""
         return moved(motion, self.body(motion.limb))
 
-    def draw(self, world: F64) -> View:
+    def draw(self, world: F64) -> SolidView:
         """The solid with its vertices at (V, 3)."""
         solid, setting = self.solid, self.setting
         hits = rasterise(self.camera.project(world), world[:, 2], solid.faces, (WIDTH, HEIGHT))
@@ -110,15 +110,15 @@ class Stage:
         colors[hit] = setting.lamp.lit(albedo, _unit(normals), _unit(-at), setting.material.shine)
         alpha = hits.coverage
         color = pixel_means(colors) / np.maximum(alpha, 1e-9)[..., None]
-        return View(color, alpha, hits)
+        return SolidView(color, alpha, hits)
 
-    def surface_points(self, xy: F64, rest: View) -> tuple[I32, F64]:
+    def surface_points(self, xy: F64, rest: SolidView) -> tuple[I32, F64]:
         """Corners (n, 3) of the faces seen at whole px (n, 2), and their weights there (n, 3)."""
         middle = rest.hits.middles()
         column, row = xy.astype(int).T
         return self.solid.faces[middle.face[row, column]], middle.corners[row, column]
 
-    def is_seen(self, points: F64, view: View) -> Mask:
+    def is_seen(self, points: F64, view: SolidView) -> Mask:
         """(n,) whether world points (n, 3) on the surface are seen in a view."""
         px = self.camera.project(points)
         column, row = np.floor(px).astype(int).T

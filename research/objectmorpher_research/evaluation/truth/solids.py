@@ -28,7 +28,7 @@ class Limb:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class TruthSolid:
     """A closed surface; its parts overlap."""
 
     name: str
@@ -49,7 +49,7 @@ class Solid:
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
-class Builder:
+class PatchBuilder:
     """Patches, part by part; `part` begins the next."""
 
     def __init__(self) -> None:
@@ -147,7 +147,7 @@ class Builder:
         axis = np.stack(np.broadcast_arrays(0 * radius * angle, along, 0 * radius * angle), -1)
         self.patch(grid @ linear.T + at, axis @ linear.T + at)
 
-    def finish(self, name: str) -> Solid:
+    def finish(self, name: str) -> TruthSolid:
         points = np.concatenate(self._points)
         middle = 0.5 * (points.min(0) + points.max(0))
         extent = float((points.max(0) - points.min(0)).max())
@@ -155,13 +155,13 @@ class Builder:
             key: Limb(parts, (np.array(pivot) - middle) / extent, (np.array(tip) - middle) / extent)
             for key, (parts, pivot, tip) in self._limbs.items()
         }
-        return Solid(
+        return TruthSolid(
             name, (points - middle) / extent, np.concatenate(self._faces),
             np.concatenate(self._welds), np.concatenate(self._parts), limbs,
         )  # fmt: skip
 
 
-def figure(build: Builder) -> None:
+def figure(build: PatchBuilder) -> None:
     build.part()
     build.ellipsoid((0, -0.66, 0), (0.16, 0.19, 0.17))
     build.part()
@@ -178,7 +178,7 @@ def figure(build: Builder) -> None:
         build.capsule((side * 0.12, 0.15, 0), (side * 0.17, 0.85, 0.0), 0.12, 0.08)
 
 
-def dog(build: Builder) -> None:
+def dog(build: PatchBuilder) -> None:
     build.part()
     build.ellipsoid((0, 0, 0), (0.42, 0.2, 0.17))
     for k, (x, z) in enumerate(((-0.3, -0.1), (-0.3, 0.1), (0.28, -0.1), (0.28, 0.1))):
@@ -196,7 +196,7 @@ def dog(build: Builder) -> None:
     build.limb("tail", (tail,), (0.36, -0.08, 0), (0.66, -0.3, 0.02))
 
 
-def star(build: Builder) -> None:
+def star(build: PatchBuilder) -> None:
     build.part()
     build.ellipsoid((0, 0, 0), (0.2, 0.2, 0.11))
     for k in range(5):
@@ -207,7 +207,7 @@ def star(build: Builder) -> None:
         build.limb(f"arm {k}", (arm,), (0.1 * np.cos(angle), 0.1 * np.sin(angle), 0), tip)
 
 
-def cactus(build: Builder) -> None:
+def cactus(build: PatchBuilder) -> None:
     build.part()
     build.capsule((0, -0.5, 0), (0, 0.5, 0), 0.15)
     for side, low, high in ((-1, 0.1, -0.25), (1, -0.05, -0.4)):
@@ -219,7 +219,7 @@ def cactus(build: Builder) -> None:
         )
 
 
-def bottle(build: Builder) -> None:
+def bottle(build: PatchBuilder) -> None:
     build.part()
     profile = [(0, -0.5), (0.07, -0.5), (0.075, -0.48), (0.07, -0.3), (0.09, -0.22), (0.16, -0.14)]
     profile += [(0.19, -0.05), (0.19, 0.2), (0.19, 0.46), (0.17, 0.5)]
@@ -227,7 +227,7 @@ def bottle(build: Builder) -> None:
     build.disc((0, 0.5, 0), 0.17, (0, 0, 0))
 
 
-def vase(build: Builder) -> None:
+def vase(build: PatchBuilder) -> None:
     t = np.linspace(0, 1, 60)
     radius = 0.16 + 0.12 * np.sin(2.9 * np.pi * t**1.2 + 0.4) * (0.5 + 0.5 * t)
     build.part()
@@ -236,7 +236,7 @@ def vase(build: Builder) -> None:
     build.disc((0, 0.5, 0), radius[-1], (0, 0, 0))
 
 
-def mug(build: Builder) -> None:
+def mug(build: PatchBuilder) -> None:
     build.part()
     build.lathe(_fine([(0.33, -0.4), (0.33, 0), (0.31, 0.38), (0.28, 0.42)]))
     build.disc((0, -0.4, 0), 0.33, (0, 0, 0))
@@ -245,17 +245,17 @@ def mug(build: Builder) -> None:
     build.torus((0.36, 0.0, 0), 0.23, 0.06)
 
 
-def crate(build: Builder) -> None:
+def crate(build: PatchBuilder) -> None:
     build.part()
     build.box((0, 0, 0), (0.36, 0.45, 0.25))
 
 
-def plank(build: Builder) -> None:
+def plank(build: PatchBuilder) -> None:
     build.part()
     build.box((0, 0, 0), (0.15, 0.6, 0.07))
 
 
-def banana(build: Builder) -> None:
+def banana(build: PatchBuilder) -> None:
     angle = np.linspace(-0.75, 0.75, 2 * LONG)
     radius = 0.1 * np.sqrt(np.clip(1 - (angle / 0.76) ** 6, 0.02, 1))
     turn = np.linspace(0, 2 * np.pi, ROUND)
@@ -267,7 +267,7 @@ def banana(build: Builder) -> None:
     build.patch(np.stack([x, y, z], -1), axis)
 
 
-def mushroom(build: Builder) -> None:
+def mushroom(build: PatchBuilder) -> None:
     build.part()
     build.lathe(_fine([(0.11, -0.2), (0.1, 0.1), (0.14, 0.4), (0.1, 0.46), (0, 0.47)]))
     t = np.linspace(0, np.pi / 2, 24)
@@ -276,7 +276,7 @@ def mushroom(build: Builder) -> None:
     build.lathe([*map(tuple, dome), (0.36, -0.1), (0.2, -0.08), (0.0, -0.08)])
 
 
-def car(build: Builder) -> None:
+def car(build: PatchBuilder) -> None:
     build.part()
     build.box((0, 0.05, 0), (0.5, 0.12, 0.22))
     build.part()
@@ -297,14 +297,14 @@ def _fine(profile: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return list(zip(radius.tolist(), y.tolist(), strict=True))
 
 
-MAKERS: Mapping[str, Callable[[Builder], None]] = {
+MAKERS: Mapping[str, Callable[[PatchBuilder], None]] = {
     f.__name__: f
     for f in (figure, dog, star, cactus, bottle, vase, mug, crate, plank, banana, mushroom, car)
 }
 
 
-def make(name: str) -> Solid:
+def make(name: str) -> TruthSolid:
     """The solid of that name, of MAKERS."""
-    build = Builder()
+    build = PatchBuilder()
     MAKERS[name](build)
     return build.finish(name)

@@ -16,7 +16,7 @@ from objectmorpher_core.base.arrays import F64, RGB, Mask
 from objectmorpher_core.base.camera import Camera
 
 from ..error import EvaluationError
-from .cases import RIGID_POINTS, Case, Guidance, inner_pixels, spread_out
+from .cases import RIGID_POINTS, TruthCase, TruthGuidance, inner_pixels, spread_out
 from .motions import Rigid
 
 NAME, CATEGORY = "64-view-motorcycle", "view"
@@ -51,7 +51,7 @@ def read_pair() -> StereoPair:
     return StereoPair(left, right, disparity, mask, _seen_from_right(mask, disparity))
 
 
-def stereo_case() -> Case:
+def stereo_case() -> TruthCase:
     """Return the right camera's view with the left one's middle. Raises EvaluationError."""
     pair = read_pair()
     mask, disparity = pair.mask, pair.disparity
@@ -66,19 +66,19 @@ def stereo_case() -> Case:
     known = mask & (disparity > 0)
     guidance = _guidance(known, disparity)
     region = (shown > 0.99).astype(np.float64)
-    return Case(
+    return TruthCase(
         NAME, CATEGORY, pair.left, mask, camera, guidance,
         np.asarray(truth, np.uint8), None, np.asarray(shown, np.float64), region, has_outside=False,
     )  # fmt: skip
 
 
-def _guidance(known: Mask, disparity: F64) -> Guidance:
+def _guidance(known: Mask, disparity: F64) -> TruthGuidance:
     """Points that go sideways by their disparity; none changes its distance."""
     xy = inner_pixels(known)
     chosen = xy[spread_out(xy, RIGID_POINTS)]
     column, row = chosen.astype(int).T
     to = chosen - np.column_stack([disparity[row, column] + OFFSET, 0 * chosen[:, 0]])
-    return Guidance(chosen, to, np.zeros(len(chosen)), Rigid())
+    return TruthGuidance(chosen, to, np.zeros(len(chosen)), Rigid())
 
 
 def _motorcycle(disparity: F64) -> Mask:

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from ..bootstrap import Estimate, mean_with_interval
-from .methods import OURS, Method
+from .methods import OURS, EditMethod
 from .motions import IN_PLANE, SPATIAL
-from .running import Row
+from .running import CaseRow
 from .scores import FIGURES
 
 GROUPS = {"3-D": SPATIAL, "in the plane": IN_PLANE}
@@ -20,7 +20,7 @@ COSTS = ("seconds", "cpu", "memory")
 
 
 @dataclass(frozen=True)
-class Table:
+class TruthTable:
     """Means over the cases of a category or of a group of them."""
 
     categories: tuple[str, ...]
@@ -29,10 +29,12 @@ class Table:
     gains: Mapping[tuple[str, str, str], Estimate]  # ours less the method's, case by case
 
 
-def build_table(rows: Sequence[Row], methods: Mapping[str, Method], seed: int = 0) -> Table:
+def build_table(
+    rows: Sequence[CaseRow], methods: Mapping[str, EditMethod], seed: int = 0
+) -> TruthTable:
     """A method that a rigid case leaves as ours is counts as ours there."""
     names = [name for name in methods if any(row.method == name for row in rows)]
-    by_case: dict[str, dict[str, Row]] = {}
+    by_case: dict[str, dict[str, CaseRow]] = {}
     for row in rows:
         by_case.setdefault(row.case, {})[row.method] = row
     categories = tuple(dict.fromkeys(row.category for row in rows))
@@ -56,14 +58,14 @@ def build_table(rows: Sequence[Row], methods: Mapping[str, Method], seed: int = 
                     ]
                     gains[group, name, figure] = mean_with_interval(pairs, seed)
     kept = tuple(group for group in chosen if any(key[0] == group for key in cells))
-    return Table(kept, tuple(names), cells, gains)
+    return TruthTable(kept, tuple(names), cells, gains)
 
 
-def _value(row: Row, figure: str) -> float:
+def _value(row: CaseRow, figure: str) -> float:
     return float(getattr(row if figure in COSTS else row.score, figure))
 
 
-def as_text(table: Table, figure: str) -> str:
+def as_text(table: TruthTable, figure: str) -> str:
     """Return a table of a figure for the terminal: methods in lines, categories in columns."""
     width = max(12, *(len(c) + 2 for c in table.categories))
     head = f"{figure:<14}" + "".join(f"{c:>{width}}" for c in table.categories)
@@ -90,7 +92,7 @@ def interval(cell: Estimate | None, figure: str) -> str:
     return f"[{low}, {high}]"
 
 
-def as_csv(rows: Sequence[Row]) -> str:
+def as_csv(rows: Sequence[CaseRow]) -> str:
     """A line for every method and case."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -102,7 +104,7 @@ def as_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def as_json(rows: Sequence[Row], table: Table) -> dict[str, object]:
+def as_json(rows: Sequence[CaseRow], table: TruthTable) -> dict[str, object]:
     """Everything as plain numbers; what is not there is null."""
 
     def plain(value: object) -> object:

@@ -23,7 +23,7 @@ TOLD = "objectmorpher"  # key of what the file says besides
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class TrainingState:
     """The state of a training."""
 
     parameters: dict[str, nn.Parameter]

@@ -1,7 +1,7 @@
 """The location of a pair's picture: a file, half of one, a video's frame, a table's row.
 
-A `Picture` is a few words, so that a list of a hundred thousand pairs goes to any machine; the
-pixels are read where the pair is worked on.
+A `PictureSource` is a few words, so that a list of a hundred thousand pairs goes to any machine;
+the pixels are read where the pair is worked on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ IMAGE = "image"  # Subjects200K's column
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureSource:
     """The location of a picture."""
 
     path: str

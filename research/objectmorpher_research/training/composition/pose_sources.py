@@ -19,12 +19,12 @@ import numpy as np
 from objectmorpher_core.base.arrays import F32, F64, frozen
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import LiftedObject
-from objectmorpher_core.lift import LiftError, Subject
+from objectmorpher_core.lift import LiftError, LiftSubject
 from objectmorpher_core.lift.registration.matches import Matches, alike
 from objectmorpher_core.lift.registration.view import towards
 from objectmorpher_core.lift.workers.answer import WRONG, check_similarity, read_told
 from objectmorpher_core.lift.workers.external import write_job
-from objectmorpher_core.lift.workers.file import Worker, read_worker, worker_names
+from objectmorpher_core.lift.workers.file import LiftWorker, read_worker, worker_names
 from objectmorpher_core.lift.workers.process import run_worker
 
 from . import TrainingError
@@ -39,8 +39,8 @@ ANSWER = "pose.json"
 class Two:
     """An object in two pictures."""
 
-    b: Subject
-    a: Subject
+    b: LiftSubject
+    a: LiftSubject
     lifted: LiftedObject  # out of `b`
 
 
@@ -122,7 +122,7 @@ class WorkerPoses:
     units of that matrix. Cameras are OpenCV's: x right, y down, z forward.
     """
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: LiftWorker) -> None:
         self._worker, self.name = worker, worker.name
 
     def missing(self) -> str | None:
@@ -178,7 +178,7 @@ def carried(two: Two) -> F64:
     return motion
 
 
-def _middle(subject: Subject) -> F64:
+def _middle(subject: LiftSubject) -> F64:
     """(2,) px of the box around the mask."""
     rows, columns = np.flatnonzero(subject.mask.any(1)), np.flatnonzero(subject.mask.any(0))
     return 0.5 * np.array([columns[0] + columns[-1] + 1.0, rows[0] + rows[-1] + 1.0])

@@ -26,13 +26,13 @@ from objectmorpher_core.base.progress import Progress, part, silent
 from objectmorpher_core.pictures.image import Picture, encode_coverage, encode_picture
 
 from . import TrainingError
-from .sources import Pair, fingerprint
-from .triplet import VERSION, How, Rejected, Triplet, make_triplet
+from .sources import SourcePair, fingerprint
+from .triplet import VERSION, Rejected, Triplet, TripletPlan, make_triplet
 
 PLAN, SHARD = "plan.json", "shard.json"
 UNFINISHED = ".unfinished-"
 PICTURES = ("b", "coarse", "a")
-Make = Callable[[Pair, How, Progress], Triplet]
+Make = Callable[[SourcePair, TripletPlan, Progress], Triplet]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Shard:
     """Some of the pairs."""
 
     number: int
-    pairs: tuple[Pair, ...]
+    pairs: tuple[SourcePair, ...]
 
     @property
     def name(self) -> str:
@@ -48,7 +48,7 @@ class Shard:
         return f"shard-{self.number:05d}"
 
 
-def shards_of(pairs: tuple[Pair, ...], size: int) -> tuple[Shard, ...]:
+def shards_of(pairs: tuple[SourcePair, ...], size: int) -> tuple[Shard, ...]:
     """`size` pairs each, in their order. Raises TrainingError."""
     if size < 1:
         raise TrainingError(f"a shard of {size} pairs is none")
@@ -61,7 +61,7 @@ def left_over(out: Path, shards: tuple[Shard, ...]) -> tuple[Shard, ...]:
     return tuple(s for s in shards if not (out / s.name / SHARD).is_file())
 
 
-def begin(out: Path, shards: tuple[Shard, ...], how: How) -> None:
+def begin(out: Path, shards: tuple[Shard, ...], how: TripletPlan) -> None:
     """The plan of a new folder; in an old one the plan has to be the same. Raises TrainingError."""
     pairs = tuple(pair for shard in shards for pair in shard.pairs)
     plan = {
@@ -86,7 +86,11 @@ def begin(out: Path, shards: tuple[Shard, ...], how: How) -> None:
 
 
 def write_shard(
-    out: Path, shard: Shard, how: How, progress: Progress = silent, make: Make = make_triplet
+    out: Path,
+    shard: Shard,
+    how: TripletPlan,
+    progress: Progress = silent,
+    make: Make = make_triplet,
 ) -> bool:
     """Makes a shard's triplets, unless they are there; whether they were made now.
 
@@ -135,7 +139,7 @@ def read_json(at: Path) -> dict[str, Any]:
     return told
 
 
-def _fill(folder: Path, shard: Shard, how: How, progress: Progress, make: Make) -> None:
+def _fill(folder: Path, shard: Shard, how: TripletPlan, progress: Progress, make: Make) -> None:
     made: list[str] = []
     rejected: dict[str, str] = {}
     count = len(shard.pairs)

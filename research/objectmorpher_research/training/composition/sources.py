@@ -17,7 +17,7 @@ from objectmorpher_core.pictures.image import READ_ENDINGS
 from objectmorpher_core.pictures.video import VideoError, frame_rate
 
 from . import TrainingError
-from .pictures import PADDING, Picture
+from .pictures import PADDING, PictureSource
 from .subjects import subjects_in
 
 VIDEOS = {".mp4", ".webm", ".mov", ".mkv", ".avi", ".m4v"}
@@ -27,19 +27,19 @@ MASK = ".mask"
 
 
 @dataclass(frozen=True)
-class Pair:
+class SourcePair:
     """Two pictures of one object: it is lifted out of `b` and put where `a` shows it."""
 
     name: str  # unique, and fit for a file's name
-    b: Picture
-    a: Picture
+    b: PictureSource
+    a: PictureSource
     item: str = ""  # what it is, where the source says so
     mask_b: str = ""  # files; none: the picture's subject
     mask_a: str = ""
     problem: str = ""  # why the source itself says that it is of no use
 
     @property
-    def turned_round(self) -> Pair:
+    def turned_round(self) -> SourcePair:
         """Return the same two in the other order."""
         return replace(
             self, name=f"{self.name}-back", b=self.a, a=self.b, mask_b=self.mask_a,
@@ -48,7 +48,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Looking:
+class SourceReading:
     """The reading of a source."""
 
     layout: str = "auto"  # of LAYOUTS
@@ -65,12 +65,12 @@ class Looking:
             raise TrainingError(f"a padding of {self.padding:g} is not between 0 and 0.4")
 
 
-def find_pairs(source: Path, how: Looking | None = None) -> tuple[Pair, ...]:
+def find_pairs(source: Path, how: SourceReading | None = None) -> tuple[SourcePair, ...]:
     """Find all pairs of a file or a folder, in an order that depends on nothing but the names.
 
     Raises TrainingError where there is none.
     """
-    how = how or Looking()
+    how = how or SourceReading()
     if not source.exists():
         raise TrainingError(f"there is no {source}")
     found = list(_found(source.absolute(), how))
@@ -85,7 +85,7 @@ def find_pairs(source: Path, how: Looking | None = None) -> tuple[Pair, ...]:
     return tuple(found)
 
 
-def fingerprint(pairs: tuple[Pair, ...]) -> str:
+def fingerprint(pairs: tuple[SourcePair, ...]) -> str:
     """SHA-256 of which pairs there are, wherever the folder lies."""
     told = hashlib.sha256()
     for pair in pairs:
@@ -93,13 +93,17 @@ def fingerprint(pairs: tuple[Pair, ...]) -> str:
     return told.hexdigest()
 
 
-def pair_from(told: dict[str, Any]) -> Pair:
+def pair_from(told: dict[str, Any]) -> SourcePair:
     """A pair out of `asdict(pair)`."""
-    values: dict[str, Any] = {**told, "a": Picture(**told["a"]), "b": Picture(**told["b"])}
-    return Pair(**values)
+    values: dict[str, Any] = {
+        **told,
+        "a": PictureSource(**told["a"]),
+        "b": PictureSource(**told["b"]),
+    }
+    return SourcePair(**values)
 
 
-def _found(source: Path, how: Looking) -> Iterator[Pair]:
+def _found(source: Path, how: SourceReading) -> Iterator[SourcePair]:
     if source.is_file():
         if source.suffix.lower() in VIDEOS:
             yield from _frames(source, how)
@@ -120,13 +124,13 @@ def _found(source: Path, how: Looking) -> Iterator[Pair]:
             yield from _frames(video, how)
 
 
-def _subjects(source: Path, how: Looking) -> Iterator[Pair]:
+def _subjects(source: Path, how: SourceReading) -> Iterator[SourcePair]:
     for k, row in enumerate(subjects_in(source)):
         left, right = (replace(row.picture, half=h, padding=how.padding) for h in ("left", "right"))
-        yield Pair(f"{k:07d}", left, right, row.item, problem=row.problem)
+        yield SourcePair(f"{k:07d}", left, right, row.item, problem=row.problem)
 
 
-def _pairs(folder: Path) -> Iterator[Pair]:
+def _pairs(folder: Path) -> Iterator[SourcePair]:
     """NAME-a and NAME-b in one folder; in other folders each picture and the next."""
     here = _pictures(folder)
     two: dict[str, dict[str, Path]] = {}
@@ -144,10 +148,10 @@ def _pairs(folder: Path) -> Iterator[Pair]:
             yield replace(pair, name=_safe(f"{sub.name}-{pair.name}"))
 
 
-def _of_files(name: str, b: Path, a: Path) -> Pair:
+def _of_files(name: str, b: Path, a: Path) -> SourcePair:
     masks = [b.with_name(b.stem + MASK + ".png"), a.with_name(a.stem + MASK + ".png")]
     known = [str(m) if m.exists() else "" for m in masks]
-    return Pair(_safe(name), Picture(str(b)), Picture(str(a)), "", *known)
+    return SourcePair(_safe(name), PictureSource(str(b)), PictureSource(str(a)), "", *known)
 
 
 def _pictures(folder: Path) -> list[Path]:
@@ -158,15 +162,15 @@ def _pictures(folder: Path) -> list[Path]:
     )
 
 
-def _frames(video: Path, how: Looking) -> Iterator[Pair]:
+def _frames(video: Path, how: SourceReading) -> Iterator[SourcePair]:
     try:
         rate, count = frame_rate(video)
     except VideoError as error:
         raise TrainingError(str(error)) from error
     step = max(round(how.seconds * rate), 1)
     for first in range(0, count - step, step):
-        one, other = (Picture(str(video), "frame", k) for k in (first, first + step))
-        yield Pair(f"{_safe(video.stem)}-{first:06d}", one, other)
+        one, other = (PictureSource(str(video), "frame", k) for k in (first, first + step))
+        yield SourcePair(f"{_safe(video.stem)}-{first:06d}", one, other)
 
 
 def _safe(name: str) -> str:

@@ -11,11 +11,11 @@ from objectmorpher_core.base.progress import Progress
 
 if TYPE_CHECKING:
     from .shards import Shard
-    from .triplet import How
+    from .triplet import TripletPlan
 
 
 def write_shards(
-    out: Path, shards: tuple[Shard, ...], how: How, address: str, progress: Progress
+    out: Path, shards: tuple[Shard, ...], how: TripletPlan, address: str, progress: Progress
 ) -> None:
     """Writes `shards` (of `composition.shards`) on the cluster at `address`; "local" starts a Ray.
 

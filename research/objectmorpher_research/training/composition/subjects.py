@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from . import TrainingError
-from .pictures import IMAGE, Picture, opened_table
+from .pictures import IMAGE, PictureSource, opened_table
 
 QUALITIES = ("compositeStructure", "objectConsistency", "imageQuality")
 LEAST_QUALITY = 5  # of 5, each: as its makers choose what they train on
@@ -22,15 +22,15 @@ LISTS = ("metadata.jsonl", "metadata.json")
 
 
 @dataclass(frozen=True)
-class Row:
+class WidePicture:
     """A wide picture."""
 
-    picture: Picture
+    picture: PictureSource
     item: str = ""
     problem: str = ""
 
 
-def subjects_in(source: Path) -> Iterator[Row]:
+def subjects_in(source: Path) -> Iterator[WidePicture]:
     """The rows of a folder or a .parquet file; none where it is not laid out so."""
     tables = [source] if source.is_file() else sorted(source.rglob("*.parquet"))
     for table in tables:
@@ -43,16 +43,16 @@ def subjects_in(source: Path) -> Iterator[Row]:
                 file = told.get("file_name")
                 if not isinstance(file, str) or not (source / file).is_file():
                     raise TrainingError(f"{at}: there is no picture {file!r}")
-                yield _row(Picture(str(source / file)), told)
+                yield _row(PictureSource(str(source / file)), told)
             return
     for at in sorted(source.glob("*.json")):
         pictures = [p for p in source.glob(f"{at.stem}.*") if p.suffix != ".json"]
         told = next(iter(_rows(at)), {})
         if len(pictures) == 1 and any(key in told for key in SAID):
-            yield _row(Picture(str(pictures[0])), told)
+            yield _row(PictureSource(str(pictures[0])), told)
 
 
-def _of_table(at: Path) -> Iterator[Row]:
+def _of_table(at: Path) -> Iterator[WidePicture]:
     table = opened_table(str(at))
     names = table.schema_arrow.names
     if IMAGE not in names:
@@ -60,7 +60,7 @@ def _of_table(at: Path) -> Iterator[Row]:
     told = table.read(columns=[key for key in SAID if key in names]).to_pylist()
     rows = told or [{} for _ in range(table.metadata.num_rows)]
     for k, row in enumerate(rows):
-        yield _row(Picture(str(at), "row", k), row)
+        yield _row(PictureSource(str(at), "row", k), row)
 
 
 def _rows(at: Path) -> list[dict[str, Any]]:
@@ -78,14 +78,14 @@ def _rows(at: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _row(picture: Picture, told: dict[str, Any]) -> Row:
+def _row(picture: PictureSource, told: dict[str, Any]) -> WidePicture:
     quality, words = (told.get(key) or {} for key in SAID)
     if not isinstance(quality, dict) or not isinstance(words, dict):
-        return Row(picture, problem="its metadata are not those of Subjects200K")
+        return WidePicture(picture, problem="its metadata are not those of Subjects200K")
     item, problem = str(words.get("item") or ""), ""
     low = [name for name in QUALITIES if (quality.get(name) or 0) < LEAST_QUALITY]
     if quality and low:
         problem = f"its makers rate {low[0]} below {LEAST_QUALITY}"
     elif words.get("description_valid") is False:
         problem = "its makers call its description wrong"
-    return Row(picture, item, problem)
+    return WidePicture(picture, item, problem)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from objectmorpher_core.base.progress import Progress, silent
 
 from . import TrainingError, adapter, edit_models
-from .checkpoint import State
+from .checkpoint import TrainingState
 from .edit_models import EditModel, Latents
 from .latents_cache import Encoding, LatentsCache, weights_fingerprint
 from .lora_plan import LoraPlan, parted
@@ -32,7 +32,7 @@ SAMPLER = 50  # steps for which the scheduler's shift is told
 
 
 @dataclass(frozen=True)
-class Places:
+class TrainingFolders:
     """Folders."""
 
     triplets: Path
@@ -54,7 +54,9 @@ class Course:
 class Trainer:
     """A transformer with its LoRA, and what trains it."""
 
-    def __init__(self, places: Places, plan: LoraPlan, progress: Progress = silent) -> None:
+    def __init__(
+        self, places: TrainingFolders, plan: LoraPlan, progress: Progress = silent
+    ) -> None:
         """Encodes what is not encoded yet, loads, and goes on from a checkpoint.
 
         Of several processes each calls it. Raises TrainingError.
@@ -82,7 +84,7 @@ class Trainer:
         self.mean = own if plan.mean else None
         weights = weights_fingerprint(places.weights, ("transformer",))
         self._facts = plan.facts(everything, weights)
-        self.state = State(self.parameters, self.optimiser, self.mean)
+        self.state = TrainingState(self.parameters, self.optimiser, self.mean)
         self.step = self.state.load(places.out, self._facts)
 
     def train(self, course: Course, progress: Progress = silent) -> Path:

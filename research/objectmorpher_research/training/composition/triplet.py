@@ -24,7 +24,7 @@ from objectmorpher_core.compose import InpaintError
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.compose.plate.plate import plate_crop
 from objectmorpher_core.document.model import GAUSSIANS, LiftSettings, Matte, Prompt
-from objectmorpher_core.lift import LiftError, Subject
+from objectmorpher_core.lift import LiftError, LiftSubject
 from objectmorpher_core.lift.registration.placement import Hints, Proposal, Registrar, register
 from objectmorpher_core.lift.registration.view import Target
 from objectmorpher_core.pictures.image import ImageError, at_most, read_mask, to_u8
@@ -35,9 +35,9 @@ from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_core.segment import SelectionError
 
 from . import TrainingError, pose_sources
-from .pictures import Picture
+from .pictures import PictureSource
 from .pose_sources import Two, carried, matched
-from .sources import Pair
+from .sources import SourcePair
 
 VERSION = 1  # of what is written of a triplet
 COVER = 0.006  # x the picture's diagonal: the background is invented this far around A's object
@@ -52,7 +52,7 @@ class Rejected(ValueError):
 
 
 @dataclass(frozen=True)
-class Limits:
+class TripletLimits:
     """The requirements on a triplet."""
 
     least_area: float = 0.01  # x the picture, of the object in each
@@ -67,7 +67,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class How:
+class TripletPlan:
     """The making of triplets."""
 
     segmenter: str = "auto"
@@ -77,7 +77,7 @@ class How:
     gaussians: int = GAUSSIANS
     longest: int = 1024  # px, longer side of the pictures that are written
     seed: int = 0
-    limits: Limits = Limits()
+    limits: TripletLimits = TripletLimits()
 
     def check(self) -> None:
         """Raises TrainingError, or the stage's own one-sentence error, where one cannot run."""
@@ -89,10 +89,10 @@ class How:
                 raise TrainingError(sentence)
 
 
-def how_from(told: dict[str, Any]) -> How:
+def how_from(told: dict[str, Any]) -> TripletPlan:
     """Build one from `asdict(how)`."""
-    values: dict[str, Any] = {**told, "limits": Limits(**told["limits"])}
-    return How(**values)
+    values: dict[str, Any] = {**told, "limits": TripletLimits(**told["limits"])}
+    return TripletPlan(**values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Triplet:
     facts: dict[str, Any]
 
 
-def make_triplet(pair: Pair, how: How, progress: Progress = silent) -> Triplet:
+def make_triplet(pair: SourcePair, how: TripletPlan, progress: Progress = silent) -> Triplet:
     """Make a triplet; the same pair gives the same one. Raises Rejected."""
     start, facts = time.perf_counter(), {"item": pair.item, "limits": how.limits.facts()}
     if pair.problem:
@@ -119,7 +119,9 @@ def make_triplet(pair: Pair, how: How, progress: Progress = silent) -> Triplet:
         raise Rejected(str(error), facts | {"seconds": _since(start)}) from error
 
 
-def _made(pair: Pair, how: How, facts: dict[str, Any], start: float, progress: Progress) -> Triplet:
+def _made(
+    pair: SourcePair, how: TripletPlan, facts: dict[str, Any], start: float, progress: Progress
+) -> Triplet:
     progress(0.0, "Selecting the object")
     b, a = (_side(pair, letter, how) for letter in "ba")
     facts["area"] = {"b": float(b.mask.mean()), "a": float(a.mask.mean())}
@@ -158,16 +160,16 @@ def _made(pair: Pair, how: How, facts: dict[str, Any], start: float, progress: P
     )  # fmt: skip
 
 
-def _side(pair: Pair, letter: str, how: How) -> Subject:
+def _side(pair: SourcePair, letter: str, how: TripletPlan) -> LiftSubject:
     """One of the two, with its object's mask; a matte that says nothing yet."""
-    picture: Picture = getattr(pair, letter)
+    picture: PictureSource = getattr(pair, letter)
     own: str = getattr(pair, f"mask_{letter}")
     whole = picture.read()
     pixels = np.ascontiguousarray(at_most(whole, how.longest))
     height, width = pixels.shape[:2]
     mask = _mask_in(own, whole, how.longest) if own else _subject(pixels, how)
     nothing = Matte(0, 0, np.zeros((1, 1), np.float32), np.zeros((1, 1, 3), np.float32))
-    return Subject(pixels, Camera.from_fov(width, height), mask, nothing)
+    return LiftSubject(pixels, Camera.from_fov(width, height), mask, nothing)
 
 
 def _mask_in(path: str, whole: RGB, longest: int) -> Mask:
@@ -180,7 +182,7 @@ def _mask_in(path: str, whole: RGB, longest: int) -> Mask:
         raise TrainingError(f"{path} cannot be read: {error.strerror or error}") from error
 
 
-def _subject(pixels: RGB, how: How) -> Mask:
+def _subject(pixels: RGB, how: TripletPlan) -> Mask:
     found = read_photo(pixels, _segmenter(how.segmenter))
     return found.segment(Prompt(is_subject=True), seed=how.seed).mask
 
@@ -190,7 +192,9 @@ def _segmenter(name: str) -> segment.Segmenter:
     return segment.load(name)
 
 
-def registered(two: Two, how: How, progress: Progress = silent) -> tuple[tuple[Proposal, ...], str]:
+def registered(
+    two: Two, how: TripletPlan, progress: Progress = silent
+) -> tuple[tuple[Proposal, ...], str]:
     """Return where the object may stand in A, and whether it looks the same there in another pose.
 
     A pose that is known comes as it is, and as the registration would have it. Raises LiftError.
@@ -224,7 +228,7 @@ def drawn_in(two: Two, motion: F64, camera: Camera) -> Picture3D:
     return tiles.render(splats, object_texture(two.b.matte, two.lifted), camera, two.b.camera)
 
 
-def _check_area(area: dict[str, float], limits: Limits) -> None:
+def _check_area(area: dict[str, float], limits: TripletLimits) -> None:
     for letter, share in area.items():
         if not limits.least_area <= share <= limits.most_area:
             raise Rejected(
@@ -233,7 +237,7 @@ def _check_area(area: dict[str, float], limits: Limits) -> None:
             )
 
 
-def _check(facts: dict[str, Any], limits: Limits) -> None:
+def _check(facts: dict[str, Any], limits: TripletLimits) -> None:
     if facts["iou"] < limits.least_iou:
         raise Rejected(
             f"registered, the outlines agree by {facts['iou']:.0%}, not {limits.least_iou:.0%}"

@@ -17,7 +17,7 @@ from objectmorpher_core.lift.crop import SIDE
 from .distance import lowest, trace
 from .families import FAMILIES
 from .materials import Material, a_colour, a_crop, a_material, albedo, grain, noise_block
-from .solid import Builder, Solid, turned
+from .solid import PrimitiveBuilder, Solid, turned
 
 COARSE = 56  # px of the first look, which finds the object's box
 LOOSE = 1.05  # x the ball's angle, of the first look
@@ -158,7 +158,7 @@ def _lamps(rng: np.random.Generator, eye: _Eye) -> F64:
     return lamps / np.linalg.norm(lamps, axis=1, keepdims=True)
 
 
-def _materials(rng: np.random.Generator, built: Builder) -> list[Material]:
+def _materials(rng: np.random.Generator, built: PrimitiveBuilder) -> list[Material]:
     """One for each part; parts with the same number look the same, others often alike."""
     base = a_colour(rng)
     found: dict[int, Material] = {}

@@ -1,6 +1,6 @@
 """A made-up object while it is put together: parts made of primitives, y up, the ground below.
 
-Lengths are free while building; `Builder.finish` scales the object into the unit ball.
+Lengths are free while building; `PrimitiveBuilder.finish` scales the object into the unit ball.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Solid(NamedTuple):
     warp: F64  # (2,) radians per radius: twist about y, bend sideways
 
 
-class How(TypedDict, total=False):
+class Joining(TypedDict, total=False):
     """The joining of a primitive to those before it; cut, cavity, keep: at most one."""
 
     soft: float
@@ -59,7 +59,7 @@ class _Primitive:
 
 
 @dataclass
-class Builder:
+class PrimitiveBuilder:
     """Primitives, part by part; every method adds to the part that `part` began last."""
 
     material: list[int] = field(default_factory=list)  # of each part
@@ -75,7 +75,7 @@ class Builder:
         self.material.append(material)
 
     def ellipsoid(
-        self, at: ArrayLike, half: ArrayLike, turn: F64 | None = None, **how: Unpack[How]
+        self, at: ArrayLike, half: ArrayLike, turn: F64 | None = None, **how: Unpack[Joining]
     ) -> None:
         size = np.asarray(half, float)
         self._add(sdf.ELLIPSOID, at, turn, tuple(size), size, **how)
@@ -86,12 +86,14 @@ class Builder:
         half: ArrayLike,
         round_: float = 0.0,
         turn: F64 | None = None,
-        **how: Unpack[How],
+        **how: Unpack[Joining],
     ) -> None:
         size = np.asarray(half, float)
         self._add(sdf.BOX, at, turn, (*size, min(round_, 0.98 * size.min())), size, **how)
 
-    def limb(self, a: ArrayLike, b: ArrayLike, near: float, far: float, **how: Unpack[How]) -> None:
+    def limb(
+        self, a: ArrayLike, b: ArrayLike, near: float, far: float, **how: Unpack[Joining]
+    ) -> None:
         """A cone with round ends from a (3,) to b (3,)."""
         start, end = np.asarray(a, float), np.asarray(b, float)
         length = max(float(np.linalg.norm(end - start)), 1e-6)
@@ -105,21 +107,21 @@ class Builder:
 
     def cylinder(
         self, at: ArrayLike, radius: float, half: float, round_: float = 0.0,
-        turn: F64 | None = None, **how: Unpack[How],
+        turn: F64 | None = None, **how: Unpack[Joining],
     ) -> None:  # fmt: skip
         numbers = (radius, half, min(round_, 0.98 * min(radius, half)))
         self._add(sdf.CYLINDER, at, turn, numbers, np.array([radius, half, radius]), **how)
 
     def ring(
         self, at: ArrayLike, large: float, small: float, half_angle: float = np.pi,
-        turn: F64 | None = None, **how: Unpack[How],
+        turn: F64 | None = None, **how: Unpack[Joining],
     ) -> None:  # fmt: skip
         """A torus about y; its middle is on +z, of which `half_angle` is there each way."""
         half = np.array([large + small, small, large + small])
         self._add(sdf.TORUS, at, turn, (large, small, half_angle), half, **how)
 
     def lathe(
-        self, at: ArrayLike, outline: F64, turn: F64 | None = None, **how: Unpack[How]
+        self, at: ArrayLike, outline: F64, turn: F64 | None = None, **how: Unpack[Joining]
     ) -> None:
         """`outline` (k, 2): radius and y, a closed polygon; on the axis where it is solid."""
         low, high, wide = outline[:, 1].min(), outline[:, 1].max(), outline[:, 0].max()
@@ -128,7 +130,7 @@ class Builder:
 
     def prism(
         self, at: ArrayLike, outline: F64, half: float, round_: float = 0.0,
-        turn: F64 | None = None, **how: Unpack[How],
+        turn: F64 | None = None, **how: Unpack[Joining],
     ) -> None:  # fmt: skip
         """`outline` (k, 2): x and y, a closed polygon, pulled along z."""
         low, high = outline.min(0), outline.max(0)
@@ -138,7 +140,7 @@ class Builder:
 
     def superquadric(
         self, at: ArrayLike, half: ArrayLike, side: float, above: float,
-        turn: F64 | None = None, **how: Unpack[How],
+        turn: F64 | None = None, **how: Unpack[Joining],
     ) -> None:  # fmt: skip
         size = np.asarray(half, float)
         self._add(sdf.SUPERQUADRIC, at, turn, (*size, side, above), size, **how)
@@ -146,7 +148,7 @@ class Builder:
     def sheet(
         self, at: ArrayLike, half: ArrayLike, thick: float,
         waves: tuple[float, float, float, float], bend: float = 0.0, turn: F64 | None = None,
-        **how: Unpack[How],
+        **how: Unpack[Joining],
     ) -> None:  # fmt: skip
         """`half` (2,): x and y; `waves`: height, per x, per y, phase; `bend`: 1 / radius."""
         x, y = np.asarray(half, float)

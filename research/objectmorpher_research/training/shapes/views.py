@@ -30,7 +30,7 @@ LEAST = 0.05  # x the picture, that the object covers at least
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class TrainingView:
     """A photo by a camera of the usual field of view."""
 
     rgb: RGB  # (s, s, 3)
@@ -40,7 +40,7 @@ class View:
 
 def make_views(
     seed: int, yaws: tuple[float, ...], side: int, families: tuple[str, ...] | None = None
-) -> tuple[View, ...]:
+) -> tuple[TrainingView, ...]:
     """Photos of one object, the camera at these `yaws` (degrees) around it.
 
     Lamps and backdrop differ. The same for the same numbers. Raises ValueError where it is hardly
@@ -56,7 +56,7 @@ def make_views(
 
 def _try(
     rng: np.random.Generator, yaws: tuple[float, ...], side: int, families: tuple[str, ...]
-) -> tuple[View, ...]:
+) -> tuple[TrainingView, ...]:
     built = FAMILIES[families[rng.integers(len(families))]](rng)
     solid = built.finish()
     scene = _Scene(solid, _materials(rng, built), lowest(solid, COLUMNS))
@@ -72,7 +72,7 @@ def _try(
         own, backdrop = np.random.default_rng(look), _backdrop(rng, side)
         picture = _picture(own, scene, eye, rays, lamps, out, side, backdrop)
         mask = (out[:, 0] > 0).reshape(side, side)
-        views.append(View(_developed(rng, picture), mask, eye.axes))
+        views.append(TrainingView(_developed(rng, picture), mask, eye.axes))
     return tuple(views)
 
 

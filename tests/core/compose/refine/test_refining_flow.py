@@ -26,7 +26,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.models import device, ledger
 from objectmorpher_core.pipeline import run_script
-from objectmorpher_core.scripting.runner import Refining, coarse_edit
+from objectmorpher_core.scripting.runner import RefineOptions, coarse_edit
 from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
@@ -56,7 +56,7 @@ def moved(is_flat=True):
 
 def test_the_job_refines_the_edit_and_the_export_shows_it():
     bare, told = moved(), []
-    how = Refining("auto", seed=2, strength=0.5)
+    how = RefineOptions("auto", seed=2, strength=0.5)
     made = job_functions.refine(
         coarse_edit(bare), how, lambda share, note: told.append((share, note))
     )
@@ -71,9 +71,9 @@ def test_the_job_refines_the_edit_and_the_export_shows_it():
 
 def test_the_next_one_finds_the_pipeline_open():
     bare = moved()
-    first = job_functions.refine(coarse_edit(bare), Refining("klein"), silent)
+    first = job_functions.refine(coarse_edit(bare), RefineOptions("klein"), silent)
     opened = ledger.SHARED.opened("the refiner")
-    other = job_functions.refine(coarse_edit(bare), Refining("klein", seed=1), silent)
+    other = job_functions.refine(coarse_edit(bare), RefineOptions("klein", seed=1), silent)
     assert opened is not None and ledger.SHARED.opened("the refiner") is opened
     assert not np.array_equal(first.pixels, other.pixels)
 
@@ -84,12 +84,12 @@ def test_the_job_stops_within_a_step():
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        job_functions.refine(coarse_edit(moved()), Refining("klein"), stop)
+        job_functions.refine(coarse_edit(moved()), RefineOptions("klein"), stop)
 
 
 def test_a_picture_of_something_else_is_refused():
     with pytest.raises(RefineError, match="try another seed"):
-        job_functions.refine(coarse_edit(moved(is_flat=False)), Refining("klein"), silent)
+        job_functions.refine(coarse_edit(moved(is_flat=False)), RefineOptions("klein"), silent)
 
 
 def test_a_script_asks_for_a_refiner():

@@ -14,7 +14,7 @@ from PIL import Image
 from objectmorpher_core import lift
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.progress import Cancelled, silent
-from objectmorpher_core.lift import LiftError, LiftSettings, Subject
+from objectmorpher_core.lift import LiftError, LiftSettings, LiftSubject
 from objectmorpher_core.lift.workers import external
 from objectmorpher_core.lift.workers import process as worker_process
 from objectmorpher_core.lift.workers.file import read_worker, worker_names
@@ -46,7 +46,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def subject():
     pixels, camera, mask = photos.small_cup(3, 37, 30)
-    return Subject(pixels, camera, mask, build_matte(pixels, mask, 12))
+    return LiftSubject(pixels, camera, mask, build_matte(pixels, mask, 12))
 
 
 def install(folder: Path, script: str, name: str = "mine", **more) -> None:
@@ -161,7 +161,7 @@ def test_a_camera_of_another_focal_length_is_carried_to_the_photo(subject):
     pose = np.eye(4)
     pose[:3, :3] *= 0.4
     pose[2, 3] = 3.0
-    found = external.Seen(pose, other).pose_for(own, points, "mine")
+    found = external.WorkerView(pose, other).pose_for(own, points, "mine")
     world = [points @ m[:3, :3].T + m[:3, 3] for m in (pose, found)]
     seen = [c.project(w) for c, w in zip((other, own), world, strict=True)]
     assert np.abs(seen[0] - seen[1]).max() < 3  # px: another perspective cannot be the same

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import LiftSettings
-from objectmorpher_core.lift import Subject
+from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.workers import external
 from objectmorpher_core.lift.workers.file import read_worker
 from objectmorpher_core.segment.matting.matte import build_matte
@@ -28,10 +28,10 @@ NAMES = sorted(at.parent.name for at in WORKERS.glob("*/worker.toml"))
 @pytest.fixture(scope="module")
 def subject():
     pixels, camera, mask = photos.small_cup(4, 27, 22)
-    return Subject(pixels, camera, mask, build_matte(pixels, mask, 12))
+    return LiftSubject(pixels, camera, mask, build_matte(pixels, mask, 12))
 
 
-def ran(name: str, subject: Subject, folder: Path) -> Path:
+def ran(name: str, subject: LiftSubject, folder: Path) -> Path:
     """The job's folder after the wrapper has run in a process of its own."""
     external.write_job(folder, subject, 2000, 3)
     env = os.environ | {

@@ -13,12 +13,12 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.crop import SIDE, Crop, rays
-from objectmorpher_core.lift.relief.body import Body
+from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.shape_look import SeenShape
-from objectmorpher_core.lift.relief.silhouette import Silhouette
+from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.shapes import completed, flattened, recognised, rounded
-from objectmorpher_core.lift.shapes.drawing import Grid, Mesh, drawn, face_normals
+from objectmorpher_core.lift.shapes.drawing import Mesh, RayGrid, drawn, face_normals
 from objectmorpher_core.lift.shapes.solids import box, ellipsoid, revolved, sheet, tube
 from objectmorpher_research.training.shape_eval import Surfaces, camera_of, score, surfaces_of
 
@@ -69,7 +69,7 @@ def seen_of(name: str) -> tuple[SeenShape, Surfaces]:
     """What a network that is right would see of a mesh, and its surfaces in px of the crop."""
     mesh, crop = MADE[name](), Crop(0, 0, SIDE, TANGENTS)
     first = TANGENTS[:2] + (0.5 / SIDE - 0.5) * WIDTH
-    found = drawn(mesh, Grid((float(first[0]), float(first[1])), WIDTH / SIDE, (SIDE, SIDE)))
+    found = drawn(mesh, RayGrid((float(first[0]), float(first[1])), WIDTH / SIDE, (SIDE, SIDE)))
     mask, ways = found.near > 0, rays(TANGENTS)
     near, far = (1 / np.where(mask, side, 1.0) / ways[..., 2] for side in (found.near, found.far))
     unit = crop.away / near[mask].mean()  # crop units to a unit of the mesh
@@ -84,9 +84,9 @@ def seen_of(name: str) -> tuple[SeenShape, Surfaces]:
     return SeenShape(crop, mask, front, *own), true
 
 
-def body_of(seen: SeenShape) -> tuple[Body, Camera]:
+def body_of(seen: SeenShape) -> tuple[ReliefBody, Camera]:
     camera = camera_of(TANGENTS, SIDE)
-    return Body.of(Silhouette.of(seen.mask), camera, LiftSettings()), camera
+    return ReliefBody.of(ReliefSilhouette.of(seen.mask), camera, LiftSettings()), camera
 
 
 def _as_far(found: Surfaces, true: Surfaces, mask: Mask, camera: Camera) -> Surfaces:

@@ -32,6 +32,6 @@ def subject():
 @pytest.fixture(scope="module")
 def picture(subject):
     """The same as the generators see it."""
-    from objectmorpher_core.lift.trellis.picture import Picture
+    from objectmorpher_core.lift.trellis.picture import ConditionPicture
 
-    return Picture.of(build_matte(subject[0], subject[2], 12))
+    return ConditionPicture.of(build_matte(subject[0], subject[2], 12))

@@ -21,7 +21,7 @@ from objectmorpher_core.lift.trellis.cupid_lifter import pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.latent import looked_up
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
-from objectmorpher_core.lift.trellis.picture import Picture
+from objectmorpher_core.lift.trellis.picture import ConditionPicture
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
@@ -119,7 +119,7 @@ def test_it_cancels(generator, picture):
 def test_where_cells_are_seen_is_where_the_object_stands():
     """From the network's axes and its picture's square to ours and the photo's pixels."""
     _, scene = registered.known_bracket()
-    picture = Picture.of(build_matte(scene.pixels, scene.mask, 12))
+    picture = ConditionPicture.of(build_matte(scene.pixels, scene.mask, 12))
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (400, 3))  # z up
     ours = points @ QUARTER_TURN.T
     turn, shift = scene.world_from_object[:3, :3], scene.world_from_object[:3, 3]

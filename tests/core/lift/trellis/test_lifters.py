@@ -45,7 +45,7 @@ def lifter(request, tmp_path_factory):
 @pytest.fixture(scope="module")
 def whole(subject):
     pixels, camera, mask = subject
-    return lift.Subject(pixels, camera, mask, build_matte(pixels, mask, 12))
+    return lift.LiftSubject(pixels, camera, mask, build_matte(pixels, mask, 12))
 
 
 @pytest.fixture(scope="module")

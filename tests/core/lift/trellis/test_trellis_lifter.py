@@ -187,7 +187,7 @@ def test_a_mask_becomes_a_registered_object_with_the_photo_on_it(installed, subj
 def test_nothing_selected_is_one_sentence(installed, subject):
     pixels, camera, mask = subject
     matte = build_matte(pixels, mask, 12)
-    empty = lift.Subject(pixels, camera, mask, replace(matte, alpha=np.zeros_like(matte.alpha)))
+    empty = lift.LiftSubject(pixels, camera, mask, replace(matte, alpha=np.zeros_like(matte.alpha)))
     with pytest.raises(LiftError, match="nothing is selected"):
         TrellisLifter().lift(empty, lift.LiftSettings(), silent)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import correlate2d
 
 from objectmorpher_core.models.onnx_session import open_session
-from objectmorpher_research.evaluation.measures.onnx_build import Graph
+from objectmorpher_research.evaluation.measures.onnx_build import OnnxGraph
 
 
 def run(model: bytes, x: np.ndarray) -> list[np.ndarray]:
@@ -20,7 +20,7 @@ def test_a_convolution_a_rectifier_and_a_pooling_at_any_size(size):
     random = np.random.default_rng(0)
     kernel, bias = random.normal(size=(4, 2, 3, 3)), random.normal(size=4)
     x = random.normal(size=(1, 2, *size)).astype(np.float32)
-    graph = Graph()
+    graph = OnnxGraph()
     weights = graph.constant("w", kernel.astype(np.float32))
     inputs = ["x", weights, graph.constant("b", bias.astype(np.float32))]
     conv = graph.add("Conv", "conv", inputs, {"pads": (1, 1, 1, 1)})

@@ -13,17 +13,17 @@ from objectmorpher_research.evaluation.measures import dino
 from objectmorpher_research.evaluation.truth import flat_methods
 from objectmorpher_research.evaluation.truth.cases import (
     PLAN,
-    Guidance,
-    Wanted,
+    PlannedCase,
+    TruthGuidance,
     make_case,
     wanted_cases,
 )
 from objectmorpher_research.evaluation.truth.chain import Chain, Way
 from objectmorpher_research.evaluation.truth.methods import METHODS
-from objectmorpher_research.evaluation.truth.motions import Body, Motion, Rigid, moved
+from objectmorpher_research.evaluation.truth.motions import PlacedSolid, Rigid, TruthEdit, moved
 from objectmorpher_research.evaluation.truth.rasterise import rasterise
-from objectmorpher_research.evaluation.truth.running import Job, Row, run, run_photo
-from objectmorpher_research.evaluation.truth.scores import PSNR_CAP, Score, score
+from objectmorpher_research.evaluation.truth.running import CaseJob, CaseRow, run, run_photo
+from objectmorpher_research.evaluation.truth.scores import PSNR_CAP, TruthScore, score
 from objectmorpher_research.evaluation.truth.solids import MAKERS, make
 from objectmorpher_research.evaluation.truth.tables import as_csv, build_table
 
@@ -43,7 +43,7 @@ def crate():
 @pytest.fixture(scope="module")
 def still(crate):
     """The same, not moved at all."""
-    wanted = replace(crate[0], motion=Motion("scale", 1.0))
+    wanted = replace(crate[0], motion=TruthEdit("scale", 1.0))
     case = make_case(wanted)
     return case, Chain(case.photo, case.mask, case.camera)
 
@@ -122,18 +122,18 @@ def test_guidance_is_the_true_motion_of_the_surface():
     assert np.ptp(case.guidance.away) < 0.1  # the centre's distance changes; parts hardly differ
 
 
-def _block() -> Body:
+def _block() -> PlacedSolid:
     points = np.random.default_rng(0).uniform(-1, 1, (500, 3)) * [0.2, 0.6, 0.3] + [0, 0, 5]
-    return Body(points, (points[:, 1] > 0.3).astype(np.int32), None)
+    return PlacedSolid(points, (points[:, 1] > 0.3).astype(np.int32), None)
 
 
 def test_a_bend_keeps_the_middle_line_and_a_twist_keeps_slices():
     body = _block()
     line = replace(body, points=np.array([[0, y, 5.0] for y in np.linspace(-0.6, 0.6, 50)]))
     for category in ("bend in", "bend out"):
-        steps = np.diff(moved(Motion(category, 40), line), axis=0)
+        steps = np.diff(moved(TruthEdit(category, 40), line), axis=0)
         assert np.linalg.norm(steps, axis=1) == pytest.approx(1.2 / 49, rel=1e-3)
-    twisted = moved(Motion("twist", 50), body)
+    twisted = moved(TruthEdit("twist", 50), body)
     assert twisted[:, 1] == pytest.approx(body.points[:, 1])
     for points in (body.points, twisted):  # the distance from the axis stays
         radius = np.linalg.norm((points - body.centre)[:, [0, 2]], axis=1)
@@ -145,7 +145,7 @@ def test_a_bend_keeps_the_middle_line_and_a_twist_keeps_slices():
 def test_a_raised_limb_leaves_the_rest_where_it_is():
     body = _block()
     limb = ((1,), np.array([0, 0.3, 5.0]), np.array([0, 0.6, 5.0]))
-    raised = moved(Motion("limb", 40, "arm"), replace(body, limb=limb))
+    raised = moved(TruthEdit("limb", 40, "arm"), replace(body, limb=limb))
     own = body.parts == 1
     assert np.array_equal(raised[~own], body.points[~own])
     assert np.linalg.norm(raised[own] - limb[1], axis=1) == pytest.approx(
@@ -161,9 +161,9 @@ def test_a_square_covers_what_it_covers():
     assert np.abs(hits.coverage - expected).max() < EXACT
 
 
-def _points(to: np.ndarray, rigid: Rigid | None = None) -> Guidance:
+def _points(to: np.ndarray, rigid: Rigid | None = None) -> TruthGuidance:
     at = np.array([[200.0, 150], [260, 160], [230, 240], [210, 200]])
-    return Guidance(at, to if to is not None else at, np.zeros(4), rigid)
+    return TruthGuidance(at, to if to is not None else at, np.zeros(4), rigid)
 
 
 def test_the_best_similarity_is_found_again():
@@ -185,7 +185,7 @@ def test_a_warp_along_a_turn_is_that_turn(still):
     angle = np.radians(12)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     to = (at - middle) @ turn.T + middle
-    told = replace(case, guidance=Guidance(at, to, np.zeros(3)))
+    told = replace(case, guidance=TruthGuidance(at, to, np.zeros(3)))
     warped = flat_methods.warp(told, matte, case.photo)
     pasted = flat_methods.paste(told, matte, case.photo)
     assert np.abs(warped.reached - to).max() < PIXEL
@@ -204,8 +204,8 @@ def test_more_iterations_come_nearer_to_the_settled_pose():
     assert gaps[1] > gaps[16] > gaps[400]
 
 
-def _job(folder, crate, *names: str) -> Job:
-    return Job(folder, (crate[0],), tuple(METHODS[name] for name in names), 0)
+def _job(folder, crate, *names: str) -> CaseJob:
+    return CaseJob(folder, (crate[0],), tuple(METHODS[name] for name in names), 0)
 
 
 def test_a_run_goes_on_where_it_was(tmp_path, crate):
@@ -231,8 +231,8 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
 
 
 def test_a_methods_rigid_cases_count_as_ours():
-    def row(case: str, category: str, method: str, psnr: float) -> Row:
-        return Row(case, category, method, Score(psnr, 1, 0, 1, 0, 60, 0), 1, 1, 1, 100)
+    def row(case: str, category: str, method: str, psnr: float) -> CaseRow:
+        return CaseRow(case, category, method, TruthScore(psnr, 1, 0, 1, 0, 60, 0), 1, 1, 1, 100)
 
     rows = [
         row("a", "turn", "ours", 20), row("a", "turn", "nothing", 15),
@@ -247,5 +247,5 @@ def test_a_methods_rigid_cases_count_as_ours():
 
 
 def test_wanted_names_tell_category_and_solid():
-    wanted = Wanted(7, CASES[0].setting, Motion("bend out", 30))
+    wanted = PlannedCase(7, CASES[0].setting, TruthEdit("bend out", 30))
     assert wanted.name == f"07-bend-out-{CASES[0].setting.solid}"

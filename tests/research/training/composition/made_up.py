@@ -9,10 +9,10 @@ import numpy as np
 
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_research.training.composition import shards
-from objectmorpher_research.training.composition.pictures import Picture
-from objectmorpher_research.training.composition.sources import Pair
-from objectmorpher_research.training.composition.train_lora import Places
-from objectmorpher_research.training.composition.triplet import How, Rejected, Triplet
+from objectmorpher_research.training.composition.pictures import PictureSource
+from objectmorpher_research.training.composition.sources import SourcePair
+from objectmorpher_research.training.composition.train_lora import TrainingFolders
+from objectmorpher_research.training.composition.triplet import Rejected, Triplet, TripletPlan
 
 SIDE = 64  # px
 REJECTED = 3  # every so manyth pair
@@ -39,12 +39,12 @@ def triplet(seed: int, side: int = SIDE) -> Triplet:
     return Triplet(*(p.astype(np.uint8) for p in (b, coarse, a)), alpha, {"seed": seed})
 
 
-def pairs(count: int) -> tuple[Pair, ...]:
-    nothing = Picture("nowhere.png")
-    return tuple(Pair(f"made-{k:03d}", nothing, nothing, str(k)) for k in range(count))
+def pairs(count: int) -> tuple[SourcePair, ...]:
+    nothing = PictureSource("nowhere.png")
+    return tuple(SourcePair(f"made-{k:03d}", nothing, nothing, str(k)) for k in range(count))
 
 
-def make(pair: Pair, how: How, progress: Progress) -> Triplet:
+def make(pair: SourcePair, how: TripletPlan, progress: Progress) -> Triplet:
     """Instead of lifting."""
     seed = int(pair.item)
     if seed % REJECTED == REJECTED - 1:
@@ -54,7 +54,7 @@ def make(pair: Pair, how: How, progress: Progress) -> Triplet:
 
 def write_triplets(out: Path, count: int = 9, size: int = 4) -> Path:
     """A folder of shards."""
-    parts, how = shards.shards_of(pairs(count), size), How()
+    parts, how = shards.shards_of(pairs(count), size), TripletPlan()
     shards.begin(out, parts, how)
     for part in parts:
         shards.write_shard(out, part, how, make=make)
@@ -62,8 +62,8 @@ def write_triplets(out: Path, count: int = 9, size: int = 4) -> Path:
     return out
 
 
-def places(at: Path, weights: Path, name: str = "out") -> Places:
+def places(at: Path, weights: Path, name: str = "out") -> TrainingFolders:
     """Folders of a training of the triplets in `at`."""
     out = at / name
     out.mkdir(exist_ok=True)
-    return Places(at / "triplets", out, weights, at / "latents")
+    return TrainingFolders(at / "triplets", out, weights, at / "latents")

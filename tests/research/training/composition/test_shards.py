@@ -24,11 +24,11 @@ from objectmorpher_research.training.composition.shards import (
     shards_of,
     write_shard,
 )
-from objectmorpher_research.training.composition.triplet import How
+from objectmorpher_research.training.composition.triplet import TripletPlan
 from objectmorpher_research.training.composition.triplet_folder import triplets_in
 
 PARTS = shards_of(made_up.pairs(7), 3)
-HOW = How()
+HOW = TripletPlan()
 
 
 def begun(out):

@@ -12,17 +12,17 @@ from skimage import data
 
 from objectmorpher_core.pictures.video import VideoError, encode_video, frame_rate, read_frames
 from objectmorpher_research.training.composition import TrainingError
-from objectmorpher_research.training.composition.pictures import Picture, halved
+from objectmorpher_research.training.composition.pictures import PictureSource, halved
 from objectmorpher_research.training.composition.sources import (
-    Looking,
-    Pair,
+    SourcePair,
+    SourceReading,
     find_pairs,
     fingerprint,
     pair_from,
 )
 from tests import shapes
 
-ONE_WAY = Looking(both_ways=False)
+ONE_WAY = SourceReading(both_ways=False)
 SIDE = 64
 EDGE = 1  # px, 8 / 528 of the height
 GOOD = {"compositeStructure": 5, "objectConsistency": 5, "imageQuality": 5}
@@ -73,7 +73,7 @@ def test_a_folder_of_subjects(tmp_path, layout):
         row["file_name"] = f"{k}.png"
     if layout == "jsonl":
         (tmp_path / "metadata.jsonl").write_text("\n".join(map(json.dumps, rows)))
-    found = find_pairs(tmp_path, Looking(both_ways=False, padding=EDGE / (SIDE + 2 * EDGE)))
+    found = find_pairs(tmp_path, SourceReading(both_ways=False, padding=EDGE / (SIDE + 2 * EDGE)))
     assert [pair.item for pair in found] == ["mug", "shoe", "hat"]
     assert found[0].problem == "" and "objectConsistency below 5" in found[1].problem
     assert "description wrong" in found[2].problem
@@ -94,7 +94,7 @@ def test_a_table_of_subjects(tmp_path):
         }
     )
     parquet.write_table(table, tmp_path / "train-0.parquet", row_group_size=2)
-    how = Looking(both_ways=True, padding=EDGE / (SIDE + 2 * EDGE))
+    how = SourceReading(both_ways=True, padding=EDGE / (SIDE + 2 * EDGE))
     found = find_pairs(tmp_path, how)
     assert len(found) == 10 and found[0].item == "thing 0"
     for k in (0, 3, 4):  # of each group
@@ -131,10 +131,10 @@ def test_frames_of_a_video(tmp_path):
     video.write_bytes(encode_video(iter(frames), 10, ".mp4"))
     rate, count = frame_rate(video)
     assert (rate, count) == (10, 21)
-    found = find_pairs(video, Looking(both_ways=False, seconds=0.5))
+    found = find_pairs(video, SourceReading(both_ways=False, seconds=0.5))
     assert [(p.b.index, p.a.index) for p in found] == [(0, 5), (5, 10), (10, 15), (15, 20)]
     for k in (0, 5, 20):
-        read = Picture(str(video), "frame", k).read()
+        read = PictureSource(str(video), "frame", k).read()
         errors = [np.abs(read.astype(int) - frame).mean() for frame in frames]
         assert int(np.argmin(errors)) == k
     assert len(read_frames(video, (3, 4))) == 2
@@ -161,7 +161,7 @@ def test_what_holds_no_pairs_is_one_sentence(tmp_path):
     with pytest.raises(TrainingError, match="cannot be read"):
         find_pairs(tmp_path)
     with pytest.raises(TrainingError, match="no layout 'rows'"):
-        Looking("rows")
-    pair = Pair("x", Picture(str(tmp_path / "gone.png")), Picture(""))
+        SourceReading("rows")
+    pair = SourcePair("x", PictureSource(str(tmp_path / "gone.png")), PictureSource(""))
     with pytest.raises(TrainingError, match=r"gone.png cannot be read"):
         pair.b.read()

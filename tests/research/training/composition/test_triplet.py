@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.lift import LiftError, Subject
+from objectmorpher_core.lift import LiftError, LiftSubject
 from objectmorpher_core.lift.workers.file import FOLDER
 from objectmorpher_research.training.composition import TrainingError, pose_sources
 from objectmorpher_research.training.composition.made_pairs import turn_of, write_made_pairs
 from objectmorpher_research.training.composition.pose_sources import Two, carried, matched
-from objectmorpher_research.training.composition.sources import Looking, find_pairs
+from objectmorpher_research.training.composition.sources import SourceReading, find_pairs
 from objectmorpher_research.training.composition.triplet import (
-    How,
-    Limits,
     Rejected,
+    TripletLimits,
+    TripletPlan,
     how_from,
     make_triplet,
 )
 from tests import shapes
 
-HOW = How(lifter="relief", inpainter="telea", gaussians=3000)
+HOW = TripletPlan(lifter="relief", inpainter="telea", gaussians=3000)
 WORKER = """
 import json, sys
 folder = sys.argv[1]
@@ -44,7 +44,7 @@ def two_pictures(at, name="ellipse", move=0):
     for letter, pixels, mask in (("b", b, inside), ("a", a, there)):
         (at / f"thing-{letter}.png").write_bytes(shapes.png(pixels))
         (at / f"thing-{letter}.mask.png").write_bytes(shapes.mask_png(mask))
-    return find_pairs(at, Looking(both_ways=False))[0]
+    return find_pairs(at, SourceReading(both_ways=False))[0]
 
 
 def worker(tmp_path, monkeypatch, told) -> str:
@@ -109,10 +109,10 @@ def test_what_is_no_good_is_rejected_with_a_reason(tmp_path, monkeypatch):
     with pytest.raises(Rejected, match="its makers"):
         make_triplet(replace(pair, problem="its makers do not like it"), how)
     for limits, words in (
-        (Limits(least_area=0.5), "covers .* of picture B"),
-        (Limits(least_iou=1.01), "the outlines agree by"),
-        (Limits(least_seen=1.01), "B shows only"),
-        (Limits(most_colour_error=-1.0), "colours are off"),
+        (TripletLimits(least_area=0.5), "covers .* of picture B"),
+        (TripletLimits(least_iou=1.01), "the outlines agree by"),
+        (TripletLimits(least_seen=1.01), "B shows only"),
+        (TripletLimits(most_colour_error=-1.0), "colours are off"),
     ):
         with pytest.raises(Rejected, match=words) as raised:
             make_triplet(pair, replace(how, limits=limits))
@@ -133,7 +133,7 @@ def test_another_thing_is_rejected(tmp_path, monkeypatch):
 def test_the_start_of_the_search_keeps_the_object_as_it_is_seen():
     scene = shapes.scene("ellipse")
     there = np.roll(scene.mask, 20, axis=1)
-    b, a = (Subject(scene.pixels, scene.camera, m, scene.matte) for m in (scene.mask, there))
+    b, a = (LiftSubject(scene.pixels, scene.camera, m, scene.matte) for m in (scene.mask, there))
     motion = carried(Two(b, a, scene.lifted))
     linear = motion[:3, :3]
     assert np.allclose(linear @ linear.T, np.eye(3)) and np.linalg.det(linear) > 0
@@ -148,8 +148,8 @@ def test_details_that_both_pictures_show_are_points_of_the_object():
     spots = cv2.GaussianBlur(rng.random((*scene.mask.shape, 3)), (0, 0), 1.5)
     spotted = np.rint(255 * (0.5 + 3 * (spots - 0.5)).clip(0, 1)).astype(np.uint8)
     darker = np.rint(0.6 * np.roll(spotted, 20, axis=1)).astype(np.uint8)
-    b = Subject(spotted, scene.camera, scene.mask, scene.matte)
-    a = Subject(darker, scene.camera, np.roll(scene.mask, 20, axis=1), scene.matte)
+    b = LiftSubject(spotted, scene.camera, scene.mask, scene.matte)
+    a = LiftSubject(darker, scene.camera, np.roll(scene.mask, 20, axis=1), scene.matte)
     two = Two(b, a, scene.lifted)
     depth = np.full(scene.mask.shape, np.float32(scene.lifted.centre[2]))
     depth[: len(depth) // 2] = np.inf  # where nothing was lifted

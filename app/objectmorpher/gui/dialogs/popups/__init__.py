@@ -13,7 +13,7 @@ from ....editor.view import Popup
 from ...widgets.fade import fades
 from .about import draw_about
 from .help import draw_help
-from .palette import Palette
+from .palette import CommandPalette
 from .preferences import ComputeFields, draw_preferences
 from .shortcuts import ShortcutsPopup
 
@@ -26,7 +26,7 @@ class Popups:
     def __init__(self, shortcuts: Shortcuts) -> None:
         self._shortcuts = shortcuts
         self._drawn: dict[Popup, Callable[[Editor], None]] = {
-            Popup.PALETTE: Palette().draw,
+            Popup.PALETTE: CommandPalette().draw,
             Popup.HELP: draw_help,
             Popup.SHORTCUTS: ShortcutsPopup(shortcuts).draw,
             Popup.PREFERENCES: partial(draw_preferences, compute=ComputeFields()),

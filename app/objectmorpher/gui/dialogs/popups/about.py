@@ -10,7 +10,7 @@ from ....system.logs import log_path
 from ....system.report import report
 from ....system.resources import resource
 from ....system.texts import t
-from ...widgets.widgets import Kind, button, gap, note, shown_path
+from ...widgets.widgets import Emphasis, button, gap, note, shown_path
 from .frame import popup
 
 SIZE = (520.0, 420.0)  # points
@@ -25,7 +25,7 @@ def draw_about(editor: Editor) -> None:
         note(t("After “ObjectMorpher” (CVPR 2026). Everything runs on this computer."))
         gap(12)
         note(t("The log is {path}", path=shown_path(log_path())))
-        if button(t("Copy report"), Kind.PLAIN, width=200):
+        if button(t("Copy report"), Emphasis.PLAIN, width=200):
             imgui.set_clipboard_text(report(log_path().parent))
             editor.say(t("The report is in the clipboard, without names of folders and photos"))
         gap(12)

@@ -39,7 +39,7 @@ class Entry:
     command: str = ""  # of COMMANDS, where it is one
 
 
-class Palette:
+class CommandPalette:
     """Remembers what is typed, and which line is chosen."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from ....editor.settings import AUTO, HERE, SERVER
 from ....system.motion import FULL, REDUCED
 from ....system.texts import languages, t
 from ...widgets.method_choice import draw_method
-from ...widgets.segmented import Choice, segmented
+from ...widgets.segmented import Segment, segmented
 from ...widgets.widgets import FILL, button, gap, heading, note
 from .frame import label, popup
 
@@ -43,29 +43,29 @@ def draw_preferences(editor: Editor, compute: ComputeFields) -> None:
 def _draw_look(editor: Editor) -> None:
     settings = editor.settings
     label(t("Theme"))
-    themes = (Choice("dark", t("Dark")), Choice("light", t("Light")))
+    themes = (Segment("dark", t("Dark")), Segment("light", t("Light")))
     _prefer(editor, "theme", segmented("theme", themes, settings.theme))
     label(t("Text size"))
     hint = t("All of the window grows with it")
     sizes = [f"{100 * scale:.0f} %" if scale else t("Auto") for scale in SCALES]
-    scales = tuple(Choice(n, name, hint) for n, name in zip(SCALES, sizes, strict=True))
+    scales = tuple(Segment(n, name, hint) for n, name in zip(SCALES, sizes, strict=True))
     _prefer(editor, "scale", segmented("scale", scales, settings.scale))
     if len(languages()) > 1:
         label(t("Language"))
-        names = tuple(Choice(code, name) for code, name in languages().items())
+        names = tuple(Segment(code, name) for code, name in languages().items())
         _prefer(editor, "language", segmented("language", names, settings.language))
     label(t("Motion"))
     motions = (
-        Choice(AUTO, t("The system's")),
-        Choice(FULL, t("Full")),
-        Choice(REDUCED, t("Reduced"), t("Nothing fades or blinks")),
+        Segment(AUTO, t("The system's")),
+        Segment(FULL, t("Full")),
+        Segment(REDUCED, t("Reduced"), t("Nothing fades or blinks")),
     )
     _prefer(editor, "motion", segmented("motion", motions, settings.motion))
 
 
 def _draw_files(editor: Editor) -> None:
     label(t("File dialogs"))
-    kinds = (Choice(AUTO, t("The system's")), Choice("built-in", t("Built in")))
+    kinds = (Segment(AUTO, t("The system's")), Segment("built-in", t("Built in")))
     _prefer(editor, "dialogs", segmented("dialogs", kinds, editor.settings.dialogs))
 
 
@@ -101,7 +101,7 @@ class ComputeFields:
         if computing.is_given:
             imgui.text_unformatted(t("On {name}, as the environment says", name=computing.address))
         else:
-            places = (Choice(HERE, t("This computer")), Choice(SERVER, t("Server")))
+            places = (Segment(HERE, t("This computer")), Segment(SERVER, t("Server")))
             chosen = segmented("compute", places, editor.settings.compute)
             if chosen != editor.settings.compute:
                 computing.choose(chosen)

@@ -12,7 +12,7 @@ from ....editor.editor import Editor
 from ....editor.shortcuts import Shortcuts
 from ....system.texts import t
 from ...widgets.theme import SMALL_SIZE, Icon, theme
-from ...widgets.widgets import Kind, bold_text, button, small_text, tooltip
+from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip
 from .frame import popup
 
 SIZE = (880.0, 720.0)  # points
@@ -99,14 +99,14 @@ class ShortcutsPopup:
         imgui.push_id(name)
         imgui.push_font(None, SMALL_SIZE)
         text = t("Press keys…") if is_awaited else keys or "–"
-        kind = Kind.PRIMARY_SMALL if is_awaited else Kind.PLAIN if keys else Kind.QUIET
+        kind = Emphasis.PRIMARY_SMALL if is_awaited else Emphasis.PLAIN if keys else Emphasis.QUIET
         if button(text, kind, width=KEYS - RESET - 4):
             shortcuts.recording = None if is_awaited else name
         imgui.pop_font()
         tooltip(t("Click, then press other keys. Esc leaves them as they are."))
         if name in shortcuts.changed:
             imgui.same_line(0, theme.pt(4))
-            if button(Icon.RESET, Kind.QUIET, width=RESET):
+            if button(Icon.RESET, Emphasis.QUIET, width=RESET):
                 shortcuts.reset(name)
             tooltip(t("Back to {keys}", keys=COMMANDS[name].keys or "–"))
         imgui.pop_id()

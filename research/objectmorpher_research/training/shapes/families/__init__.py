@@ -1,4 +1,4 @@
-"""The kinds of objects; each is a function of a random generator that returns a `Builder`."""
+"""The kinds of objects: functions of a random generator that return a `PrimitiveBuilder`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..solid import Builder
+from ..solid import PrimitiveBuilder
 from .boxes import boxes
 from .busts import busts
 from .creatures import creatures
@@ -20,7 +20,7 @@ from .sheets import sheets
 from .vehicles import vehicles
 from .vessels import lathe
 
-Family = Callable[[np.random.Generator], Builder]
+Family = Callable[[np.random.Generator], PrimitiveBuilder]
 
 # Names and what makes such an object
 FAMILIES: dict[str, Family] = {

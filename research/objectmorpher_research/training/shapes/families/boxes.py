@@ -8,14 +8,14 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .buildings import buildings, house, tower
 from .making import Rng, chance, ngon, pick, rounded, span, vec
 
 BODY, FRONT, KNOB, MORE, GLASS = range(5)
 
 
-def boxes(rng: Rng) -> Builder:
+def boxes(rng: Rng) -> PrimitiveBuilder:
     """Make a box with its details."""
     kinds = (
         _carton,
@@ -36,7 +36,7 @@ def boxes(rng: Rng) -> Builder:
         _washer,
         _stack,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
@@ -46,7 +46,7 @@ def _size(rng: Rng, x: float, y: float, z: float) -> F64:
     return vec(x, y, z) * np.exp(rng.normal(0, 0.2, 3))
 
 
-def _dials(rng: Rng, built: Builder, half: F64, count: int, size: float) -> None:
+def _dials(rng: Rng, built: PrimitiveBuilder, half: F64, count: int, size: float) -> None:
     """Knobs on the front (+z) of a box that stands on the ground."""
     for _ in range(count):
         built.part(pick(rng, (KNOB, KNOB, MORE)))
@@ -58,7 +58,7 @@ def _dials(rng: Rng, built: Builder, half: F64, count: int, size: float) -> None
             built.box(at, [1.4 * own, 0.6 * own, 0.4 * own], 0.1 * own)
 
 
-def _carton(rng: Rng, built: Builder) -> None:
+def _carton(rng: Rng, built: PrimitiveBuilder) -> None:
     """A box, shut or open with its flaps out."""
     half = _size(rng, 0.7, 0.5, 0.5)
     built.part(BODY)
@@ -85,7 +85,7 @@ def _carton(rng: Rng, built: Builder) -> None:
         built.box([0, half[1], 0], half * [1, 1, 0.12] + [0.008, 0.008, 0])
 
 
-def _books(rng: Rng, built: Builder) -> None:
+def _books(rng: Rng, built: PrimitiveBuilder) -> None:
     """A pile of books, or one that stands."""
     y, is_standing = 0.0, chance(rng, 0.25)
     for k in range(1 if is_standing else rng.integers(1, 6)):
@@ -103,7 +103,7 @@ def _books(rng: Rng, built: Builder) -> None:
         y += 2 * half[1]
 
 
-def _radio(rng: Rng, built: Builder) -> None:
+def _radio(rng: Rng, built: PrimitiveBuilder) -> None:
     """With loudspeakers, a dial, knobs, an aerial, a bow."""
     half = _size(rng, 0.8, 0.45, 0.25)
     built.part(BODY)
@@ -130,7 +130,7 @@ def _radio(rng: Rng, built: Builder) -> None:
         built.ring([0, 2 * half[1], 0], 0.5 * half[0], 0.035, 1.57, turned(0, -np.pi / 2))
 
 
-def _television(rng: Rng, built: Builder) -> None:
+def _television(rng: Rng, built: PrimitiveBuilder) -> None:
     """Flat, or deep like the old ones; with feet or a stand."""
     is_flat = chance(rng, 0.5)
     half = _size(rng, 1.0, 0.6, 0.05 if is_flat else 0.45)
@@ -168,7 +168,7 @@ def _television(rng: Rng, built: Builder) -> None:
             )
 
 
-def _camera(rng: Rng, built: Builder) -> None:
+def _camera(rng: Rng, built: PrimitiveBuilder) -> None:
     """With a lens, a hump, a grip, buttons."""
     half = _size(rng, 0.6, 0.38, 0.22)
     built.part(BODY)
@@ -194,7 +194,7 @@ def _camera(rng: Rng, built: Builder) -> None:
         )
 
 
-def _suitcase(rng: Rng, built: Builder) -> None:
+def _suitcase(rng: Rng, built: PrimitiveBuilder) -> None:
     """With straps, a bow and locks."""
     half = _size(rng, 0.75, 0.5, 0.2)
     built.part(BODY)
@@ -213,7 +213,7 @@ def _suitcase(rng: Rng, built: Builder) -> None:
                 built.ellipsoid([x * half[0], -0.03, z * half[2]], [0.07, 0.07, 0.05])
 
 
-def _toaster(rng: Rng, built: Builder) -> None:
+def _toaster(rng: Rng, built: PrimitiveBuilder) -> None:
     """Rounded, with one or two slots."""
     half = _size(rng, 0.6, 0.4, 0.3)
     built.part(BODY)
@@ -240,7 +240,7 @@ def _toaster(rng: Rng, built: Builder) -> None:
     )
 
 
-def _phone(rng: Rng, built: Builder) -> None:
+def _phone(rng: Rng, built: PrimitiveBuilder) -> None:
     """A telephone to carry, a tablet or a laptop."""
     half = _size(rng, 0.45, 0.04, 0.85)
     turn = turned(span(rng, 0, 6)) @ turned(0, span(rng, 0, 1.4), rng.normal(0, 0.3))
@@ -262,7 +262,7 @@ def _phone(rng: Rng, built: Builder) -> None:
             )
 
 
-def _brick(rng: Rng, built: Builder) -> None:
+def _brick(rng: Rng, built: PrimitiveBuilder) -> None:
     """A brick with holes, or a toy's with studs."""
     half = _size(rng, 0.7, 0.28, 0.35)
     built.part(BODY)
@@ -280,7 +280,7 @@ def _brick(rng: Rng, built: Builder) -> None:
             built.cylinder(at, size, 0.1 if is_toy else 4.0, 0.01, cut=not is_toy)
 
 
-def _parcel(rng: Rng, built: Builder) -> None:
+def _parcel(rng: Rng, built: PrimitiveBuilder) -> None:
     """Wrapped, with a ribbon and a bow."""
     half = _size(rng, 0.55, 0.4, 0.55)
     built.part(BODY)
@@ -300,7 +300,7 @@ def _parcel(rng: Rng, built: Builder) -> None:
     built.ellipsoid([0, 2 * half[1] + 0.07, 0], [0.09, 0.08, 0.09])
 
 
-def _dice(rng: Rng, built: Builder) -> None:
+def _dice(rng: Rng, built: PrimitiveBuilder) -> None:
     """With spots cut in."""
     turn = turned(span(rng, 0, 6), *(rng.normal(0, 0.5, 2) * (rng.random() < 0.5)))
     built.part(BODY)
@@ -319,7 +319,7 @@ def _dice(rng: Rng, built: Builder) -> None:
             )
 
 
-def _washer(rng: Rng, built: Builder) -> None:
+def _washer(rng: Rng, built: PrimitiveBuilder) -> None:
     """A washing machine, an oven, a refrigerator, a cupboard."""
     half = _size(rng, 0.5, 0.65, 0.48)
     built.part(BODY)
@@ -349,7 +349,7 @@ def _washer(rng: Rng, built: Builder) -> None:
     _dials(rng, built, half * [1, 1, 1], int(rng.integers(0, 4)), 0.05)
 
 
-def _stack(rng: Rng, built: Builder) -> None:
+def _stack(rng: Rng, built: PrimitiveBuilder) -> None:
     """A child's tower of blocks: boxes, drums and arches."""
     y = 0.0
     for k in range(rng.integers(2, 6)):

@@ -6,13 +6,13 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, ngon, pick, span, vec
 
 BODY, FRONT, KNOB, MORE, GLASS = range(5)
 
 
-def _roof(rng: Rng, built: Builder, at: F64, half: F64, kind: str) -> None:
+def _roof(rng: Rng, built: PrimitiveBuilder, at: F64, half: F64, kind: str) -> None:
     """On a storey's upper side `at`."""
     high, over = span(rng, 0.5, 1.2) * half[2], span(rng, 0.03, 0.12)
     built.part(FRONT)
@@ -48,7 +48,9 @@ def _roof(rng: Rng, built: Builder, at: F64, half: F64, kind: str) -> None:
         built.box(at + [0, 0.04, 0], [half[0] + over, 0.05, half[2] + over])
 
 
-def _windows(rng: Rng, built: Builder, middle: F64, half: F64, rows: int, columns: int) -> None:
+def _windows(
+    rng: Rng, built: PrimitiveBuilder, middle: F64, half: F64, rows: int, columns: int
+) -> None:
     """On the front (+z) and one side of a storey."""
     built.part(GLASS)
     tall, wide = 0.3 * half[1] / rows * 1.6, 0.5 * half[0] / columns
@@ -65,7 +67,7 @@ def _windows(rng: Rng, built: Builder, middle: F64, half: F64, rows: int, column
         built.box([x, middle[1] - half[1] + tall, middle[2] + half[2]], [0.12, tall, 0.035])
 
 
-def house(rng: Rng, built: Builder) -> None:
+def house(rng: Rng, built: PrimitiveBuilder) -> None:
     """Make a house with a roof of some kind, windows, a chimney, a wing."""
     half = vec(0.8, 0.4, 0.5) * np.exp(rng.normal(0, 0.2, 3))
     middle = vec(0, half[1], 0)
@@ -86,7 +88,7 @@ def house(rng: Rng, built: Builder) -> None:
         _roof(rng, built, at + [0, wing[1], 0], wing, pick(rng, ("hip", "shed", "gable")))
 
 
-def tower(rng: Rng, built: Builder) -> None:
+def tower(rng: Rng, built: PrimitiveBuilder) -> None:
     """Storeys that get narrower; round, square or with many corners."""
     corners, y, wide = pick(rng, (0, 4, 4, 6, 8)), 0.0, span(rng, 0.4, 0.7)
     for k in range(rng.integers(2, 6)):
@@ -116,7 +118,7 @@ def tower(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, y, 0], [0.8 * wide, span(rng, 0.2, 0.7), 0.8 * wide])
 
 
-def buildings(rng: Rng, built: Builder) -> None:
+def buildings(rng: Rng, built: PrimitiveBuilder) -> None:
     """Several blocks on one ground."""
     built.part(MORE)
     built.box([0, 0.03, 0], [1.1, 0.03, 0.8])

@@ -6,15 +6,15 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, curve, pick, profile, span, tube, vec
 
 SKIN, HAIR, CLOTH, EYE, MORE = range(5)
 
 
-def busts(rng: Rng) -> Builder:
+def busts(rng: Rng) -> PrimitiveBuilder:
     """Make a bust, head or hand that looks along +z."""
-    built = Builder()
+    built = PrimitiveBuilder()
     kind = rng.random()
     if kind < 0.25:
         _hand(rng, built)
@@ -26,7 +26,7 @@ def busts(rng: Rng) -> Builder:
     return built
 
 
-def _head(rng: Rng, built: Builder, tilt: F64) -> None:
+def _head(rng: Rng, built: PrimitiveBuilder, tilt: F64) -> None:
     """About the origin; the skull's radius is about 0.8."""
     wide, deep = span(rng, 0.66, 0.82), span(rng, 0.78, 0.92)
     built.part(SKIN)
@@ -55,7 +55,7 @@ def _head(rng: Rng, built: Builder, tilt: F64) -> None:
     _hair(rng, built, tilt, wide)
 
 
-def _face(rng: Rng, built: Builder, tilt: F64) -> None:
+def _face(rng: Rng, built: PrimitiveBuilder, tilt: F64) -> None:
     """Nose and sockets (the same skin), eyes, mouth; spectacles for some."""
     long, out, nose = span(rng, 0.25, 0.45), span(rng, 0.95, 1.15), span(rng, 0.1, 0.18)
     tip = vec(0, 0.1 - long, out)
@@ -102,7 +102,7 @@ def _face(rng: Rng, built: Builder, tilt: F64) -> None:
         built.limb(tilt @ vec(-0.08, 0.07, 0.95), tilt @ vec(0.08, 0.07, 0.95), 0.03, 0.03)
 
 
-def _hair(rng: Rng, built: Builder, tilt: F64, wide: float) -> None:
+def _hair(rng: Rng, built: PrimitiveBuilder, tilt: F64, wide: float) -> None:
     """Short, long, curly, a knot, a hat, a beard, or none."""
     kind = pick(rng, ("cap", "cap", "long", "curls", "none", "hat", "crown", "helmet"))
     if kind in ("cap", "long", "helmet"):
@@ -140,7 +140,7 @@ def _hair(rng: Rng, built: Builder, tilt: F64, wide: float) -> None:
         built.ellipsoid(tilt @ vec(0, -0.85, 0.4), [0.5, span(rng, 0.3, 0.7), 0.4], tilt)
 
 
-def _cap(rng: Rng, built: Builder, tilt: F64, wide: float, kind: str) -> None:
+def _cap(rng: Rng, built: PrimitiveBuilder, tilt: F64, wide: float, kind: str) -> None:
     """Hair or a helmet around the skull, open before the face."""
     built.part(HAIR)
     over = span(rng, 0.06, 0.16)
@@ -165,7 +165,7 @@ def _cap(rng: Rng, built: Builder, tilt: F64, wide: float, kind: str) -> None:
         built.ellipsoid(tilt @ vec(0, span(rng, 0.2, 1.1), -0.95), np.full(3, 0.33))
 
 
-def _shoulders(rng: Rng, built: Builder) -> None:
+def _shoulders(rng: Rng, built: PrimitiveBuilder) -> None:
     """The neck, and a chest that ends in a plinth, a cut, or a shirt with a collar."""
     neck = span(rng, 0.28, 0.42)
     broad = span(rng, 0.85, 1.35)
@@ -203,7 +203,7 @@ def _shoulders(rng: Rng, built: Builder) -> None:
             )
 
 
-def _hand(rng: Rng, built: Builder) -> None:
+def _hand(rng: Rng, built: PrimitiveBuilder) -> None:
     """Open, a fist, pointing, counting, holding a ball; the palm looks along +z."""
     turn = turned(span(rng, 0, 6), rng.normal(0, 0.6), rng.normal(0, 0.5))
     wide, thick = span(rng, 0.4, 0.52), span(rng, 0.13, 0.2)

@@ -6,13 +6,13 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, curve, pick, profile, smooth, span, tube, vec
 
 CLOTH, MORE, METAL, THIRD = range(4)
 
 
-def hat(rng: Rng, built: Builder) -> None:
+def hat(rng: Rng, built: PrimitiveBuilder) -> None:
     """Brimmed, with a band, a dent, and now and then a feather; hollow below."""
     tilt = turned(span(rng, 0, 6), *rng.normal(0, 0.4, 2))
     wide, brim, high = span(rng, 0.4, 0.5), span(rng, 0.2, 0.6), span(rng, 0.3, 0.9)
@@ -46,7 +46,7 @@ def hat(rng: Rng, built: Builder) -> None:
         built.ellipsoid(tilt @ vec(wide, 0.35, 0), [0.03, 0.35, 0.1], tilt @ turned(0, 0.5))
 
 
-def cap(rng: Rng, built: Builder) -> None:
+def cap(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cap with a peak, or a woollen one with a bobble."""
     wide, high = 0.5, span(rng, 0.35, 0.6)
     built.part(CLOTH)
@@ -63,7 +63,7 @@ def cap(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, high + 0.1, 0], np.full(3, span(rng, 0.12, 0.2)))
 
 
-def shoe(rng: Rng, built: Builder) -> None:
+def shoe(rng: Rng, built: PrimitiveBuilder) -> None:
     """Shoes, boots, slippers, pumps, single or in a pair; they point along +x."""
     heel, shaft = pick(rng, (0.05, 0.08, 0.35)), pick(rng, (0.15, 0.3, 0.8))
     toe = span(rng, 0.22, 0.34)
@@ -73,7 +73,7 @@ def shoe(rng: Rng, built: Builder) -> None:
 
 
 def _one_shoe(
-    rng: Rng, built: Builder, at: F64, turn: F64, size: tuple[float, float, float]
+    rng: Rng, built: PrimitiveBuilder, at: F64, turn: F64, size: tuple[float, float, float]
 ) -> None:
     """A hollow shoe; `size`: the heel's height, the shaft's, half the width at the toes."""
     heel, shaft, toe = size
@@ -114,7 +114,7 @@ def _one_shoe(
         built.limb(at + turn @ (p + [0, 0, -0.12]), at + turn @ (p + [0, 0, 0.12]), 0.025, 0.025)
 
 
-def handbag(rng: Rng, built: Builder) -> None:
+def handbag(rng: Rng, built: PrimitiveBuilder) -> None:
     """A bag with a bow or a strap, soft or stiff, with a flap."""
     half, deep = vec(span(rng, 0.45, 0.7), span(rng, 0.3, 0.5)), span(rng, 0.12, 0.25)
     built.part(CLOTH)
@@ -150,7 +150,7 @@ def handbag(rng: Rng, built: Builder) -> None:
         tube(built, curve(line, 10), 0.035)
 
 
-def rucksack(rng: Rng, built: Builder) -> None:
+def rucksack(rng: Rng, built: PrimitiveBuilder) -> None:
     """A bag for the back with a pocket, straps and a lid."""
     half = vec(span(rng, 0.35, 0.5), span(rng, 0.5, 0.7), span(rng, 0.2, 0.3))
     built.part(CLOTH)
@@ -177,7 +177,7 @@ def rucksack(rng: Rng, built: Builder) -> None:
     built.ring([0, 1.95 * half[1], -0.5 * half[2]], 0.12, 0.03, turn=turned(0, np.pi / 2))
 
 
-def shirt(rng: Rng, built: Builder) -> None:
+def shirt(rng: Rng, built: PrimitiveBuilder) -> None:
     """A shirt or a coat, flat as if it hung, with sleeves."""
     wide, long, thick = span(rng, 0.42, 0.55), span(rng, 0.55, 0.9), span(rng, 0.05, 0.16)
     built.part(CLOTH)
@@ -200,7 +200,7 @@ def shirt(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, 0.6 * long - 0.25 * k, thick], [0.035, 0.035, 0.025])
 
 
-def trousers(rng: Rng, built: Builder) -> None:
+def trousers(rng: Rng, built: PrimitiveBuilder) -> None:
     """Two legs and a belt."""
     wide, long = span(rng, 0.35, 0.45), span(rng, 0.4, 1.3)
     built.part(CLOTH)
@@ -213,7 +213,7 @@ def trousers(rng: Rng, built: Builder) -> None:
     built.box([0, 0.36, 0], [0.93 * wide, 0.05, 0.12], 0.04)
 
 
-def glove(rng: Rng, built: Builder) -> None:
+def glove(rng: Rng, built: PrimitiveBuilder) -> None:
     """A mitten or a sock."""
     built.part(CLOTH)
     turn = turned(span(rng, 0, 6), rng.normal(0, 0.4), rng.normal(0, 0.4))

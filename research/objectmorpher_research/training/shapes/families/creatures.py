@@ -8,7 +8,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, ahead, chance, curve, joint, pick, span, tube, two_bones, vary, vec
 from .small_creatures import bird, fish, insect
 
@@ -48,7 +48,7 @@ PLANS = {
 }
 
 
-def creatures(rng: Rng) -> Builder:
+def creatures(rng: Rng) -> PrimitiveBuilder:
     """Half of them have four legs."""
     kind = rng.random()
     if kind < 0.56:
@@ -56,7 +56,7 @@ def creatures(rng: Rng) -> Builder:
     return bird(rng) if kind < 0.74 else fish(rng) if kind < 0.87 else insect(rng)
 
 
-def _four_legged(rng: Rng) -> Builder:
+def _four_legged(rng: Rng) -> PrimitiveBuilder:
     """Any of the plans, varied, in one of the poses."""
     name = pick(rng, tuple(PLANS))
     base = PLANS[name]
@@ -69,7 +69,7 @@ def _four_legged(rng: Rng) -> Builder:
     pose = pick(rng, ("stand", "stand", "walk", "walk", "sit", "lie"))
     if name in ("turtle", "hippo", "giraffe", "cow") and pose == "sit":
         pose = "stand"
-    built = Builder()
+    built = PrimitiveBuilder()
     lift = {"stand": plan.leg, "walk": 0.97 * plan.leg, "sit": 0.3 * plan.girth, "lie": 0.0}[pose]
     hip = vec(-0.5, lift + 0.9 * plan.girth, 0)
     chest = vec(0.5, plan.leg + 0.9 * plan.girth if pose == "sit" else hip[1], 0)
@@ -89,7 +89,7 @@ def _four_legged(rng: Rng) -> Builder:
     return built
 
 
-def _torso(rng: Rng, built: Builder, plan: _Plan, hip: F64, chest: F64) -> None:
+def _torso(rng: Rng, built: PrimitiveBuilder, plan: _Plan, hip: F64, chest: F64) -> None:
     """The body with the neck and the head, which are one skin."""
     g = plan.girth
     soft = g * span(rng, 0.25, 0.6)
@@ -114,7 +114,7 @@ def _torso(rng: Rng, built: Builder, plan: _Plan, hip: F64, chest: F64) -> None:
     _head(rng, built, plan, head, face)
 
 
-def _head(rng: Rng, built: Builder, plan: _Plan, head: F64, face: F64) -> None:
+def _head(rng: Rng, built: PrimitiveBuilder, plan: _Plan, head: F64, face: F64) -> None:
     """Skull, snout, ears, eyes; a trunk or horns for some."""
     r = plan.head
     axes = ahead(face)
@@ -140,7 +140,7 @@ def _head(rng: Rng, built: Builder, plan: _Plan, head: F64, face: F64) -> None:
         _horns(rng, built, head, axes * r)
 
 
-def _ears(rng: Rng, built: Builder, plan: _Plan, head: F64, axes: F64) -> None:
+def _ears(rng: Rng, built: PrimitiveBuilder, plan: _Plan, head: F64, axes: F64) -> None:
     """Two ears of the shape that the plan asks for."""
     r = plan.head
     shape = {  # where on the head, half sizes, and turn of the ear: forward, up, aside
@@ -163,7 +163,7 @@ def _ears(rng: Rng, built: Builder, plan: _Plan, head: F64, axes: F64) -> None:
         built.ellipsoid(head + axes @ (r * at * [1, 1, sign]), np.maximum(half * r, 0.014), turn)
 
 
-def _horns(rng: Rng, built: Builder, head: F64, axes: F64) -> None:
+def _horns(rng: Rng, built: PrimitiveBuilder, head: F64, axes: F64) -> None:
     """Two horns, short or long; `axes` (3, 3) are as long as the head is thick."""
     high, wide, on = span(rng, 0.6, 1.8), span(rng, 0.4, 1.2), span(rng, -0.6, 0.6)
     for sign in (1, -1):
@@ -173,7 +173,7 @@ def _horns(rng: Rng, built: Builder, head: F64, axes: F64) -> None:
         tube(built, curve(line, 6), 0.035, 0.012)
 
 
-def _legs(rng: Rng, built: Builder, plan: _Plan, pose: str, hip: F64, chest: F64) -> None:
+def _legs(rng: Rng, built: PrimitiveBuilder, plan: _Plan, pose: str, hip: F64, chest: F64) -> None:
     """Two fore, two hind; each is a part of its own, in some the skin runs on."""
     g, is_low = plan.girth, plan.tail == "thick"
     own = pick(rng, (SKIN, SKIN, SKIN, OTHER))
@@ -206,7 +206,7 @@ def _legs(rng: Rng, built: Builder, plan: _Plan, pose: str, hip: F64, chest: F64
             built.ellipsoid(foot + vec(0.5 * plan.shin, -0.3 * plan.shin, 0), paw, soft=soft)
 
 
-def _tail(rng: Rng, built: Builder, plan: _Plan, hip: F64, pose: str) -> None:
+def _tail(rng: Rng, built: PrimitiveBuilder, plan: _Plan, hip: F64, pose: str) -> None:
     """One tail of the kind that the plan asks for."""
     start = hip - vec(0.75 * plan.girth, -0.35 * plan.girth, 0)
     sway = rng.normal(0, 0.25, 3)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .legs import legs
 from .making import Rng, chance, pick, span, vec
 
 WOOD, SOFT, METAL, MORE = range(4)
 
 
-def shelf(rng: Rng, built: Builder) -> None:
+def shelf(rng: Rng, built: PrimitiveBuilder) -> None:
     """A case with boards, and things on them."""
     half = vec(span(rng, 0.35, 0.9), span(rng, 0.5, 1.2), span(rng, 0.15, 0.3))
     boards, wall = int(rng.integers(2, 5)), span(rng, 0.02, 0.04)
@@ -30,7 +30,7 @@ def shelf(rng: Rng, built: Builder) -> None:
             x += 2 * wide + (0.01 if chance(rng, 0.6) else 0.2)
 
 
-def bed(rng: Rng, built: Builder) -> None:
+def bed(rng: Rng, built: PrimitiveBuilder) -> None:
     """A frame with a head and a foot, a mattress, a blanket and pillows."""
     half, high = vec(span(rng, 0.4, 0.8), 1.0), span(rng, 0.2, 0.4)
     built.part(WOOD)
@@ -52,7 +52,7 @@ def bed(rng: Rng, built: Builder) -> None:
         )
 
 
-def dresser(rng: Rng, built: Builder) -> None:
+def dresser(rng: Rng, built: PrimitiveBuilder) -> None:
     """Drawers, of which some are open."""
     half, foot = (
         vec(span(rng, 0.5, 0.9), span(rng, 0.35, 0.7), span(rng, 0.25, 0.4)),

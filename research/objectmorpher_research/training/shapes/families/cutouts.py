@@ -6,14 +6,14 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .letters import STROKES, draw, strokes
 from .making import Rng, chance, depth, ngon, pick, smooth, span, vec
 
 BODY, MORE, THIRD = range(3)
 
 
-def sign(rng: Rng, built: Builder, turn: F64) -> None:
+def sign(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A road sign on its post, with something raised on it."""
     post = turned(float(np.arctan2(turn[0, 2], turn[2, 2])))
     corners = pick(rng, (3, 4, 6, 8, 24))
@@ -33,7 +33,7 @@ def sign(rng: Rng, built: Builder, turn: F64) -> None:
         draw(built, lines, vec(0, high + 0.2), 0.05, 0.07, post, False)
 
 
-def blob(rng: Rng, built: Builder, turn: F64) -> None:
+def blob(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A random outline: a puddle, a stone cut flat, a cloud, a state on a map; with holes."""
     half, bevel = depth(rng)
     count = int(rng.integers(5, 12))
@@ -51,7 +51,7 @@ def blob(rng: Rng, built: Builder, turn: F64) -> None:
         built.prism(turn @ vec(0, 0, half), smooth(other, 2), span(rng, 0.04, 0.2), 0.02, turn)
 
 
-def cookie(rng: Rng, built: Builder, turn: F64) -> None:
+def cookie(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A gingerbread man, a tree, a moon, a fish: flat, with swollen edges."""
     half = span(rng, 0.08, 0.2)
     built.part(BODY)
@@ -76,7 +76,7 @@ def cookie(rng: Rng, built: Builder, turn: F64) -> None:
         built.ellipsoid(turn @ vec(0.6, 0.12, half), np.full(3, 0.09))
 
 
-def _gingerbread(built: Builder, half: float, turn: F64) -> None:
+def _gingerbread(built: PrimitiveBuilder, half: float, turn: F64) -> None:
     """A man of round limbs, cut flat, with eyes and buttons."""
     ends = ((0, 0, 0, 0.3), (0, 0.2, 0.6, 0.35), (0, 0.2, -0.6, 0.35))
     for a, b, c, d in (*ends, (0, -0.1, 0.35, -0.8), (0, -0.1, -0.35, -0.8)):
@@ -88,7 +88,7 @@ def _gingerbread(built: Builder, half: float, turn: F64) -> None:
         built.ellipsoid(turn @ vec(x, y, half), np.full(3, 0.06))
 
 
-def comb(rng: Rng, built: Builder, turn: F64) -> None:
+def comb(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A comb, a rake, a fence, a xylophone: many bars side by side."""
     count, half = int(rng.integers(5, 12)), span(rng, 0.03, 0.1)
     high, slope = span(rng, 0.5, 1.2), span(rng, -0.4, 0.4)
@@ -103,7 +103,7 @@ def comb(rng: Rng, built: Builder, turn: F64) -> None:
         built.box(turn @ vec(x, -long + 0.1, 0.3 * half), [0.6 / count, long, half], 0.01, turn)
 
 
-def stairs(rng: Rng, built: Builder, turn: F64) -> None:
+def stairs(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Steps, a zigzag, a wall with battlements, an arch, a bridge."""
     half = span(rng, 0.2, 0.7)
     turn = turned(float(np.arctan2(turn[0, 2], turn[2, 2])))

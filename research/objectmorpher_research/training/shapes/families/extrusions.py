@@ -6,7 +6,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .cutouts import blob, comb, cookie, sign, stairs
 from .letters import letter, word
 from .making import Rng, chance, depth, ngon, pick, smooth, span, vec
@@ -15,7 +15,7 @@ from .tools import tool
 BODY, MORE, THIRD = range(3)
 
 
-def extrusions(rng: Rng) -> Builder:
+def extrusions(rng: Rng) -> PrimitiveBuilder:
     """Make an extrusion that stands, leans or lies."""
     kinds = (
         letter,
@@ -33,7 +33,7 @@ def extrusions(rng: Rng) -> Builder:
         comb,
         stairs,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     if chance(rng, 0.35):
         tool(rng, built, _pose(rng))
     else:
@@ -49,7 +49,7 @@ def _pose(rng: Rng) -> F64:
     )
 
 
-def _star(rng: Rng, built: Builder, turn: F64) -> None:
+def _star(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Some have a smaller star on them, a hole, or a stick: a wand."""
     half, bevel = depth(rng)
     points, inner = int(rng.integers(4, 9)), span(rng, 0.35, 0.75)
@@ -67,7 +67,7 @@ def _star(rng: Rng, built: Builder, turn: F64) -> None:
         built.limb(turn @ vec(0, -0.5, 0), turn @ vec(0, -2.2, 0), 0.08, 0.08)
 
 
-def _heart(rng: Rng, built: Builder, turn: F64) -> None:
+def _heart(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Flat, with a hole, or swollen."""
     t = np.linspace(0, 2 * np.pi, 28, endpoint=False)
     x = 16 * np.sin(t) ** 3
@@ -89,7 +89,7 @@ def _heart(rng: Rng, built: Builder, turn: F64) -> None:
         built.prism(turn @ vec(0, 0, half), 0.7 * outline, 0.06, 0.02, turn)
 
 
-def _gear(rng: Rng, built: Builder, turn: F64) -> None:
+def _gear(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """One wheel with teeth, or two that mesh, on axles."""
     half, bevel = depth(rng)
     for k in range(pick(rng, (1, 1, 2))):
@@ -122,7 +122,7 @@ def _gear(rng: Rng, built: Builder, turn: F64) -> None:
             built.cylinder(at, 0.1 * size, half + span(rng, 0.1, 0.5), 0.02, axle)
 
 
-def _arrow(rng: Rng, built: Builder, turn: F64) -> None:
+def _arrow(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Arrows, bolts of lightning, crosses, ticks."""
     half, bevel = depth(rng)
     wide, head = span(rng, 0.1, 0.25), span(rng, 0.4, 0.7)
@@ -161,7 +161,7 @@ def _arrow(rng: Rng, built: Builder, turn: F64) -> None:
     built.prism([0, 0, 0], smooth(outline, 2) if chance(rng, 0.3) else outline, half, bevel, spin)
 
 
-def _puzzle(rng: Rng, built: Builder, turn: F64) -> None:
+def _puzzle(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """One to four pieces with knobs and hollows."""
     half, bevel = span(rng, 0.06, 0.2), 0.03
     axle = turn @ turned(0, np.pi / 2)

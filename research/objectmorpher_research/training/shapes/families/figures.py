@@ -8,7 +8,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, along, turned
+from ..solid import PrimitiveBuilder, along, turned
 from .making import Rng, chance, joint, pick, span, two_bones, vary, vec
 
 SKIN, SHIRT, TROUSERS, HAIR, SHOES, MORE = range(6)
@@ -29,7 +29,7 @@ class _Body(NamedTuple):
     is_stiff: bool  # boxes and cylinders: a robot
 
 
-def figures(rng: Rng) -> Builder:
+def figures(rng: Rng) -> PrimitiveBuilder:
     """Make a figure, sometimes with a thing in its hand."""
     is_toy, is_stiff = chance(rng, 0.35), chance(rng, 0.2)
     body = _Body(
@@ -44,7 +44,7 @@ def figures(rng: Rng) -> Builder:
         vary(rng, 0.13 if is_toy else 0.1, 0.2),
         is_stiff,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     is_sitting = chance(rng, 0.25)
     high = 0.5 * body.leg if is_sitting and chance(rng, 0.5) else 0.12 if is_sitting else body.leg
     hip = vec(0, 0.96 * high, 0)
@@ -70,7 +70,7 @@ def figures(rng: Rng) -> Builder:
     return built
 
 
-def _torso(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
+def _torso(rng: Rng, built: PrimitiveBuilder, body: _Body, hip: F64, axes: F64) -> None:
     """Chest, belly, shoulders, hips and neck; a box or a drum for a robot."""
     built.part(SHIRT)
     if body.is_stiff:
@@ -116,7 +116,7 @@ def _torso(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
     )
 
 
-def _head(rng: Rng, built: Builder, body: _Body, at: F64, axes: F64) -> None:
+def _head(rng: Rng, built: PrimitiveBuilder, body: _Body, at: F64, axes: F64) -> None:
     """A head with eyes, ears, a nose and hair, or that of a robot."""
     r = body.head
     turn = axes @ turned(rng.normal(0, 0.4), rng.normal(0, 0.2), rng.normal(0, 0.1))
@@ -152,7 +152,7 @@ def _head(rng: Rng, built: Builder, body: _Body, at: F64, axes: F64) -> None:
         built.ellipsoid(eye, np.full(3, span(rng, 0.08, 0.16) * r))
 
 
-def _hair(rng: Rng, built: Builder, r: float, at: F64, turn: F64) -> None:
+def _hair(rng: Rng, built: PrimitiveBuilder, r: float, at: F64, turn: F64) -> None:
     """Hair short or long, or a hat, a cap, a helmet."""
     kind = pick(rng, ("short", "short", "long", "bun", "hat", "cap", "helmet", "bald", "cone"))
     if kind == "bald":
@@ -191,7 +191,7 @@ def _hair(rng: Rng, built: Builder, r: float, at: F64, turn: F64) -> None:
         built.ellipsoid(at + turn @ (r * vec(0, 0.42, 0.95)), r * vec(0.7, 0.09, 0.6), turn)
 
 
-def _skirt(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> None:
+def _skirt(rng: Rng, built: PrimitiveBuilder, body: _Body, hip: F64, is_sitting: bool) -> None:
     """From the waist over the legs."""
     built.part(TROUSERS)
     long = (0.35 if is_sitting else span(rng, 0.3, 0.85)) * body.leg
@@ -204,7 +204,7 @@ def _skirt(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) ->
     built.lathe([0, 0, 0], outline, soft=0.0)
 
 
-def _legs(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> None:
+def _legs(rng: Rng, built: PrimitiveBuilder, body: _Body, hip: F64, is_sitting: bool) -> None:
     """Two legs, each with a shoe, walking, standing or sitting."""
     stride = pick(rng, (0.0, 0.1, 0.5)) * body.leg * span(rng, 0.6, 1.1)
     wide = span(rng, 0.45, 0.75) * body.hip
@@ -238,7 +238,7 @@ def _legs(rng: Rng, built: Builder, body: _Body, hip: F64, is_sitting: bool) -> 
         )
 
 
-def _arms(rng: Rng, built: Builder, body: _Body, hip: F64, axes: F64) -> None:
+def _arms(rng: Rng, built: PrimitiveBuilder, body: _Body, hip: F64, axes: F64) -> None:
     """Each arm is a part; many lie before the torso."""
     poses = ("down", "down", "up", "akimbo", "across", "across", "ahead", "side", "wave")
     both = pick(rng, poses)
@@ -290,7 +290,7 @@ def _hand(rng: Rng, body: _Body, pose: str, sign: int, root: F64) -> tuple[F64, 
     return hand + rng.normal(0, 0.05, 3), bend
 
 
-def _held(rng: Rng, built: Builder, at: F64) -> None:
+def _held(rng: Rng, built: PrimitiveBuilder, at: F64) -> None:
     """A ball, a stick, a bag or a book."""
     built.part(MORE)
     kind = pick(rng, ("ball", "stick", "bag", "book"))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, pick, profile, smooth, span, vec
 
 BODY, GLASS, TYRE, METAL, MORE = range(5)
 FLAT = turned(0, np.pi / 2)  # an outline's x and y become x and -z
 
 
-def aeroplane(rng: Rng, built: Builder) -> None:
+def aeroplane(rng: Rng, built: PrimitiveBuilder) -> None:
     """Jets, airliners, biplanes, gliders."""
     fat, long = span(rng, 0.09, 0.17), 1.0
     kind = pick(rng, ("airliner", "light", "biplane", "jet"))
@@ -57,7 +57,7 @@ def aeroplane(rng: Rng, built: Builder) -> None:
     _engines(rng, built, kind, fat, reach)
 
 
-def _engines(rng: Rng, built: Builder, kind: str, fat: float, reach: float) -> None:
+def _engines(rng: Rng, built: PrimitiveBuilder, kind: str, fat: float, reach: float) -> None:
     """Jets beneath the wings or a propeller; wheels."""
     axle = turned(0, 0, np.pi / 2)
     if kind == "airliner":
@@ -89,7 +89,7 @@ def _engines(rng: Rng, built: Builder, kind: str, fat: float, reach: float) -> N
             built.cylinder(foot, 0.08 if z else 0.04, 0.03, 0.015, FLAT)
 
 
-def helicopter(rng: Rng, built: Builder) -> None:
+def helicopter(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cabin, a boom and rotors."""
     built.part(BODY)
     built.ellipsoid([0.2, 0, 0], [span(rng, 0.38, 0.5), span(rng, 0.26, 0.34), 0.27])
@@ -112,7 +112,7 @@ def helicopter(rng: Rng, built: Builder) -> None:
             built.limb([x, -0.2, 0.5 * z], [x, -0.42, z], 0.02, 0.02)
 
 
-def rocket(rng: Rng, built: Builder) -> None:
+def rocket(rng: Rng, built: PrimitiveBuilder) -> None:
     """A rocket with fins, standing or tilted."""
     wide, high = span(rng, 0.15, 0.32), span(rng, 0.8, 1.8)
     lean = turned(0, *(rng.normal(0, 0.4, 2) * (rng.random() < 0.5)))
@@ -154,7 +154,7 @@ def rocket(rng: Rng, built: Builder) -> None:
             built.limb(lean @ at, lean @ (at + [0, 0.6 * high, 0]), 0.1, 0.09)
 
 
-def balloon(rng: Rng, built: Builder) -> None:
+def balloon(rng: Rng, built: PrimitiveBuilder) -> None:
     """A hot-air balloon with its basket, or an airship."""
     if chance(rng, 0.4):
         built.part(BODY)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, curve, pick, profile, span, tube, vec
 
 GREEN, SKIN, MIDDLE, MORE = range(4)
 
 
-def fruit(rng: Rng, built: Builder) -> None:
+def fruit(rng: Rng, built: PrimitiveBuilder) -> None:
     """Make a fruit, or a bunch."""
     kinds = (_apple, _pear, _banana, _pumpkin, _grapes, _cherries, _pineapple, _slice, _strawberry)
     pick(rng, kinds)(rng, built)
 
 
-def vegetable(rng: Rng, built: Builder) -> None:
+def vegetable(rng: Rng, built: PrimitiveBuilder) -> None:
     """Make a vegetable."""
     kinds = (_carrot, _aubergine, _pepper, _tomatoes, _cabbage, _onion, _pod, _maize)
     pick(rng, kinds)(rng, built)
@@ -27,7 +27,9 @@ def _tilt(rng: Rng) -> np.ndarray:
     return turned(span(rng, 0, 6), *(rng.normal(0, 0.6, 2) * (rng.random() < 0.5)))
 
 
-def _stem(rng: Rng, built: Builder, turn: np.ndarray, y: float, long: float, thick: float) -> None:
+def _stem(
+    rng: Rng, built: PrimitiveBuilder, turn: np.ndarray, y: float, long: float, thick: float
+) -> None:
     """On top, at the height y; sometimes with a leaf."""
     built.part(MIDDLE)
     bow = vec(span(rng, -0.4, 0.4) * long, 0.5 * long, 0)
@@ -39,7 +41,7 @@ def _stem(rng: Rng, built: Builder, turn: np.ndarray, y: float, long: float, thi
         built.ellipsoid(turn @ line[1] + leaf @ vec(0, 0, 0.28), [0.13, 0.02, 0.28], leaf)
 
 
-def _apple(rng: Rng, built: Builder) -> None:
+def _apple(rng: Rng, built: PrimitiveBuilder) -> None:
     """Apples, peaches, oranges, plums: a dent above, sometimes a seam, sometimes a bite."""
     turn, high = _tilt(rng), span(rng, 0.75, 1.1)
     built.part(SKIN)
@@ -72,7 +74,7 @@ def _apple(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, 0.45 * high, 0.6, 0.05)
 
 
-def _pear(rng: Rng, built: Builder) -> None:
+def _pear(rng: Rng, built: PrimitiveBuilder) -> None:
     """A belly and a neck."""
     turn, long = _tilt(rng), span(rng, 0.9, 1.5)
     built.part(SKIN)
@@ -82,7 +84,7 @@ def _pear(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, long + 0.2, 0.45, 0.05)
 
 
-def _banana(rng: Rng, built: Builder) -> None:
+def _banana(rng: Rng, built: PrimitiveBuilder) -> None:
     """One, or several that hang together."""
     count, bow = pick(rng, (1, 1, 2, 3, 4)), span(rng, 0.2, 0.5)
     turn = _tilt(rng)
@@ -106,7 +108,7 @@ def _banana(rng: Rng, built: Builder) -> None:
         built.limb(spin @ line[0], spin @ vec(-1.2, 0.2, 0), 0.07, 0.06)
 
 
-def _pumpkin(rng: Rng, built: Builder) -> None:
+def _pumpkin(rng: Rng, built: PrimitiveBuilder) -> None:
     """Ribs around the middle; now and then with a face."""
     ribs, flat, wide = int(rng.integers(7, 12)), span(rng, 0.55, 1.1), span(rng, 0.55, 0.75)
     built.part(SKIN)
@@ -125,7 +127,7 @@ def _pumpkin(rng: Rng, built: Builder) -> None:
     _stem(rng, built, np.eye(3), 0.6 * flat, 0.5, 0.12)
 
 
-def _grapes(rng: Rng, built: Builder) -> None:
+def _grapes(rng: Rng, built: PrimitiveBuilder) -> None:
     """Balls around a stalk, fewer towards the end."""
     count, size = int(rng.integers(10, 22)), span(rng, 0.18, 0.24)
     turn = turned(0, span(rng, 0, 1.4))
@@ -138,7 +140,7 @@ def _grapes(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, 0.1, 0.5, 0.04)
 
 
-def _cherries(rng: Rng, built: Builder) -> None:
+def _cherries(rng: Rng, built: PrimitiveBuilder) -> None:
     """One to three on their stalks."""
     top = vec(0, 1.2, 0)
     for k in range(pick(rng, (1, 2, 2, 3))):
@@ -151,7 +153,7 @@ def _cherries(rng: Rng, built: Builder) -> None:
     built.ellipsoid(top + [0.25, 0, 0], [0.28, 0.03, 0.14], turned(0, 0, 0.3))
 
 
-def _pineapple(rng: Rng, built: Builder) -> None:
+def _pineapple(rng: Rng, built: PrimitiveBuilder) -> None:
     """A barrel under a tuft."""
     built.part(SKIN)
     high = span(rng, 0.65, 0.9)
@@ -163,7 +165,7 @@ def _pineapple(rng: Rng, built: Builder) -> None:
         built.ellipsoid(vec(0, high, 0) + spin @ vec(0, long, 0), [0.08, long, 0.03], spin)
 
 
-def _slice(rng: Rng, built: Builder) -> None:
+def _slice(rng: Rng, built: PrimitiveBuilder) -> None:
     """Of a melon, an orange, a cake, a pizza."""
     half, turn = span(rng, 0.25, 0.8), _tilt(rng)
     wedge = 3 * np.array([[0, 0], [np.cos(half), -np.sin(half)], [np.cos(half), np.sin(half)]])
@@ -195,7 +197,7 @@ def _slice(rng: Rng, built: Builder) -> None:
             )
 
 
-def _strawberry(rng: Rng, built: Builder) -> None:
+def _strawberry(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cone with a collar of leaves."""
     turn = _tilt(rng)
     built.part(SKIN)
@@ -207,7 +209,7 @@ def _strawberry(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, 0.5, 0.35, 0.04)
 
 
-def _carrot(rng: Rng, built: Builder) -> None:
+def _carrot(rng: Rng, built: PrimitiveBuilder) -> None:
     """Carrots, radishes, beets, with their greens."""
     turn, long = _tilt(rng) @ turned(0, pick(rng, (0.0, 1.4))), pick(rng, (0.3, 1.2, 1.8))
     built.part(SKIN)
@@ -224,7 +226,7 @@ def _carrot(rng: Rng, built: Builder) -> None:
         built.ellipsoid(spin @ vec(0, high, 0), [0.13, 0.28, 0.03], spin)
 
 
-def _aubergine(rng: Rng, built: Builder) -> None:
+def _aubergine(rng: Rng, built: PrimitiveBuilder) -> None:
     """Aubergines, cucumbers, courgettes."""
     turn = _tilt(rng) @ turned(0, 0, 1.5)
     near, far, long = span(rng, 0.25, 0.5), span(rng, 0.15, 0.3), span(rng, 0.9, 2.0)
@@ -236,7 +238,7 @@ def _aubergine(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, long + far, 0.3, 0.06)
 
 
-def _pepper(rng: Rng, built: Builder) -> None:
+def _pepper(rng: Rng, built: PrimitiveBuilder) -> None:
     """Three or four lobes."""
     lobes, turn, high = pick(rng, (3, 4)), _tilt(rng), span(rng, 0.5, 0.8)
     built.part(SKIN)
@@ -249,7 +251,7 @@ def _pepper(rng: Rng, built: Builder) -> None:
     _stem(rng, built, turn, 0.5, 0.5, 0.09)
 
 
-def _tomatoes(rng: Rng, built: Builder) -> None:
+def _tomatoes(rng: Rng, built: PrimitiveBuilder) -> None:
     """One or several, with a star of leaves on each."""
     for k in range(pick(rng, (1, 1, 3, 4))):
         at = vec(0.9 * np.cos(2 * k), 0, 0.9 * np.sin(2 * k)) * (k > 0)
@@ -265,7 +267,7 @@ def _tomatoes(rng: Rng, built: Builder) -> None:
         built.limb(at + [0, 1.65 * size, 0], at + [0.03, 1.65 * size + 0.2, 0], 0.035, 0.035)
 
 
-def _cabbage(rng: Rng, built: Builder) -> None:
+def _cabbage(rng: Rng, built: PrimitiveBuilder) -> None:
     """A head with leaves around it."""
     built.part(SKIN)
     built.ellipsoid([0, 0.6, 0], [0.65, 0.6, 0.65])
@@ -279,7 +281,7 @@ def _cabbage(rng: Rng, built: Builder) -> None:
         )
 
 
-def _onion(rng: Rng, built: Builder) -> None:
+def _onion(rng: Rng, built: PrimitiveBuilder) -> None:
     """Onions, garlic, figs."""
     turn, neck = _tilt(rng), span(rng, 0.3, 0.8)
     outline = [[0.05, -0.6], [0.4, -0.6], [0.85, -0.1], [0.6, 0.4], [0.12, 0.6], [0.06, 0.6 + neck]]
@@ -291,7 +293,7 @@ def _onion(rng: Rng, built: Builder) -> None:
         built.limb(root, root + turn @ vec(0.12 * np.cos(k), -0.2, 0.12 * np.sin(k)), 0.025, 0.018)
 
 
-def _pod(rng: Rng, built: Builder) -> None:
+def _pod(rng: Rng, built: PrimitiveBuilder) -> None:
     """A pod with peas in it."""
     turn, long = _tilt(rng), span(rng, 0.9, 1.3)
     built.part(GREEN)
@@ -304,7 +306,7 @@ def _pod(rng: Rng, built: Builder) -> None:
         built.ellipsoid(turn @ vec(x, 0.02, 0), np.full(3, min(0.18, 0.8 * long / count)))
 
 
-def _maize(rng: Rng, built: Builder) -> None:
+def _maize(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cob in its leaves."""
     turn = _tilt(rng) @ turned(0, 0, span(rng, 0, 1.5))
     built.part(SKIN)

@@ -6,7 +6,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .cupboards import bed, dresser, shelf
 from .legs import legs
 from .making import Rng, chance, curve, pick, profile, rounded, span, tube, vec
@@ -14,7 +14,7 @@ from .making import Rng, chance, curve, pick, profile, rounded, span, tube, vec
 WOOD, SOFT, METAL, MORE = range(4)
 
 
-def furniture(rng: Rng) -> Builder:
+def furniture(rng: Rng) -> PrimitiveBuilder:
     """Make a piece of furniture."""
     kinds = (
         _chair,
@@ -32,12 +32,12 @@ def furniture(rng: Rng) -> Builder:
         _swivel,
         dresser,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
 
-def _seat(rng: Rng, built: Builder, half: F64, high: float) -> None:
+def _seat(rng: Rng, built: PrimitiveBuilder, half: F64, high: float) -> None:
     """A board, or a cushion on it."""
     thick = span(rng, 0.03, 0.08)
     built.part(pick(rng, (WOOD, SOFT)))
@@ -53,7 +53,7 @@ def _seat(rng: Rng, built: Builder, half: F64, high: float) -> None:
         )
 
 
-def _back(rng: Rng, built: Builder, half: F64, low: float, high: float) -> None:
+def _back(rng: Rng, built: PrimitiveBuilder, half: F64, low: float, high: float) -> None:
     """A chair's back, at -z; it leans."""
     lean = span(rng, 0, 0.25) * (high - low)
     z = -half[1] + 0.04
@@ -104,7 +104,7 @@ def _back(rng: Rng, built: Builder, half: F64, low: float, high: float) -> None:
         built.box(middle, [half[0] - 0.06, 0.32 * (high - low), 0.035], 0.02, turn)
 
 
-def _chair(rng: Rng, built: Builder) -> None:
+def _chair(rng: Rng, built: PrimitiveBuilder) -> None:
     """Any legs with any back, with or without arms."""
     half = vec(span(rng, 0.38, 0.55), span(rng, 0.36, 0.52))
     high, top = span(rng, 0.65, 0.95), span(rng, 0.7, 1.2)
@@ -122,7 +122,7 @@ def _chair(rng: Rng, built: Builder) -> None:
             )
 
 
-def _stool(rng: Rng, built: Builder) -> None:
+def _stool(rng: Rng, built: PrimitiveBuilder) -> None:
     """On one, three or four legs."""
     wide, high = span(rng, 0.3, 0.5), span(rng, 0.5, 1.5)
     built.part(pick(rng, (WOOD, SOFT)))
@@ -146,7 +146,7 @@ def _stool(rng: Rng, built: Builder) -> None:
         built.ring([0, 0.35 * high, 0], wide * (0.95 if legs > 1 else 0.6), 0.025)
 
 
-def _table(rng: Rng, built: Builder) -> None:
+def _table(rng: Rng, built: PrimitiveBuilder) -> None:
     """Square, round, on four legs, on one or on trestles; sometimes laid."""
     half, high = vec(span(rng, 0.6, 1.3), span(rng, 0.4, 0.8)), span(rng, 0.4, 1.0)
     thick, is_round = span(rng, 0.025, 0.06), chance(rng, 0.35)
@@ -194,7 +194,7 @@ def _table(rng: Rng, built: Builder) -> None:
             built.box(at + [0, 0.05, 0], [0.17, 0.05, 0.12], 0.01, turned(span(rng, 0, 3)))
 
 
-def _sofa(rng: Rng, built: Builder) -> None:
+def _sofa(rng: Rng, built: PrimitiveBuilder) -> None:
     """Armchairs and sofas with cushions."""
     seats = pick(rng, (1, 1, 2, 3))
     wide, deep, high = (
@@ -236,7 +236,7 @@ def _sofa(rng: Rng, built: Builder) -> None:
         legs(rng, built, vec(0.9 * wide, 0.9 * deep), foot + 0.05, "taper")
 
 
-def _cushions(rng: Rng, built: Builder, seats: int, size: F64) -> None:
+def _cushions(rng: Rng, built: PrimitiveBuilder, seats: int, size: F64) -> None:
     """One on each seat, often another behind; `size`: half the width, height, half the depth."""
     wide, high, deep = size
     for k in range(seats):
@@ -251,7 +251,7 @@ def _cushions(rng: Rng, built: Builder, seats: int, size: F64) -> None:
             built.superquadric([x, high + 0.35, -0.5 * deep], [0.28, 0.26, 0.12], 0.7, 0.7, turn)
 
 
-def _bench(rng: Rng, built: Builder) -> None:
+def _bench(rng: Rng, built: PrimitiveBuilder) -> None:
     """Of slats, on two trestles."""
     half, high = vec(span(rng, 0.7, 1.2), span(rng, 0.22, 0.35)), span(rng, 0.4, 0.6)
     slats = int(rng.integers(2, 5))
@@ -273,7 +273,7 @@ def _bench(rng: Rng, built: Builder) -> None:
         built.limb([x, high, -half[1]], [x, high + 0.62, -half[1] - 0.13], 0.035, 0.03)
 
 
-def _lamp(rng: Rng, built: Builder) -> None:
+def _lamp(rng: Rng, built: PrimitiveBuilder) -> None:
     """On the floor or on the desk, with an arm in two parts."""
     built.part(METAL)
     built.cylinder([0, 0.04, 0], span(rng, 0.2, 0.35), 0.04, 0.03)
@@ -299,7 +299,7 @@ def _lamp(rng: Rng, built: Builder) -> None:
     built.lathe(low, profile(inside, 1), turn, cavity=True)
 
 
-def _swivel(rng: Rng, built: Builder) -> None:
+def _swivel(rng: Rng, built: PrimitiveBuilder) -> None:
     """An office chair on castors."""
     high, half = span(rng, 0.55, 0.75), vec(span(rng, 0.36, 0.48), span(rng, 0.36, 0.45))
     built.part(SOFT)

@@ -6,11 +6,11 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder
+from ..solid import PrimitiveBuilder
 from .making import Rng, chance, curve, profile, span, tube, vec
 
 
-def hollow(built: Builder, outside: F64, wall: float, floor: float) -> None:
+def hollow(built: PrimitiveBuilder, outside: F64, wall: float, floor: float) -> None:
     """A body turned from `outside` (k, 2), below to top, hollow and open above."""
     built.lathe([0, 0, 0], profile(outside, 3))
     inside = np.array([p for p in outside if p[1] > outside[0, 1] + floor])
@@ -22,7 +22,7 @@ def hollow(built: Builder, outside: F64, wall: float, floor: float) -> None:
 
 
 def handle(
-    rng: Rng, built: Builder, x: float, low: float, high: float, out: float, thick: float
+    rng: Rng, built: PrimitiveBuilder, x: float, low: float, high: float, out: float, thick: float
 ) -> None:
     """An ear at the side +x, between two heights."""
     knots = [
@@ -39,7 +39,7 @@ def handle(
     tube(built, curve(knots, 9), thick, thick * span(rng, 0.8, 1.2))
 
 
-def saucer(rng: Rng, built: Builder, wide: float) -> None:
+def saucer(rng: Rng, built: PrimitiveBuilder, wide: float) -> None:
     """A dish that rises to its rim."""
     rim = span(rng, 0.08, 0.25)
     outline = [

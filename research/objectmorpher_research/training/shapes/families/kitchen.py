@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .hollow import handle, hollow, saucer
 from .making import Rng, chance, curve, pick, profile, span, tube, vec
 
 BODY, LID, INSIDE, MORE = range(4)
 
 
-def pot(rng: Rng, built: Builder) -> None:
+def pot(rng: Rng, built: PrimitiveBuilder) -> None:
     """Pots and pans with lids, ears or a long handle."""
     wide, high = span(rng, 0.5, 0.8), span(rng, 0.2, 0.8)
     built.part(BODY)
@@ -41,7 +41,7 @@ def pot(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, high + tall + 0.13, 0], [0.11, 0.09, 0.11])
 
 
-def teapot(rng: Rng, built: Builder) -> None:
+def teapot(rng: Rng, built: PrimitiveBuilder) -> None:
     """Teapots, kettles, watering cans: a spout on -x and a handle on +x."""
     wide, high = span(rng, 0.5, 0.75), span(rng, 0.6, 1.2)
     foot, top = span(rng, 0.3, 0.5), span(rng, 0.2, 0.35)
@@ -65,7 +65,7 @@ def teapot(rng: Rng, built: Builder) -> None:
     built.ellipsoid([0, high + 0.17, 0], [0.07, 0.08, 0.07], soft=0.03)
 
 
-def plate(rng: Rng, built: Builder) -> None:
+def plate(rng: Rng, built: PrimitiveBuilder) -> None:
     """A plate, often with food on it."""
     wide = span(rng, 0.8, 1.2)
     built.part(BODY)
@@ -83,7 +83,7 @@ def plate(rng: Rng, built: Builder) -> None:
         )
 
 
-def cheese(rng: Rng, built: Builder) -> None:
+def cheese(rng: Rng, built: PrimitiveBuilder) -> None:
     """A wheel of cheese, a cake or a pie; often a slice is gone."""
     wide, high = span(rng, 0.6, 1.0), span(rng, 0.12, 0.4)
     built.part(BODY)

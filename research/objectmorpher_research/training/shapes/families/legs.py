@@ -6,13 +6,15 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder
+from ..solid import PrimitiveBuilder
 from .making import Rng, chance, pick, profile, span, vec
 
 WOOD, SOFT, METAL = range(3)
 
 
-def legs(rng: Rng, built: Builder, half: F64, high: float, kind: str | None = None) -> None:
+def legs(
+    rng: Rng, built: PrimitiveBuilder, half: F64, high: float, kind: str | None = None
+) -> None:
     """Four legs beneath a seat or a top of half sizes (2,), x and z; each a part."""
     kind = kind or pick(rng, ("square", "round", "splayed", "turned", "taper"))
     thick, out = span(rng, 0.03, 0.07), span(rng, 0.05, 0.2)

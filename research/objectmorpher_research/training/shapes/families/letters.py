@@ -8,7 +8,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, depth, pick, rounded, span, vec
 
 BODY, MORE, THIRD = range(3)
@@ -54,7 +54,7 @@ def strokes(name: str) -> list[F64]:
 
 
 def draw(
-    built: Builder,
+    built: PrimitiveBuilder,
     lines: list[F64],
     shift: F64,
     thick: float,
@@ -76,7 +76,7 @@ def draw(
                 )
 
 
-def letter(rng: Rng, built: Builder, turn: F64) -> None:
+def letter(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Make a letter or digit with straight, bevelled or round strokes; or O, C, D, P."""
     half, bevel = depth(rng)
     built.part(BODY)
@@ -102,7 +102,7 @@ def letter(rng: Rng, built: Builder, turn: F64) -> None:
     draw(built, strokes(pick(rng, tuple(STROKES))), vec(0, 0), thick, half, turn, chance(rng, 0.3))
 
 
-def word(rng: Rng, built: Builder, turn: F64) -> None:
+def word(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Two to four letters side by side, on a board or alone."""
     count, half, thick = int(rng.integers(2, 5)), span(rng, 0.08, 0.25), span(rng, 0.1, 0.17)
     is_round = chance(rng, 0.25)

@@ -6,14 +6,14 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, pick, rounded, smooth, span, vec
 from .wheels import lights, wheels
 
 BODY, GLASS, TYRE, METAL, MORE, SEAT = range(6)
 
 
-def truck(rng: Rng, built: Builder) -> None:
+def truck(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cab, and behind it a box, a bed, a tank or a mixer's drum; fire engines with ladders."""
     wheel, wide, long = span(rng, 0.14, 0.2), span(rng, 0.32, 0.42), span(rng, 1.0, 1.4)
     deck, cab = 1.5 * wheel, span(rng, 0.5, 0.8)
@@ -49,7 +49,7 @@ def truck(rng: Rng, built: Builder) -> None:
     wheels(rng, built, xs, wheel, wide)
 
 
-def _load(rng: Rng, built: Builder, middle: F64, size: F64) -> None:
+def _load(rng: Rng, built: PrimitiveBuilder, middle: F64, size: F64) -> None:
     """What stands on the deck at `middle`; `size`: half its length, height, half its width."""
     rear, high, wide = size
     load = pick(rng, ("box", "bed", "tank", "mixer", "ladder", "logs"))
@@ -83,7 +83,7 @@ def _load(rng: Rng, built: Builder, middle: F64, size: F64) -> None:
             )
 
 
-def bus(rng: Rng, built: Builder) -> None:
+def bus(rng: Rng, built: PrimitiveBuilder) -> None:
     """Make a bus with one or two storeys."""
     wheel, wide, long = span(rng, 0.13, 0.18), span(rng, 0.28, 0.36), span(rng, 0.8, 1.4)
     storeys = pick(rng, (1, 1, 1, 2))
@@ -109,7 +109,7 @@ def bus(rng: Rng, built: Builder) -> None:
     wheels(rng, built, (-0.6 * long, 0.62 * long), wheel, wide)
 
 
-def train(rng: Rng, built: Builder) -> None:
+def train(rng: Rng, built: PrimitiveBuilder) -> None:
     """A steam engine, or an electric one, with or without a wagon."""
     wide, wheel = span(rng, 0.28, 0.36), span(rng, 0.13, 0.2)
     deck = 1.6 * wheel

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder
+from ..solid import PrimitiveBuilder
 from .making import Rng, chance, span
 
 
-def superquadrics(rng: Rng) -> Builder:
+def superquadrics(rng: Rng) -> PrimitiveBuilder:
     """Make one to five superquadrics that run into one another."""
-    built = Builder()
+    built = PrimitiveBuilder()
     soft = span(rng, 0, 0.3) if chance(rng, 0.6) else 0.0
     middles: list[np.ndarray] = []
     sizes: list[float] = []

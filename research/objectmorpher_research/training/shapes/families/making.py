@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder
+from ..solid import PrimitiveBuilder
 
 Rng = np.random.Generator
 T = TypeVar("T")
@@ -98,7 +98,7 @@ def curve(points: ArrayLike, count: int, is_closed: bool = False) -> F64:
 
 
 def tube(
-    built: Builder,
+    built: PrimitiveBuilder,
     points: F64,
     near: float,
     far: float | None = None,
@@ -122,7 +122,7 @@ def joint(a: F64, b: F64, length: float, towards: ArrayLike) -> F64:
 
 
 def two_bones(
-    built: Builder, points: Sequence[F64], radii: Sequence[float], soft: float = 0.0
+    built: PrimitiveBuilder, points: Sequence[F64], radii: Sequence[float], soft: float = 0.0
 ) -> None:
     """A limb along points, with a radius at each."""
     for k in range(len(points) - 1):

@@ -6,14 +6,14 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, along, turned
+from ..solid import PrimitiveBuilder, along, turned
 from .fruit import fruit, vegetable
 from .making import Rng, chance, curve, pick, profile, smooth, span, tube, vec
 
 GREEN, PETAL, MIDDLE, POT, MORE = range(5)
 
 
-def plants(rng: Rng) -> Builder:
+def plants(rng: Rng) -> PrimitiveBuilder:
     """Make a plant."""
     kinds = (
         _flower,
@@ -35,12 +35,12 @@ def plants(rng: Rng) -> Builder:
         vegetable,
         vegetable,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
 
-def _bloom(rng: Rng, built: Builder, at: F64, face: F64, size: float) -> None:
+def _bloom(rng: Rng, built: PrimitiveBuilder, at: F64, face: F64, size: float) -> None:
     """A flower's head that looks along `face`: a disc with petals, a tulip's cup, or a ball."""
     axes = along(face) @ turned(span(rng, 0, 6))
     kind = pick(rng, ("daisy", "daisy", "sheets", "cup", "rose", "ball"))
@@ -86,7 +86,9 @@ def _bloom(rng: Rng, built: Builder, at: F64, face: F64, size: float) -> None:
     built.ellipsoid(at + 0.05 * size * face, size * vec(0.32, 0.16, 0.32), axes)
 
 
-def _stalk(rng: Rng, built: Builder, foot: F64, top: F64, thick: float, leaves: int) -> F64:
+def _stalk(
+    rng: Rng, built: PrimitiveBuilder, foot: F64, top: F64, thick: float, leaves: int
+) -> F64:
     """From the foot to the top, with leaves; returns the direction of its end."""
     bow = rng.normal(0, 0.12, 3) * [1, 0, 1]
     line = curve([foot, 0.5 * (foot + top) + bow, top], 6)
@@ -98,7 +100,7 @@ def _stalk(rng: Rng, built: Builder, foot: F64, top: F64, thick: float, leaves: 
     return end / np.linalg.norm(end)
 
 
-def _blade(rng: Rng, built: Builder, root: F64, yaw: float, long: float) -> None:
+def _blade(rng: Rng, built: PrimitiveBuilder, root: F64, yaw: float, long: float) -> None:
     """A leaf that leaves the stalk upwards and hangs over."""
     built.part(GREEN)
     spin = turned(yaw) @ turned(0, -span(rng, 0.1, 1.1))
@@ -118,7 +120,7 @@ def _blade(rng: Rng, built: Builder, root: F64, yaw: float, long: float) -> None
         )
 
 
-def _flower(rng: Rng, built: Builder) -> None:
+def _flower(rng: Rng, built: PrimitiveBuilder) -> None:
     """One flower on its stalk."""
     high = span(rng, 0.5, 2.0)
     top = vec(rng.normal(0, 0.15), high, rng.normal(0, 0.15))
@@ -127,7 +129,7 @@ def _flower(rng: Rng, built: Builder) -> None:
     _bloom(rng, built, top, face / np.linalg.norm(face), span(rng, 0.4, 0.7))
 
 
-def _bouquet(rng: Rng, built: Builder) -> None:
+def _bouquet(rng: Rng, built: PrimitiveBuilder) -> None:
     """Some flowers, in a vase or without."""
     in_vase = chance(rng, 0.6)
     count = int(rng.integers(2, 5))
@@ -152,7 +154,7 @@ def _bouquet(rng: Rng, built: Builder) -> None:
         built.lathe([0, 0, 0], profile(outline, 3))
 
 
-def _potted(rng: Rng, built: Builder) -> None:
+def _potted(rng: Rng, built: PrimitiveBuilder) -> None:
     """A pot with earth and a bush, blades, a flower, a cactus or a little tree."""
     wide, high = span(rng, 0.3, 0.5), span(rng, 0.35, 0.7)
     built.part(POT)
@@ -191,7 +193,7 @@ def _potted(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, top + 0.25, 0], np.full(3, span(rng, 0.3, 0.45)))
 
 
-def _leaf(rng: Rng, built: Builder) -> None:
+def _leaf(rng: Rng, built: PrimitiveBuilder) -> None:
     """One leaf: oval, pointed, lobed; bent and waved."""
     turn = turned(span(rng, 0, 6), span(rng, -1.5, 0.2), rng.normal(0, 0.4))
     kind = pick(rng, ("oval", "point", "lobed"))
@@ -213,7 +215,7 @@ def _leaf(rng: Rng, built: Builder) -> None:
     )
 
 
-def _mushroom(rng: Rng, built: Builder) -> None:
+def _mushroom(rng: Rng, built: PrimitiveBuilder) -> None:
     """One to three of them."""
     for k in range(pick(rng, (1, 1, 2, 3))):
         size = span(rng, 0.5, 1.0) if k else 1.0
@@ -242,7 +244,7 @@ def _mushroom(rng: Rng, built: Builder) -> None:
                 built.ellipsoid(at, np.full(3, size * span(rng, 0.04, 0.09)))
 
 
-def _arms(rng: Rng, built: Builder, foot: F64, high: float) -> None:
+def _arms(rng: Rng, built: PrimitiveBuilder, foot: F64, high: float) -> None:
     """A cactus: a column with arms, a barrel, or pads on pads."""
     kind = pick(rng, ("column", "column", "barrel", "pads"))
     thick = high * span(rng, 0.13, 0.2)
@@ -286,12 +288,12 @@ def _arms(rng: Rng, built: Builder, foot: F64, high: float) -> None:
         built.ellipsoid(top, high * vec(0.1, 0.1, 0.1))
 
 
-def _cactus(rng: Rng, built: Builder) -> None:
+def _cactus(rng: Rng, built: PrimitiveBuilder) -> None:
     """Without a pot."""
     _arms(rng, built, vec(0, 0, 0), 1.0)
 
 
-def _tree(rng: Rng, built: Builder) -> None:
+def _tree(rng: Rng, built: PrimitiveBuilder) -> None:
     """A trunk with boughs and a crown of balls."""
     high, thick = span(rng, 0.4, 1.0), span(rng, 0.06, 0.14)
     built.part(MIDDLE)
@@ -316,7 +318,7 @@ def _tree(rng: Rng, built: Builder) -> None:
             built.ellipsoid(top + [0, 0.4, 0] + rng.normal(0, 0.35, 3), np.full(3, 0.07))
 
 
-def _fir(rng: Rng, built: Builder) -> None:
+def _fir(rng: Rng, built: PrimitiveBuilder) -> None:
     """Cones on a trunk; sometimes with balls on them."""
     storeys = int(rng.integers(1, 5))
     built.part(MIDDLE)
@@ -341,7 +343,7 @@ def _fir(rng: Rng, built: Builder) -> None:
             )
 
 
-def _palm(rng: Rng, built: Builder) -> None:
+def _palm(rng: Rng, built: PrimitiveBuilder) -> None:
     """A bent trunk with fronds."""
     high = span(rng, 0.8, 1.5)
     top = vec(span(rng, -0.4, 0.4), high, span(rng, -0.2, 0.2))

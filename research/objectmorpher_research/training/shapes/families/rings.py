@@ -6,13 +6,13 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, curve, ngon, pick, rounded, span, tube, vec
 
 BODY, MORE, THIRD = range(3)
 
 
-def rings(rng: Rng) -> Builder:
+def rings(rng: Rng) -> PrimitiveBuilder:
     """Make one that lies, stands or hangs."""
     kinds = (
         _torus,
@@ -34,7 +34,7 @@ def rings(rng: Rng) -> Builder:
         _headphones,
         _glasses,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
@@ -47,7 +47,7 @@ def _any_turn(rng: Rng) -> F64:
     return pick(rng, (turn * np.sign(np.linalg.det(turn)), upright, lying))
 
 
-def _torus(rng: Rng, built: Builder) -> None:
+def _torus(rng: Rng, built: PrimitiveBuilder) -> None:
     """A ring or an arc of one, a doughnut with icing, a finger ring with a stone."""
     turn, thick = _any_turn(rng), span(rng, 0.08, 0.42)
     half = np.pi if chance(rng, 0.6) else span(rng, 0.6, 2.8)
@@ -70,7 +70,7 @@ def _torus(rng: Rng, built: Builder) -> None:
             built.ellipsoid(turn @ at, np.full(3, span(rng, 0.4, 0.8) * thick + 0.02))
 
 
-def _bent_tube(rng: Rng, built: Builder) -> None:
+def _bent_tube(rng: Rng, built: PrimitiveBuilder) -> None:
     """Along a smooth line: hoses, snakes, worms, sausages, ropes, horns."""
     count = int(rng.integers(4, 8))
     steps = rng.normal(0, 1, (count, 3)) * [1, span(rng, 0.1, 1), 1]
@@ -87,7 +87,7 @@ def _bent_tube(rng: Rng, built: Builder) -> None:
         built.ellipsoid(line[0], size * np.exp(rng.normal(0, 0.2, 3)))
 
 
-def _chain(rng: Rng, built: Builder) -> None:
+def _chain(rng: Rng, built: PrimitiveBuilder) -> None:
     """Links along a line, each turned against the last; a clasp or a pendant."""
     count = int(rng.integers(4, 11))
     bow = span(rng, -0.25, 0.25)
@@ -108,7 +108,7 @@ def _chain(rng: Rng, built: Builder) -> None:
         way += bow + rng.normal(0, 0.1)
 
 
-def _tyre(rng: Rng, built: Builder) -> None:
+def _tyre(rng: Rng, built: PrimitiveBuilder) -> None:
     """A tyre with its tread, alone or piled up; or on its rim."""
     large, small = span(rng, 0.5, 0.8), span(rng, 0.15, 0.3)
     piled = pick(rng, (1, 1, 2, 3))
@@ -137,7 +137,7 @@ def _tyre(rng: Rng, built: Builder) -> None:
             built.cylinder(turn @ at, 0.15 * large, small, 0, turn, cut=True)
 
 
-def _wreath(rng: Rng, built: Builder) -> None:
+def _wreath(rng: Rng, built: PrimitiveBuilder) -> None:
     """Balls, leaves or lumps on a ring."""
     turn, count, size = _any_turn(rng), int(rng.integers(10, 24)), span(rng, 0.12, 0.25)
     built.part(BODY)
@@ -154,7 +154,7 @@ def _wreath(rng: Rng, built: Builder) -> None:
             built.ellipsoid(at, size * vec(1.5, 0.25, 0.7), leaf)
 
 
-def _knot(rng: Rng, built: Builder) -> None:
+def _knot(rng: Rng, built: PrimitiveBuilder) -> None:
     """A torus knot; the trefoil is the simplest."""
     p, q = pick(rng, ((2, 3), (3, 2), (2, 5), (1, 3), (1, 4), (3, 1)))
     t = np.linspace(0, 2 * np.pi, 36, endpoint=False)
@@ -165,7 +165,7 @@ def _knot(rng: Rng, built: Builder) -> None:
     tube(built, line @ _any_turn(rng).T, span(rng, 0.08, 0.2), is_closed=True)
 
 
-def _spring(rng: Rng, built: Builder) -> None:
+def _spring(rng: Rng, built: PrimitiveBuilder) -> None:
     """A coil, a telephone's cord, a corkscrew."""
     turns, high = span(rng, 2.0, 4.5), span(rng, 0.8, 2.5)
     count = min(int(9 * turns), 38)
@@ -185,7 +185,7 @@ def _spring(rng: Rng, built: Builder) -> None:
             built.cylinder(turn @ middle, 0.7, 0.06, 0.02, turn)
 
 
-def _hook(rng: Rng, built: Builder) -> None:
+def _hook(rng: Rng, built: PrimitiveBuilder) -> None:
     """Hooks, canes, clothes hangers, question marks, anchors."""
     thick = span(rng, 0.06, 0.16)
     kind = pick(rng, ("cane", "hanger", "anchor", "ess"))
@@ -220,7 +220,7 @@ def _hook(rng: Rng, built: Builder) -> None:
         built.ellipsoid(flat @ np.array(top[-1]), np.full(3, 1.4 * thick))
 
 
-def _pipes(rng: Rng, built: Builder) -> None:
+def _pipes(rng: Rng, built: PrimitiveBuilder) -> None:
     """Straight pieces with elbows, flanges and a tap."""
     at, way, thick = np.zeros(3), vec(1, 0, 0), span(rng, 0.12, 0.25)
     axes = [vec(*row) for row in np.concatenate([np.eye(3), -np.eye(3)])]
@@ -241,7 +241,7 @@ def _pipes(rng: Rng, built: Builder) -> None:
         built.ring(at + vec(0, 2.3 * thick, 0), 1.2 * thick, 0.25 * thick)
 
 
-def _frame(rng: Rng, built: Builder) -> None:
+def _frame(rng: Rng, built: PrimitiveBuilder) -> None:
     """Picture frames, mirrors, windows, doors: a hole cut into a board."""
     half, deep = vec(span(rng, 0.5, 1.0), span(rng, 0.5, 1.2)), span(rng, 0.03, 0.12)
     rim = span(rng, 0.08, 0.3) * float(half.min())
@@ -274,7 +274,7 @@ def _frame(rng: Rng, built: Builder) -> None:
         built.limb(turn @ vec(0, 0.3 * half[1], -deep), leg, 0.04, 0.04)
 
 
-def _washers(rng: Rng, built: Builder) -> None:
+def _washers(rng: Rng, built: PrimitiveBuilder) -> None:
     """Rings on a peg, rolls of tape and paper, a nut."""
     wide = span(rng, 0.6, 1.0)
     if chance(rng, 0.5):
@@ -297,7 +297,7 @@ def _washers(rng: Rng, built: Builder) -> None:
     built.cylinder([0, 0, 0], span(rng, 0.3, 0.8), 2 * high, 0, turn, cut=True)
 
 
-def _links(rng: Rng, built: Builder) -> None:
+def _links(rng: Rng, built: PrimitiveBuilder) -> None:
     """A bunch of rings, a key ring with keys."""
     built.part(BODY)
     built.ring([0, 0.9, 0], 0.35, 0.045, turn=turned(span(rng, 0, 0.5), np.pi / 2))
@@ -314,7 +314,7 @@ def _links(rng: Rng, built: Builder) -> None:
             built.box(at + turn @ vec(0.08, y, 0), [0.06, 0.04, 0.03], 0.005, turn)
 
 
-def _basket(rng: Rng, built: Builder) -> None:
+def _basket(rng: Rng, built: PrimitiveBuilder) -> None:
     """A basket or a bucket with a bow over it."""
     wide, high = span(rng, 0.5, 0.8), span(rng, 0.3, 0.6)
     built.part(BODY)
@@ -336,7 +336,7 @@ def _basket(rng: Rng, built: Builder) -> None:
         built.ellipsoid(at + [0, 0.75 * high, 0], np.full(3, span(rng, 0.14, 0.24)))
 
 
-def _headphones(rng: Rng, built: Builder) -> None:
+def _headphones(rng: Rng, built: PrimitiveBuilder) -> None:
     """A band over two cups."""
     built.part(BODY)
     turn = turned(0, -np.pi / 2)
@@ -348,7 +348,7 @@ def _headphones(rng: Rng, built: Builder) -> None:
             built.cylinder([sign * x, -0.08, 0], wide, half, 0.07, lying)
 
 
-def _glasses(rng: Rng, built: Builder) -> None:
+def _glasses(rng: Rng, built: PrimitiveBuilder) -> None:
     """Spectacles: two rims, a bridge, two bars."""
     size, thick = span(rng, 0.24, 0.32), span(rng, 0.025, 0.05)
     gap = size + 0.1

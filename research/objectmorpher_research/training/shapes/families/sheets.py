@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .clothes import cap, glove, handbag, hat, rucksack, shirt, shoe, trousers
 from .making import Rng, chance, curve, pick, profile, rounded, span, tube, vec
 
 CLOTH, MORE, METAL, THIRD = range(4)
 
 
-def sheets(rng: Rng) -> Builder:
+def sheets(rng: Rng) -> PrimitiveBuilder:
     """Make a sheet."""
     kinds = (
         _cloth,
@@ -34,7 +34,7 @@ def sheets(rng: Rng) -> Builder:
         glove,
         _scroll,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
@@ -44,7 +44,7 @@ def _waves(rng: Rng, high: float) -> tuple[float, float, float, float]:
     return span(rng, 0.2, 1.0) * high, span(rng, 0, 6), span(rng, 0, 6), span(rng, 0, 6.3)
 
 
-def _cloth(rng: Rng, built: Builder) -> None:
+def _cloth(rng: Rng, built: PrimitiveBuilder) -> None:
     """A cloth that hangs, lies or flies; one or two of them."""
     turn = turned(span(rng, 0, 6), span(rng, -1.5, 0.3), rng.normal(0, 0.4))
     built.part(CLOTH)
@@ -57,7 +57,7 @@ def _cloth(rng: Rng, built: Builder) -> None:
         built.sheet(turn @ vec(0, 0, 0.12), 0.8 * half, 0.02, _waves(rng, 0.08), bend, spin)
 
 
-def _flag(rng: Rng, built: Builder) -> None:
+def _flag(rng: Rng, built: PrimitiveBuilder) -> None:
     """On a pole, with one to three stripes or a cross."""
     half = vec(span(rng, 0.5, 0.9), span(rng, 0.3, 0.5))
     top = span(rng, 1.2, 2.0)
@@ -76,7 +76,7 @@ def _flag(rng: Rng, built: Builder) -> None:
         built.prism(at, outline, 2.0, keep=True)
 
 
-def _paper(rng: Rng, built: Builder) -> None:
+def _paper(rng: Rng, built: PrimitiveBuilder) -> None:
     """Sheets of paper, a letter, a curled page, a folded card, a paper plane."""
     kind = pick(rng, ("pile", "curl", "card", "plane"))
     turn = turned(span(rng, 0, 6))
@@ -104,7 +104,7 @@ def _paper(rng: Rng, built: Builder) -> None:
         built.sheet([0, 0.06 * k, 0], [0.7, 1.0], 0.014, waves, bend, spin)
 
 
-def _open_book(rng: Rng, built: Builder) -> None:
+def _open_book(rng: Rng, built: PrimitiveBuilder) -> None:
     """Two bowed halves and a cover."""
     half, lift = vec(span(rng, 0.45, 0.6), span(rng, 0.6, 0.8)), span(rng, 0.05, 0.5)
     tilt = turned(span(rng, 0, 6)) @ turned(0, -span(rng, 0, 1.0))
@@ -136,7 +136,7 @@ def _open_book(rng: Rng, built: Builder) -> None:
             )
 
 
-def _umbrella(rng: Rng, built: Builder) -> None:
+def _umbrella(rng: Rng, built: PrimitiveBuilder) -> None:
     """Open, with panes that sag between its ribs, or closed; a parasol stands."""
     tilt = turned(0, *rng.normal(0, 0.5, 2)) if chance(rng, 0.7) else np.eye(3)
     ribs, wide, high = int(rng.integers(6, 10)), span(rng, 0.8, 1.1), span(rng, 0.3, 0.6)
@@ -171,7 +171,7 @@ def _umbrella(rng: Rng, built: Builder) -> None:
     built.box(tilt @ vec(0, -1.0, 0), [2, 1.0, 2], 0, tilt, cut=True)
 
 
-def _pillow(rng: Rng, built: Builder) -> None:
+def _pillow(rng: Rng, built: PrimitiveBuilder) -> None:
     """One or a heap of them, with buttons or a rim."""
     y = 0.0
     for k in range(rng.integers(1, 4)):
@@ -187,7 +187,7 @@ def _pillow(rng: Rng, built: Builder) -> None:
         y += 1.7 * half[1]
 
 
-def _tent(rng: Rng, built: Builder) -> None:
+def _tent(rng: Rng, built: PrimitiveBuilder) -> None:
     """A tent with two sides, an open front and a pole, or a dome."""
     long, high, wide = span(rng, 0.7, 1.2), span(rng, 0.6, 1.0), span(rng, 0.5, 0.9)
     built.part(CLOTH)
@@ -209,7 +209,7 @@ def _tent(rng: Rng, built: Builder) -> None:
         built.ring([0, 0, 0], 1.0, 0.03, np.pi / 2, turned(0, -np.pi / 2))
 
 
-def _fan(rng: Rng, built: Builder) -> None:
+def _fan(rng: Rng, built: PrimitiveBuilder) -> None:
     """Folded paper: a fan, a lampshade, a screen."""
     if chance(rng, 0.5):
         count, half = int(rng.integers(5, 9)), span(rng, 0.6, 1.3)
@@ -239,7 +239,7 @@ def _fan(rng: Rng, built: Builder) -> None:
         x, z = float(b[0]), float(b[2])
 
 
-def _scroll(rng: Rng, built: Builder) -> None:
+def _scroll(rng: Rng, built: PrimitiveBuilder) -> None:
     """Paper, a carpet or a mat that is rolled up at one end or at both."""
     long, wide, thick = span(rng, 0.5, 1.2), span(rng, 0.35, 0.7), span(rng, 0.014, 0.04)
     built.part(CLOTH)

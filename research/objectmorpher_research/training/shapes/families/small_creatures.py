@@ -6,15 +6,15 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, curve, joint, pick, span, tube, two_bones, vec
 
 SKIN, OTHER, EYES, HORN = 0, 1, 2, 3
 
 
-def bird(rng: Rng) -> Builder:
+def bird(rng: Rng) -> PrimitiveBuilder:
     """Make a bird, from ducks to storks; wings folded or spread."""
-    built = Builder()
+    built = PrimitiveBuilder()
     long, fat = 1.0, span(rng, 0.28, 0.45)
     leg = pick(rng, (0.05, 0.3, 0.35, 0.9)) * span(rng, 0.8, 1.2)
     pitch = span(rng, -0.1, 0.8)
@@ -45,7 +45,7 @@ def bird(rng: Rng) -> Builder:
     return built
 
 
-def _beak(rng: Rng, built: Builder, head: F64, face: F64, size: float) -> None:
+def _beak(rng: Rng, built: PrimitiveBuilder, head: F64, face: F64, size: float) -> None:
     """A beak, eyes, now and then a comb."""
     built.part(HORN)
     long = size * pick(rng, (0.6, 0.8, 1.4, 2.4))
@@ -76,7 +76,13 @@ def _beak(rng: Rng, built: Builder, head: F64, face: F64, size: float) -> None:
 
 
 def _wing(
-    rng: Rng, built: Builder, middle: F64, fat: float, pitch: float, sign: int, is_spread: bool
+    rng: Rng,
+    built: PrimitiveBuilder,
+    middle: F64,
+    fat: float,
+    pitch: float,
+    sign: int,
+    is_spread: bool,
 ) -> None:
     """Folded at the side, or spread in two pieces."""
     built.part(OTHER)
@@ -98,7 +104,7 @@ def _wing(
         built.ellipsoid(middle + 0.5 * (a + b), half, axes, soft=0.06)
 
 
-def _bird_leg(rng: Rng, built: Builder, middle: F64, fat: float, sign: int) -> None:
+def _bird_leg(rng: Rng, built: PrimitiveBuilder, middle: F64, fat: float, sign: int) -> None:
     """A leg with four toes."""
     built.part(HORN)
     root = middle + vec(0, -0.6 * fat, sign * 0.4 * fat)
@@ -110,9 +116,9 @@ def _bird_leg(rng: Rng, built: Builder, middle: F64, fat: float, sign: int) -> N
         built.limb(foot, toe, 0.028, 0.02)
 
 
-def fish(rng: Rng) -> Builder:
+def fish(rng: Rng) -> PrimitiveBuilder:
     """Make a fish, from eels to discs, sharks and dolphins; bent a little as if it swam."""
-    built = Builder()
+    built = PrimitiveBuilder()
     high, wide = span(rng, 0.14, 0.5), span(rng, 0.1, 0.24)
     wag = rng.normal(0, 0.12)
     built.part(SKIN)
@@ -158,9 +164,9 @@ def fish(rng: Rng) -> Builder:
     return built
 
 
-def insect(rng: Rng) -> Builder:
+def insect(rng: Rng) -> PrimitiveBuilder:
     """Beetles, ants, flies, butterflies and spiders."""
-    built = Builder()
+    built = PrimitiveBuilder()
     pairs = pick(rng, (3, 3, 3, 4))
     sizes = np.exp(rng.normal([-1.0, -1.35, -1.5], 0.2))  # hind body, middle, head
     at, high = 0.0, span(rng, 0.22, 0.4)
@@ -199,7 +205,7 @@ def insect(rng: Rng) -> Builder:
     return built
 
 
-def _insect_wings(rng: Rng, built: Builder, root: F64, size: float) -> None:
+def _insect_wings(rng: Rng, built: PrimitiveBuilder, root: F64, size: float) -> None:
     """One or two pairs, flat."""
     lift, wide = span(rng, 0.05, 1.2), span(rng, 0.15, 0.4)
     for back in (0.0, 0.8)[: pick(rng, (1, 2))]:

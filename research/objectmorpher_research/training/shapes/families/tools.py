@@ -8,13 +8,13 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, ngon, pick, profile, rounded, smooth, span, vec
 
 STEEL, GRIP, MORE = range(3)
 
 
-def tool(rng: Rng, built: Builder, turn: F64) -> None:
+def tool(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Make a tool in the plane of x and y of `turn`, its handle below."""
     kinds = (
         _hammer,
@@ -39,7 +39,9 @@ def tool(rng: Rng, built: Builder, turn: F64) -> None:
     pick(rng, kinds)(rng, built, turn)
 
 
-def _grip(rng: Rng, built: Builder, turn: F64, low: float, high: float, thick: float) -> None:
+def _grip(
+    rng: Rng, built: PrimitiveBuilder, turn: F64, low: float, high: float, thick: float
+) -> None:
     """A handle along y: round, swollen or flat."""
     built.part(GRIP)
     kind = pick(rng, ("round", "turned", "flat"))
@@ -57,7 +59,7 @@ def _grip(rng: Rng, built: Builder, turn: F64, low: float, high: float, thick: f
         built.lathe([0, 0, 0], profile(swell * [thick, high - low] + [0, low], 2), turn)
 
 
-def _hammer(rng: Rng, built: Builder, turn: F64) -> None:
+def _hammer(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """With a claw, a mallet, or square."""
     _grip(rng, built, turn, -1.2, 0.6, span(rng, 0.07, 0.12))
     built.part(STEEL)
@@ -75,7 +77,7 @@ def _hammer(rng: Rng, built: Builder, turn: F64) -> None:
             built.limb(turn @ a, turn @ b, 0.09, 0.03, soft=0.03)
 
 
-def _spanner(rng: Rng, built: Builder, turn: F64) -> None:
+def _spanner(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Jaws at one end, a ring or jaws at the other."""
     half, wide = span(rng, 0.05, 0.1), span(rng, 0.1, 0.16)
     axle = turn @ turned(0, np.pi / 2)
@@ -93,7 +95,7 @@ def _spanner(rng: Rng, built: Builder, turn: F64) -> None:
             built.prism(turn @ vec(0, -1.15, 0), ngon(6, 0.2), 1, 0, turn, cut=True)
 
 
-def _key(rng: Rng, built: Builder, turn: F64) -> None:
+def _key(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """With a ring, a plate or a clover leaf, and teeth."""
     half = span(rng, 0.05, 0.09)
     axle = turn @ turned(0, np.pi / 2)
@@ -113,7 +115,7 @@ def _key(rng: Rng, built: Builder, turn: F64) -> None:
         built.box(turn @ vec(0.08 + long, y, 0), [long, 0.07, half], 0.01, turn)
 
 
-def _scissors(rng: Rng, built: Builder, turn: F64) -> None:
+def _scissors(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """More or less open."""
     opened = span(rng, 0.05, 0.5)
     for sign in (1, -1):
@@ -135,7 +137,7 @@ def _scissors(rng: Rng, built: Builder, turn: F64) -> None:
     built.cylinder([0, 0, 0], 0.07, 0.1, 0.02, turn @ turned(0, np.pi / 2))
 
 
-def _screwdriver(rng: Rng, built: Builder, turn: F64) -> None:
+def _screwdriver(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A blade in a handle."""
     _grip(rng, built, turn, -1.0, -0.1, span(rng, 0.14, 0.22))
     built.part(STEEL)
@@ -143,7 +145,7 @@ def _screwdriver(rng: Rng, built: Builder, turn: F64) -> None:
     built.box(turn @ vec(0, 0.95, 0), [0.09, 0.1, 0.03], 0.01, turn)
 
 
-def _saw(rng: Rng, built: Builder, turn: F64) -> None:
+def _saw(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A blade with teeth and a handle with a hole."""
     teeth, high = int(rng.integers(8, 14)), span(rng, 0.25, 0.4)
     x = np.linspace(0, 1.8, 2 * teeth)
@@ -156,7 +158,7 @@ def _saw(rng: Rng, built: Builder, turn: F64) -> None:
     built.prism(turn @ vec(-0.75, 0.12, 0), rounded(0.13, 0.16, 0.1), 0.5, 0, turn, cut=True)
 
 
-def _knife(rng: Rng, built: Builder, turn: F64) -> None:
+def _knife(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A knife or a sword with its guard."""
     long, wide = span(rng, 0.8, 1.8), span(rng, 0.08, 0.18)
     _grip(rng, built, turn, -0.7, 0.0, span(rng, 0.07, 0.11))
@@ -170,7 +172,7 @@ def _knife(rng: Rng, built: Builder, turn: F64) -> None:
         built.ellipsoid(turn @ vec(0, -0.75, 0), np.full(3, 0.12))
 
 
-def _fork(rng: Rng, built: Builder, turn: F64) -> None:
+def _fork(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A fork, or a garden's."""
     teeth, thick = pick(rng, (2, 3, 4)), span(rng, 0.03, 0.05)
     built.part(STEEL)
@@ -182,7 +184,7 @@ def _fork(rng: Rng, built: Builder, turn: F64) -> None:
         built.limb(turn @ a, turn @ b, thick, 0.7 * thick, soft=0.02)
 
 
-def _spoon(rng: Rng, built: Builder, turn: F64) -> None:
+def _spoon(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A spoon, a ladle or a shovel."""
     long, wide = span(rng, 1.2, 2.0), span(rng, 0.25, 0.5)
     built.part(STEEL)
@@ -199,7 +201,7 @@ def _spoon(rng: Rng, built: Builder, turn: F64) -> None:
     )
 
 
-def _brush(rng: Rng, built: Builder, turn: F64) -> None:
+def _brush(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A paint brush, a broom, a toothbrush."""
     kind = pick(rng, ("paint", "broom", "tooth"))
     _grip(rng, built, turn, -1.6 if kind == "broom" else -1.0, 0.0, 0.07)
@@ -222,7 +224,7 @@ def _brush(rng: Rng, built: Builder, turn: F64) -> None:
         built.box(turn @ vec(0, 0.4, 0.14), [0.085, 0.22, 0.12], 0.02, turn)
 
 
-def _racket(rng: Rng, built: Builder, turn: F64) -> None:
+def _racket(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """For tennis (strings) or table tennis (a blade)."""
     _grip(rng, built, turn, -1.2, -0.4, 0.09)
     if chance(rng, 0.5):
@@ -244,7 +246,7 @@ def _racket(rng: Rng, built: Builder, turn: F64) -> None:
         )
 
 
-def _guitar(rng: Rng, built: Builder, turn: F64) -> None:
+def _guitar(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A body with a waist, a hole, a neck and pegs."""
     deep, wide = span(rng, 0.06, 0.2), span(rng, 0.48, 0.62)
     side = [
@@ -271,7 +273,7 @@ def _guitar(rng: Rng, built: Builder, turn: F64) -> None:
         built.ellipsoid(turn @ vec(x, 1.68 + 0.06 * k, deep - 0.02), [0.06, 0.03, 0.03], turn)
 
 
-def _torch(rng: Rng, built: Builder, turn: F64) -> None:
+def _torch(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A torch, a microphone, a hair dryer."""
     kind = pick(rng, ("torch", "microphone", "dryer"))
     _grip(rng, built, turn, -1.0, 0.3, span(rng, 0.13, 0.2))
@@ -289,7 +291,7 @@ def _torch(rng: Rng, built: Builder, turn: F64) -> None:
         built.cylinder(turn @ vec(-0.95, 0.45, 0), 0.16, 0.15, 0, lying, cavity=True)
 
 
-def _pen(rng: Rng, built: Builder, turn: F64) -> None:
+def _pen(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A pencil with six sides, a pen with a clip."""
     long, thick = span(rng, 0.7, 1.3), span(rng, 0.09, 0.14)
     along_y = turn @ turned(0, np.pi / 2)
@@ -307,7 +309,7 @@ def _pen(rng: Rng, built: Builder, turn: F64) -> None:
         built.box(turn @ vec(0, -0.65 * long, thick + 0.03), [0.03, 0.3 * long, 0.02], 0.01, turn)
 
 
-def _magnifier(rng: Rng, built: Builder, turn: F64) -> None:
+def _magnifier(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A magnifying glass, a hand mirror, a pan seen from above."""
     size, axle = span(rng, 0.4, 0.6), turn @ turned(0, np.pi / 2)
     _grip(rng, built, turn, -1.0 - size, -size, span(rng, 0.07, 0.11))
@@ -318,7 +320,7 @@ def _magnifier(rng: Rng, built: Builder, turn: F64) -> None:
         built.ellipsoid([0, 0, 0], [size, size, span(rng, 0.03, 0.1)], turn)
 
 
-def _pliers(rng: Rng, built: Builder, turn: F64) -> None:
+def _pliers(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """Pliers, tongs, pegs, tweezers."""
     opened = span(rng, 0.08, 0.35)
     for sign in (1, -1):
@@ -333,7 +335,7 @@ def _pliers(rng: Rng, built: Builder, turn: F64) -> None:
     built.cylinder([0, 0, 0], 0.14, 0.15, 0.03, turn @ turned(0, np.pi / 2))
 
 
-def _axe(rng: Rng, built: Builder, turn: F64) -> None:
+def _axe(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """An axe, a pick, a hoe."""
     _grip(rng, built, turn, -1.5, 0.6, 0.08)
     built.part(STEEL)
@@ -356,7 +358,7 @@ def _axe(rng: Rng, built: Builder, turn: F64) -> None:
             built.limb(turn @ vec(0, 0.55, 0), turn @ vec(0.6 * sign, 0.4, 0), 0.1, 0.03)
 
 
-def _plug(rng: Rng, built: Builder, turn: F64) -> None:
+def _plug(rng: Rng, built: PrimitiveBuilder, turn: F64) -> None:
     """A plug with a wire, a light bulb, a tap."""
     if chance(rng, 0.5):
         outline = np.array([[0.14, -0.6], [0.2, -0.3], [0.48, 0.15], [0.4, 0.5], [0.03, 0.68]])

@@ -6,7 +6,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .flying import aeroplane, balloon, helicopter, rocket
 from .lorries import bus, train, truck
 from .making import Rng, chance, pick, smooth, span, vec
@@ -15,7 +15,7 @@ from .wheels import LYING, lights, wheel, wheels
 BODY, GLASS, TYRE, METAL, MORE, SEAT = range(6)
 
 
-def vehicles(rng: Rng) -> Builder:
+def vehicles(rng: Rng) -> PrimitiveBuilder:
     """Make a vehicle that drives along +x, or flies or swims."""
     kinds = (
         _car,
@@ -37,12 +37,12 @@ def vehicles(rng: Rng) -> Builder:
         helicopter,
         balloon,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
 
-def _car(rng: Rng, built: Builder) -> None:
+def _car(rng: Rng, built: PrimitiveBuilder) -> None:
     """Saloons, hatchbacks, pick-ups, vans, racers and old round ones."""
     wheel, wide = span(rng, 0.17, 0.25), span(rng, 0.36, 0.46)
     long, sill = span(rng, 0.85, 1.1), span(rng, 0.1, 0.2)
@@ -88,7 +88,7 @@ def _car(rng: Rng, built: Builder) -> None:
     wheels(rng, built, xs, wheel, wide)
 
 
-def _windscreen(built: Builder, x: float, belt: float, wide: float) -> None:
+def _windscreen(built: PrimitiveBuilder, x: float, belt: float, wide: float) -> None:
     """All that an open car has, but for its seats."""
     built.part(GLASS)
     built.box([x, belt + 0.08, 0], [0.015, 0.12, 0.85 * wide], 0.01, turned(0, 0, 0.5))
@@ -97,7 +97,7 @@ def _windscreen(built: Builder, x: float, belt: float, wide: float) -> None:
         built.box([x - behind, belt, 0], [0.06, 0.2, 0.6 * wide], 0.05)
 
 
-def _cabin(rng: Rng, built: Builder, cabin: F64, wide: float, times: int) -> None:
+def _cabin(rng: Rng, built: PrimitiveBuilder, cabin: F64, wide: float, times: int) -> None:
     """Glass beneath a roof on posts; `cabin` (4, 2): below behind, below before, above."""
     built.part(GLASS)
     built.prism([0, 0, 0], smooth(cabin, times), 0.88 * wide, 0.05)
@@ -110,7 +110,7 @@ def _cabin(rng: Rng, built: Builder, cabin: F64, wide: float, times: int) -> Non
             built.limb([*a, sign * 0.86 * wide], [*b, sign * 0.86 * wide], 0.03, 0.025)
 
 
-def _motorcycle(rng: Rng, built: Builder) -> None:
+def _motorcycle(rng: Rng, built: PrimitiveBuilder) -> None:
     """Motorcycles and scooters; often leaning."""
     wheel, base = span(rng, 0.26, 0.36), span(rng, 0.6, 0.75)
     for x in (base, -base):
@@ -150,7 +150,7 @@ def _motorcycle(rng: Rng, built: Builder) -> None:
         built.box([0.5 * base, 0.6, 0], [0.03, 0.3, 0.22], 0.02, turned(0, 0, 0.3))
 
 
-def _bicycle(rng: Rng, built: Builder) -> None:
+def _bicycle(rng: Rng, built: PrimitiveBuilder) -> None:
     """Wheels with spokes, a frame of tubes, now and then a basket."""
     wheel, base = span(rng, 0.33, 0.4), span(rng, 0.5, 0.6)
     thick = span(rng, 0.02, 0.03)
@@ -188,7 +188,7 @@ def _bicycle(rng: Rng, built: Builder) -> None:
         built.box([base + 0.02, 1.0, 0], [0.115, 0.15, 0.145], 0.02, cavity=True)
 
 
-def _boat(rng: Rng, built: Builder) -> None:
+def _boat(rng: Rng, built: PrimitiveBuilder) -> None:
     """Rowing boats, yachts and steamers: a hull cut open above."""
     long, wide, deep = 1.0, span(rng, 0.22, 0.4), span(rng, 0.25, 0.4)
     kind = pick(rng, ("open", "sail", "steam", "tug"))
@@ -234,7 +234,7 @@ def _boat(rng: Rng, built: Builder) -> None:
         )
 
 
-def _tractor(rng: Rng, built: Builder) -> None:
+def _tractor(rng: Rng, built: PrimitiveBuilder) -> None:
     """Large wheels behind, small ones before; some have a shovel."""
     large, small = span(rng, 0.38, 0.5), span(rng, 0.2, 0.28)
     built.part(BODY)
@@ -268,7 +268,7 @@ def _tractor(rng: Rng, built: Builder) -> None:
         built.box([1.33, lift + 0.08, 0], [0.17, 0.14, 0.38], 0, cut=True)
 
 
-def _pram(rng: Rng, built: Builder) -> None:
+def _pram(rng: Rng, built: PrimitiveBuilder) -> None:
     """A wheelbarrow, a cart or a pram."""
     wheel = span(rng, 0.18, 0.3)
     half = vec(span(rng, 0.4, 0.6), span(rng, 0.15, 0.25), span(rng, 0.25, 0.35))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..solid import Builder, along, turned
+from ..solid import PrimitiveBuilder, along, turned
 from .hollow import handle, hollow, saucer
 from .kitchen import cheese, plate, pot, teapot
 from .making import Rng, chance, curve, pick, profile, span, tube, vec
@@ -12,7 +12,7 @@ from .making import Rng, chance, curve, pick, profile, span, tube, vec
 BODY, LID, INSIDE, MORE = range(4)
 
 
-def lathe(rng: Rng) -> Builder:
+def lathe(rng: Rng) -> PrimitiveBuilder:
     """Make a vessel or turned thing."""
     kinds = (
         _cup,
@@ -33,12 +33,12 @@ def lathe(rng: Rng) -> Builder:
         _chessman,
         _anything,
     )
-    built = Builder()
+    built = PrimitiveBuilder()
     pick(rng, kinds)(rng, built)
     return built
 
 
-def _cup(rng: Rng, built: Builder) -> None:
+def _cup(rng: Rng, built: PrimitiveBuilder) -> None:
     """Mugs, cups with a saucer, beakers, buckets."""
     low, high, top = span(rng, 0.3, 0.75), span(rng, 0.7, 1.6), span(rng, 0.5, 0.9)
     belly = span(rng, 0.9, 1.2) * 0.5 * (low + top)
@@ -63,7 +63,7 @@ def _cup(rng: Rng, built: Builder) -> None:
         saucer(rng, built, 1.5 * low + 0.25)
 
 
-def _bottle(rng: Rng, built: Builder) -> None:
+def _bottle(rng: Rng, built: PrimitiveBuilder) -> None:
     """From flasks to wine bottles; some have square bodies, labels and sprayers."""
     wide, body, neck = span(rng, 0.3, 0.55), span(rng, 0.6, 1.5), span(rng, 0.08, 0.16)
     slope, long = span(rng, 0.1, 0.5), span(rng, 0.1, 0.6)
@@ -97,7 +97,7 @@ def _bottle(rng: Rng, built: Builder) -> None:
         handle(rng, built, 0.8 * wide, 0.5 * body, body + 0.6 * slope, 0.3, 0.06)
 
 
-def _vase(rng: Rng, built: Builder) -> None:
+def _vase(rng: Rng, built: PrimitiveBuilder) -> None:
     """Hollow or not; some have two ears."""
     count = int(rng.integers(3, 6))
     y = np.sort(rng.uniform(0, 1, count)) * span(rng, 1, 1.8)
@@ -116,7 +116,7 @@ def _vase(rng: Rng, built: Builder) -> None:
             tube(built, curve(knots * [sign, 1, 1], 7), 0.05)
 
 
-def _bowl(rng: Rng, built: Builder) -> None:
+def _bowl(rng: Rng, built: PrimitiveBuilder) -> None:
     """A bowl, sometimes with fruit or eggs in it."""
     wide, high, foot = span(rng, 0.7, 1.1), span(rng, 0.3, 0.8), span(rng, 0.25, 0.6)
     outside = np.array(
@@ -133,7 +133,7 @@ def _bowl(rng: Rng, built: Builder) -> None:
             built.ellipsoid(at, size * np.exp(rng.normal(0, 0.1, 3)))
 
 
-def _can(rng: Rng, built: Builder) -> None:
+def _can(rng: Rng, built: PrimitiveBuilder) -> None:
     """A tin with rims, a drum, a pillbox."""
     wide, high = span(rng, 0.3, 0.7), span(rng, 0.25, 1.0)
     built.part(BODY)
@@ -146,7 +146,7 @@ def _can(rng: Rng, built: Builder) -> None:
         built.box([0.3 * wide, 2 * high + 0.02, 0], [0.3 * wide, 0.02, 0.12 * wide], 0.02)
 
 
-def _jar(rng: Rng, built: Builder) -> None:
+def _jar(rng: Rng, built: PrimitiveBuilder) -> None:
     """With a lid and often a knob."""
     wide, high, neck = span(rng, 0.4, 0.6), span(rng, 0.6, 1.2), span(rng, 0.6, 0.9)
     outline = [
@@ -166,7 +166,7 @@ def _jar(rng: Rng, built: Builder) -> None:
         built.ellipsoid([0, high + 0.24, 0], np.full(3, span(rng, 0.08, 0.14)))
 
 
-def _lamp(rng: Rng, built: Builder) -> None:
+def _lamp(rng: Rng, built: PrimitiveBuilder) -> None:
     """A table lamp with a shade open above and below."""
     high, foot = span(rng, 0.6, 1.6), span(rng, 0.25, 0.5)
     built.part(BODY)
@@ -193,7 +193,7 @@ def _lamp(rng: Rng, built: Builder) -> None:
     built.ellipsoid([0, high + 0.3, 0], [0.12, 0.15, 0.12])
 
 
-def _glass(rng: Rng, built: Builder) -> None:
+def _glass(rng: Rng, built: PrimitiveBuilder) -> None:
     """A wine glass or a goblet."""
     wide, foot, stem = span(rng, 0.3, 0.5), span(rng, 0.25, 0.4), span(rng, 0.3, 0.7)
     cup, top = span(rng, 0.4, 0.8), span(rng, 0.7, 1.1)
@@ -218,7 +218,7 @@ def _glass(rng: Rng, built: Builder) -> None:
     built.lathe([0, 0, 0], profile(inside, 1), cavity=True)
 
 
-def _candle(rng: Rng, built: Builder) -> None:
+def _candle(rng: Rng, built: PrimitiveBuilder) -> None:
     """A candle on a stick."""
     foot, stick, wax = span(rng, 0.25, 0.5), span(rng, 0.1, 1.0), span(rng, 0.3, 0.9)
     thick = span(rng, 0.07, 0.2)
@@ -239,7 +239,7 @@ def _candle(rng: Rng, built: Builder) -> None:
     built.limb([0, stick + wax, 0], [0.02, stick + wax + 0.25, 0], 0.02, 0.016)
 
 
-def _chessman(rng: Rng, built: Builder) -> None:
+def _chessman(rng: Rng, built: PrimitiveBuilder) -> None:
     """A pawn, a rook, a bishop, a king or a queen."""
     high = span(rng, 0.7, 1.5)
     base, waist, collar = span(rng, 0.35, 0.5), span(rng, 0.12, 0.2), span(rng, 0.2, 0.3)
@@ -281,7 +281,7 @@ def _chessman(rng: Rng, built: Builder) -> None:
             )
 
 
-def _anything(rng: Rng, built: Builder) -> None:
+def _anything(rng: Rng, built: PrimitiveBuilder) -> None:
     """A turned thing without a name, leaning or lying."""
     count = int(rng.integers(4, 9))
     y = np.cumsum(rng.uniform(0.05, 0.4, count))

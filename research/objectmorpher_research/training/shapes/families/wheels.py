@@ -6,14 +6,16 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F64
 
-from ..solid import Builder, turned
+from ..solid import PrimitiveBuilder, turned
 from .making import Rng, chance, span, vec
 
 TYRE, METAL = 2, 3  # as in `vehicles`
 LYING = turned(0, np.pi / 2)  # an axle along z
 
 
-def wheel(rng: Rng, built: Builder, at: F64, radius: float, half: float, style: int) -> None:
+def wheel(
+    rng: Rng, built: PrimitiveBuilder, at: F64, radius: float, half: float, style: int
+) -> None:
     """About z; the hub is a part of its own."""
     built.part(TYRE)
     built.cylinder(at, radius, half, 0.4 * half, LYING)
@@ -30,7 +32,9 @@ def wheel(rng: Rng, built: Builder, at: F64, radius: float, half: float, style: 
             built.cylinder(spot, 0.13 * radius, 3 * half, 0, LYING, cut=True)
 
 
-def wheels(rng: Rng, built: Builder, xs: tuple[float, ...], radius: float, track: float) -> None:
+def wheels(
+    rng: Rng, built: PrimitiveBuilder, xs: tuple[float, ...], radius: float, track: float
+) -> None:
     """Pairs of wheels at places along x, `track` from the middle."""
     half, style = span(rng, 0.06, 0.1), int(rng.integers(3))
     for x in xs:
@@ -38,7 +42,7 @@ def wheels(rng: Rng, built: Builder, xs: tuple[float, ...], radius: float, track
             wheel(rng, built, vec(x, radius, sign * (track - 0.5 * half)), radius, half, style)
 
 
-def lights(rng: Rng, built: Builder, long: float, y: float, wide: float) -> None:
+def lights(rng: Rng, built: PrimitiveBuilder, long: float, y: float, wide: float) -> None:
     """Lamps before and behind at height y; often bumpers."""
     built.part(METAL)
     size = span(rng, 0.04, 0.08)
