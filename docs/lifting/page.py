@@ -122,9 +122,10 @@ object hides of another counts as invented although it may stay hidden.
 
 Up to 25 degrees the cat, the astronaut, the flower, the rocket, the bowl and the logo look right.
 What does not: the saucer of the coffee becomes egg-shaped from 25 degrees on, and the lip of the
-cup bends; the fig in the bowl slides at 35; the retina and the colour ball, which fill their photos,
-get corners; the drawn horse is flat, and is taken for a round one; the pagoda is selected in part,
-and leans; of the moon and of the cell a piece of ground is selected, which has a ragged edge.
+cup bends; the fig in the bowl slides at 35; the retina and the colour ball, which fill their
+photos, get corners; the drawn horse is flat, and is taken for a round one; the pagoda is selected
+in part, and leans; of the moon and of the cell a piece of ground is selected, which has a ragged
+edge.
 """
 STEREO = """## A photographed thing whose shape is known
 

@@ -296,9 +296,21 @@ def _encode_avif(picture: Picture, quality: int) -> bytes:
     out = io.BytesIO()
     Image.fromarray(_colours_and_alpha(picture)).save(
         out, "AVIF", quality=quality, subsampling="4:4:4", speed=AVIF_SPEED,
-        icc_profile=_profile_for(picture, 3) or b"", exif=picture.exif or b"",
+        icc_profile=_profile_for(picture, 3) or b"", exif=_exif_for_avif(picture.exif),
     )  # fmt: skip
     return out.getvalue()
+
+
+def _exif_for_avif(block: bytes | None) -> bytes:
+    """The block, which Pillow takes apart for AVIF; empty where it is too damaged for that."""
+    found = Image.Exif()
+    try:
+        found.load(block or b"")
+        found.get(exif.ORIENTATION)
+        found.tobytes()
+    except Exception:  # Pillow raises whatever a broken block makes it stumble over
+        return b""
+    return block or b""
 
 
 def _encode_jxl(picture: Picture, quality: int) -> bytes:
@@ -327,7 +339,8 @@ def to_u8(pixels: np.ndarray) -> RGB:
     """8-bit values of u8 or u16 pixels of any shape, rounded (65535 / 255 = 257)."""
     if pixels.dtype == np.uint8:
         return pixels
-    return cv2.convertScaleAbs(pixels, alpha=1 / 257).astype(np.uint8, copy=False)
+    found = cv2.convertScaleAbs(pixels, alpha=1 / 257)  # which drops a last axis of length 1
+    return found.astype(np.uint8, copy=False).reshape(pixels.shape)
 
 
 def resized(pixels: np.ndarray, width: int, height: int) -> np.ndarray:

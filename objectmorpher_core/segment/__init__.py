@@ -82,7 +82,7 @@ class Quick(Protocol):
 
 BACKENDS = {
     "dino": "objectmorpher_core.segment.dino_walk:DinoWalk",
-    "subject": "objectmorpher_core.segment.subject:Subject",
+    "subject": "objectmorpher_core.segment.subject:SubjectSegmenter",
     "grabcut": "objectmorpher_core.segment.grabcut:GrabCut",
     "sam2": "objectmorpher_core.segment.sam.segmenter:sam2",
     "sam": "objectmorpher_core.segment.sam.segmenter:sam",

@@ -11,7 +11,7 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import Pixels
 from objectmorpher_core.compose.plate.repair import PlatePatch
-from objectmorpher_core.document.model import LiftedObject, Matte, Plate
+from objectmorpher_core.document.model import LiftedObject, Matte, Plate, Sides
 from objectmorpher_core.document.settings import Refined
 from objectmorpher_core.segment import Found
 
@@ -103,7 +103,14 @@ def _(part: LiftedObject, asked: Any) -> bool:
         and points.shape[1] == 3
         and len(points) > 0
         and part.world_from_object.shape == (4, 4)
+        and (part.sides is None or _fit_gaussians(part.sides, count))
     )
+
+
+def _fit_gaussians(sides: Sides, count: int) -> bool:
+    """Whether they are pictures, and say of each of `count` Gaussians where it looks."""
+    found = sides.at.shape, sides.slopes.shape, sides.zoom.shape, sides.pixels.shape[2:]
+    return found == ((count, 2), (count, 2, 3), (count,), (3,)) and sides.pixels.size > 0
 
 
 @_is_whole.register

@@ -104,7 +104,8 @@ def types() -> Mapping[str, type]:
     kinds = (
         documents.BesidePrompt, Camera, BackendChoice, documents.Click, CoarseEdit, Cut, Cutout,
         Found, Gaussians, Hint, LiftedObject, LiftSettings, Matte, PlatePatch,
-        documents.PhotoTexture, Plate, Prompt, Refined, RefineOptions, Shadow, Variant,
+        documents.PhotoTexture, Plate, Prompt, Refined, RefineOptions, Shadow, documents.Sides,
+        Variant,
     )  # fmt: skip
     return {kind.__name__: kind for kind in kinds}
 

@@ -41,7 +41,6 @@ class Dimming:
 @pytest.fixture
 def dimming(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refine, "BACKENDS", {"dimming": f"{__name__}:Dimming"})
-    monkeypatch.setattr(job_functions, "_refiners", {})
 
 
 def coarse() -> CoarseEdit:
@@ -115,7 +114,6 @@ def test_a_networks_refinement_is_the_same_there_and_here_when_the_server_has_go
 
     monkeypatch.setenv("OBJECTMORPHER_CACHE", str(tmp_path / "models"))
     monkeypatch.setenv(device.DEVICE, "cpu")
-    monkeypatch.setattr(job_functions, "_refiners", {})
     models.use_folder("flux2-klein-4b", tiny_pipelines.write_klein(tmp_path / "klein"))
     flat, hole = np.full((96, 96, 3), 128, np.uint8), np.zeros((96, 96), np.float32)
     hole[40:60, 40:60] = 1
