@@ -38,7 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(_Notes(path))
 
 
+LONG = (  # files and folders that take longest, by the process that does them: they begin
+    "test_first_use", "test_window", "test_train", "tests/faults", "test_refin", "test_hostile",
+    "app/editing", "app/tools", "tests/app", "core/compose",
+)  # fmt: skip
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: next((k for k, n in enumerate(LONG) if n in item.nodeid), 99))
     path = config.getoption("--without")
     if path is None:
         return

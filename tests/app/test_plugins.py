@@ -67,6 +67,7 @@ def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.window
 def test_the_window_sends_layers_back_and_closes(
     window_environment: dict[str, str], photo_path: Path, tmp_path: Path
