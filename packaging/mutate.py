@@ -105,7 +105,8 @@ def test_files(path: str, first: str) -> list[str]:
     there = {*(TESTS / folder).glob("test_*.py"), *TESTS.glob(f"test_{stem}.py")}
     files = [
         file for file in there
-        if file.name == always or re.search(rf"\b(test_)?{stem}\b", f"{file.stem} {file.read_text()}")
+        if file.name in (always, f"test_{stem}.py")
+        or re.search(rf"\b{stem}\b", file.read_text(encoding="utf-8"))
     ]  # fmt: skip
     slow = ("test_tiles", "test_surface_links", "test_regions", "test_hold_edits", "test_several",
             "test_refitting", "test_pipeline")  # fmt: skip
@@ -162,7 +163,7 @@ def main() -> None:
         before = {tuple(row[3:]): row[2].split("::")[0] for row in rows}
         first = {one: test for one, test in before.items() if one in first}
     known = len(arguments.out.read_text().splitlines()) if arguments.out.exists() else 0
-    left_out = arguments.leave_out.read_text().split() if arguments.leave_out else []
+    left_out = arguments.leave_out.read_text().splitlines() if arguments.leave_out else []
     for mutant, test in list(first.items())[known : arguments.count]:
         start = time.monotonic()
         how, by = noticed(mutant, test_files(mutant[0], test), left_out)
