@@ -6,7 +6,9 @@ stage, for which more is installed, does not do again what passed without it.
 
 from __future__ import annotations
 
+import hashlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,6 +27,43 @@ def _photo_fixture(name: str):
 
 
 chelsea, coffee, astronaut, rocket, flower, china = map(_photo_fixture, photos.NAMES)
+
+
+@pytest.fixture(scope="module")
+def lifted_once() -> Iterator[None]:
+    """For a module: the same object of the same photo is lifted once, and its progress repeated.
+
+    What is lifted is immutable, and that two lifts are equal is tested in tests/core/lift.
+    """
+    from objectmorpher_core.lift.relief.lifter import ReliefLifter
+
+    lift, known = ReliefLifter.lift, {}
+
+    def remembered(self, subject, settings, progress, seed=0):
+        matte = subject.matte
+        arrays = (subject.pixels, subject.mask, matte.alpha, matte.foreground, settings.hidden,
+                  settings.nearness)  # fmt: skip
+        told = repr((matte.box, subject.camera, vars(settings), seed)).encode()
+        digest = hashlib.sha256(told)
+        for array in arrays:
+            digest.update(b"" if array is None else repr(array.shape).encode() + array.tobytes())
+        if (key := digest.digest()) in known:
+            lifted, steps = known[key]
+            for step in steps:
+                progress(*step)
+            return lifted
+        steps = []
+
+        def note(fraction: float, text: str) -> None:
+            steps.append((fraction, text))
+            progress(fraction, text)
+
+        known[key] = lift(self, subject, settings, note, seed), steps
+        return known[key][0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ReliefLifter, "lift", remembered)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

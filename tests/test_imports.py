@@ -214,6 +214,7 @@ def loaded_by(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_the_window_imports_in_a_few_times_what_numpy_takes():
     """Before its first frame: what takes longer is imported when it is needed.
 

@@ -1,4 +1,4 @@
-"""Where the sources are, and a test over all files of a kind."""
+"""Where the sources are, a test over all files of a kind, and the first few of many examples."""
 
 from __future__ import annotations
 
@@ -8,11 +8,23 @@ import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 # For processes that a test starts in another folder.
 PYTHONPATH = os.pathsep.join([str(ROOT / "app"), str(ROOT)])
 
 Test = Callable[..., None]
+
+
+def quick(items: Iterable[object], count: int) -> list[object]:
+    """For `parametrize`: the first `count` run always, the others in the slow stage.
+
+    A tuple is the values of several arguments.
+    """
+    values = [item if isinstance(item, tuple) else (item,) for item in items]
+    marks = [() if k < count else pytest.mark.slow for k in range(len(values))]
+    return [pytest.param(*value, marks=mark) for value, mark in zip(values, marks, strict=True)]
 
 
 def over(name: str, items: Iterable[object]) -> Callable[[Test], Test]:

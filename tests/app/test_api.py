@@ -20,6 +20,8 @@ from objectmorpher.cli import parser as cli
 from objectmorpher_core.pictures.image import read_picture
 from tests import shapes
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 ROOT = Path(__file__).parents[2]
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)

@@ -24,6 +24,8 @@ from objectmorpher_core.splat_files.splats.ply import decode_ply
 from tests import shapes
 from tests.tree import PYTHONPATH
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 ROOT = Path(__file__).parents[2]
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)

@@ -131,6 +131,7 @@ def test_krita_sends_a_layer_and_shows_what_comes_back(edited: Path, tmp_path: P
     assert np.abs(pixels(edited / "shown.png") - pixels(edited / "edited.png")).max() <= 2
 
 
+@pytest.mark.slow
 def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     edited: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -158,6 +159,7 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
 
 
+@pytest.mark.slow
 def test_comfyuis_nodes_select_lift_pose_render_and_save(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
     nodes = module("comfy", PLUGINS / "comfyui" / "objectmorpher" / "__init__.py")

@@ -70,6 +70,7 @@ def test_the_page_is_one_small_file_that_asks_for_nothing(folder: Path) -> None:
     assert "default-src 'none'" in text and "{{" not in text
 
 
+@pytest.mark.slow
 def test_it_begins_with_what_the_program_shows(page: Browser, folder: Path) -> None:
     edited = np.asarray(Image.open(folder / "flower.png").convert("RGB")) / 255
     shown = canvas(page)
@@ -79,6 +80,7 @@ def test_it_begins_with_what_the_program_shows(page: Browser, folder: Path) -> N
     assert np.abs(shown - photo).mean() > 3 * ALIKE  # it would be seen if nothing were posed
 
 
+@pytest.mark.slow
 def test_the_photo_is_there_while_the_button_is_held(page: Browser) -> None:
     photo = np.asarray(Image.open(PHOTO).convert("RGB")) / 255
     press = "document.getElementById('before').dispatchEvent(new PointerEvent('%s')); return 0"
@@ -87,6 +89,7 @@ def test_the_photo_is_there_while_the_button_is_held(page: Browser) -> None:
     page.run(press % "pointerup")
 
 
+@pytest.mark.slow
 def test_a_point_follows_the_pointer_and_reset_brings_all_back(page: Browser) -> None:
     first = canvas(page)
     start, end = on_screen(page, 300, 300), on_screen(page, 260, 330)
@@ -108,6 +111,7 @@ def test_a_point_follows_the_pointer_and_reset_brings_all_back(page: Browser) ->
     np.testing.assert_array_equal(canvas(page), first)
 
 
+@pytest.mark.slow
 def test_a_drag_beside_the_object_turns_it_and_does_not_bend_it(page: Browser) -> None:
     first = canvas(page)
     page.drag(on_screen(page, 40, 40), on_screen(page, 100, 40))
@@ -124,6 +128,7 @@ def test_a_drag_beside_the_object_turns_it_and_does_not_bend_it(page: Browser) -
     np.testing.assert_array_equal(canvas(page), first)
 
 
+@pytest.mark.slow
 def test_a_double_click_releases_a_point(page: Browser) -> None:
     place = on_screen(page, 320, 215)
     page.drag(place, place)

@@ -194,6 +194,7 @@ PROGRAM = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="homes are elsewhere there")
 def test_every_home_and_language_gives_the_same_picture(folder: Path) -> None:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("LC_", "LANG", "XDG_"))}

@@ -13,6 +13,8 @@ from objectmorpher_core.scripting.script import BatchItem, ScriptError, parse_sc
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 PARTS = shapes.mask("parts")
 LEFT, RIGHT = PARTS.copy(), PARTS.copy()
 LEFT[:, 80:] = False

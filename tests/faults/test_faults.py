@@ -33,6 +33,7 @@ def assert_none_lost(found: list[dict[str, Any]], least: int) -> None:
         assert sum(result["runs"].values()) >= least, result["name"]
 
 
+@pytest.mark.slow
 def test_errors_full_disks_and_kills_leave_the_old_file_or_the_new_one() -> None:
     found = run("--quick", "--scenarios", QUICK)
     assert len(found) == QUICK.count(",") + 1
@@ -46,6 +47,7 @@ def test_power_cuts_leave_the_old_step_or_the_new_one() -> None:
     assert any(result["ends"].get("new") for result in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--quick", "--power"])
 def test_a_writer_that_takes_no_care_is_found_out(option: str) -> None:
     """A file that is opened and written over: what the product must not do."""

@@ -72,6 +72,7 @@ def test_a_model_is_downloaded_and_removed(choosing: Editor, server: Hub) -> Non
     assert hub.shown("sam2").state == "missing"
 
 
+@pytest.mark.slow
 def test_a_licence_is_accepted_before_a_download(
     choosing: Editor, server: Hub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_licence_is_accepted_before_a_download(
     hub.accept(GATED, False)
 
 
+@pytest.mark.slow
 def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     choosing: Editor, tmp_path: Path
 ) -> None:

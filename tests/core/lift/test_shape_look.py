@@ -96,6 +96,7 @@ def test_what_it_says_is_a_shape(net):
         assert (found.front_error > 0).all() and (found.depth_error > 0).all()
 
 
+@pytest.mark.slow
 def test_it_is_nearer_to_the_truth_than_the_silhouette(net):
     """On objects that it was not trained on; how much nearer is in the card."""
     errors = []

@@ -159,6 +159,7 @@ def opened(family: str, folder: Path, seed: int = 0):
     return open_network(models.use_folder(family, at).model), tiny_sams.tiny(family, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", tiny_sams.FAMILIES)
 def test_what_was_saved_is_loaded_and_asked_as_transformers_would(own_cache, family, picture):
     needs_torch()
@@ -225,6 +226,7 @@ def test_sam_sees_and_answers_as_by_its_own_processor(own_cache, picture):
         assert np.abs(large - masks[k].numpy()).max() < SUB_PIXEL * np.ptp(logits[k]) + F32
 
 
+@pytest.mark.slow
 def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
     needs_torch()
     at = tiny_sams.write("sam2", own_cache / "sam2")
@@ -239,6 +241,7 @@ def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", tiny_sams.FAMILIES)
 def test_short_numbers_encode_nearly_the_same(own_cache, family, picture):
     needs_torch()
@@ -477,6 +480,7 @@ def test_files_that_are_no_sam_are_one_sentence(own_cache, picture):
         segment.load("sam-onnx").encode(picture, silent)
 
 
+@pytest.mark.slow
 def test_memory_that_runs_out_is_followed_by_the_next_tier(own_cache, picture, caplog):
     needs_torch()
     import torch

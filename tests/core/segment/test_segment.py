@@ -191,6 +191,7 @@ def test_a_negative_click_takes_away_just_the_helmet(dino, embeddings, astronaut
     assert overlap(gone, ellipses(astronaut.shape, (390, 440, 112, 96))) > 0.8  # cut by the frame
 
 
+@pytest.mark.slow
 def test_a_second_positive_click_adds_what_it_is_on(dino, embeddings, chelsea):
     head = [(250, 150), (40, 270, False)]
     first = dino.segment(chelsea, prompt(head), embeddings("chelsea"), silent)
