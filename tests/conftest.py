@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -75,6 +76,14 @@ def pytest_configure(config: pytest.Config) -> None:
     path = config.getoption("--note")
     if path is not None and not hasattr(config, "workerinput"):  # reports come to the first process
         config.pluginmanager.register(_Notes(path))
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Whole files of the slow stage, and what they import, are not read where it is not run."""
+    if config.option.markexpr != "not slow" or not collection_path.match("test_*.py"):
+        return None
+    text = collection_path.read_text(encoding="utf-8")
+    return True if re.search(r"^pytestmark = .*\bmark\.slow\b", text, re.MULTILINE) else None
 
 
 LONG = (  # files and folders that take longest, by the process that does them: they begin

@@ -9,16 +9,18 @@ import pytest
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import BACKENDS, InpaintError, load
 from tests.core.compose import tiny_inpainters
+from tests.tree import over
 
 LEARNED = tiny_inpainters.FAMILIES
 
 
-@pytest.fixture(params=BACKENDS)
-def inpainter(request, tmp_path, monkeypatch):
+@pytest.fixture(scope="module", params=BACKENDS)
+def inpainter(request, tmp_path_factory):
     """Each; those that learned something are tiny networks of random weights."""
-    if request.param in LEARNED:
-        tiny_inpainters.bring(request.param, tmp_path, monkeypatch)
-    return load(request.param)
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param in LEARNED:
+            tiny_inpainters.bring(request.param, tmp_path_factory.mktemp("tiny"), patch)
+        yield load(request.param)
 
 
 def is_trained(inpainter) -> bool:
@@ -97,7 +99,7 @@ def test_only_a_rim_is_known(inpainter, view):
     np.testing.assert_array_equal(filled[~hole], view[~hole])
 
 
-@pytest.mark.parametrize("shape", [(1, 2), (2, 1), (3, 3), (1, 40), (9, 5)])
+@over("shape", [(1, 2), (2, 1), (3, 3), (1, 40), (9, 5)])
 def test_tiny_pictures(inpainter, view, shape):
     pixels = view[: shape[0], : shape[1]]
     hole = np.zeros(shape, bool)

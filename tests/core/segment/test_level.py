@@ -53,6 +53,7 @@ def test_a_part_is_in_its_object_and_the_object_in_its_group(name):
     check_nested(levels("grabcut", name), name)
 
 
+@pytest.mark.slow
 def test_so_it_is_by_tokens():
     check_nested(levels("dino", "flower"), "flower")
 

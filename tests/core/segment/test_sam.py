@@ -27,6 +27,7 @@ from tests.core.models.small_networks import in_ways
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt
+from tests.tree import quick
 
 LAYOUTS = ("sam", "pixels", "efficient")
 F32 = 1e-4  # logits of two ways to the same network
@@ -54,7 +55,9 @@ def cache(tmp_path_factory):
         yield
 
 
-@pytest.fixture(scope="module", params=[*tiny_sams.FAMILIES, *(f"onnx {n}" for n in LAYOUTS)])
+@pytest.fixture(
+    scope="module", params=[*quick(tiny_sams.FAMILIES, 1), *(f"onnx {n}" for n in LAYOUTS)]
+)
 def segmenter(request, cache, tmp_path_factory):
     """A SAM of each family; of random weights the first whose answers are no specks."""
     kind, _, layout = request.param.partition(" ")

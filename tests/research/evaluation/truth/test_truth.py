@@ -194,6 +194,7 @@ def test_a_warp_along_a_turn_is_that_turn(still):
     assert apart.mean() < 1
 
 
+@pytest.mark.slow
 def test_more_iterations_come_nearer_to_the_settled_pose():
     case = make_case(CATEGORIES["limb"])
     chain = Chain(case.photo, case.mask, case.camera)
@@ -208,6 +209,7 @@ def _job(folder, crate, *names: str) -> CaseJob:
     return CaseJob(folder, (crate[0],), tuple(METHODS[name] for name in names), 0)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_it_was(tmp_path, crate):
     first = run_photo(_job(tmp_path, crate, "nothing"))
     path = tmp_path / "cases" / crate[0].name / "nothing.json"

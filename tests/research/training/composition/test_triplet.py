@@ -62,6 +62,7 @@ def same(depth=1.0):
     return {"version": 1, "a_from_b": np.eye(4).tolist(), "depth_b": depth}
 
 
+@pytest.mark.slow
 def test_what_did_not_move_is_drawn_where_it_was(tmp_path, monkeypatch):
     pair = two_pictures(tmp_path / "pair")
     poses = worker(tmp_path, monkeypatch, same())
