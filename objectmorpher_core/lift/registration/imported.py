@@ -71,9 +71,7 @@ def rematted(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) 
     body = np.flatnonzero(lifted.texture.solidity > 0.5)
     nothing = np.zeros(len(body), np.float32)
     texture = PhotoTexture(lifted.texture.u0[body], nothing, nothing + 1)
-    plain = replace(
-        lifted, gaussians=lifted.gaussians.select(body), texture=texture, sides=None
-    )
+    plain = replace(lifted, gaussians=lifted.gaussians.select(body), texture=texture, sides=None)
     picture = rest_picture(plain, camera, matte)
     seen = visibilities(plain, picture, matte)
     brim = brim_around(plain, picture, matte, np.random.default_rng(seed))
