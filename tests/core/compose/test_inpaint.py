@@ -160,8 +160,8 @@ def test_16_bit_gradient_shows_no_bands():
     np.testing.assert_allclose(means, ramp[90:150, 0, 0], atol=257)
 
 
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-@pytest.mark.parametrize("share", [0.0, 1.0])
+@over("kind", [np.uint8, np.uint16])
+@over("share", [0.0, 1.0])
 def test_black_and_white_stay_black_and_white(inpainter, kind, share):
     """Where OpenCV goes a level beyond white, nothing turns black."""
     if not is_trained(inpainter):

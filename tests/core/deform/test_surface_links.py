@@ -14,7 +14,7 @@ from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph, SolidSurf
 from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
-from tests.tree import quick
+from tests.tree import over, quick
 
 FAITHFUL = DeformSettings(is_faithful=True)
 FALSE_SHARE = 0.01  # of the false links that the paper's rule keeps
@@ -266,7 +266,7 @@ def test_limbs_stay_on_the_body_they_grow_from(gaussians):
     assert _kept(SolidSurface(own.means, own.normals)) > 0.98
 
 
-@pytest.mark.parametrize("name", shapes.MASKS)
+@over("name", shapes.MASKS)
 @pytest.mark.parametrize("gaussians", quick([800, 4000], 1))
 def test_a_lifted_silhouette_stays_in_as_many_parts(name, gaussians):
     lifted = shapes.scene(name, gaussians).lifted

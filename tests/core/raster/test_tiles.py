@@ -19,7 +19,7 @@ from objectmorpher_core.raster.reference_layers import Picture3D
 from objectmorpher_core.raster.rules import RULES
 from objectmorpher_core.raster.texture import TextureLevels, build_levels, sample_texture
 from tests import shapes
-from tests.tree import quick
+from tests.tree import over, quick
 
 PIXEL = 2 / 255  # where a sample falls on the other side of a layer's limit by rounding
 MEAN = 1e-4
@@ -320,7 +320,7 @@ def _resting(scene: shapes.Scene, view: Camera, zoom: float) -> np.ndarray:
 @pytest.mark.parametrize(("count", "zoom"), quick(
     [(500, 2.0), (2000, 0.5), (16000, 1.0), *product((500, 2000, 16000), (1.0, 2.0, 0.5))], 3
 ))  # fmt: skip
-@pytest.mark.parametrize("name", shapes.MASKS)
+@over("name", shapes.MASKS)
 def test_at_rest_the_photos_own_cut_out_comes_back(name, count, zoom):
     """Soft edges included, whatever the number of Gaussians and the magnification."""
     scene = shapes.scene(name, count)
@@ -342,8 +342,8 @@ def test_at_rest_the_photo_comes_back_through_a_hundred_thousand_gaussians():
         assert np.abs(difference).max() <= EXACT
 
 
-@pytest.mark.parametrize("count", [500, 2000, 16000])
-@pytest.mark.parametrize("name", shapes.MASKS)
+@over("count", [500, 2000, 16000])
+@over("name", shapes.MASKS)
 def test_at_rest_all_is_seen_to_come_from_the_photo(name, count):
     scene = shapes.scene(name, count).with_plain_edge()
     picture = scene.puppet.draw(None, Placement(), scene.texture, scene.camera)

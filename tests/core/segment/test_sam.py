@@ -27,7 +27,7 @@ from tests.core.models.small_networks import in_ways
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt
-from tests.tree import quick
+from tests.tree import over, quick
 
 LAYOUTS = ("sam", "pixels", "efficient")
 F32 = 1e-4  # logits of two ways to the same network
@@ -109,7 +109,7 @@ def test_progress_grows_to_the_end(segmenter, disc):
     assert seen == sorted(seen) and seen[-1] == 1
 
 
-@pytest.mark.parametrize("step", range(1, 6))
+@over("step", range(1, 6))
 def test_it_can_be_cancelled_at_each_step(segmenter, disc, step):
     calls = 0
 

@@ -26,6 +26,7 @@ from objectmorpher_research.evaluation.truth.running import CaseJob, CaseRow, ru
 from objectmorpher_research.evaluation.truth.scores import PSNR_CAP, TruthScore, score
 from objectmorpher_research.evaluation.truth.solids import MAKERS, make
 from objectmorpher_research.evaluation.truth.tables import as_csv, build_table
+from tests.tree import over
 
 EXACT = 1e-9
 PIXEL = 0.02  # px, a warp's points from where they must be: they are held by stiff springs
@@ -54,7 +55,7 @@ def test_there_are_enough_cases_of_every_kind():
     assert {wanted.motion.category for wanted in CASES} == set(PLAN)
 
 
-@pytest.mark.parametrize("name", sorted(MAKERS))
+@over("name", sorted(MAKERS))
 def test_solids_are_closed_and_face_outwards(name):
     solid = make(name)
     a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
