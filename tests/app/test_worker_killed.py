@@ -21,7 +21,7 @@ from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.pictures.image import ImageError, read_picture
 from objectmorpher_core.session.file import decode_session
 
-KILLS = int(os.environ.get("OBJECTMORPHER_KILLS", "9"))  # seconds each
+KILLS = int(os.environ.get("OBJECTMORPHER_KILLS", "3"))  # seconds each
 HEARD = 0.02  # s in which the thread that reads the pipe hands over what it has read
 FUNCTIONS = {  # what is asked -> what the worker runs
     "save": "write_session", "export": "write_export", "background": "inpaint",

@@ -14,7 +14,7 @@ from tests.fuzz.readers import by_name, readers
 FOUND = Path(__file__).parent / "found"  # files that once did worse
 SLOW = ("drawn-session",)  # what is drawn has to be compiled first
 EACH = 3  # files of each reader
-MANY = 40  # the same files each time: new ones are for `make fuzz`
+MANY = 15  # the same files each time: new ones are for `make fuzz`
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="the limits on a process are Linux's"

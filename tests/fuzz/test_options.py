@@ -49,8 +49,8 @@ def test_every_option_with_a_value_is_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_a_few_hundred_command_lines() -> None:
-    result = options.fuzz(number=1, runs=300, seconds=1500)
+def test_a_hundred_command_lines() -> None:
+    result = options.fuzz(number=1, runs=100, seconds=600)
     assert result["found"] == []
     runs = result["runs"]
-    assert min(runs["done"], runs["refused"]) > 30 and sum(runs.values()) == 300
+    assert min(runs["done"], runs["refused"]) > 10 and sum(runs.values()) == 100

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import product
 
 import cv2
 import numpy as np
@@ -115,7 +114,7 @@ def test_tiles_equal_the_reference_on_a_bent_object(window):
 KINDS = shapes.KINDS
 
 
-@pytest.mark.parametrize("seed", quick(range(20), 4))
+@pytest.mark.parametrize("seed", quick(range(10), 4))
 @pytest.mark.parametrize(("splatting", "is_textured"), KINDS)
 def test_tiles_equal_the_reference_on_gaussians_of_every_kind(splatting, is_textured, seed):
     """Measured 2026-11: 2.3e-3 at most (what lies behind an alpha of 0.999), mean 1.4e-5."""
@@ -318,7 +317,7 @@ def _resting(scene: shapes.Scene, view: Camera, zoom: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("count", "zoom"), quick(
-    [(500, 2.0), (2000, 0.5), (16000, 1.0), *product((500, 2000, 16000), (1.0, 2.0, 0.5))], 3
+    [(500, 2.0), (2000, 0.5), (16000, 1.0), (500, 0.5), (2000, 1.0), (16000, 2.0)], 3
 ))  # fmt: skip
 @over("name", shapes.MASKS)
 def test_at_rest_the_photos_own_cut_out_comes_back(name, count, zoom):
