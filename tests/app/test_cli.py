@@ -146,7 +146,7 @@ def test_with_nothing_to_do_every_tiff_comes_back_to_the_last_bit(folder, kind):
     assert np.array_equal(back, photo)
 
 
-@over("kind", KINDS)
+@over("kind", [kind for kind in KINDS if "16" in kind])
 def test_an_edit_leaves_what_is_far_from_it_to_the_last_bit(folder, kind):
     photo = _photo_of(kind)
     cv2.imwrite("any.png", photo)
