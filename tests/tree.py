@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
 import os
@@ -15,6 +16,12 @@ ROOT = Path(__file__).parents[1]
 PYTHONPATH = os.pathsep.join([str(ROOT / "app"), str(ROOT)])
 
 Test = Callable[..., None]
+
+
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    """A source file's syntax tree, read once: not to be changed."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def quick(items: Iterable[object], count: int) -> list[object]:

@@ -59,7 +59,7 @@ def _posed(name: str) -> Posed:
     return Posed(document, puppet, composite(document, {0: puppet}).pixels)
 
 
-@pytest.fixture(scope="module", params=SUBJECTS)
+@pytest.fixture(scope="module", params=quick(SUBJECTS, 2))
 def posed(request) -> Posed:
     return _posed(request.param)
 

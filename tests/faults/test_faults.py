@@ -46,6 +46,7 @@ def test_a_writer_that_takes_no_care_is_found_out(option: str) -> None:
     assert found["wrong"]
 
 
+@pytest.mark.slow
 def test_a_journal_whose_names_are_not_brought_to_the_disk_is_found_out() -> None:
     (found,) = run("--power", "--scenarios", "careless order")
     assert found["wrong"]

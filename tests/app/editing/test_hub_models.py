@@ -111,6 +111,7 @@ def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     assert json.loads((folder / "config.json").read_bytes()) == {"model_type": "sam2"}
 
 
+@pytest.mark.slow
 def test_a_set_is_told_for_this_machine_and_downloads_queue(choosing: Editor, server: Hub) -> None:
     offers = {offer.set.id: offer for offer in choosing.models.offers}
     assert set(offers) == set(SETS) and offers["clicks"].missing > 0

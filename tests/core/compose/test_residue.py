@@ -125,6 +125,7 @@ def footless() -> Document:
     return edits.set_plate(document, build_plate(pixels, covered, compose.load("telea")))
 
 
+@pytest.mark.slow
 def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
     pixels, behind, own = _scene("patch", "astronaut", "street")
     ghosts = find_ghosts(footless, SEAM * MARGIN)
