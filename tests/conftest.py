@@ -86,9 +86,10 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if re.search(r"^pytestmark = .*\bmark\.slow\b", text, re.MULTILINE) else None
 
 
-LONG = (  # files and folders that take longest, by the process that does them: they begin
-    "test_first_use", "test_window", "test_train", "tests/faults", "test_refin", "test_hostile",
-    "app/editing", "app/tools", "tests/app", "core/compose",
+LONG = (  # files and folders of which a test takes long: they begin
+    "tests/fuzz", "tests/faults", "tests/soak", "test_train", "test_autosave", "test_worker",
+    "test_window", "test_first_use", "test_refin", "app/editing", "app/tools", "tests/app",
+    "core/compose",
 )  # fmt: skip
 
 
