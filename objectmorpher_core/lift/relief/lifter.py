@@ -100,8 +100,9 @@ class ReliefLifter:
         is_carried = is_mirrored and hidden is None and body.behind is None
         lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
         progress(0.85, "Filling in its sides")
-        lifted = with_sides(lifted, matte, camera, seed)
-        return lifted if body.behind is None else _as_coloured(lifted)
+        if body.behind is not None:  # what it hides has the colours of what is like it
+            return lifted
+        return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
         """The shape alone, on which `lift` spreads its Gaussians."""
@@ -249,15 +250,6 @@ def _touched(share: np.ndarray, step: int) -> Mask:
         share = share.view(np.uint8) * np.uint8(255)
     part = share[: height * step, : width * step]
     return np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)) > 0
-
-
-def _as_coloured(lifted: LiftedObject) -> LiftedObject:
-    """`lifted` without invented pictures of what has the colours of a place like it."""
-    if lifted.sides is None:
-        return lifted
-    is_known = lifted.texture.visibility == np.float32(HIDDEN)
-    zoom = np.where(is_known, 0, lifted.sides.zoom).astype(np.float32)
-    return replace(lifted, sides=replace(lifted.sides, zoom=zoom))
 
 
 def _assemble(

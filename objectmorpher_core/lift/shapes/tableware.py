@@ -122,6 +122,7 @@ class Stack(NamedTuple):
         far = np.maximum(np.where(lies, dish_far, vessel_far), near)
         nearest = nearest_in(stands | lies)  # what sticks out, and what is around, goes on
         near, far = near.ravel()[nearest], far.ravel()[nearest]
+        stands = outline.inside & stands.ravel()[nearest]
         # It closes at its limb: no wall stands there.
         beside = cv2.dilate((outline.inside & ~stands).astype(np.uint8), np.ones((5, 5))) > 0
         vessel_far = np.where(stands & beside, near, np.maximum(vessel_far, near))
