@@ -113,7 +113,7 @@ class ReliefBody:
         thickness = own * (front - back)
         if self.behind is not None:
             known = np.isfinite(self.behind.front)
-            thickness = np.where(known, front - self.behind.own_back, thickness)
+            thickness = np.where(known, front - self.behind.own_back, 0.0)  # no walls elsewhere
         found = overlaps_of(front, back, thickness, self.cuts, outline.inside, outline.extent)
         return found if self.behind is None else found.known(self.behind)
 

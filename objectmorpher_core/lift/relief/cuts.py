@@ -129,19 +129,17 @@ class Overlaps:
     own_beside: I64 | None = None  # (h, w, 2) likewise of the own back; None: those that hide it
 
     def known(self, behind: Behind) -> Overlaps:
-        """Return these with what a shape says is behind it."""
+        """Return these with what a shape says is behind it, and nothing else."""
         is_known = np.isfinite(behind.front)
         rows, columns = np.divmod(nearest_in(is_known), is_known.shape[1])
         # Beyond it the sheets go on, so that they do not bend at its end.
-        taken = is_known | ~self.is_apart
-        i, j = np.indices(is_known.shape)
         return replace(
             self,
-            own_back=np.where(taken, behind.own_back[rows, columns], self.own_back),
-            beneath=np.where(taken, behind.front[rows, columns], self.beneath),
-            beside=np.where(is_known[..., None], behind.beside, self.beside),
-            is_apart=self.is_apart | is_known,
-            own_beside=np.where(is_known[..., None], behind.own_beside, np.stack([j, i], -1)),
+            own_back=behind.own_back[rows, columns],
+            beneath=behind.front[rows, columns],
+            beside=behind.beside,
+            is_apart=is_known,
+            own_beside=behind.own_beside,
         )
 
 

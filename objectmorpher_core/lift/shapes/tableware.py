@@ -36,7 +36,7 @@ FEET, BULGES = (0.35, 0.5, 0.65, 0.8, 0.95), (1.0, 0.5, 0.25)  # x the lip's rad
 BAND = 0.12  # x the lip's radius, within which a vessel ends at the photo's edge
 AROUND_SHARE = 0.15  # x its radius: how much a way around an axis counts beside one along it
 RINGS, USUAL = 16, 60  # rings in a rim's radius, and percent of each that look alike
-CLEAR = 4  # cells from where a part ends, nearer to which colours are mixed
+CLEAR = 9  # cells from where a part ends, nearer to which colours are mixed
 LEAST_STEP = 0.02  # x extent, over which a cut falls
 
 
