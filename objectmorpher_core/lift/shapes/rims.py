@@ -26,6 +26,7 @@ SEEN_LEAN = 0.35  # x a rim's own slope, that the network sees of it
 LEVEL = 0.25  # slope, below which a rim may as well face the camera
 HEIGHTS, RADII = (0.05, 1.6), (0.2, 1.05)  # x the first radius, of a further circle
 STEPS, ROUNDS = 25, 4  # of each, and how often they are made finer
+NEAREST = 0.1  # x the first circle's depth, that a further one is from the camera at least
 FRAME = 2.0  # px from the photo's frame, where an outline is its cut and no outline
 
 
@@ -184,6 +185,8 @@ def _further(first: Rim, rest: F64, error: float) -> Rim | None:
         heights, radii = (np.linspace(span[0], span[1], STEPS) for span in spans)
         for height in heights:
             centre = first.centre + height * first.radius * first.normal
+            if centre[2] - RADII[1] * first.radius < NEAREST:
+                continue
             away = Rim(centre, first.normal, 0.0).outside(rest) * centre[2]
             off = (away[:, None] - radii * first.radius) / (error * centre[2])
             scores = (1 / (1 + off**2)).sum(0)
