@@ -152,6 +152,10 @@ object hides of another counts as invented although it may stay hidden.
 
 ![Sixteen photos, turned by 15, 25 and 35 degrees to both sides and pitched by 20](turned.jpg)
 
+That sheet is older than rims. With them, the coffee is:
+
+![The coffee, turned by as much](turned-coffee.jpg)
+
 Up to 25 degrees the flower, the rocket, the bowl and the logo look right, and the coffee nearly so:
 its cup and saucer keep their ellipses, and the saucer goes on behind the cup. Its handle and spoon
 lie flat on the saucer, the lip's photo is stretched down the cup's side where that turns into view,
