@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, U8, Mask
 from ...base.camera import Camera
@@ -35,15 +36,16 @@ from .colours import fill_in
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
-# that both agree where they meet: of a turn by 17 degrees and more.
-PINNED = 0.2
+# that both agree where they meet: of a turn by 30 degrees and more.
+PINNED = 0.27
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
 LONGEST = 400.0  # px, longer side of the object in a picture
 SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
-HALF = 0.5  # of the matte's alpha, to which its own colours are sure enough
+OWN = 0.9  # alpha of the matte from which its colours are the object's own
+HALF = 0.5  # share
 EDGE = 1  # px of what is known beside a hole that are filled anew: they are mixed with it
 RIM = 4  # small px of the object's edge that are no source, for what is beyond is in their patches
 STRANGE = 20_000.0  # squared levels that they cost
@@ -53,6 +55,7 @@ ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
+APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
 GAP = 32  # px between the matte and the pictures, and between them
 
 
@@ -111,7 +114,7 @@ class _View:
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
         at = (looks - [matte.left, matte.top] - 0.5).astype(np.float32)
-        is_known &= cv2.remap(matte.alpha, at, None, cv2.INTER_LINEAR) > HALF
+        is_known &= cv2.remap(matte.alpha, at, None, cv2.INTER_LINEAR) > OWN
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
         is_clear = area * (self.camera.focal / photo.focal) ** 2 > RULES.look_aside
@@ -185,6 +188,7 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
         )
         if wanted.sum() >= 3:
             sides.append(_side(view, np.flatnonzero(wanted), lit, matte, camera))
+    sides = _apart(sides, lifted.world_points(rest.means), APART * rest.spacing)
     filled: list[U8 | None] = [None] * len(sides)
 
     def fill(first: int, last: int) -> None:
@@ -193,6 +197,22 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
 
     in_threads(fill, len(sides), parts=len(sides))
     return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
+
+
+def _apart(sides: list[_Side], places: F64, gap: float) -> list[_Side]:
+    """The sides without what is nearer than `gap` to a larger one; Gaussians lie at `places`.
+
+    No pixel shows two pictures at once: a mean of places in both would be a place in neither.
+    """
+    taken, kept = np.zeros(len(places), bool), {}
+    for k in sorted(range(len(sides)), key=lambda k: -len(sides[k].index)):
+        index = sides[k].index
+        if taken.any():
+            nearest, _ = KDTree(places[taken]).query(places[index], distance_upper_bound=gap)
+            index = index[np.isinf(nearest)]
+        taken[index] = True
+        kept[k] = replace(sides[k], index=index)
+    return [kept[k] for k in range(len(sides))]
 
 
 def _carried(
@@ -288,7 +308,10 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     small, share = shrunk(levels, (~whole).astype(np.float32), size)
     guess = smooth(small, (share >= 0.5).astype(np.float32))
     unlikely = _unlikely(known & picture.is_clear, share < 0.5, round(width * scale))
-    guide = Guide(unlikely, find_lines(guess, share < 0.5))
+    # Where the photo is drawn out, each speck is a line: those that go on are found elsewhere.
+    blurred = (known & ~picture.is_clear).astype(np.float32)
+    blurred = cv2.resize(blurred, size, interpolation=cv2.INTER_AREA) > HALF
+    guide = Guide(unlikely, find_lines(guess, (share < 0.5) | blurred))
     completion = complete(small, share, guide, seed, silent)
     coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
     change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
@@ -314,7 +337,7 @@ def _pinned(colors: F32, hole: Mask, known: F32, sure: F32) -> F32:
         cv2.GaussianBlur(part * weight[..., None], (0, 0), COARSE)
         for part, weight in ((colors, inner), (known, sure))
     ]
-    own, other = (total / np.maximum(weight, 1e-4) for total, weight in zip(sums, weights))
+    own, other = (s / np.maximum(w, 1e-4) for s, w in zip(sums, weights, strict=True))
     away = cv2.distanceTransform((sure < HALF).astype(np.uint8), cv2.DIST_L2, 5)
     share = np.exp(-((away / (2 * COARSE)) ** 2))[..., None] * (weights[1] > 1e-3)
     return np.asarray(colors + share * (other - own), np.float32)
