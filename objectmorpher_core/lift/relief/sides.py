@@ -36,16 +36,15 @@ from .colours import fill_in
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
 # Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
-# that both agree where they meet: of a turn by 30 degrees and more.
-PINNED = 0.27
+# that both agree where they meet: of a turn by 17 degrees and more.
+PINNED = 0.2
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
 LONGEST = 400.0  # px, longer side of the object in a picture
 SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
-OWN = 0.9  # alpha of the matte from which its colours are the object's own
-HALF = 0.5  # share
+HALF = 0.5  # alpha of the matte, to which its own colours are sure enough; of a share, likewise
 EDGE = 1  # px of what is known beside a hole that are filled anew: they are mixed with it
 RIM = 4  # small px of the object's edge that are no source, for what is beyond is in their patches
 STRANGE = 20_000.0  # squared levels that they cost
@@ -114,7 +113,7 @@ class _View:
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
         at = (looks - [matte.left, matte.top] - 0.5).astype(np.float32)
-        is_known &= cv2.remap(matte.alpha, at, None, cv2.INTER_LINEAR) > OWN
+        is_known &= cv2.remap(matte.alpha, at, None, cv2.INTER_LINEAR) > HALF
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
         is_clear = area * (self.camera.focal / photo.focal) ** 2 > RULES.look_aside
@@ -308,10 +307,7 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     small, share = shrunk(levels, (~whole).astype(np.float32), size)
     guess = smooth(small, (share >= 0.5).astype(np.float32))
     unlikely = _unlikely(known & picture.is_clear, share < 0.5, round(width * scale))
-    # Where the photo is drawn out, each speck is a line: those that go on are found elsewhere.
-    blurred = (known & ~picture.is_clear).astype(np.float32)
-    blurred = cv2.resize(blurred, size, interpolation=cv2.INTER_AREA) > HALF
-    guide = Guide(unlikely, find_lines(guess, (share < 0.5) | blurred))
+    guide = Guide(unlikely, find_lines(guess, share < 0.5))
     completion = complete(small, share, guide, seed, silent)
     coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
     change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
