@@ -55,6 +55,7 @@ KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
 APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
+MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
 
 
@@ -336,7 +337,8 @@ def _pinned(colors: F32, hole: Mask, known: F32, sure: F32) -> F32:
     own, other = (s / np.maximum(w, 1e-4) for s, w in zip(sums, weights, strict=True))
     away = cv2.distanceTransform((sure < HALF).astype(np.uint8), cv2.DIST_L2, 5)
     share = np.exp(-((away / (2 * COARSE)) ** 2))[..., None] * (weights[1] > 1e-3)
-    return np.asarray(colors + share * (other - own), np.float32)
+    change = np.clip(other - own, -MOST_TONED, MOST_TONED)  # more is another thing's colour
+    return np.asarray(colors + share * change, np.float32)
 
 
 def _unlikely(known: Mask, hole: Mask, width: int) -> F32:
