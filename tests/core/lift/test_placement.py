@@ -150,6 +150,7 @@ def test_what_is_shifted_in_the_photo_is_shifted_in_the_world():
     assert np.abs(first.world_from_object - second.world_from_object).max() < 0.01
 
 
+@pytest.mark.slow
 def test_two_runs_give_the_same_pose():
     first, second = _found(), register(*_known())
     assert len(first.proposals) == len(second.proposals)
@@ -168,6 +169,7 @@ def test_up_to_three_poses_are_proposed_best_first_and_all_differ():
             assert error > 9.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [registered.cylinder, pytest.param(registered.ball, marks=slow)])
 def test_a_symmetric_object_is_called_ambiguous(body):
     scene = registered.photo(body(), registered.pose(6))
