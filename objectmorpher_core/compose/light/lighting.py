@@ -71,11 +71,11 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
         slice(max(y0 - top - near, 0), y1 - top + near),
         slice(max(x0 - left - near, 0), x1 - left + near),
     )
-    own = cv2.copyMakeBorder(matte.foreground, *4 * (near,), cv2.BORDER_REPLICATE)
+    own = cv2.copyMakeBorder(matte.foreground, near, near, near, near, cv2.BORDER_REPLICATE)
     first = max(near - (y0 - top), 0), max(near - (x0 - left), 0)
     size = foreground[around].shape
     foreground[around] = own[first[0] :, first[1] :][: size[0], : size[1]]
-    return build_levels(foreground, alpha, left, top)
+    return build_levels(np.asarray(foreground, np.float32), alpha, left, top)
 
 
 class Lighting:

@@ -114,7 +114,7 @@ class _View:
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
         looks = self._looks(picture, photo)
         at = (looks - [matte.left, matte.top] - 0.5).astype(np.float32)
-        is_known &= cv2.remap(matte.alpha, at, None, cv2.INTER_LINEAR) > HALF
+        is_known &= cv2.remap(matte.alpha, at[..., 0], at[..., 1], cv2.INTER_LINEAR) > HALF
         across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
         area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
         is_clear = area * (self.camera.focal / photo.focal) ** 2 > RULES.look_aside
@@ -315,7 +315,9 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     sure = np.asarray(
         cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32
     )
-    toned = _pinned(completion.colors + KEPT * change, completion.hole, small, sure)
+    toned = _pinned(
+        (completion.colors + KEPT * change).astype(np.float32), completion.hole, small, sure
+    )
     colors = np.where(completion.hole[..., None], toned, small)
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     colors = np.clip(colors, 0, 255).astype(np.float32)

@@ -89,7 +89,7 @@ def test_stripes_go_on_where_the_photo_ends(vase, yaw):
     aside = is_shown & (sides.zoom > 0) & (rest.cosines < RULES.look_aside * cosines)
     i = np.flatnonzero(aside)
     own = np.flatnonzero(is_shown & ~aside & (lifted.texture.visibility > 0))
-    gap, nearest = KDTree(world[own]).query(world[i])
+    gap, nearest = map(np.asarray, KDTree(world[own]).query(world[i]))
     is_near = gap < 1.5 * rest.spacing
     i, j = i[is_near], own[nearest[is_near]]
     assert len(i) > 30
