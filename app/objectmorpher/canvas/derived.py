@@ -148,15 +148,13 @@ class Derived:
 
     def shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
         """Solver, poser and texture; a fraction of a second the first time."""
-        return self._shapes(
-            lambda: self._build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
-        )
+        return self._shapes(lambda: self._build_shape(photo, thing), *_parts_of(thing))
 
     def _build_shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
-        """Of a rig that changed, only what depends on it."""
+        """Of a rig, or of the colours of an edge, that changed, only what depends on it."""
         similar = self._latest
         if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
-            shape = similar[2].with_rig(thing.rig)
+            shape = similar[2].changed_to(thing)
         else:
             shape = build_shape(photo.camera, thing)
         self._latest = (thing.lifted, thing.deform, shape)
@@ -170,7 +168,7 @@ class Derived:
 
     def remember(self, thing: EditObject, shape: CanvasShape) -> None:
         """Takes over an object's shape that was made in a thread."""
-        self._shapes(lambda: shape, thing.lifted, thing.deform, thing.rig)
+        self._shapes(lambda: shape, *_parts_of(thing))
         self._latest = (thing.lifted, thing.deform, shape)
 
     def make_room(self, objects: int) -> None:
@@ -342,6 +340,11 @@ class Derived:
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip
+
+
+def _parts_of(thing: EditObject) -> tuple[object, ...]:
+    """Return what a shape is made of."""
+    return thing.lifted, thing.matte, thing.deform, thing.rig
 
 
 def _strongest(weights: Sparse, count: int) -> I32:

@@ -25,6 +25,7 @@ from .filing import OPEN, Dialog, Filing
 from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
+from .intents.edging import Edging
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
 from .intents.landing import Landing
@@ -63,6 +64,7 @@ class Editor(EditorState):
         self.tasks = Tasks(self, self.posing)
         self.refits = Refits(self, self.posing, self.tasks)
         self.masking = Masking(self, self.landing, self.posing)
+        self.edging = Edging(self, self.landing, self.masking)
         self.candidates = Candidates(self, self.tasks)
         self.closer_look = CloserLook(self, self.tasks)
         self.selection = Selection(
@@ -145,6 +147,7 @@ class Editor(EditorState):
         self.objects.carried = None
         self.tasks.forget()
         self.refits.forget()
+        self.edging.forget()
         self.composing.forget()
         self.hinting.forget()
         self.refining.forget()

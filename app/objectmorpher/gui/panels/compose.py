@@ -50,6 +50,7 @@ from ..widgets.widgets import (
 )
 from ..window.landmarks import mark
 from .brush import draw_brush_fields, draw_radius
+from .edge import draw_decontaminate
 
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 DEGREES = 72.0  # points, width of the direction's field
@@ -241,6 +242,8 @@ def _draw_edge(editor: Editor) -> None:
     preview = editor.composing.preview_feather
     _take(editor, change, lambda: preview(change.value), t("Blend of edge"))
     note(t("How wide the edit fades into the photo."))
+    draw_decontaminate(editor)
+    command_button(editor, "edge_brush", width=-1)
 
 
 def _take(editor: Editor, change: FieldChange, preview: Callable[[], None], label: str) -> None:
