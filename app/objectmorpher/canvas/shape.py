@@ -69,7 +69,8 @@ class CanvasShape:
             puppet = puppet.with_rig(thing.rig)
         if thing.matte is not None and thing.matte is not matte:
             texture, matte = object_texture(thing.matte, thing.lifted), thing.matte
-        other = CanvasShape(puppet, texture, thing.rig, matte)
+        is_ready = self.is_rehearsed and puppet is self.puppet
+        other = CanvasShape(puppet, texture, thing.rig, matte, is_ready)
         if "surface" in vars(self):
             other.surface = self.surface
         return other

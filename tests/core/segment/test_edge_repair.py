@@ -1,4 +1,4 @@
-"""The edge brush and decontamination, on pictures whose alpha and colours are known to the pixel."""
+"""The edge brush and decontamination, on pictures whose alpha and colours are known."""
 
 from __future__ import annotations
 
@@ -80,10 +80,8 @@ def test_the_brush_changes_nothing_elsewhere_and_can_be_undone() -> None:
     coverage, mixed = brush_edge(EdgeStroke(pixels, mask, None, left))
     np.testing.assert_array_equal(mixed, left)
     np.testing.assert_array_equal(coverage[~left], 255 * mask[~left])
-    once, again = (
-        build_matte(pixels, *given)
-        for given in ((mask, MARGIN), (coverage, MARGIN, mixed))
-    )  # fmt: skip
+    once = build_matte(pixels, mask, MARGIN)
+    again = build_matte(pixels, coverage, MARGIN, mixed)
     far = ~_moved_edge(left, 24)
     one, two = (crop(m.foreground * m.alpha[..., None], m.box, BOX)[far] for m in (once, again))
     change = np.abs(one - two)  # colours go over into each other, faintly
@@ -107,7 +105,7 @@ def test_a_stroke_beside_every_edge_finds_nothing() -> None:
 
 
 def _spilled(name: str, foreground: F32, alpha: F32, where: Mask) -> float:
-    """How far colours are on the way from the object's own, inside, to the background's, outside."""
+    """How far colours are on the way from the object's, inside, to the background's, outside."""
     pixels, _ = picture(name)
     color, true = _object(name)
     own = color / np.maximum(true, 1e-3)[..., None]

@@ -82,9 +82,9 @@ def draw_decontaminate(editor: Editor) -> None:
     if not editor.is_lifted:
         note(t("Lift the object to take the background's colour out of its edge."))
         return
-    number = Number(t("Decontaminate"), "%.0f %%", 0.5, 10.0, 0.0, 0.0, 100.0)
+    number = Number(t("Clean"), "%.0f %%", 0.5, 10.0, 0.0, 0.0, 100.0)
     change = number_field(number, 100 * editor.edging.decontaminate)
-    tooltip(t("Take the background's colour out of the object's soft edge"))
+    tooltip(t("Decontaminate: take the background's colour out of the object's soft edge"))
     if change.is_changed:
         editor.edging.preview_decontaminate(change.value / 100)
     if change.is_done:

@@ -70,7 +70,7 @@ def _draw_edge_brush(editor: Editor) -> None:
     note(t("Paint along an edge with hair, fur or a halo, wherever the object is now: it is found "
            "again there."))  # fmt: skip
     gap(12)
-    heading(t("Colour of the edge"))
+    heading(t("Decontaminate"))
     draw_decontaminate(editor)
 
 
