@@ -6,11 +6,8 @@ where it has the size and the hash of the registry, so that a mirror needs no tr
 
 from __future__ import annotations
 
-import http.client
 import logging
 import os
-import urllib.error
-import urllib.request
 from pathlib import Path
 
 from ..base.progress import Progress
@@ -37,12 +34,15 @@ def fetch_mirrored(wanted: Weight, target: Path, progress: Progress) -> bool:
 
     Its hash is for the caller to check. Raises OSError where the disk is full. `Cancelled` passes.
     """
+    from http.client import HTTPException
+    from urllib.error import URLError
+
     for address in addresses():
         try:
             if _copy(f"{address}/{wanted.file}", wanted, target, progress):
                 return True
             reason = "it has another size"
-        except (urllib.error.URLError, http.client.HTTPException, TimeoutError) as error:
+        except (URLError, HTTPException, TimeoutError) as error:
             reason = str(error)
         log.info("%s does not come from %s: %s", wanted.id, address, reason)
     return False
@@ -51,7 +51,9 @@ def fetch_mirrored(wanted: Weight, target: Path, progress: Progress) -> bool:
 def _copy(address: str, wanted: Weight, target: Path, progress: Progress) -> bool:
     """Write what `address` answers to `target`; no more of it than the weight has."""
     count = 0
-    with urllib.request.urlopen(address, timeout=WAIT) as answer, target.open("wb") as file:
+    from urllib.request import urlopen
+
+    with urlopen(address, timeout=WAIT) as answer, target.open("wb") as file:
         while count <= wanted.size and (block := answer.read(BLOCK)):
             file.write(block)
             count += len(block)

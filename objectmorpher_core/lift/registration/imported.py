@@ -71,15 +71,11 @@ def rematted(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) 
     body = np.flatnonzero(lifted.texture.solidity > 0.5)
     nothing = np.zeros(len(body), np.float32)
     texture = PhotoTexture(lifted.texture.u0[body], nothing, nothing + 1)
-    sides = None if lifted.sides is None else lifted.sides.select(body)
-    plain = replace(
-        lifted, gaussians=lifted.gaussians.select(body), texture=texture, sides=sides
-    )  # fmt: skip
+    plain = replace(lifted, gaussians=lifted.gaussians.select(body), texture=texture, sides=None)
     picture = rest_picture(plain, camera, matte)
     seen = visibilities(plain, picture, matte)
     brim = brim_around(plain, picture, matte, np.random.default_rng(seed))
-    whole = _assembled(plain, seen, plain.gaussians.colors, brim, camera)
-    return replace(whole, sides=None if sides is None else sides.followed_by(len(brim.world)))
+    return _assembled(plain, seen, plain.gaussians.colors, brim, camera)
 
 
 def _in_own_frame(gaussians: Gaussians, world_from_file: F64) -> tuple[Gaussians, F64]:

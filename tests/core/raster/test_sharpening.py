@@ -56,8 +56,9 @@ def test_at_rest_a_pixel_is_that_of_the_photo() -> None:
     draft = _draft(scene, Placement(), 4, 1.0)
     alpha = scene.texture.levels[0][..., 3]
     top, left = int(scene.texture.top), int(scene.texture.left)
-    inside = np.zeros(draft.shape[:2], bool)
-    inside[top : top + alpha.shape[0], left : left + alpha.shape[1]] = alpha > 0.999
+    inside = np.zeros((top + alpha.shape[0], left + alpha.shape[1]), bool)  # invented sides, too
+    inside[top:, left:] = alpha > 0.999
+    inside = inside[: draft.shape[0], : draft.shape[1]] & scene.mask
     inside = cv2.erode(inside.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
     photo = scene.document().photo.pixels / 255
     assert inside.sum() > 500
