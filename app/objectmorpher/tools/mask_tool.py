@@ -43,7 +43,7 @@ class MaskTool:
             return t("Esc cancels the stroke")
         painted = editor.view.selecting.painted
         if painted is Painted.EDGE:
-            return t("Drag along the edge to find hair and blur there · Alt undoes it · [ ] size")
+            return t("Drag along the edge to find hair and blur there · Alt restores it · [ ] size")
         if painted is Painted.DEPTH:
             return t("Drag brings nearer · Right-drag or Alt pushes back · [ ] size")
         if painted is Painted.HIDDEN:

@@ -51,7 +51,7 @@ def _ways(painted: Painted) -> tuple[Segment[bool], Segment[bool]]:
     if painted is Painted.EDGE:
         return (
             Segment(False, t("Find"), t("The brush looks for the edge again"), icon=Icon.BRUSH),
-            Segment(True, t("Undo"), t("The edge is as it was found at first"), icon=Icon.ERASE),
+            Segment(True, t("Restore"), t("The edge is as it was found at first"), icon=Icon.ERASE),
         )
     if painted is Painted.HIDDEN:
         return (
