@@ -20,6 +20,7 @@ from tests.core.segment.truth_masks import truth, truth_mask
 from tests.photos import photo
 from tests.reflected import mirrored, photo_with, thing
 from tests.shadowed import FOOT, HEIGHT, WIDTH, ground_of, inside, photo_of, thrown
+from tests.tree import quick
 
 WHOLE = (0, 0, WIDTH, HEIGHT)
 
@@ -34,7 +35,7 @@ def _around() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("tilt", "strength"), [(0.0, 0.2), (1.0, 0.4), (-2.0, 0.6)])
-@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("bits", quick([8, 16], 1))
 def test_a_reflection_is_found_where_it_is(tilt, strength, bits):
     laid = mirrored(tilt)
     pixels = photo_with(laid, strength)
@@ -62,7 +63,7 @@ def test_it_ends_where_it_is_no_longer_seen():
     assert ends - 12 < rows[-1] < ends + 16
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", quick(range(3), 1))
 def test_even_ground_mirrors_nothing(seed):
     assert find_old_reflection(photo_with(None, ground=ground_of(seed)), _matte()) is None
 
