@@ -233,4 +233,5 @@ def window_environment(display: str, folder: Path, settings: str) -> dict[str, s
         "OBJECTMORPHER_DATA": str(folder / "data"),
         "OBJECTMORPHER_LANDMARKS": str(folder / "landmarks.json"),
         "PYTHONFAULTHANDLER": "1",
+        "DBUS_SESSION_BUS_ADDRESS": "disabled:",  # else a daemon is started where there is none
     }

@@ -134,6 +134,7 @@ def test_without_a_script_there_is_nothing_to_run(folder, capsys):
     assert "is no folder" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_outputs_keep_their_photos_format_in_a_folder_that_is_made(folder):
     Image.open("photos/two.png").convert("RGB").save("photos/three.JPG")
     Path("photos/two.png").unlink()

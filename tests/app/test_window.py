@@ -96,6 +96,7 @@ def hands(window_environment: dict[str, str], photo_path: Path) -> Iterator[Hand
         yield hands
 
 
+@pytest.mark.slow
 def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -> None:
     x, y = CENTRE
     hands.click(*screen_xy(x, y))

@@ -11,7 +11,7 @@ from ...base.arrays import F64
 from ...base.camera import Camera
 from ...document.model import LiftSettings
 from .bilinear import bilinear
-from .cuts import Cuts, Overlaps, overlaps_of
+from .cuts import Behind, Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
 from .prism import Prism
 from .silhouette import ReliefSilhouette
@@ -35,6 +35,7 @@ class ReliefBody:
     detail: F64 | None = None  # (h, w) px, height of the front beyond its thickness; None: 0
     cuts: Cuts | None = None  # between cells where one part ends before another
     own: F64 | None = None  # (h, w) share of the thickness that is the nearest part's; None: 1
+    behind: Behind | None = None  # what its shape hides from the photo; None: nothing is known
     kind: str = "free"  # what it was recognised as: see `shapes`
     doubt: float = 0.0  # x extent, expected error of the front's depth; 0: nobody said
 
@@ -86,7 +87,7 @@ class ReliefBody:
         if self.detail is not None:
             self._add_detail(grid_xy, np.maximum(share, 0.0), height, gradient)
         if self.cuts is not None:
-            height += cell * ((wanted - grid_xy) * gradient).sum(1)
+            height += np.clip(cell * ((wanted - grid_xy) * gradient).sum(1), -cell, cell)
         return height, gradient
 
     def height(self, xy: F64, side: float) -> F64:
@@ -110,7 +111,11 @@ class ReliefBody:
         front, back = (self.sample(at, side)[0].reshape(outline.shape) for side in (FRONT, BACK))
         own = np.ones(outline.shape) if self.own is None else self.own
         thickness = own * (front - back)
-        return overlaps_of(front, back, thickness, self.cuts, outline.inside, outline.extent)
+        if self.behind is not None:
+            known = np.isfinite(self.behind.front)
+            thickness = np.where(known, front - self.behind.own_back, 0.0)  # no walls elsewhere
+        found = overlaps_of(front, back, thickness, self.cuts, outline.inside, outline.extent)
+        return found if self.behind is None else found.known(self.behind)
 
     @cached_property
     def _middle_fields(self) -> F64:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -126,6 +126,30 @@ class Overlaps:
     beneath: F64  # of the front that goes on behind it, hidden from the photo
     beside: I64  # (h, w, 2) column and row of a cell that has the colours of that
     is_apart: Mask  # where there is air between the two
+    own_beside: I64 | None = None  # (h, w, 2) likewise of the own back; None: those that hide it
+
+    def known(self, behind: Behind) -> Overlaps:
+        """Return these with what a shape says is behind it, and nothing else."""
+        is_known = np.isfinite(behind.front)
+        rows, columns = np.divmod(nearest_in(is_known), is_known.shape[1])
+        # Beyond it the sheets go on, so that they do not bend at its end.
+        return replace(
+            self,
+            own_back=behind.own_back[rows, columns],
+            beneath=behind.front[rows, columns],
+            beside=behind.beside,
+            is_apart=is_known,
+            own_beside=behind.own_beside,
+        )
+
+
+class Behind(NamedTuple):
+    """Fields (h, w) of what a shape hides from the photo of itself; NaN where it hides nothing."""
+
+    own_back: F64  # px, of the part that is seen
+    front: F64  # px, of the next part
+    own_beside: I64  # (h, w, 2) column and row of a cell that has the colours of the own back
+    beside: I64  # likewise of the next part
 
 
 def overlaps_of(

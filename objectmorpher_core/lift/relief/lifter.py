@@ -23,7 +23,7 @@ from ...document.gaussians import Gaussians
 from ...document.model import LiftedObject, LiftSettings, Matte, PhotoTexture
 from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
-from ..shapes import Recognised, completed, flattened, recognised, rounded
+from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rounded
 from . import shape_look
 from .bilinear import bilinear
 from .body import MIDDLE, ReliefBody
@@ -46,6 +46,7 @@ LEAST_AREA = 25  # px
 SEAM = 2.0  # x mean spacing: so near to what was hidden nothing of the photo is carried
 NEARNESS_RADIUS = 5  # cells: how far a painted nearness is drawn to an edge of the photo
 NEARNESS_EPS = 1e-3  # variance of colours in [0, 1] that counts as flat
+HIDDEN = 1e-6  # visibility of what faces the photo's camera and something else hides
 PROFILE = 1.2  # width over height, from which what stands is thought to be seen from the side
 
 Shaper = Callable[[ReliefSilhouette, Camera, LiftSettings, MirrorAxis | None], ReliefBody]
@@ -96,9 +97,11 @@ class ReliefLifter:
         progress(0.8, "Choosing control points")
         lifted = _assemble(surface, spacing, body, colours, camera)
         # A mirrored back shows the photo itself, as sharp as the front does.
-        is_carried = is_mirrored and hidden is None
+        is_carried = is_mirrored and hidden is None and body.behind is None
         lifted = replace(lifted, splatting="edged surface" if is_carried else "edged solid")
         progress(0.85, "Filling in its sides")
+        if body.behind is not None:  # what it hides has the colours of what is like it
+            return lifted
         return with_sides(lifted, matte, camera, seed)
 
     def body(self, subject: LiftSubject, settings: LiftSettings) -> ReliefBody:
@@ -122,9 +125,12 @@ class ReliefLifter:
             if (seen := self._see(subject.pixels, mask, camera)) is not None:
                 body = fused(body, seen, camera, settings.thickness, settings.trust)
                 body = replace(body, doubt=seen.doubt)
-                shape = recognised(seen, settings.kind)
-                if shape is not None and not _contradicts(shape, body, settings):
-                    body = completed(body, shape, camera, settings.thickness, settings.trust)
+                rims = rims_of(seen, camera) if settings.kind == "auto" else []
+                # An egg that lies as a plate does looks like one, and is rarer.
+                if len(rims) > 1 or (rims and rims[0].is_steep):
+                    body = laid(body, rims, seen, subject, settings.thickness)
+                else:
+                    body = _recognised(body, seen, camera, settings)
         if settings.kind == "tube":
             body = rounded(body, settings.thickness)
         elif settings.kind == "flat" and body.kind != "flat":
@@ -149,6 +155,16 @@ class ReliefLifter:
             limit = np.array(hidden.shape[::-1]) - 1
             cells = hidden[tuple(np.moveaxis(np.clip(at, 0, limit), -1, 0)[::-1])]
         return follow(body, seen, subject.camera.focal, settings.thickness, cells)
+
+
+def _recognised(
+    body: ReliefBody, seen: shape_look.SeenShape, camera: Camera, settings: LiftSettings
+) -> ReliefBody:
+    """`body` as the plain shape that it looks like, if any."""
+    shape = recognised(seen, settings.kind)
+    if shape is None or _contradicts(shape, body, settings):
+        return body
+    return completed(body, shape, camera, settings.thickness, settings.trust)
 
 
 def _contradicts(shape: Recognised, body: ReliefBody, settings: LiftSettings) -> bool:
@@ -265,9 +281,12 @@ def _assemble(
         colours.sample(surface.color_xy, ~surface.is_front),
     )
     solid = ~surface.is_brim
+    visibility = surface.is_seen.astype(np.float32)
+    if body.behind is not None:
+        visibility[surface.is_front & ~surface.is_seen] = HIDDEN
     texture = PhotoTexture(
         u0=camera.project(gaussians.means @ world_from_object[:3, :3].T + centre),
-        visibility=surface.is_seen.astype(np.float32),
+        visibility=visibility,
         solidity=solid.astype(np.float32),
     )
     points = sample_control_points(gaussians.means[solid], gaussians.opacities[solid], COUNT)

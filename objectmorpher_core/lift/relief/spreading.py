@@ -222,19 +222,21 @@ def _inner(body: ReliefBody, density: float, rng: np.random.Generator) -> list[S
     behind = outline.photo_xy(walls.near[which] - walls.step[which].astype(np.float64))
     sheets = [SurfacePoints(xy, height, normals, ~no, no, no, behind)]
     assert body.cuts is not None, "there are overlaps"
-    for field, side in ((inner.own_back, BACK), (inner.beneath, FRONT)):
+    beneath = (inner.own_back, BACK, inner.own_beside), (inner.beneath, FRONT, inner.beside)
+    for field, side, beside in beneath:
         down, right = (slope / cell for slope in body.cuts.gradient(field))
         area = np.where(inner.is_apart, cell**2 * np.sqrt(1 + down**2 + right**2), 0.0)
         xy = _draw(outline, area * density, rng)
         at = outline.grid_xy(xy)
         near = body.cuts.settled(at)
         height, dx, dy = bilinear(np.stack([field, right, down], -1), near).T
-        height = height + cell * ((at - near) * np.column_stack([dx, dy])).sum(1)
+        step = cell * ((at - near) * np.column_stack([dx, dy])).sum(1)
+        height = height + np.clip(step, -cell, cell)
         normals = side * np.column_stack([-dx, -dy, np.ones(len(xy))])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         no = np.zeros(len(xy), bool)
         j, i = np.clip(np.rint(at).astype(int), 0, np.array(field.shape[::-1]) - 1).T
-        source = xy if side == BACK else outline.photo_xy(inner.beside[i, j].astype(np.float64))
+        source = xy if beside is None else outline.photo_xy(beside[i, j].astype(np.float64))
         sheets.append(SurfacePoints(xy, height, normals, ~no, no, no, source))
     return sheets
 

@@ -10,5 +10,7 @@ from __future__ import annotations
 
 from .completing import completed, flattened, rounded
 from .recognition import Recognised, recognised
+from .rims import rims_of
+from .tableware import laid
 
-__all__ = ["Recognised", "completed", "flattened", "recognised", "rounded"]
+__all__ = ["Recognised", "completed", "flattened", "laid", "recognised", "rims_of", "rounded"]

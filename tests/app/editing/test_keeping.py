@@ -86,6 +86,7 @@ def test_the_order_can_put_an_object_before_it(keeping: Editor) -> None:
     assert (changed != composite(document).pixels).any()
 
 
+@pytest.mark.slow
 def test_it_can_be_let_go_and_what_moved_cannot_be_kept(keeping: Editor) -> None:
     keeping.objects.choose(1)
     run(keeping, "keep_in_front")
@@ -95,6 +96,7 @@ def test_it_can_be_let_go_and_what_moved_cannot_be_kept(keeping: Editor) -> None
     assert why_not(keeping, "keep_in_front") == "It has moved"
 
 
+@pytest.mark.slow
 def test_a_changed_selection_is_cut_out_anew(keeping: Editor) -> None:
     document = keeping.document
     assert document is not None and document.objects[1].matte is not None

@@ -136,6 +136,7 @@ def test_the_background_is_without_it(taken):
     ].mean()  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_script_that_moves_a_thing_takes_its_shadow_along():
     dark = photo_of(thrown(35.0, 0.8))
     script = {"move": [-70, 0], "inpaint": "telea", "gaussians": 800}

@@ -169,6 +169,7 @@ def test_up_to_three_poses_are_proposed_best_first_and_all_differ():
             assert error > 9.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [registered.cylinder, pytest.param(registered.ball, marks=slow)])
 def test_a_symmetric_object_is_called_ambiguous(body):
     scene = registered.photo(body(), registered.pose(6))

@@ -100,3 +100,5 @@ def test_trust_falls_with_every_degree(scene):
     assert found[0].sign == "fine" and found[0].invented < 0.02 and found[0].astray < 1e-3
     assert np.all(np.diff([trust.invented for trust in found]) > 0)
     assert found[-1].sign == "guesswork" and found[-1].invented > 0.95
+    file = Puppet(replace(scene.lifted, backend="imported"), DeformSettings(), scene.camera)
+    assert trust_in(file.posed(None, TURN)).sign == "fine", "it came with its back"

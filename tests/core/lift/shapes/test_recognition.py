@@ -66,8 +66,12 @@ KINDS = {"box": "box", "leaf": "flat"}  # the others are round
 
 @cache
 def seen_of(name: str) -> tuple[SeenShape, Surfaces]:
+    return see(MADE[name]())
+
+
+def see(mesh: Mesh) -> tuple[SeenShape, Surfaces]:
     """What a network that is right would see of a mesh, and its surfaces in px of the crop."""
-    mesh, crop = MADE[name](), Crop(0, 0, SIDE, TANGENTS)
+    crop = Crop(0, 0, SIDE, TANGENTS)
     first = TANGENTS[:2] + (0.5 / SIDE - 0.5) * WIDTH
     found = drawn(mesh, RayGrid((float(first[0]), float(first[1])), WIDTH / SIDE, (SIDE, SIDE)))
     mask, ways = found.near > 0, rays(TANGENTS)
@@ -89,7 +93,7 @@ def body_of(seen: SeenShape) -> tuple[ReliefBody, Camera]:
     return ReliefBody.of(ReliefSilhouette.of(seen.mask), camera, LiftSettings()), camera
 
 
-def _as_far(found: Surfaces, true: Surfaces, mask: Mask, camera: Camera) -> Surfaces:
+def as_far(found: Surfaces, true: Surfaces, mask: Mask, camera: Camera) -> Surfaces:
     """`found` enlarged about the camera until it is as far away: nobody knows how far that is."""
     front = found.front - camera.focal
     scale = float(true.front[mask].mean() / front[mask].mean())
@@ -108,7 +112,7 @@ def test_a_shape_is_recognised_and_completed(name: str) -> None:
     whole = completed(fused(body, seen, camera, 1.0, 1.0), found, camera, 1.0, 1.0)
     assert whole.kind == KINDS.get(name, "round")
     before, after = (
-        score(_as_far(surfaces_of(each, seen.mask), true, seen.mask, camera), true, seen.mask)
+        score(as_far(surfaces_of(each, seen.mask), true, seen.mask, camera), true, seen.mask)
         for each in (body, whole)
     )
     if name != "leaf":  # which is thinner than any error is to be measured in

@@ -1,0 +1,309 @@
+"""Bodies by their rims: plates and bowls that lie as their rim does, and cups on saucers.
+
+What stands in a dish is a solid of its own, about the same axis; behind it the dish goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...base.arrays import F64, I64, U8, Mask, Pixels
+from ...base.camera import Camera
+from ...base.distances import nearest_in
+from ...pictures.image import to_u8
+from .. import LiftSubject
+from ..relief.body import ReliefBody
+from ..relief.cuts import Behind, Cuts
+from ..relief.integration import solved
+from ..relief.shape_look import SeenShape
+from ..relief.silhouette import ReliefSilhouette
+from .drawing import Mesh, RayGrid, drawn
+from .evidence import Evidence
+from .rims import Rim
+from .solids import AROUND, FINE, revolved
+
+NEAR = 1.5  # cells from a rim's picture, where the front is on it
+LEAST_KNOWN = 60  # cells on rims
+PULL = 100.0  # x a step's weight, that a place on a rim has
+SOLVING = 300, 1e-4  # rounds of conjugate gradients, and when the residual is small enough
+DISH = 0.07, 0.05  # x its radius: how deep a dish is, and how thick
+FEET, BULGES = (0.35, 0.5, 0.65, 0.8, 0.95), (1.0, 0.5, 0.25)  # x the lip's radius; exponents
+BAND = 0.12  # x the lip's radius, within which a vessel ends at the photo's edge
+AROUND_SHARE = 0.15  # x its radius: how much a way around an axis counts beside one along it
+RINGS, USUAL = 16, 60  # rings in a rim's radius, and percent of each that look alike
+CLEAR = 9  # cells from where a part ends, nearer to which colours are mixed
+LEAST_STEP = 0.02  # x extent, over which a cut falls
+
+
+def laid(
+    body: ReliefBody, rims: list[Rim], seen: SeenShape, subject: LiftSubject, thickness: float
+) -> ReliefBody:
+    """`body`, whose thickness was multiplied by `thickness`, as its rims lie.
+
+    How far away the whole is, the body decides.
+    """
+    stack = Stack.of(body, rims, seen, subject) if len(rims) > 1 else None
+    if stack is not None:
+        return _stacked(body, rims, stack, subject, thickness)
+    camera = subject.camera
+    outline = body.silhouette
+    tangents, before = _front(body, camera)
+    known = _along(rims[0], tangents, outline, camera)
+    if known.sum() < LEAST_KNOWN:
+        return body
+    change = np.where(known, np.log(rims[0].depth(tangents)) - before, 0.0)
+    at = np.concatenate([tangents, np.ones((*outline.shape, 1))], -1)
+    whole = at @ np.linalg.lstsq(at[known], change[known])[0]
+    rest = np.where(known, change - whole, 0.0)
+    inside, zero = outline.inside.astype(np.float64), np.zeros(outline.shape)
+    steps = (
+        np.pad(inside[1:] * inside[:-1], ((0, 1), (0, 0))),
+        np.pad(inside[:, 1:] * inside[:, :-1], ((0, 0), (0, 1))),
+    )
+    rest = rest + solved(rest, PULL * known, zero, zero, *steps, *SOLVING)
+    after = before + whole + rest.ravel()[nearest_in(outline.inside)]
+    after += float(np.median((before - after)[outline.inside]))
+    return replace(body, middle=body.middle + np.exp(before) - np.exp(after))
+
+
+def _front(body: ReliefBody, camera: Camera) -> tuple[F64, F64]:
+    """(h, w, 2) tangents of a body's cells, and (h, w) the logarithms of its front's depths, px."""
+    outline = body.silhouette
+    tangents = (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / camera.focal
+    half = body.front.half(outline.cells.reshape(-1, 2)).reshape(outline.shape)
+    return tangents, np.log(camera.focal - body.middle - half)
+
+
+def _along(rim: Rim, tangents: F64, outline: ReliefSilhouette, camera: Camera) -> Mask:
+    """(h, w) where the outline is on a rim."""
+    cell = outline.cell / camera.focal
+    is_on = outline.inside & (np.abs(rim.outside(tangents)) < NEAR * cell)
+    return is_on & (outline.depth < 2 * NEAR * outline.cell)
+
+
+class Stack(NamedTuple):
+    """A dish and what stands in it, fields (h, w); depths are logarithms of px."""
+
+    stands: Mask
+    lies: Mask  # where the dish is, also behind what stands in it
+    near: F64
+    far: F64
+    vessel_far: F64  # of what stands
+    dish_near: F64  # also where it is hidden
+
+    @staticmethod
+    def of(
+        body: ReliefBody, rims: list[Rim], seen: SeenShape, subject: LiftSubject
+    ) -> Stack | None:
+        """None where nothing stands before the dish."""
+        outline, camera = body.silhouette, subject.camera
+        tangents, before = _front(body, camera)
+        start = (float(tangents[0, 0, 0]), float(tangents[0, 0, 1]))
+        grid = RayGrid(start, outline.cell / camera.focal, outline.shape)
+        dish = drawn(_dish(rims[0], FINE), grid)
+        vessel = drawn(_vessel(rims, Evidence.of(seen)), grid)
+        stands = outline.inside & (vessel.near > np.maximum(dish.near, 1e-9))
+        lies = outline.inside & (dish.near > 0)
+        if (stands & lies).sum() < LEAST_KNOWN:
+            return None
+        wide = rims[1].radius / rims[1].centre[2] * camera.focal  # px
+        stands = _edged(stands, outline, BAND * wide, subject.pixels)
+        if (stands & lies).sum() < LEAST_KNOWN:
+            return None
+        vessel_near, vessel_far = (_log_depth(part) for part in (vessel.near, vessel.far))
+        dish_near, dish_far = (_log_depth(part) for part in (dish.near, dish.far))
+        near = np.where(stands, vessel_near, dish_near)
+        near += _hollow(rims[1], tangents, before, outline)
+        far = np.maximum(np.where(lies, dish_far, vessel_far), near)
+        nearest = nearest_in(stands | lies)  # what sticks out, and what is around, goes on
+        near, far = near.ravel()[nearest], far.ravel()[nearest]
+        stands = outline.inside & stands.ravel()[nearest]
+        # It closes at its limb: no wall stands there.
+        beside = cv2.dilate((outline.inside & ~stands).astype(np.uint8), np.ones((5, 5))) > 0
+        vessel_far = np.where(stands & beside, near, np.maximum(vessel_far, near))
+        away = float(np.median((before - near)[outline.inside]))
+        return Stack(stands, lies, near + away, far + away, vessel_far + away, dish_near + away)
+
+    def behind(self, rims: list[Rim], outline: ReliefSilhouette, subject: LiftSubject) -> Behind:
+        """Return what the stack hides, in the colours of what is like it about the axis."""
+        camera = subject.camera
+        tangents = (outline.photo_xy(outline.cells) - [camera.cx, camera.cy]) / camera.focal
+        away = float(np.median((self.dish_near - np.log(rims[0].depth(tangents)))[self.lies]))
+        seen, back, dish = (
+            Around.of(rims[0], tangents, depth - away)
+            for depth in (self.near, self.vessel_far, self.dish_near)
+        )
+        photo, hidden = _photo(outline, subject.pixels), self.stands & self.lies
+        clear = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * CLEAR + 1,) * 2)
+        wall, plain = (
+            _usual(cv2.erode(own.astype(np.uint8), clear) > 0, level, photo)
+            for own, level in (
+                (self.stands & (rims[1].outside(tangents) > 0), seen.height),
+                (self.lies & ~self.stands, seen.radius),
+            )
+        )
+        own_back, front = (
+            np.where(hidden, camera.focal - np.exp(depth), np.nan)
+            for depth in (self.vessel_far, self.dish_near)
+        )
+        return Behind(
+            own_back, front,
+            seen.nearest(back, wall, hidden, "height"),
+            seen.nearest(dish, plain, hidden, "radius"),
+        )  # fmt: skip
+
+
+def _stacked(
+    body: ReliefBody, rims: list[Rim], stack: Stack, subject: LiftSubject, thickness: float
+) -> ReliefBody:
+    """`body` as a dish and what stands in it."""
+    outline, focal = body.silhouette, subject.camera.focal
+    front, back = (focal - np.exp(depth) for depth in (stack.near, stack.far))
+    half, share = 0.5 * (front - back), np.ones(outline.shape)
+    cuts = _cuts([(front, stack.stands), (back, stack.stands & ~stack.lies)], outline)
+    sides = [
+        replace(side.towards(thickness * half, share), cuts=cuts)
+        for side in (body.front, body.back)
+    ]
+    return replace(
+        body, middle=front - half, front=sides[0], back=sides[1], cuts=cuts, kind="round",
+        behind=stack.behind(rims, outline, subject),
+    )  # fmt: skip
+
+
+def _log_depth(inverse: F64) -> F64:
+    """(h, w) logarithm of the depth, where nothing is hit that of the nearest hit."""
+    return -np.log(inverse.ravel()[nearest_in(inverse > 0)])
+
+
+def _edged(stands: Mask, outline: ReliefSilhouette, reach: float, pixels: Pixels) -> Mask:
+    """`stands` (h, w) up to the photo's own edge, within `reach` px of its outline."""
+    photo = _photo(outline, pixels)
+    size = 2 * int(round(reach / outline.cell)) + 1
+    band = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    own = stands.astype(np.uint8)
+    labels = np.zeros(stands.shape, np.int32)
+    labels[cv2.erode(own, band) > 0] = 1
+    labels[(cv2.dilate(own, band) == 0) & outline.inside] = 2
+    found = np.asarray(cv2.watershed(photo, labels))
+    return outline.inside & np.where(found > 0, found == 1, stands)
+
+
+def _photo(outline: ReliefSilhouette, pixels: Pixels) -> U8:
+    """(h, w, 3) the photo on a silhouette's cells."""
+    at = outline.photo_xy(outline.cells)
+    j, i = (at[..., k].astype(int).clip(0, pixels.shape[1 - k] - 1) for k in (0, 1))
+    return np.ascontiguousarray(to_u8(pixels)[i, j])
+
+
+def _usual(mask: Mask, level: F64, photo: U8) -> Mask:
+    """`mask` (h, w) without what looks different from most that is on the same `level` (h, w)."""
+    found = np.zeros(mask.shape, bool)
+    ring = (level * RINGS).astype(int)
+    for own in np.unique(ring[mask]):
+        is_own = mask & (ring == own)
+        colours = photo[is_own].astype(np.float64)
+        off = np.abs(colours - np.median(colours, 0)).sum(1)
+        found[is_own] = off <= np.percentile(off, USUAL)
+    return found
+
+
+class Around(NamedTuple):
+    """Places (h, w) about an axis, x its rim's radius."""
+
+    height: F64
+    radius: F64
+    angle: F64  # radians
+
+    @staticmethod
+    def of(rim: Rim, tangents: F64, log_depth: F64) -> Around:
+        rays = np.concatenate([tangents, np.ones((*log_depth.shape, 1))], -1)
+        off = (rays * np.exp(log_depth)[..., None] - rim.centre) / rim.radius
+        across = np.cross(rim.normal, [0.0, 0.0, 1.0])
+        across /= max(float(np.linalg.norm(across)), 1e-9)
+        x, y = off @ across, off @ np.cross(rim.normal, across)
+        return Around(off @ rim.normal, np.hypot(x, y), np.arctan2(y, x))
+
+    def nearest(self, other: Around, source: Mask, wanted: Mask, level: str) -> I64:
+        """(h, w, 2) columns and rows of cells of `source` that are like `other` where `wanted`.
+
+        As high, or as far from the axis, and about as far around it.
+        """
+        found = np.zeros((*source.shape, 2), np.int64)
+        if source.any() and wanted.any():
+            tree = KDTree(self._places(level)[source])
+            _, index = tree.query(other._places(level)[wanted])
+            rows, columns = np.nonzero(source)
+            found[wanted] = np.column_stack([columns, rows])[index]
+        return found
+
+    def _places(self, level: str) -> F64:
+        own = self.height if level == "height" else self.radius
+        return np.stack(
+            [own, AROUND_SHARE * np.cos(self.angle), AROUND_SHARE * np.sin(self.angle)], -1
+        )
+
+
+def _hollow(lip: Rim, tangents: F64, before: F64, outline: ReliefSilhouette) -> F64:
+    """(h, w) how much deeper than its lip what is within it is, of the logarithm of its depth."""
+    within = -lip.outside(tangents) * lip.centre[2] / lip.radius  # from 0 at the lip to 1
+    ring = outline.inside & (within > 0) & (within < 0.15)
+    if ring.sum() < LEAST_KNOWN:
+        return np.zeros(outline.shape)
+    at = np.concatenate([tangents, np.ones((*outline.shape, 1))], -1)
+    level = at @ np.linalg.lstsq(at[ring], before[ring])[0]
+    return np.where(within > 0, np.maximum(before - level, 0) * np.clip(within / 0.3, 0, 1), 0.0)
+
+
+def _dish(rim: Rim, around: int) -> Mesh:
+    deep, thick = DISH
+    heights = np.array([-deep, -deep, -0.4 * deep, 0.0, -0.4 * thick, -deep - thick, -deep - thick])
+    radii = np.array([0.001, 0.55, 0.8, 1.0, 1.0, 0.55, 0.001])
+    return _turned(rim, heights, radii, around)
+
+
+def _turned(rim: Rim, heights: F64, radii: F64, around: int) -> Mesh:
+    """Circles `radii` (n,) wide and `heights` (n,) above a rim, both x its radius."""
+    places = rim.centre + rim.radius * heights[:, None] * rim.normal
+    return revolved(places, rim.radius * radii, rim.normal, around)
+
+
+def _vessel(rims: list[Rim], evidence: Evidence) -> Mesh:
+    """What stands in a dish, from its foot to its lip, as the network's normals say."""
+    first, lip = rims
+    high = float((lip.centre - first.centre) @ lip.normal) / first.radius
+    wide, foot = lip.radius / first.radius, -DISH[0]
+    rise = np.linspace(0, 1, 12)
+    heights = np.r_[foot + (high - foot) * rise, high]
+
+    def built(narrow: float, bulge: float, around: int) -> Mesh:
+        radii = wide * np.r_[narrow + (1 - narrow) * rise**bulge, 0.001]
+        return _turned(first, np.r_[foot, heights], np.r_[0.001, radii], around)
+
+    saucer = _dish(first, AROUND)
+    trials = [(f, b) for f in FEET for b in BULGES]
+
+    def cost(trial: tuple[float, float]) -> float:
+        own = built(*trial, AROUND)
+        faces = np.concatenate([saucer.faces, own.faces + len(saucer.vertices)])
+        both = Mesh(np.concatenate([saucer.vertices, own.vertices]), faces)
+        return evidence.misfit(both).normal
+
+    best = min(trials, key=cost)
+    return built(*best, FINE)
+
+
+def _cuts(ends: list[tuple[F64, Mask]], outline: ReliefSilhouette) -> Cuts:
+    """Where sheets (h, w) px fall off at the ends of parts (h, w)."""
+    least, inside = LEAST_STEP * outline.extent, outline.inside
+    down, right = inside[1:] & inside[:-1], inside[:, 1:] & inside[:, :-1]
+    is_down, is_right = np.zeros(down.shape, bool), np.zeros(right.shape, bool)
+    for sheet, part in ends:
+        is_down |= (part[1:] != part[:-1]) & (np.abs(np.diff(sheet, axis=0)) > least)
+        is_right |= (part[:, 1:] != part[:, :-1]) & (np.abs(np.diff(sheet, axis=1)) > least)
+    return Cuts(down & is_down, right & is_right)
