@@ -49,7 +49,7 @@ IN_MEMORY = "photo"  # name of a photo that is no file
 PREVIEW = 1024  # px, longer side of the picture that a notebook shows
 OF_THE_SHAPE = {
     "lift", "splats", "flip", "gaussians", "thickness", "back", "symmetry", "floating", "shape",
-    "trust", "no_depth", "hidden",
+    "trust", "no_depth", "hidden", "decontaminate",
 }  # fmt: skip
 
 
@@ -66,6 +66,7 @@ class Shape(TypedDict, total=False):
     trust: float  # in the shape network, 0 to 1
     no_depth: bool
     hidden: str  # file
+    decontaminate: float  # of the background's colour in its edge, 0 to 1
     splats: str  # file: a splat or mesh file takes the object's place
     flip: bool
 

@@ -24,6 +24,7 @@ from .compose.order import doubt_about_front
 from .compose.plate.plate import build_plate
 from .deform.puppet import Puppet, puppet_of
 from .document import edits
+from .document.edge_edits import set_decontaminate
 from .document.model import (
     AS_SEEN,
     Document,
@@ -100,21 +101,25 @@ def lift_mask(
     settings: LiftSettings = AS_SEEN,
     progress: Progress = silent,
     seed: int = 0,
+    mixed: Mask | None = None,
 ) -> tuple[Matte, LiftedObject]:
-    """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians."""
+    """The object under `mask` (H, W), bool or soft u8, as a cut-out and as 3D Gaussians.
+
+    `mixed` (H, W): where the edge brush has found the softness of the mask, see `build_matte`.
+    """
     lifter = lift.load(backend)
     progress(0.0, "Cutting out the object")
-    matte = cut_out(pixels, mask)
+    matte = cut_out(pixels, mask, mixed)
     subject = lift.LiftSubject(pixels, camera, is_selected(mask), matte)
     return matte, lifter.lift(subject, settings, part(progress, 0.3, 1.0), seed)
 
 
-def cut_front(pixels: Pixels, mask: Selection) -> Matte:
+def cut_front(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -> Matte:
     """The soft cut-out of what stays in front under `mask` (H, W), bool or soft u8.
 
     Where it is opaque, or short of it by less than shows, it is the photo to the last bit.
     """
-    matte = cut_out(pixels, mask)
+    matte = cut_out(pixels, mask, mixed)
     height, width = mask.shape
     is_whole = matte.alpha >= OPAQUE
     own = unit_pixels(crop(pixels, (0, 0, width, height), matte.box))
@@ -308,7 +313,10 @@ class _Run:
     def lift(self, k: int, script: EditScript, progress: Progress) -> None:
         """Object `k`, which is chosen, in 3D."""
         with self._stopwatch.stage("lift"):
-            self.document = _lift(self.document, k, script, progress)
+            document = _lift(self.document, k, script, progress)
+            if script.decontaminate > 0:
+                document = set_decontaminate(document, k, script.decontaminate)
+            self.document = document
 
     def choose(self, script: EditScript, mask: bytes | None, progress: Progress) -> None:
         """The next object is the one that the script means."""

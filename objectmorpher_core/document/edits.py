@@ -145,7 +145,7 @@ def _with_mask(
     if not is_refined:
         return document.with_object(k, changed)
     # The plate and the refinement stay, too, until the shape is refitted; copies stay copies.
-    outline = {name: getattr(changed, name) for name in ("mask", "coverage", "shaped")}
+    outline = {name: getattr(changed, name) for name in ("mask", "coverage", "shaped", "mixed")}
     objects = (replace(o, **outline) if _is_copy(o, item) else o for o in document.objects)
     document = replace(document, objects=tuple(objects))
     return replace(
@@ -165,10 +165,13 @@ def refit(
     Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
     """
     from ..lift.carrying import refitted
+    from .edge_edits import decontaminated
 
     item, camera = document.objects[k], document.photo.camera
     objects = tuple(
-        refitted(other, matte, lifted, camera) if _is_copy(other, item) else other
+        decontaminated(document.photo, refitted(other, matte, lifted, camera))
+        if _is_copy(other, item)
+        else other
         for other in document.objects
     )
     return replace(document, objects=objects, plate=plate, refined=None)
@@ -182,7 +185,10 @@ def set_lifted(
     shape: LiftSettings | None = None,
 ) -> Document:
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
-    changed = document.with_object(k, document.objects[k].with_lifted(matte, lifted, shape))
+    from .edge_edits import decontaminated
+
+    item = document.objects[k].with_lifted(matte, lifted, shape)
+    changed = document.with_object(k, decontaminated(document.photo, item))
     return changed.with_backend("lift", lifted.backend)
 
 
@@ -191,8 +197,10 @@ def reshape(
 ) -> Document:
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
     from ..lift.carrying import carried_over
+    from .edge_edits import decontaminated
 
     changed = carried_over(document.objects[k], matte, lifted, shape)
+    changed = decontaminated(document.photo, changed)
     return document.with_object(k, changed).with_backend("lift", lifted.backend)
 
 
@@ -493,7 +501,7 @@ def keep_in_front(document: Document, k: int, matte: Matte | None = None) -> Doc
         raise EditError("nothing is selected that could stay in front")
     if item.is_moved:
         raise EditError("what was moved cannot stay where it is")
-    kept = replace(item, matte=matte or item.matte, stays_in_front=True)
+    kept = replace(item, matte=matte or item.found_matte, contaminated=None, stays_in_front=True)
     return document.with_object(k, kept)
 
 

@@ -370,6 +370,17 @@ class EditObject:
     base: Base = field(default_factory=Base)  # what the handles move it from
     is_held_around: bool = False  # whether a drag leaves all that is not near it where it is
     is_grounded: bool = False  # moving it slides it over the ground
+    mixed: Mask | None = None  # (H, W) where the coverage was found in the photo by the edge brush
+    decontaminate: float = 0.0  # in [0, 1], how far the background's colour is out of its edge
+    # (h, w, 3) the matte's foreground before that; None: as it is
+    contaminated: F32 | None = None
+
+    @property
+    def found_matte(self) -> Matte | None:
+        """Return the matte as it was found, with what its edge holds of the background's colour."""
+        if self.matte is None or self.contaminated is None:
+            return self.matte
+        return replace(self.matte, foreground=self.contaminated)
 
     @property
     def footing(self) -> Base:
@@ -398,7 +409,7 @@ class EditObject:
         return EditObject(
             self.name, prompt=prompt, mask=mask, coverage=coverage,
             found=None if found is None else frozen(found, np.bool_), deform=self.deform,
-            shape=self.shape, stays_in_front=self.stays_in_front,
+            shape=self.shape, stays_in_front=self.stays_in_front, mixed=self._still_mixed(coverage),
         )  # fmt: skip
 
     def with_refined_mask(
@@ -413,15 +424,26 @@ class EditObject:
             self, prompt=prompt, mask=mask, coverage=coverage,
             found=None if found is None else frozen(found, np.bool_),
             shaped=self.selection if self.shaped is None else self.shaped,
+            mixed=self._still_mixed(coverage),
         )  # fmt: skip
+
+    def _still_mixed(self, coverage: U8 | None) -> Mask | None:
+        """Where (H, W) the edge brush has found an edge that another `coverage` leaves as it is."""
+        if self.mixed is None or self.coverage is None or coverage is None:
+            return None
+        if coverage.shape != self.mixed.shape:
+            return None
+        kept = self.mixed & (coverage == self.coverage)
+        return frozen(kept) if kept.any() else None
 
     def with_lifted(
         self, matte: Matte, lifted: LiftedObject, shape: LiftSettings | None = None
     ) -> EditObject:
         """A new lift: handles, rig and pose named the old one's control points and are gone."""
         fresh = replace(
-            self, handles=(), rig=Rig(), pose=None, base=Base(), shape=shape or self.shape
-        )
+            self, handles=(), rig=Rig(), pose=None, base=Base(), shape=shape or self.shape,
+            contaminated=self.contaminated if matte is self.matte else None,
+        )  # fmt: skip
         shaped = self.shaped if matte is self.matte else None
         return replace(fresh, matte=matte, lifted=lifted, stays_in_front=False, shaped=shaped)
 

@@ -59,7 +59,7 @@ def _object(item: EditObject, times: int, width: int, height: int) -> EditObject
         lifted = replace(lifted, texture=texture, middle=None)
     return replace(
         item, mask=mask, coverage=None, found=None, lifted=lifted,
-        matte=None if matte is None else _matte(matte, times),
+        matte=None if matte is None else _matte(matte, times), mixed=None, contaminated=None,
         placement=smaller(placement, times),
     )  # fmt: skip
 

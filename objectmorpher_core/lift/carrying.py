@@ -59,7 +59,7 @@ def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camer
     gaps, nearest = KDTree(old.control_points).query(rest, k=min(GUIDES, len(old.control_points)))
     gaps, nearest = gaps.reshape(len(rest), -1), nearest.reshape(len(rest), -1)
     return replace(
-        item, matte=matte, lifted=lifted, shaped=None,
+        item, matte=matte, contaminated=None, lifted=lifted, shaped=None,
         handles=_held(item.handles, lifted), rig=item.rig.moved_to(nearest[:, 0]),
         pose=None if item.pose is None else _pose_of(rest, old, item.pose, gaps, nearest),
         placement=_same_motion(item.placement, old, lifted, camera),

@@ -105,7 +105,7 @@ def refit_object(
     if not changed.any():
         return was.matte, was.lifted
     away = cv2.distanceTransform((~changed).astype(np.uint8), cv2.DIST_L2, 5)
-    matte = _blended(was.matte, cut_out(scene.pixels, scene.mask), away)
+    matte = _blended(was.matte, cut_out(scene.pixels, scene.mask, scene.mixed), away)
     camera, lifted = scene.camera, was.lifted
     if lifted.middle is None:
         shown = rematted(lifted, matte, camera, seed)

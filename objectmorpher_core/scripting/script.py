@@ -68,6 +68,7 @@ class EditScript:
     trust: float = 1.0  # in the shape network, of [0, 1]
     no_depth: bool = False  # not as a depth network sees it, where one is installed
     hidden: str | None = None  # file
+    decontaminate: float = 0.0  # in [0, 1], of the background's colour in its edge
     front: tuple[XY, ...] = ()  # px, on things that stay in front of what is edited
     front_mask: str | None = None  # file: another one
     remove: bool = False
@@ -385,7 +386,8 @@ PARSERS: dict[str, Callable[[str, Any], Any]] = {
     "fill_from": _sources,
     "splats": _text, "flip": _flag, "thickness": _between(LEAST_THICKNESS, MOST_THICKNESS),
     "back": _one_of(*BACKS), "symmetry": _one_of("auto", "yes", "no"), "floating": _flag,
-    "shape": _one_of(*KINDS), "trust": _between(0, 1), "no_depth": _flag, "hidden": _text,
+    "shape": _one_of(*KINDS), "trust": _between(0, 1), "decontaminate": _between(0, 1),
+    "no_depth": _flag, "hidden": _text,
     "gaussians": _whole(100, 2_000_000), "front": _points, "front_mask": _text, "remove": _flag,
     "pin": _points, "handle": _handles, "key": _keys,
     "move": _numbers(2, 3), "turn": _numbers(1, 3), "scale": _number,

@@ -286,6 +286,10 @@ def _check(document: Document) -> None:
         if item.mask is not None:
             _same("mask", item.mask.shape, (height, width))
         _check_coverage(item)
+        if not 0 <= item.decontaminate <= 1:
+            raise ValueError(f"an object's decontamination is {item.decontaminate:g}")
+        if item.contaminated is not None and item.matte is not None:
+            _same("an edge's colours", item.contaminated.shape, item.matte.foreground.shape)
         if item.matte is not None:
             _same("matte", item.matte.foreground.shape, (*item.matte.alpha.shape, 3))
             _near("matte", item.matte.box, (width, height))
@@ -325,15 +329,16 @@ def _check_joining(document: Document) -> None:
 
 
 def _check_coverage(item: EditObject) -> None:
-    """A soft mask and a prompt's answer belong to the mask."""
+    """A soft mask, what the edge brush found, and a prompt's answer belong to the mask."""
     if item.coverage is not None:
         if item.mask is None or item.coverage.dtype != np.uint8:
             raise ValueError("an object's coverage belongs to no mask")
         if not np.array_equal(item.coverage >= SELECTED, item.mask):
             raise ValueError("an object's coverage is not that of its mask")
-    if item.found is not None:
-        found = None if item.mask is None else item.mask.shape
-        _same("an answer's mask", (item.found.shape, item.found.dtype), (found, np.dtype(bool)))
+    for of_photo in (item.found, item.mixed):
+        shape = None if item.mask is None else item.mask.shape
+        if of_photo is not None:
+            _same("a part of a mask", (of_photo.shape, of_photo.dtype), (shape, np.dtype(bool)))
 
 
 def _check_lifted(item: EditObject) -> None:

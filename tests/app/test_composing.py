@@ -139,6 +139,17 @@ def test_variants_can_be_looked_at_and_chosen(bare: Editor, ball: Document) -> N
     wait_until(bare, lambda: bool(bare.composing.variants))
     variants = bare.composing.variants
     assert len({v.plate.seed for v in variants}) == len(variants) == 3
+    before = bare.committed
+    bare.composing.compare_variant(2)
+    assert bare.document is not None and bare.document.plate is variants[2].plate
+    assert bare.committed is before, "it is only looked at"
+    bare.composing.compare_variant(None)
+    assert bare.document is before
+    bare.composing.compare_variant(0)
+    bare.choose_tool(ToolName.PLACE)  # another tool, and nothing is looked at any more
+    bare.poll()
+    assert bare.document is before
+    bare.choose_tool(ToolName.COMPOSE)
     bare.composing.choose_variant(variants[1])
     assert bare.document is not None and bare.document.plate is variants[1].plate
     bare.undo()

@@ -50,6 +50,24 @@ def test_labels_name_what_undo_and_redo_would_do() -> None:
     assert (past.undo_label, past.redo_label) == (None, "Move handle")
 
 
+def test_a_snapshot_outlives_the_steps_and_is_replaced_by_its_name() -> None:
+    past = History(document(), limit=0)
+    kept = replace(document(), seed=3)
+    past.apply("One", kept)
+    past.keep("Mine")
+    for _ in range(3):
+        past.apply("Other", document())
+    assert past.count < 4, "the oldest steps went"
+    assert [(step.label, step.document) for step in past.snapshots] == [("Mine", kept)]
+    past.apply("Mine", past.snapshots[0].document)
+    assert past.document is kept
+    past.apply("Other", document())
+    past.keep("Mine")
+    assert [step.document for step in past.snapshots] == [past.document]
+    past.drop("Mine")
+    assert past.snapshots == () and past.old_bytes >= 0
+
+
 def test_a_new_step_forgets_what_was_undone() -> None:
     past = History(document())
     past.apply("One", document())

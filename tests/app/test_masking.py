@@ -16,7 +16,7 @@ from objectmorpher.commands import run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.tasks import Combine, Question
-from objectmorpher.editor.view import Selecting, SelectMode, ToolName
+from objectmorpher.editor.view import Painted, Selecting, SelectMode, ToolName
 from objectmorpher.gui.window.scenes import build_scene
 from objectmorpher.tools.mask_tool import MaskTool
 from objectmorpher.tools.pointer import Button
@@ -26,6 +26,7 @@ from objectmorpher_core import segment
 from objectmorpher_core.base.brush import Brush
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Click, Document, EditObject, Placement, Prompt
+from objectmorpher_core.document.settings import Refined
 from objectmorpher_core.segment import mask_edit
 from objectmorpher_core.session.file import decode_session, encode_session
 from strokes import move, press, stroke
@@ -154,6 +155,77 @@ def test_the_mask_of_a_moved_object_is_refined_where_it_is_seen(
     assert editor.committed is before
     run(editor, "redo")
     assert editor.object is thing
+
+
+def test_the_edge_of_a_moved_object_is_repaired_where_it_is_seen(
+    editor: Editor, ball: Document
+) -> None:
+    """A stroke is one step with its shape; a refinement stays where nothing changed."""
+    item = _moved_ball(editor, ball, 50.0, -6.0)
+    rim = editor.derived.carried(editor.committed, 0, np.array([[CENTRE[0] - 34, CENTRE[1]]]))[0]
+    alpha = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    refined = Refined(0, 0, 255 - editor.committed.photo.pixels, alpha, "klein")
+    editor.apply("Refine", edits.set_refined(editor.committed, refined))
+    before = editor.committed
+    editor.view.selecting.painted, editor.view.tool = Painted.EDGE, ToolName.MASK
+    draw(editor, MaskTool(), [(rim[0], rim[1] - 8), (rim[0], rim[1] + 8)])
+    assert editor.edging.stroke is None
+    wait_until(editor, lambda: editor.object.mixed is not None and editor.object.shaped is None)
+    thing = editor.object
+    assert editor.history.undo_label == "Edge brush"
+    found = np.argwhere(thing.mixed)[:, ::-1].mean(0)
+    assert np.hypot(*(found - (CENTRE[0] - 34, CENTRE[1]))) < 6
+    assert len(thing.handles) == 1 and thing.placement.turn == item.placement.turn
+    kept = editor.committed.refined
+    assert kept.alpha[-5:, :20].all() and not kept.alpha[int(rim[1]), int(rim[0])]
+    document = decode_session(encode_session(editor.committed))
+    np.testing.assert_array_equal(document.objects[0].mixed, thing.mixed)
+    editor.view.brush = Brush(12.0, 1.0)
+    draw(editor, MaskTool(), [(rim[0], rim[1] - 10), (rim[0], rim[1] + 10)], alt=True)
+    wait_until(editor, lambda: editor.object.mixed is None and editor.object.shaped is None)
+    run(editor, "undo")
+    assert editor.object is thing
+    run(editor, "undo")
+    assert editor.committed is before
+    press(editor, MaskTool(), editor.view.canvas_from_image(rim))
+    editor.escape()
+    wait_for_jobs(editor)
+    assert editor.committed is before
+
+
+def test_the_backgrounds_colour_goes_out_of_the_edge_and_comes_back(
+    editor: Editor, ball: Document
+) -> None:
+    _moved_ball(editor, ball, 50.0, -6.0)
+    editor.view.selecting.reach = 3.0
+    for name, label in (("grow", "Grow selection"), ("feather", "Feather selection")):
+        run(editor, name)  # drawn, so that it has a halo of the wall
+        wait_until(editor, lambda label=label: editor.history.undo_label == label)
+    wait_until(editor, lambda: editor.object.shaped is None)
+    item = editor.object
+    shape = editor.derived.shape(ball.photo, item)
+    editor.edging.preview_decontaminate(0.5)
+    half = editor.document.objects[0].matte.foreground
+    editor.edging.preview_decontaminate(1.0)
+    whole = editor.document.objects[0].matte.foreground
+    np.testing.assert_allclose(whole - half, half - item.matte.foreground, atol=1e-6)
+    editor.commit("Decontaminate edge")
+    assert np.abs(whole - half).max() > 0.01
+    thing = editor.object
+    clean = editor.derived.shape(ball.photo, thing)
+    assert clean.puppet is shape.puppet and clean.texture is not shape.texture
+    document = decode_session(encode_session(editor.committed))
+    np.testing.assert_array_equal(document.objects[0].matte.foreground, whole)
+    # The outline is refined: the fresh cut-out is as clean.
+    paint(editor, (CENTRE[0] + 20, CENTRE[1] - 6), alt=True)
+    wait_until(editor, lambda: editor.object.shaped is None)
+    after = editor.object
+    assert after.contaminated is not None and after.decontaminate == 1.0
+    run(editor, "decontaminate")
+    assert editor.object.matte.foreground is after.contaminated
+    for _ in range(3):
+        run(editor, "undo")
+    assert editor.object is item
 
 
 def test_what_would_throw_work_away_is_only_offered(editor: Editor, ball: Document) -> None:

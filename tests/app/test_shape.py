@@ -56,7 +56,7 @@ def test_what_many_objects_need_is_remembered_of_all_of_them(ball: Document) -> 
         for k in range(MOST_SHAPES + 6)
     )
     document, shape = replace(ball, objects=many), build_shape(ball.photo.camera, thing)
-    made = [(one, CanvasShape(shape.puppet, shape.texture)) for one in many]
+    made = [(one, replace(shape)) for one in many]
     cache, view = Cache(), ViewState()
     derived = cache.derived
     derived.adopt(made)

@@ -17,10 +17,8 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.base.pixels import crop
 from objectmorpher_core.document import edits, hold_edits
 from objectmorpher_core.document.model import (
-    DeformSettings,
     Document,
     EditObject,
-    LiftedObject,
     Photo,
     Plate,
     Pose,
@@ -78,7 +76,7 @@ class Derived:
         self._shapes = Memo(MOST_SHAPES)
         self._posed: dict[int, Memo] = {}  # of each object
         self._drafts: dict[int, Memo] = {}
-        self._latest: tuple[LiftedObject | None, DeformSettings, CanvasShape] | None = None
+        self._latest = Memo(MOST_SHAPES)  # the last shape of each lift, in a list of one
         self._drawables: dict[int, tuple[PosedSplats, tuple[float, ...], Drawable]] = {}
         self._shares, self._contours, self._holes = Memo(), Memo(), Memo()
         self._links, self._plates, self._bodies = Memo(), Memo(), Memo()
@@ -148,18 +146,13 @@ class Derived:
 
     def shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
         """Solver, poser and texture; a fraction of a second the first time."""
-        return self._shapes(
-            lambda: self._build_shape(photo, thing), thing.lifted, thing.deform, thing.rig
-        )
+        return self._shapes(lambda: self._build_shape(photo, thing), *_parts_of(thing))
 
     def _build_shape(self, photo: Photo, thing: EditObject) -> CanvasShape:
-        """Of a rig that changed, only what depends on it."""
-        similar = self._latest
-        if similar and similar[0] is thing.lifted and similar[1] is thing.deform:
-            shape = similar[2].with_rig(thing.rig)
-        else:
-            shape = build_shape(photo.camera, thing)
-        self._latest = (thing.lifted, thing.deform, shape)
+        """Of a rig, or of the colours of an edge, that changed, only what depends on it."""
+        latest = self._latest(list, thing.lifted, thing.deform)
+        shape = latest[0].changed_to(thing) if latest else build_shape(photo.camera, thing)
+        latest[:] = [shape]
         return shape
 
     def adopt(self, shapes: Shapes) -> None:
@@ -169,13 +162,16 @@ class Derived:
             self.remember(thing, shape)
 
     def remember(self, thing: EditObject, shape: CanvasShape) -> None:
-        """Takes over an object's shape that was made in a thread."""
-        self._shapes(lambda: shape, thing.lifted, thing.deform, thing.rig)
-        self._latest = (thing.lifted, thing.deform, shape)
+        """Takes over an object's shape that was made in a thread, of one that is equal to it."""
+        assert thing.matte is not None, "a lifted object has one"
+        shape.rig, shape.matte = thing.rig, thing.matte  # known by identity from now on
+        self._shapes(lambda: shape, *_parts_of(thing))
+        self._latest(list, thing.lifted, thing.deform)[:] = [shape]
 
     def make_room(self, objects: int) -> None:
         """Remembers what so many objects need in each frame."""
         self._shapes.make_room(objects + SPARE_SHAPES)
+        self._latest.make_room(objects + SPARE_SHAPES)
 
     def posed(self, document: Document, k: int) -> PosedSplats:
         """Object `k`'s Gaussians where the edit has put them, world."""
@@ -342,6 +338,11 @@ class Derived:
         return shape.puppet.pick_in(
             drawable, shape.texture, at, thing.pose, thing.placement, reach
         )  # fmt: skip
+
+
+def _parts_of(thing: EditObject) -> tuple[object, ...]:
+    """Return what a shape is made of."""
+    return thing.lifted, thing.matte, thing.deform, thing.rig
 
 
 def _strongest(weights: Sparse, count: int) -> I32:

@@ -52,15 +52,25 @@ class CanvasShape:
 
     puppet: Puppet
     texture: TextureLevels
+    rig: Rig  # of the puppet
+    matte: Matte  # of the texture
     is_rehearsed: bool = False  # or is being so: nobody else has to
 
     @cached_property
     def surface(self) -> RestSurface:
         return build_surface(self.puppet.lifted)
 
-    def with_rig(self, rig: Rig) -> CanvasShape:
-        """Return the same object with another rig; whatever does not depend on it is kept."""
-        other = CanvasShape(self.puppet.with_rig(rig), self.texture)
+    def changed_to(self, thing: EditObject) -> CanvasShape:
+        """Return the same object with another rig or matte; what does not depend on it is kept."""
+        from objectmorpher_core.compose.light.lighting import object_texture
+
+        puppet, texture, matte = self.puppet, self.texture, self.matte
+        if thing.rig is not self.rig:
+            puppet = puppet.with_rig(thing.rig)
+        if thing.matte is not None and thing.matte is not matte:
+            texture, matte = object_texture(thing.matte, thing.lifted), thing.matte
+        is_ready = self.is_rehearsed and puppet is self.puppet
+        other = CanvasShape(puppet, texture, thing.rig, matte, is_ready)
         if "surface" in vars(self):
             other.surface = self.surface
         return other
@@ -83,7 +93,8 @@ def build_shape(camera: Camera, thing: EditObject) -> CanvasShape:
     from objectmorpher_core.deform.puppet import puppet_of
 
     assert thing.matte is not None
-    return CanvasShape(puppet_of(thing, camera), object_texture(thing.matte, thing.lifted))
+    texture = object_texture(thing.matte, thing.lifted)
+    return CanvasShape(puppet_of(thing, camera), texture, thing.rig, thing.matte)
 
 
 def build_ready_shape(camera: Camera, thing: EditObject) -> CanvasShape:
@@ -118,7 +129,7 @@ def build_ready(document: Document) -> Shapes:
     camera, built = document.photo.camera, Memo(len(document.objects))
 
     def shape(thing: EditObject) -> CanvasShape:
-        parts = thing.lifted, thing.deform, thing.rig
+        parts = thing.lifted, thing.matte, thing.deform, thing.rig
         return built(lambda: build_ready_shape(camera, thing), *parts)
 
     return [(thing, shape(thing)) for thing in document.objects if thing.lifted is not None]

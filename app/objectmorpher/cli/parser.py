@@ -195,6 +195,8 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--no-depth", action="store_true", default=None,
         help="ignore the depth model even where one is installed")  # fmt: skip
     add("--hidden", metavar="M.png", help="a mask of its parts that are hidden behind something")
+    add("--decontaminate", type=float, metavar="S",
+        help="take this share of the background's colour out of its edge, 0 to 1")  # fmt: skip
     add("--splats", metavar="FILE", help="use this 3DGS or mesh file instead of lifting")
     add("--flip", action="store_true", default=None, help="turn that file upside down")
     add = parser.add_argument_group("deforming").add_argument

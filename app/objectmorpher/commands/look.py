@@ -51,6 +51,7 @@ def _history(editor: Editor) -> None:
 
 COMMANDS: dict[str, Command] = {
     "panel": Command("Panel", "F8", _panel, is_on=lambda e: e.view.has_panel),
+    "snapshot": Command("Keep a snapshot", "Ctrl+Alt+S", lambda e: e.keep_snapshot()),
     "history": Command("History", "Ctrl+H", _history, is_on=lambda e: e.view.has_history),
     "fit": Command("Fit to window", "F", _fit),
     "actual": Command("Actual size", "Ctrl+1", lambda e: navigate.zoom_to(e, 1.0)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..editor.editor import Editor
 from ..editor.filing import Dialog
-from ..editor.view import Painted
+from ..editor.view import Painted, ToolName
 from ..system.texts import t
 from .command import Command, asks_for, cannot_lift, no_lift, no_selection
 
@@ -32,6 +32,17 @@ def _nothing_painted(editor: Editor) -> str | None:
     return no_selection(editor) or (None if field is not None else t("Nothing is painted yet"))
 
 
+def _is_edge_brush(editor: Editor) -> bool:
+    return editor.view.tool is ToolName.MASK and editor.view.selecting.painted is Painted.EDGE
+
+
+def _toggle_edge_brush(editor: Editor) -> None:
+    """To the edge brush, or from it back to the brush of the selection."""
+    is_on = _is_edge_brush(editor)
+    editor.choose_tool(ToolName.MASK)
+    editor.view.selecting.painted = Painted.SELECTION if is_on else Painted.EDGE
+
+
 COMMANDS: dict[str, Command] = {
     "subject": Command("Select subject", "Ctrl+Shift+A", lambda e: e.selection.select_subject()),
     "invert": Command(
@@ -50,6 +61,14 @@ COMMANDS: dict[str, Command] = {
         "Add what was left out", "", lambda e: e.leaving_out.add(), _nothing_left_out
     ),
     "harden": Command("Edge from the photo", "", lambda e: e.masking.harden(), _no_soft_edge),
+    "edge_brush": Command("Edge brush", "E", _toggle_edge_brush, no_selection, _is_edge_brush),
+    "decontaminate": Command(
+        "Decontaminate edge",
+        "",
+        lambda e: e.edging.toggle_decontaminate(),
+        no_lift,
+        lambda e: e.edging.decontaminate > 0,
+    ),
     "import_mask": Command("Import mask…", "", asks_for(Dialog.MASK_OPEN)),
     "export_mask": Command("Export mask…", "", asks_for(Dialog.MASK_SAVE), no_selection),
     "lift": Command("Lift object", "Ctrl+L", lambda e: e.tasks.lift(), cannot_lift),

@@ -8,7 +8,7 @@ from __future__ import annotations
 SETTINGS: dict[str, tuple[str, ...]] = {
     "preferences": ("Theme", "Text size", "Language", "Motion", "File dialogs", "Long jobs"),
     "select": ("Select by", "Keep in front"),
-    "mask": ("Brush", "Radius", "Hardness", "Distance", "Depth", "Hidden"),
+    "mask": ("Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Depth", "Hidden"),
     "pose": (
         "Rigidity", "What stays", "Symmetry", "Drag the mirrored point too", "Rotation ring (R)",
         "Anchors", "Regions", "Influence of the handle", "Strain", "Softness", "Stiffness", "Turn",

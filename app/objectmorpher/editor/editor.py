@@ -25,6 +25,7 @@ from .filing import OPEN, Dialog, Filing
 from .history import History
 from .intents.composing import Composing
 from .intents.computing import Computing
+from .intents.edging import Edging
 from .intents.exporting import Exporting
 from .intents.hinting import Hinting
 from .intents.landing import Landing
@@ -63,6 +64,7 @@ class Editor(EditorState):
         self.tasks = Tasks(self, self.posing)
         self.refits = Refits(self, self.posing, self.tasks)
         self.masking = Masking(self, self.landing, self.posing)
+        self.edging = Edging(self, self.landing, self.masking)
         self.candidates = Candidates(self, self.tasks)
         self.closer_look = CloserLook(self, self.tasks)
         self.selection = Selection(
@@ -145,6 +147,7 @@ class Editor(EditorState):
         self.objects.carried = None
         self.tasks.forget()
         self.refits.forget()
+        self.edging.forget()
         self.composing.forget()
         self.hinting.forget()
         self.refining.forget()
@@ -180,6 +183,25 @@ class Editor(EditorState):
             return
         text = t("Back at: {label}", label=self.history.label(index))
         self._travel(partial(self.history.jump, index), text)
+
+    def keep_snapshot(self, name: str = "") -> None:
+        """Keep the edit as it is under a name, by default the next number."""
+        history = self.history
+        if history is None or self.hand.is_busy:
+            return
+        taken = {step.label for step in history.snapshots}
+        numbered = (t("Snapshot {number}", number=n) for n in range(1, len(taken) + 2))
+        name = name.strip() or next(label for label in numbered if label not in taken)
+        history.keep(name)
+        self.say(t("{name} is kept in the history (Ctrl+H)", name=name))
+
+    def take_snapshot(self, name: str) -> None:
+        """Go to the snapshot of this name: a step of its own, so that nothing is lost."""
+        history = self.history
+        if history is None or self.hand.is_busy:
+            return
+        found = next(step.document for step in history.snapshots if step.label == name)
+        self._travel(partial(history.apply, name, found), t("Back at: {label}", label=name))
 
     def _travel(self, go: Callable[[], None], text: str) -> None:
         """Goes to another step, which may lack what the view points at."""

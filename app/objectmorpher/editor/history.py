@@ -39,6 +39,7 @@ class History:
         self._limit = limit
         self._cursor = 0
         self._saved: Document | None = document
+        self.snapshots: tuple[Step, ...] = ()  # by their names; no limit lets one go
         self._append("Open", document)
 
     @property
@@ -118,6 +119,21 @@ class History:
     def label(self, index: int) -> str:
         """Return the label of the step at `index`."""
         return self._steps[index].label
+
+    # Snapshots
+
+    def keep(self, name: str) -> None:
+        """Keep the shown document as a snapshot; one of the same name is replaced."""
+        self.drop(name)
+        self.snapshots = (*self.snapshots, Step(name, self.document))
+        self._memory.take(self.document)
+
+    def drop(self, name: str) -> None:
+        """Forget the snapshot of this name."""
+        for step in self.snapshots:
+            if step.label == name:
+                self._memory.let_go(step.document)
+        self.snapshots = tuple(step for step in self.snapshots if step.label != name)
 
     # Memory
 

@@ -9,9 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
+import numpy as np
+
 from objectmorpher_core.base.arrays import Mask
-from objectmorpher_core.document import edits
+from objectmorpher_core.document import edge_edits, edits
 from objectmorpher_core.document.model import Document, LiftedObject, Plate
+from objectmorpher_core.segment.mask_edit import as_coverage
 
 from ..system.texts import t
 from ..worker import job_functions
@@ -25,6 +29,8 @@ if TYPE_CHECKING:
     from .tasks import Tasks
 
 REFIT = "refit"  # kind of job
+FARTHEST = 6.0  # x the matte's band, from a changed outline to what is drawn otherwise
+STRIDE = 3  # px between places that tell where a part of the photo is shown now
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +93,8 @@ class Refits:
 
         editor, item, photo = self._editor, document.objects[k], document.photo
         assert item.mask is not None and item.lifted is not None
-        assert item.shaped is not None and item.matte is not None and item.selection is not None
+        matte, outline = item.found_matte, item.selection
+        assert item.shaped is not None and matte is not None and outline is not None
         wanted = RefitRequest(k, item.mask, item.lifted, document.plate)
         self._asked, self._answer = wanted, None
 
@@ -100,8 +107,8 @@ class Refits:
 
         editor.jobs.start(
             t("Fitting {name} to its new outline", name=item.name), job_functions.refit,
-            Lifted(item.shaped, item.matte, item.lifted, item.shape),
-            ImportTarget(photo.pixels, photo.camera, item.selection),
+            Lifted(item.shaped, matte, item.lifted, item.shape),
+            ImportTarget(photo.pixels, photo.camera, outline, mixed=item.mixed),
             background_of(document, k, editor.settings.backends.inpaint), document.seed,
             done=accept, failed=fail, kind=REFIT,
         )  # fmt: skip
@@ -114,7 +121,11 @@ class Refits:
         def change(document: Document) -> Document | None:
             if not wanted.is_of(document):
                 return None
-            return edits.refit(document, k, answer.matte, answer.lifted, answer.plate)
+            fitted = edits.refit(document, k, answer.matte, answer.lifted, answer.plate)
+            if document.refined is None:
+                return fitted
+            disturbed = _disturbed(editor, document, fitted, k)
+            return edge_edits.keep_refined(fitted, document.refined, disturbed)
 
         def show(changed: Document) -> None:
             if editor.hand.is_busy or editor.preview is not None:
@@ -129,6 +140,34 @@ class Refits:
 
         title = t("Fitting {name} to its new outline", name=_name(editor, k))
         self._tasks.make_ready(k, change, title, show)
+
+
+def _disturbed(editor: EditorState, before: Document, after: Document, k: int) -> Mask:
+    """(H, W) where the edited picture changes when object `k` is refitted.
+
+    That is where its outline changed in the photo, and where the object shows that part of it now.
+    """
+    from objectmorpher_core.segment.matting.matte import band_width
+
+    item = before.objects[k]
+    assert item.shaped is not None and item.selection is not None
+    width, height = before.photo.size
+    reach = int(np.ceil(FARTHEST * band_width(width, height)))
+    changed = as_coverage(item.shaped) != as_coverage(item.selection)
+    near = np.asarray(cv2.boxFilter(changed.astype(np.float32), -1, (2 * reach + 1,) * 2) > 0)
+    rows, columns = np.nonzero(near[::STRIDE, ::STRIDE])
+    if len(rows) == 0:
+        return near
+    at = np.column_stack([columns, rows]) * STRIDE + 0.5
+    shown = np.zeros((height, width), np.uint8)
+    for j, other in enumerate(before.objects):
+        if other.mask is not item.mask or not other.is_moved or not other.is_visible:
+            continue
+        for document in (before, after):
+            x, y = np.floor(editor.derived.carried(document, j, at)).astype(int).T
+            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+            shown[y[inside], x[inside]] = 1
+    return near | (cv2.dilate(shown, np.ones((4 * STRIDE + 1,) * 2, np.uint8)) > 0)
 
 
 def _name(editor: EditorState, k: int) -> str:

@@ -211,7 +211,7 @@ class Tasks:
         title = t("Lifting the object")
         editor.jobs.start(
             title, job_functions.lift,
-            Cut(photo.pixels, photo.camera, thing.selection),
+            Cut(photo.pixels, photo.camera, thing.selection, thing.mixed),
             BackendChoice(settings.backends.lift, document.seed), wanted,
             done=accept, failed=editor.complain_of, kind=LIFT,
         )  # fmt: skip
@@ -306,7 +306,7 @@ class Tasks:
         self._front = (mask, None)
         editor.jobs.start(
             t("Cutting out what stays in front"), job_functions.cut_front,
-            document.photo.pixels, item.selection,
+            document.photo.pixels, item.selection, item.mixed,
             done=accept, failed=editor.complain_of, kind=FRONT,
         )  # fmt: skip
         return True

@@ -76,6 +76,7 @@ class Painted(Enum):
     """Things that the Mask tool's brush paints."""
 
     SELECTION = "Selection"
+    EDGE = "Edge"
     DEPTH = "Depth"
     HIDDEN = "Hidden"
 

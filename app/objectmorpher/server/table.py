@@ -141,6 +141,8 @@ def _check_matte(matte: Matte) -> None:
 def _check_lift(cut: Cut, choice: BackendChoice, shape: LiftSettings) -> None:
     _check_photo(cut.pixels)
     _check_mask(cut.mask, cut.pixels, "mask")
+    if cut.mixed is not None:
+        _check_mask(cut.mixed, cut.pixels, "mask of the edge brush")
     height, width = cut.mask.shape
     _require((cut.camera.width, cut.camera.height) == (width, height), "the camera is another's")
     _require(0 < shape.count <= MOST_GAUSSIANS, f"{shape.count} Gaussians are asked for")

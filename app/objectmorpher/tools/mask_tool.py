@@ -17,6 +17,9 @@ class MaskTool:
 
     def press(self, editor: Editor, pointer: Pointer) -> Stroke:
         is_erasing = erases(editor, pointer)
+        if editor.view.selecting.painted is Painted.EDGE:
+            is_painting = editor.edging.start_stroke(pointer, is_erasing)
+            return _find_edge(editor) if is_painting else ignore()
         if editor.view.selecting.painted is not Painted.SELECTION:
             is_painting = editor.shaping.start_stroke(is_erasing)
             return _shape(editor, pointer) if is_painting else ignore()
@@ -39,6 +42,8 @@ class MaskTool:
         if editor.hand.is_busy:
             return t("Esc cancels the stroke")
         painted = editor.view.selecting.painted
+        if painted is Painted.EDGE:
+            return t("Drag along the edge to find hair and blur there · Alt restores it · [ ] size")
         if painted is Painted.DEPTH:
             return t("Drag brings nearer · Right-drag or Alt pushes back · [ ] size")
         if painted is Painted.HIDDEN:
@@ -46,6 +51,16 @@ class MaskTool:
         if editor.view.selecting.is_erasing:
             return t("Drag erases · Right-drag or Alt paints · Shift-click draws a line · [ ] size")
         return t("Drag paints · Right-drag or Alt erases · Shift-click draws a line · [ ] size")
+
+
+def _find_edge(editor: Editor) -> Stroke:
+    """A stroke along the edge, which is found anew under it."""
+    try:
+        while (pointer := (yield)).is_down:
+            editor.edging.move_stroke(pointer)
+        editor.edging.finish_stroke()
+    finally:
+        editor.edging.drop_stroke()
 
 
 def _shape(editor: Editor, pointer: Pointer) -> Stroke:

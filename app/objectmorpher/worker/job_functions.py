@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.pipeline import Reading
     from objectmorpher_core.scripting.runner import RefineOptions
     from objectmorpher_core.segment import Found, Segmenter
+    from objectmorpher_core.segment.matting.repair import EdgeStroke
 
 WARM = ("objectmorpher_core.pipeline",)  # what the worker imports before the first request
 
@@ -63,6 +64,7 @@ class Cut:
     pixels: Pixels
     camera: Camera
     mask: Selection
+    mixed: Mask | None = None  # (H, W) where the edge brush has found the mask's softness
 
 
 class PhotoMemory:
@@ -144,7 +146,7 @@ def lift(
 
     stage = part(progress, 0.0, 0.95)
     matte, lifted = lift_mask(
-        cut.pixels, cut.camera, cut.mask, choice.backend, shape, stage, choice.seed
+        cut.pixels, cut.camera, cut.mask, choice.backend, shape, stage, choice.seed, cut.mixed
     )
     progress(0.95, "getting ready to pose")
     rehearse_lift(matte, lifted, cut.camera)  # seconds, once
@@ -160,11 +162,20 @@ def refit(
     return refit(was, scene, behind, progress, seed)
 
 
-def cut_front(pixels: Pixels, mask: Selection, progress: Progress) -> Matte:
+def cut_front(
+    pixels: Pixels, mask: Selection, mixed: Mask | None, progress: Progress
+) -> Matte:  # fmt: skip
     """The soft cut-out of what stays in front of the edit."""
     from objectmorpher_core.pipeline import cut_front
 
-    return cut_front(pixels, mask)
+    return cut_front(pixels, mask, mixed)
+
+
+def brush_edge(stroke: EdgeStroke, is_erasing: bool, progress: Progress) -> tuple[U8, Mask]:
+    """The coverage and the places of the edge brush after a stroke of it."""
+    from objectmorpher_core.segment.matting import repair
+
+    return repair.unbrush_edge(stroke) if is_erasing else repair.brush_edge(stroke)
 
 
 def import_object(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...base.arrays import F64, Pixels, Selection
+from ...base.arrays import F64, Mask, Pixels, Selection
 from ...base.camera import Camera
 from ...base.progress import Progress, part, silent
 from ...document.gaussians import Gaussians
@@ -28,6 +28,7 @@ class ImportTarget:
     camera: Camera
     mask: Selection  # (H, W) bool, or soft u8
     is_focal_free: bool = False  # whether the camera's focal length is only a guess
+    mixed: Mask | None = None  # (H, W) where the edge brush has found the mask's softness
 
     @property
     def target(self) -> Target:
@@ -91,6 +92,6 @@ def place_import(
     The document's camera must become `proposal.camera`. Raises LiftError.
     """
     progress(0.0, "Cutting out the object")
-    matte = cut_out(scene.pixels, scene.mask)
+    matte = cut_out(scene.pixels, scene.mask, scene.mixed)
     rest = part(progress, 0.4, 1.0)
     return matte, lift_imported(gaussians, proposal, matte, progress=rest, seed=seed)

@@ -98,16 +98,19 @@ def extended_mask(mask: Selection, extension: tuple[int, int, int, int]) -> Sele
     return whole
 
 
-def cut_out(pixels: Pixels, mask: Selection) -> Matte:
+def cut_out(pixels: Pixels, mask: Selection, mixed: Mask | None = None) -> Matte:
     """`build_matte` with as much around the object as its soft edge may need."""
     height, width = mask.shape
-    return build_matte(pixels, mask, int(np.ceil(MARGIN * band_width(width, height))) + 8)
+    return build_matte(pixels, mask, int(np.ceil(MARGIN * band_width(width, height))) + 8, mixed)
 
 
-def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
+def build_matte(
+    pixels: Pixels, mask: Selection, margin: int, mixed: Mask | None = None
+) -> Matte:  # fmt: skip
     """Soft cut-out of `mask` (H, W) in the photo (H, W, 3), on a crop with `margin` px around it.
 
-    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha.
+    A mask of u8 is a coverage: where it is soft, it is the cut-out's alpha, and where it is `mixed`
+    (H, W), the photo is a mixture of object and background by it.
     Where the object leaves the photo the crop does so too, see `frame_extension`.
     Raises ValueError for an empty mask or one that is not the photo's size.
     """
@@ -124,22 +127,32 @@ def build_matte(pixels: Pixels, mask: Selection, margin: int) -> Matte:
     right, bottom = min(columns[-1] + 1 + margin, width), min(rows[-1] + 1 + margin, height)
     window = (slice(top, bottom), slice(left, right))
     part = extended_part(pixels, extension, window)
-    alpha, colours = soft_cutout(part, mask[window], band)
+    own = None if mixed is None else extended_mask(mixed, extension)[window]
+    alpha, colours = soft_cutout(part, mask[window], band, own)
     return Matte(int(left) - extension[2], int(top) - extension[0], alpha, colours.foreground)
 
 
-def soft_cutout(pixels: Pixels, selection: Selection, band: float) -> tuple[F32, Unmixed]:
-    """Alpha (h, w) and the colours of a photo's crop (h, w, 3) in which an object is selected."""
-    drawn = _drawn(selection, band)
+def soft_cutout(
+    pixels: Pixels, selection: Selection, band: float, mixed: Mask | None = None
+) -> tuple[F32, Unmixed]:
+    """Alpha (h, w) and the colours of a photo's crop (h, w, 3) in which an object is selected.
+
+    Where it is `mixed` (h, w), the selection is alpha, as the edge brush found it.
+    """
+    if mixed is None or not mixed.any():
+        painted, drawn = selection, _drawn(selection, band)
+    else:
+        painted = np.where(mixed, is_selected(selection) * np.uint8(FULL), selection)
+        drawn = _drawn(painted, band) | mixed
     alpha = find_alpha(pixels, selection, drawn, band, REACH * band)
     if not drawn.any():
         return alpha, unmixed(pixels, alpha)
     # Of an edge that was drawn the photo is no mixture: what is inside it is the object's own.
-    through = veil(selection)
-    is_edge = drawn & ~through
+    through = veil(painted)
+    is_edge = drawn & ~through if mixed is None else drawn & ~through & ~mixed
     share = np.where(is_edge, is_selected(selection), alpha).astype(np.float32)
     colours = unmixed(pixels, share)
-    return alpha, _unveiled(pixels, selection, through, colours) if through.any() else colours
+    return alpha, _unveiled(pixels, painted, through, colours) if through.any() else colours
 
 
 def _unveiled(pixels: Pixels, coverage: U8, through: Mask, colours: Unmixed) -> Unmixed:

@@ -78,15 +78,18 @@ class Composing:
         self._stroke: Stroke | None = None  # being painted
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
+        self._compared: tuple[Plate, Document] | None = None  # a variant that is looked at
         self._offer: TraceOffer | None = None  # found in the photo, not taken along yet
 
     def forget(self) -> None:
         """Another document is opened."""
         self._variants, self._ready = ((), ()), []
-        self._stroke, self._waiting, self._offer = None, [], None
+        self._stroke, self._waiting, self._offer, self._compared = None, [], None, None
 
     def deliver(self) -> bool:
         """Takes in what the worker has made, between strokes; once a frame."""
+        if self._compared is not None and self._editor.view.tool is not ToolName.COMPOSE:
+            self.compare_variant(None)
         if not self._ready or self._editor.hand.is_busy:
             return False
         ready, self._ready = self._ready, []
@@ -185,8 +188,24 @@ class Composing:
         masks, variants = self._variants
         return variants if document is not None and same(masks, _masks(document)) else ()
 
+    def compare_variant(self, k: int | None) -> None:
+        """Show the edit on the variant at `k`, or, for None, on its own background again."""
+        editor, document = self._editor, self._editor.committed
+        is_free = document is not None and not editor.hand.is_busy
+        k = k if is_free and k is not None and k < len(self.variants) else None
+        if k is None or document is None:
+            if self._compared is not None and editor.preview is self._compared[1]:
+                editor.preview = None
+            self._compared = None
+            return
+        plate = self.variants[k].plate
+        if self._compared is None or self._compared[0] is not plate:
+            self._compared = plate, edits.set_plate(document, plate)
+        editor.preview = self._compared[1]
+
     def choose_variant(self, variant: Variant) -> None:
-        document = self._editor.document
+        self.compare_variant(None)
+        document = self._editor.committed
         if document is not None and document.plate is not variant.plate:
             masks, hints = _masks(document), document.hints
             self._take_plate(masks, variant.plate, t("Choose background"), hints)

@@ -212,7 +212,7 @@ class Shaping:
         """Return the painted hints about the shape, as a tint over the canvas."""
         editor, document = self._editor, self._editor.document
         painted = editor.view.selecting.painted
-        if document is None or painted is Painted.SELECTION:
+        if document is None or painted not in (Painted.DEPTH, Painted.HIDDEN):
             return None
         size = document.photo.size
         if painted is Painted.DEPTH:
@@ -315,7 +315,8 @@ class Shaping:
         photo = document.photo
         is_alone = not any(o.lifted for o in document.objects if o is not thing)
         is_guess = photo.camera == Camera.from_fov(*photo.size)
-        return ImportTarget(photo.pixels, photo.camera, thing.selection, is_alone and is_guess)
+        is_free, mixed = is_alone and is_guess, thing.mixed
+        return ImportTarget(photo.pixels, photo.camera, thing.selection, is_free, mixed)
 
     def _take_import(
         self, k: int, fitting: Fitting, matte: Matte, lifted: LiftedObject, label: str

@@ -102,22 +102,26 @@ def draw_mask(canvas: CanvasPainter) -> None:
     Over an edit, which has no veil, a band shows where the brush went.
     """
     editor = canvas.editor
-    if editor.masking.painting is None:
+    masking, edging = editor.masking, editor.edging
+    if masking.painting is None or editor.landing.is_edit_shown:
         draw_edge(canvas)
-    elif editor.landing.is_edit_shown:
-        draw_edge(canvas)
-        _draw_trail(canvas)
+    if edging.stroke is not None:
+        _draw_trail(canvas, edging.trail, edging.is_erasing, 2.0)
+    elif masking.painting is not None and editor.landing.is_edit_shown:
+        is_erasing, hardness = masking.painting.is_erasing, editor.view.brush.hardness
+        _draw_trail(canvas, masking.trail, is_erasing, 1 + hardness)
     if editor.pointer is not None:
         canvas.brush(erases(editor, editor.pointer))
 
 
-def _draw_trail(canvas: CanvasPainter) -> None:
-    """The band that a stroke in progress has covered."""
-    masking, view = canvas.editor.masking, canvas.editor.view
-    assert masking.painting is not None
-    color = theme.u32(WARM if masking.painting.is_erasing else ACCENT, 0.45)
-    width = max(view.brush.radius * (1 + view.brush.hardness) * view.zoom / canvas.ratio, 2.0)
-    places = canvas.on_canvas(np.array(masking.trail))
+def _draw_trail(
+    canvas: CanvasPainter, trail: list[np.ndarray], is_erasing: bool, radii: float
+) -> None:
+    """The band, so many radii of the brush wide, that a stroke in progress has covered."""
+    view = canvas.editor.view
+    color = theme.u32(WARM if is_erasing else ACCENT, 0.45)
+    width = max(view.brush.radius * radii * view.zoom / canvas.ratio, 2.0)
+    places = canvas.on_canvas(np.array(trail))
     if len(places) == 1:
         canvas.draw.add_circle_filled(places[0], width / 2, color)
     else:

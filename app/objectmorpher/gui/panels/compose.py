@@ -50,6 +50,7 @@ from ..widgets.widgets import (
 )
 from ..window.landmarks import mark
 from .brush import draw_brush_fields, draw_radius
+from .edge import draw_decontaminate
 
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 DEGREES = 72.0  # points, width of the direction's field
@@ -105,19 +106,36 @@ def _draw_brush(editor: Editor) -> None:
 
 
 def _draw_variants(editor: Editor) -> None:
-    """Thumbnails; the one that is shown has the accent's edge."""
+    """Thumbnails; the one that is shown has the accent's edge.
+
+    The one that is pointed at, or whose key is held, is seen large in the picture.
+    """
     variants = editor.composing.variants
     if not variants:
         return
+    looked_at = _held_variant(len(variants))
     room = imgui.get_content_region_avail().x
     width = (room - (len(variants) - 1) * theme.pt(GAP)) / len(variants)
     for k, variant in enumerate(variants):
         if k:
             imgui.same_line(0, theme.pt(GAP))
-        _draw_variant(editor, k, variant, ImVec2(width, width * THUMB_SHAPE))
+        if _draw_variant(editor, k, variant, ImVec2(width, width * THUMB_SHAPE)):
+            looked_at = k
+    editor.composing.compare_variant(looked_at)
+    note(t("Hold Shift+1, 2 or 3, or point at one, to see it large. Click to choose."))
 
 
-def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> None:
+def _held_variant(count: int) -> int | None:
+    """Index of the variant whose key is held with Shift, or None."""
+    io = imgui.get_io()
+    keys = (imgui.Key._1, imgui.Key._2, imgui.Key._3)[:count]
+    if io.want_text_input or not io.key_shift:
+        return None
+    return next((k for k, key in enumerate(keys) if imgui.is_key_down(key)), None)
+
+
+def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> bool:
+    """A thumbnail that a click chooses; whether it is pointed at."""
     start, draw = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
     end = ImVec2(start.x + size.x, start.y + size.y)
     if drawn_button(f"##variant{k}", size):
@@ -131,6 +149,7 @@ def _draw_variant(editor: Editor, k: int, variant: Variant, size: ImVec2) -> Non
     if is_chosen or is_hovered:
         role = "accent" if is_chosen else "secondary"
         draw.add_rect(start, end, theme.u32(role), corner, thickness=theme.pt(2))
+    return is_hovered
 
 
 def _draw_shadow(editor: Editor) -> None:
@@ -241,6 +260,8 @@ def _draw_edge(editor: Editor) -> None:
     preview = editor.composing.preview_feather
     _take(editor, change, lambda: preview(change.value), t("Blend of edge"))
     note(t("How wide the edit fades into the photo."))
+    draw_decontaminate(editor)
+    command_button(editor, "edge_brush", width=-1)
 
 
 def _take(editor: Editor, change: FieldChange, preview: Callable[[], None], label: str) -> None:

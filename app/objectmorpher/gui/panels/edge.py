@@ -77,6 +77,20 @@ def _hint(name: str) -> str:
     return hints.get(name, "")
 
 
+def draw_decontaminate(editor: Editor) -> None:
+    """Draw how far the background's colour is taken out of the object's edge."""
+    if not editor.is_lifted:
+        note(t("Lift the object to take the background's colour out of its edge."))
+        return
+    number = Number(t("Clean"), "%.0f %%", 0.5, 10.0, 0.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.edging.decontaminate)
+    tooltip(t("Decontaminate: take the background's colour out of the object's soft edge"))
+    if change.is_changed:
+        editor.edging.preview_decontaminate(change.value / 100)
+    if change.is_done:
+        editor.commit(t("Decontaminate edge"))
+
+
 def draw_refinement_note(editor: Editor) -> None:
     """Draw the note on what a changed selection means for the lifted object."""
     if editor.object is not None and editor.is_lifted:

@@ -1,14 +1,25 @@
-"""The steps since the file was opened: the current one marked, a click travels."""
+"""The steps since the file was opened, and the snapshots: a click travels there."""
 
 from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
 from ...editor.editor import Editor
-from ...editor.history import History
+from ...editor.history import History, Step
 from ...system.texts import t
-from ..widgets.theme import theme
-from ..widgets.widgets import drawn_button, fill_row, heading, rule, text_top
+from ..widgets.theme import Icon, theme
+from ..widgets.widgets import (
+    FIELD,
+    GAP,
+    drawn_button,
+    fill_row,
+    gap,
+    heading,
+    icon_button,
+    rule,
+    text_top,
+)
+from ..window.landmarks import mark
 
 ROW = 28.0  # points
 CORNER = 4.0  # radius
@@ -22,6 +33,7 @@ def draw_history(editor: Editor) -> None:
         _seen.is_shown = False
         return
     rule()
+    _draw_snapshots(editor, history)
     heading(t("History"))
     cursor, row = history.cursor, theme.pt(ROW)
     height = row * min(history.count, MOST)
@@ -36,6 +48,43 @@ def draw_history(editor: Editor) -> None:
     if not _seen.is_shown:  # it was just switched on, maybe below the panel's end
         imgui.set_scroll_here_y(1.0)
         _seen.is_shown = True
+
+
+def _draw_snapshots(editor: Editor, history: History) -> None:
+    """Edits that were kept by a name, and the field that keeps the shown one."""
+    heading(t("Snapshots"))
+    field = imgui.get_content_region_avail().x - theme.pt(FIELD + GAP)
+    imgui.set_next_item_width(field)
+    flags = imgui.InputTextFlags_.enter_returns_true
+    hint = t("name of a snapshot")
+    is_entered, _seen.name = imgui.input_text_with_hint("##snapshot", hint, _seen.name, flags)
+    mark(t("Name of the snapshot"))
+    imgui.same_line(0, theme.pt(GAP))
+    if icon_button(Icon.PLUS, "keep", t("Keep a snapshot")) or is_entered:
+        editor.keep_snapshot(_seen.name)
+        _seen.name = ""
+    for step in history.snapshots:
+        _draw_snapshot(editor, history, step)
+    gap(8)
+
+
+def _draw_snapshot(editor: Editor, history: History, step: Step) -> None:
+    """One row: a click goes there, the cross forgets it."""
+    start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    size = ImVec2(width - theme.pt(ROW), theme.pt(ROW))
+    if drawn_button(f"##snapshot {step.label}", size):
+        editor.take_snapshot(step.label)
+    mark(f"snapshot {step.label}")
+    end = ImVec2(start.x + width, start.y + theme.pt(ROW))
+    fill_row(start, end, step.document is editor.committed, imgui.is_item_hovered(), CORNER)
+    draw, place = imgui.get_window_draw_list(), ImVec2(start.x + theme.pt(12), 0)
+    place.y = text_top(start, theme.pt(ROW))
+    draw.push_clip_rect(start, ImVec2(end.x - theme.pt(ROW), end.y), True)
+    draw.add_text(place, theme.u32("text"), step.label)
+    draw.pop_clip_rect()
+    imgui.same_line(0, 0)
+    if icon_button(Icon.CLOSE, f"forget {step.label}", t("Forget the snapshot"), None, ROW):
+        history.drop(step.label)
 
 
 def _draw_steps(editor: Editor, history: History, row: float) -> None:
@@ -71,6 +120,7 @@ class _Seen:
 
     def __init__(self) -> None:
         self.is_shown = False
+        self.name = ""  # of a snapshot, as it is being typed
         self.step: tuple[int, int] = (-1, -1)  # the current one, and how many there were
 
 

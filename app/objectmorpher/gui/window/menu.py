@@ -36,7 +36,7 @@ MENUS: dict[str, tuple[str, ...]] = {
         "zoom_in", "zoom_out", "fit", "actual", "double", "pixels", "-",
         *(f"show_{s.name.lower()}" for s in Shown), "-", "split", "points",
     ),
-    "Window": ("panel", "history", "models", "preferences"),
+    "Window": ("panel", "history", "snapshot", "models", "preferences"),
     "Help": ("palette", "help", "shortcuts", "-", "about"),
 }  # fmt: skip
 

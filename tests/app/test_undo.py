@@ -1,0 +1,106 @@
+"""Undo covers everything that changes an edit: every command, and every control of every panel."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from conftest import PATIENCE, wait_for_jobs
+from hands import ROOT
+from objectmorpher.commands import COMMANDS, GROUPS, run, why_not
+from objectmorpher.editor.editor import Editor
+from objectmorpher.editor.view import ToolName
+from objectmorpher_core.document import edits
+from objectmorpher_core.document.model import Document, Placement
+from tests.tree import PYTHONPATH
+
+ELSEWHERE = {"undo", "redo", "quit", "close", "revert", "open", "paste"}  # not about an edit
+CHANGING = {  # commands of which a change is known: nobody may forget to look
+    "grow", "shrink", "smooth", "feather", "remove_handle", "reset_handle",
+    "reset_handles", "reset_pose", "reset_place", "reset_position", "reset_turn", "reset_size",
+    "ground", "duplicate", "remove_object", "forward", "shadow", "decontaminate", "to_front",
+}  # fmt: skip
+
+
+def worked_on(ball: Document) -> Document:
+    """The ball bent by a handle, held by a pin, turned and moved; a copy of it lies beside."""
+    lifted = ball.objects[0].lifted
+    assert lifted is not None
+    first, second = lifted.control_points[0], lifted.control_points[-1]
+    document = edits.add_handle(ball, 0, first, first + 0.1)
+    document = edits.add_handle(document, 0, second, is_pin=True)
+    document = edits.set_placement(
+        document, 0, Placement(move=(20.0, -4.0), turn=(10.0, 0.0, 0.0), scale=0.9)
+    )
+    document = edits.duplicate(document, 0)
+    return edits.set_placement(document, 1, Placement(move=(-45.0, 6.0)))
+
+
+def test_every_command_that_changes_the_edit_is_one_step_that_undo_takes_back(
+    editor: Editor, ball: Document
+) -> None:
+    document, changing = worked_on(ball), set()
+    tools = {"Pose": ToolName.POSE, "Place": ToolName.PLACE, "Compose": ToolName.COMPOSE}
+    for group, commands in GROUPS.items():
+        for name in commands:
+            if name in ELSEWHERE or "…" in COMMANDS[name].label:
+                continue
+            editor.start(document)
+            editor.current, editor.view.tool = 0, tools.get(group, ToolName.SELECT)
+            editor.posing.select(0)
+            wait_for_jobs(editor)
+            before = editor.committed
+            if why_not(editor, name) is not None:
+                continue
+            run(editor, name)
+            wait_for_jobs(editor)
+            assert editor.preview is None, name
+            after, history = editor.committed, editor.history
+            if after is before:
+                continue
+            changing.add(name)
+            assert history is not None
+            assert history.cursor == 1, (name, history.steps)
+            run(editor, "undo")
+            wait_for_jobs(editor)
+            assert editor.committed is before, name
+            run(editor, "redo")
+            wait_for_jobs(editor)
+            assert editor.committed is after, name
+    assert changing >= CHANGING, CHANGING - changing
+
+
+def test_a_snapshot_is_gone_back_to_as_a_step(editor: Editor, ball: Document) -> None:
+    editor.start(ball)
+    editor.placing.move_to(Placement(move=(9.0, 0.0)))
+    editor.commit("Move object")
+    moved = editor.committed
+    run(editor, "snapshot")
+    editor.keep_snapshot("To the left ")
+    assert editor.history is not None
+    names = [step.label for step in editor.history.snapshots]
+    assert names == ["Snapshot 1", "To the left"]
+    run(editor, "undo")
+    editor.take_snapshot("Snapshot 1")
+    assert editor.committed is moved
+    run(editor, "undo")
+    assert editor.committed is ball
+
+
+@pytest.mark.window
+@pytest.mark.slow
+def test_every_control_of_every_panel_is_undone(window_environment: dict[str, str]) -> None:
+    """Each is clicked and dragged in the real window, in each tool and in what a tool unfolds."""
+    command = [sys.executable, "tests/app/flip_controls.py"]
+    said = subprocess.run(
+        command, cwd=ROOT, env=window_environment | {"PYTHONPATH": PYTHONPATH},
+        capture_output=True, text=True, timeout=5 * PATIENCE,
+    )  # fmt: skip
+    assert said.returncode == 0, said.stderr[-3000:]
+    rows = [json.loads(line) for line in said.stdout.splitlines()]
+    assert [row for row in rows if row["wrong"]] == []
+    assert len({(row["state"], row["label"]) for row in rows}) > 80
+    assert len({row["label"] for row in rows if row["changed"]}) > 25
