@@ -21,7 +21,7 @@ from tests.photos import outlined
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]
 RUN = ("edit", "select", "replay", "convert", "batch", "share")
-EXPECTED = re.compile(r"goes along with it|is removed")  # of a shadow or a reflection
+EXPECTED = re.compile(r"goes along with it|is removed")  # of a shadow
 TWO = {
     "photo": "flower.jpg", "click": [[300, 190]], "move": [-60, 0],
     "objects": [{"click": [[90, 330]], "remove": True}],

@@ -224,7 +224,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--key", action="append", type=_key, metavar="POSE",
         help="a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'")  # fmt: skip
     add("--shadow", metavar="auto|none",
-        help="auto (default): its shadow goes along, its reflection is erased")  # fmt: skip
+        help="auto (default): its shadow in the photo goes along")  # fmt: skip
     add(
         "--remove",
         action="store_true",

@@ -303,26 +303,23 @@ class Cutout:
 
 def take_shadow(
     cutout: Cutout, choice: BackendChoice, progress: Progress
-) -> tuple[Shadow | None, Plate] | None:
-    """A shadow like the object's in the photo, and the background without that and its reflection.
-
-    None where neither is sure; a background alone where no shadow is.
-    """
+) -> tuple[Shadow, Plate] | None:
+    """A shadow like the object's in the photo, and the background without that; None: none is sure."""
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
-    from objectmorpher_core.compose.shadow.old_traces import find_old_traces
     from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY
+    from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 
     progress(0.0, "")
-    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
-    if not old.found:
+    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
+    if old is None:
         return None
     inpainter = compose.load(choice.backend, bool(choice.hints))
     step = part(progress, 0.1, 1.0)
     plate = traceless_plate(
-        cutout.pixels, cutout.covered, old.found, inpainter, step, choice.seed, choice.hints
+        cutout.pixels, cutout.covered, [old], inpainter, step, choice.seed, choice.hints
     )
-    return (None if old.shadow is None else old.shadow.shadow), plate
+    return old.shadow, plate
 
 
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:

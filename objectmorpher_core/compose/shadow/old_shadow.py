@@ -21,7 +21,6 @@ from .. import Inpainter
 from ..plate.plate import Box, build_plate, cut, hole_margin, overlap
 from ..silhouette import cells_bounds, sampled
 from . import shadow_edge
-from .old_reflection import OldReflection, without_reflection
 from .shadow import GAMMA
 
 LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
@@ -158,7 +157,7 @@ def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tupl
 def traceless_plate(
     pixels: Pixels,
     covered: Mask,
-    traces: Sequence[OldShadow | OldReflection],
+    shadows: Sequence[OldShadow],
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
@@ -166,22 +165,16 @@ def traceless_plate(
 ) -> Plate:
     """Build the plate of the photo in full light: shadows beside objects go as well.
 
-    Reflections are taken off, too. There it is painted, as by hand: shown wherever something has
-    moved. Where it is so dark that the photo shows little of the ground, and where that mirrors an
-    object in a way that is not known, it is invented.
+    There it is painted, as by hand: shown wherever something has moved. Where it is so dark that
+    the photo shows little of the ground, it is invented.
     """
     height, width = covered.shape
     lit = pixels.copy()
     is_changed, lost = np.zeros_like(covered), np.zeros_like(covered)
-    traces = sorted(traces, key=lambda old: isinstance(old, OldShadow))  # what is added goes first
-    shades = [old.bounds(width, height) for old in traces]
-    for old, shade in zip(traces, shades, strict=True):
+    shades = [old.bounds(width, height) for old in shadows]
+    for old, shade in zip(shadows, shades, strict=True):
         part = (slice(shade[1], shade[3]), slice(shade[0], shade[2]))
-        if isinstance(old, OldShadow):
-            lit[part], is_other, is_lost = _lifted(lit, old, shade)
-        else:
-            is_lost = old.lost(shade)
-            lit[part], is_other = without_reflection(lit, old, shade)
+        lit[part], is_other, is_lost = _lifted(lit, old, shade)
         is_changed[part] |= is_other
         lost[part] |= is_lost
     lost &= ~covered
