@@ -105,7 +105,7 @@ def answer_prompt(document: Document, k: int, found: Mask, prompt: Prompt) -> Do
     What was changed by hand since the last answer stays as it is, except where a new click says
     the contrary: the latest word counts.
     """
-    from ..segment.corrections import corrected
+    from ..segment.mask_edit import corrected
 
     item = document.objects[k]
     if item.found is None or item.mask is None:
@@ -198,7 +198,7 @@ def reshape(
 
 def set_thickness(document: Document, k: int, thickness: float) -> Document:
     """Object `k` as thick as `thickness` times what its silhouette says; no pose."""
-    from ..lift.relief.rethicken import with_thickness
+    from ..lift.relief.thickness import with_thickness
 
     item = document.objects[k]
     if item.lifted is None or item.matte is None:

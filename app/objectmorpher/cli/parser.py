@@ -17,10 +17,19 @@ from typing import Any
 from objectmorpher_core.base.quoting import count_range, reason
 
 from .. import __version__
-from .command_parser import MISUSED, Parser, completed_files, misspelt_command
+from .command_parser import (
+    MISUSED,
+    RESEARCH,
+    Parser,
+    Subcommand,
+    add_subcommands,
+    completed_files,
+    lazily,
+    misspelt_command,
+    research_commands,
+)
 from .options import RENDERERS, WindowOptions
 from .ray import add_ray
-from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
 from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"

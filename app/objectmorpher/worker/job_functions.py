@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
-    from objectmorpher_core.lift.registration.importing import Import, ImportTarget
+    from objectmorpher_core.lift.registration.imported import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
@@ -171,7 +171,7 @@ def import_object(
     path: Path, scene: ImportTarget, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """An object's file registered to the photo, and in the best pose textured with it."""
-    from objectmorpher_core.lift.registration.importing import Source, place_import, register_file
+    from objectmorpher_core.lift.registration.imported import Source, place_import, register_file
 
     try:
         found = register_file(Source(path), scene, part(progress, 0.0, 0.8), seed)
@@ -188,7 +188,7 @@ def place_object(
     scene: ImportTarget, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
 ) -> tuple[Matte, LiftedObject]:
     """An object's Gaussians in a proposed pose, textured with the photo."""
-    from objectmorpher_core.lift.registration.importing import place_import
+    from objectmorpher_core.lift.registration.imported import place_import
 
     return place_import(scene, gaussians, proposal, progress, seed)
 
@@ -197,7 +197,7 @@ def fit_object(
     scene: ImportTarget, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """The best pose near `start` (4, 4 world from object), textured with the photo."""
-    from objectmorpher_core.lift.registration.importing import fit_near, place_import
+    from objectmorpher_core.lift.registration.imported import fit_near, place_import
 
     found = fit_near(scene, gaussians, start, part(progress, 0.0, 0.5), seed)
     rest = part(progress, 0.5, 1.0)
@@ -304,7 +304,10 @@ class Cutout:
 def take_shadow(
     cutout: Cutout, choice: BackendChoice, progress: Progress
 ) -> tuple[Shadow, Plate] | None:
-    """A shadow like the object's in the photo, and the background without that; None: none is sure."""
+    """A shadow like the object's in the photo, and the background without it.
+
+    None where none is sure.
+    """
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
     from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...base.arrays import F64
 from .drawing import Mesh
-from .evidence import STRIDE, Evidence, Misfit
-from .refining import least
+from .evidence import STRIDE, Evidence, Misfit, least
 from .solids import AROUND, FINE, tube
 
 LEAST_HOLE = 0.01  # x the filled outline's area

@@ -11,9 +11,8 @@ import numpy as np
 
 from ...base.arrays import F64, Mask
 from .drawing import Mesh, drawn
-from .evidence import Evidence, Misfit
+from .evidence import HOPELESS, Evidence, Misfit, least
 from .lathe import Lathe, Profile
-from .refining import HOPELESS, least
 from .solids import AROUND, FINE, ellipsoid
 
 LEANS = np.radians([4.0, 15.0, 28.0, 42.0, 58.0, 74.0])  # of the axis from the picture's plane

@@ -20,8 +20,7 @@ from ...base.arrays import F64, U8
 from ...base.limits import MESH_BYTES as MAX_MESH
 from ...document.gaussians import Gaussians
 from ..limits import GREATEST, SplatFileError
-from ..splats.axes import HALF_TURN, QUARTER_TURN, turned
-from ..splats.ply_table import read_header
+from ..splats.ply_table import HALF_TURN, QUARTER_TURN, read_header, turned
 from .folder import MeshFolder
 from .gltf_check import MAX_SIDE, MAX_TRIANGLES, check_gltf
 from .sampling import sample_surface

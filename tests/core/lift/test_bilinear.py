@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.lift.relief.bilinear import bilinear
+from objectmorpher_core.lift.relief.canvas import bilinear
 
 F64 = 1e-12
 RNG = np.random.default_rng(0)

@@ -26,7 +26,6 @@ from ...system.texts import sentence, t
 from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
 from ..widgets.method_choice import draw_method
-from ..widgets.pictures import pictures
 from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import RADIUS, theme
 from ..widgets.widgets import (
@@ -45,6 +44,7 @@ from ..widgets.widgets import (
     heading,
     note,
     number_field,
+    pictures,
     rule,
     tooltip,
 )

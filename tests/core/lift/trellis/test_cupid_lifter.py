@@ -16,8 +16,7 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.lift import LiftError
 from objectmorpher_core.lift.registration.placement import Hints, Registrar
 from objectmorpher_core.lift.trellis.camera import view
-from objectmorpher_core.lift.trellis.cupid import CupidGenerator, centres
-from objectmorpher_core.lift.trellis.cupid_lifter import pose_seen
+from objectmorpher_core.lift.trellis.cupid_lifter import CupidGenerator, centres, pose_seen
 from objectmorpher_core.lift.trellis.generator import Folders
 from objectmorpher_core.lift.trellis.latent import looked_up
 from objectmorpher_core.lift.trellis.lifter import FITS, placed
@@ -25,7 +24,7 @@ from objectmorpher_core.lift.trellis.picture import ConditionPicture
 from objectmorpher_core.lift.trellis.voxels import Voxels
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
-from objectmorpher_core.splat_files.splats.axes import QUARTER_TURN
+from objectmorpher_core.splat_files.splats.ply_table import QUARTER_TURN
 from tests.core.lift import registered
 from tests.core.lift.trellis import tiny_trellis
 
