@@ -490,7 +490,7 @@ SUBCOMMANDS = (
     ),
     Subcommand(
         "doctor", "show what runs on this machine, and what would help", _add_doctor,
-        lazily("doctor", "run_doctor"),
+        lazily("commands", "run_doctor"),
     ),
     Subcommand(
         "plugin", "install the plug-in for Krita, GIMP or ComfyUI",

@@ -45,9 +45,9 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
-    from ..server.alone import Alone
     from ..server.cluster import Cluster, ClusterPlan
     from ..server.front import Front, RequestLimits
+    from ..server.running import Alone
     from ..server.table import table
     from ..system.logs import show_log
     from ..worker.stages import STAGES

@@ -6,7 +6,7 @@ from ..editor.editor import Editor
 from ..editor.tasks import SELECT
 from ..editor.view import ToolName
 from ..system.texts import t
-from . import compose, edit, files, look, objects, place, pose, select, window
+from . import compose, edit, look, objects, place, pose, select
 from .command import Command
 
 # Which settings there are, by the command that brings them into view: for the command palette.
@@ -38,7 +38,7 @@ __all__ = [
 ]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
-    "File": files.COMMANDS,
+    "File": edit.FILE_COMMANDS,
     "Edit": edit.COMMANDS,
     "Select": select.COMMANDS,
     "Objects": objects.COMMANDS,
@@ -46,7 +46,7 @@ GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of short
     "Place": place.COMMANDS,
     "Look": look.COMMANDS,
     "Compose": compose.COMMANDS,
-    "Window": window.COMMANDS,
+    "Window": edit.WINDOW_COMMANDS,
 }
 COMMANDS: dict[str, Command] = {
     name: command for group in GROUPS.values() for name, command in group.items()

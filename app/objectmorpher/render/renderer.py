@@ -15,8 +15,7 @@ from objectmorpher_core.base.arrays import U8
 from ..canvas.layer import CanvasLayer
 from ..canvas.memo import same
 from ..editor.view import ViewState
-from .defocus_pass import DefocusPass
-from .layer_pass import LayerPass, photo_box
+from .layer_pass import DefocusPass, LayerPass, photo_box
 from .photo_pass import PhotoPass
 from .scene import Colour, Scene, SplatObject
 from .textures import BlendTexture, PictureTexture

@@ -20,9 +20,9 @@ from ...base.progress import Progress, part, silent
 from ...base.threads import core_count, in_threads
 from ...document.gaussians import Gaussians
 from .. import LiftError
-from .matches import NEAR, Matches
 from .search import angles, search
-from .sketch import COVERAGE, Surfels, even_surfels, own_frame
+from .sketch import COVERAGE, Matches, Surfels, even_surfels, own_frame
+from .sketch import NEAR_MATCH as NEAR
 from .view import (
     Agreement,
     RegistrationView,

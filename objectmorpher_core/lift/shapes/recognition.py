@@ -15,8 +15,7 @@ from ..relief.silhouette import ReliefSilhouette
 from .boxes import fit_box, fit_flat
 from .drawing import Mesh, RayGrid, drawn
 from .evidence import Evidence, Misfit
-from .rings import fit_ring
-from .round import fit_ellipsoid, fit_revolution
+from .round import fit_ellipsoid, fit_revolution, fit_ring
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it

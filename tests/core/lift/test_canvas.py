@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.document.model import Matte
-from objectmorpher_core.lift.relief.canvas import ReliefCanvas
-from objectmorpher_core.lift.relief.fusion import LEAST_SIDE
+from objectmorpher_core.lift.relief.canvas import LEAST_SIDE, ReliefCanvas
 
 F32 = 1e-5
 HEIGHT, WIDTH = 3 * LEAST_SIDE + 1, 5 * LEAST_SIDE // 2

@@ -25,8 +25,7 @@ from ...editor.view import Composed
 from ...system.texts import sentence, t
 from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
-from ..widgets.method_choice import draw_method
-from ..widgets.segmented import Segment, segmented
+from ..widgets.segmented import Segment, draw_method, segmented
 from ..widgets.theme import RADIUS, theme
 from ..widgets.widgets import (
     GAP,

@@ -12,10 +12,10 @@ from ....system.report import report
 from ....system.resources import resource
 from ....system.texts import t
 from ...widgets import widgets
+from ...widgets.modal import popup
 from ...widgets.theme import theme
 from ...widgets.widgets import Emphasis, bold_text, button, gap, note, shown_path
 from ...window.landmarks import mark
-from .frame import popup
 
 # The About popup: this program, and the sources of its parts.
 

@@ -14,10 +14,10 @@ from ....editor.editor import Editor
 from ....editor.view import Popup
 from ....system.help_pages import pages
 from ....system.texts import t
+from ...widgets.modal import popup
 from ...widgets.theme import theme
 from ...widgets.widgets import fitted, tooltip
 from ...window.landmarks import mark
-from .frame import popup
 
 SIZE = (600.0, 480.0)  # points
 ROW = 28.0
