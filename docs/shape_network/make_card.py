@@ -44,8 +44,8 @@ sure (`--trust`, or Trust in the Shape panel; at 0 the silhouette alone tells th
 where DINOv2's weights are not there).
 
 - **What it is**: a U-Net of {parameters:.1f} million parameters,
-  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision), SHA-256
-  `{sha256}`.
+  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision, of 8 binary
+  digits), SHA-256 `{sha256}`.
 - **Licence**: Apache-2.0 as the program. It was trained from nothing on pictures that the program
   draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0).
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:

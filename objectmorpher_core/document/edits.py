@@ -164,7 +164,7 @@ def refit(
 
     Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
     """
-    from ..lift.carrying import refitted
+    from ..lift.refitting import refitted
 
     item, camera = document.objects[k], document.photo.camera
     objects = tuple(
@@ -190,7 +190,7 @@ def reshape(
     document: Document, k: int, matte: Matte, lifted: LiftedObject, shape: LiftSettings
 ) -> Document:
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
-    from ..lift.carrying import carried_over
+    from ..lift.refitting import carried_over
 
     changed = carried_over(document.objects[k], matte, lifted, shape)
     return document.with_object(k, changed).with_backend("lift", lifted.backend)

@@ -106,7 +106,7 @@ def _greet(url: str, token: str | None, options: argparse.Namespace) -> None:
 
 def _token(path: Path | None) -> tuple[str, bool]:
     """The token, and whether it was made just now."""
-    from ..server.tokens import VARIABLE, check_token, make_token, read_token, write_token
+    from ..server.address import VARIABLE, check_token, make_token, read_token, write_token
 
     if path is not None:
         if kept := read_token(path):

@@ -32,12 +32,11 @@ from objectmorpher_core.base.limits import WAITING_JOBS as MOST_JOBS
 from objectmorpher_core.base.progress import Cancelled
 
 from .. import __version__
-from .address import PROTOCOL
+from .address import PROTOCOL, check_token, is_same
 from .message import MessageError, MissingError, decode, digest
 from .offers import told_offers
 from .running import Call, JobOutcome, Runner
 from .table import Table, types
-from .tokens import check_token, is_same
 
 # An HTTP server for a few known users: one request per connection, a thread for each.
 #

@@ -36,8 +36,8 @@ from ..widgets.panes import fades
 from ..widgets.theme import theme
 from ..widgets.widgets import pictures
 from . import landmarks
-from .frame_log import FrameLog
 from .input import HELP, Input
+from .landmarks import FrameLog
 from .layout import Layout, Rect, has_panel, lay_out
 from .menu import draw_menu, draw_toolbar
 from .overlays import draw_overlays
