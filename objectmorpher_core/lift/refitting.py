@@ -44,8 +44,8 @@ from .relief.spreading import BRIM
 #
 # A shape that is lifted anew, or made thicker, is seen at the same places of the photo: a handle
 # takes hold of what is seen there now, on the same side, and is dragged as far. So does each region
-# of the rig. A shape that was refitted to a refined mask has the old one's surface and control points
-# wherever the mask did not change: there pose and placement go over as they are.
+# of the rig. A shape that was refitted to a refined mask has the old one's surface and control
+# points wherever the mask did not change: there pose and placement go over as they are.
 
 GUIDES = 4  # old control points that tell where a new one goes
 HANDLE_STILL_THERE = (
