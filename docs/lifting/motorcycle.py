@@ -29,7 +29,7 @@ from objectmorpher_core.lift import LiftSubject
 from objectmorpher_core.lift.relief.body import ReliefBody
 from objectmorpher_core.lift.relief.depth_prior import NetworkDepth
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
-from objectmorpher_core.lift.relief.sides import MirrorAxis
+from objectmorpher_core.lift.relief.mirror import MirrorAxis
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.lift.relief.standing import FLAT
 from objectmorpher_core.lift.relief.thickness import Thickness

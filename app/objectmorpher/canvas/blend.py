@@ -15,7 +15,6 @@ import numpy as np
 
 from objectmorpher_core.base.arrays import F32, F64
 from objectmorpher_core.base.camera import Camera
-from objectmorpher_core.base.kernel_files import numba
 from objectmorpher_core.document.model import Document
 
 from ..editor.view import ViewState
@@ -24,39 +23,6 @@ from .layer import PosedObject
 if TYPE_CHECKING:
     from objectmorpher_core.compose.light.lighting import Lit
     from objectmorpher_core.raster.posed import PosedSplats
-
-
-# Which cells of a grid over the canvas something has moved from, or to: compiled.
-
-
-@numba.njit(cache=True, nogil=True)
-def mark_moved(free, rest, world, lens, corner, scale, tolerance, has_left):
-    """Sets `free` (h, w) u8 to 0 where Gaussians that moved are, and with `has_left` were.
-
-    `rest` (N, 2) image px; `world` (N, 3) where they are now, or (0, 3) where they are hidden:
-    then all have gone. `lens`: focal length and centre of the photo's camera, px; `corner`: image
-    px at the grid's left top; `scale`: cells per image px; `tolerance`: image px.
-    """
-    height, width = free.shape
-    focal, cx, cy = lens
-    left, top = corner
-    for i in range(len(rest)):
-        x, y = rest[i, 0], rest[i, 1]
-        if len(world) > 0:
-            z = world[i, 2]
-            if z <= 0.0:  # behind the camera
-                continue
-            u, v = focal * world[i, 0] / z + cx, focal * world[i, 1] / z + cy
-            if not (u - x) ** 2 + (v - y) ** 2 > tolerance * tolerance:
-                continue
-            column, row = int((u - left) * scale // 1), int((v - top) * scale // 1)
-            if 0 <= column < width and 0 <= row < height:
-                free[row, column] = 0
-        if has_left:
-            column, row = int((x - left) * scale // 1), int((y - top) * scale // 1)
-            if 0 <= column < width and 0 <= row < height:
-                free[row, column] = 0
-
 
 CELL = 4  # canvas px, of the grid
 TOLERANCE = 0.25  # canvas px: a Gaussian that moved less is where it was
@@ -99,6 +65,8 @@ def _distance(
 ) -> F32:
     """(h, w) photo px from each cell to what moved, on the canvas or a little beside it."""
     from objectmorpher_core.compose import composite
+
+    from .moved_cells import mark_moved
 
     height, width = -(-view.height // CELL), -(-view.width // CELL)
     free = np.ones((height + 2 * PAD, width + 2 * PAD), np.uint8)

@@ -133,7 +133,7 @@ def rehearse(shape: CanvasShape, camera: Camera, placement: Placement | None = N
     from objectmorpher_core.raster import tiles
     from objectmorpher_core.raster.sharpening import sharpen
 
-    from .blend import mark_moved
+    from .moved_cells import mark_moved
 
     puppet, texture, placement = shape.puppet, shape.texture, placement or Placement()
     deformer = puppet.deformer

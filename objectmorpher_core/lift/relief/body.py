@@ -12,8 +12,8 @@ from ...base.camera import Camera
 from ...document.model import LiftSettings
 from .canvas import bilinear
 from .cuts import Cuts, Overlaps, overlaps_of
+from .mirror import MirrorAxis
 from .prism import Prism
-from .sides import MirrorAxis
 from .silhouette import ReliefSilhouette
 from .standing import FLAT, StandingSheet, stand
 from .thickness import Thickness

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
 from .canvas import ReliefCanvas, bilinear
-from .sides import MirrorAxis
+from .mirror import MirrorAxis
 from .silhouette import ReliefSilhouette
 
 FINENESS = 3.0  # px to a mean spacing: more of the photo plain colours need not see

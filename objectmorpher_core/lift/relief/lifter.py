@@ -31,7 +31,8 @@ from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow
 from .fusion import fused
-from .sides import MirrorAxis, find_axis, with_sides
+from .mirror import MirrorAxis, find_axis
+from .sides import with_sides
 from .silhouette import ReliefSilhouette
 from .spreading import SurfacePoints, spread
 

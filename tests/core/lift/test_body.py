@@ -9,7 +9,7 @@ from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import LiftSettings
 from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
-from objectmorpher_core.lift.relief.sides import MirrorAxis
+from objectmorpher_core.lift.relief.mirror import MirrorAxis
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder

@@ -10,7 +10,7 @@ from objectmorpher_core.base.arrays import F32, F64, Mask
 from objectmorpher_core.document.model import LiftSettings, Matte
 from objectmorpher_core.lift.relief.canvas import ReliefCanvas
 from objectmorpher_core.lift.relief.colours import Colouring, colouring, fill_in, grown
-from objectmorpher_core.lift.relief.sides import MirrorAxis
+from objectmorpher_core.lift.relief.mirror import MirrorAxis
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from objectmorpher_core.pipeline import lift_mask
 from tests import shapes

@@ -9,7 +9,7 @@ import pytest
 from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.lift.relief.canvas import ReliefCanvas
-from objectmorpher_core.lift.relief.sides import MirrorAxis, find_axis
+from objectmorpher_core.lift.relief.mirror import MirrorAxis, find_axis
 
 EXACT = 1e-9
 SIZE = 240  # px
