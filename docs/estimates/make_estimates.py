@@ -30,6 +30,7 @@ from published import (
 
 from objectmorpher_core import models
 from objectmorpher_core.compose.plate import inpaint_pixelhacker
+from objectmorpher_core.compose.plate.pixelhacker import sampler
 from objectmorpher_core.compose.refine import klein, qwen
 from objectmorpher_core.compose.refine.diffusion import DiffusionRefiner
 from objectmorpher_core.lift.trellis import lifter
@@ -141,7 +142,7 @@ def _inpainters() -> Iterator[Row]:
     unet, codec = build("pixelhacker"), build("pixelhacker-vae")
     ids = torch.zeros(2, 10, dtype=torch.long, device="meta")
     step = operations(unet, lambda m: m(normal(2, 9, 64, 64), normal(2), ids))
-    work = (inpaint_pixelhacker.STEPS - 1) * step
+    work = (sampler.STEPS - 1) * step
     work += operations(codec, lambda m: (m.encode(_photo(512)), m.decode(normal(1, 4, 64, 64))))
     count = parameters(unet) + parameters(codec)
     need = inpaint_pixelhacker.need(count)

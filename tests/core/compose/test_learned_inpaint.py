@@ -119,9 +119,9 @@ def test_each_step_is_told_and_can_be_the_last(pixelhacker, view, hole):
 
 def test_bfloat16_invents_nearly_the_same(pixelhacker):
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.inpaint_pixelhacker import sample
     from objectmorpher_core.compose.plate.pixelhacker.network import load as load_network
     from objectmorpher_core.compose.plate.pixelhacker.network import load_codec
+    from objectmorpher_core.compose.plate.pixelhacker.sampler import sample
 
     codec = load_codec(pixelhacker / "vae", "cpu")
     weights = pixelhacker / "diffusion_pytorch_model.safetensors"
@@ -138,7 +138,7 @@ def test_bfloat16_invents_nearly_the_same(pixelhacker):
 
 def test_the_masks_cells_are_whole():
     torch = pytest.importorskip("torch")
-    from objectmorpher_core.compose.plate.inpaint_pixelhacker import in_cells
+    from objectmorpher_core.compose.plate.pixelhacker.sampler import in_cells
 
     mask = torch.zeros(1, 1, 32, 32)
     mask[..., 13, 13] = 1
