@@ -20,7 +20,7 @@ ARGS ?=
 LOCK ?= # versions and hashes of what the tests need: packaging/locks/ci.txt
 # Several test files at a time, one of them by one process; JOBS=0 is for debuggers.
 JOBS ?= auto
-PYTEST = $(PYTHON) -m pytest -n $(JOBS) --maxprocesses 4 --dist loadfile
+PYTEST = $(PYTHON) -m pytest -n $(JOBS) --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # Installs Debian packages where this is Debian or Ubuntu and we may; fails quietly elsewhere.
 define APT

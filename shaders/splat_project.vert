@@ -185,7 +185,7 @@ void main() {
     p_axes = axes(vec3(fxx, sxy, fyy), fdet, cut);
     p_color = vec4(paint.rgb, 1.0 - seen);
     vec3 along_depth = motion[2] * root;
-    float depth = at.z - (is_aside ? ahead / near * nearest : 0.0);
+    float depth = max(at.z - (is_aside ? ahead / near * nearest : 0.0), 0.5 * at.z);
     p_depth = vec4(depth, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
     p_shift = vec4(looks - photo_focal * sideways, photo, body);
     p_slope = vec4(axx, axy, ayx, ayy);

@@ -95,7 +95,11 @@ def opened_browser() -> Iterator[Browser]:
     url = f"http://127.0.0.1:{port}"
     with subprocess.Popen([driver, f"--port={port}"], stdout=subprocess.DEVNULL) as process:
         try:
-            yield Browser(url, _session(url, found))
+            session = _session(url, found)
+            try:
+                yield Browser(url, session)
+            finally:  # else Chromium outlives its driver
+                ask(f"{url}/session/{session}", method="DELETE")
         finally:
             process.terminate()
 

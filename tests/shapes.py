@@ -328,7 +328,7 @@ class Scene:
         return replace(document, plate=grey_plate(self.mask))
 
 
-def grey_plate(inside: Mask, margin: int = 9) -> Plate:
+def grey_plate(inside: Mask, margin: int = 1) -> Plate:
     """A plate that shows plain grey where the object was."""
     hole = cv2.dilate(inside.astype(np.uint8), np.ones((2 * margin + 1,) * 2)).astype(bool)
     return Plate(0, 0, np.full((*inside.shape, 3), 128, np.uint8), hole, "made")

@@ -256,6 +256,7 @@ def test_python_on_a_page_names_what_there_is(page):
                 assert not is_om or node.attr in om.__all__, node.attr
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_and_shows_what_it_was_kept_with(tmp_path, monkeypatch):
     """It runs in a copy of its place, beside the sample photos, and saves only what it names."""
     runner = _module(DOCS / "examples" / "run_notebook.py")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tree import PYTHONPATH
+from tests.tree import PYTHONPATH, parsed
 
 ROOT = Path(__file__).parents[1]
 CORE, APP = ROOT / "objectmorpher_core", ROOT / "app" / "objectmorpher"
@@ -57,7 +57,7 @@ def imports(path: Path, is_at_import: bool = False) -> frozenset[str]:
 def _imports(path: Path, is_at_import: bool) -> Iterator[str]:
     package = path.relative_to(ROOT).parent.parts
     package = package[1:] if package[0] in ("app", "research") else package
-    nodes: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    nodes: list[ast.AST] = [parsed(path)]
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.Import):
@@ -214,6 +214,7 @@ def loaded_by(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
+@pytest.mark.slow
 def test_the_window_imports_in_a_few_times_what_numpy_takes():
     """Before its first frame: what takes longer is imported when it is needed.
 
@@ -278,7 +279,7 @@ def _is_module(name: str) -> bool:
 def test_no_two_public_classes_have_the_same_name():
     places: dict[str, list[str]] = {}
     for path in sources(CORE, APP, RESEARCH):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in parsed(path).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert len(places) > 500

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.tree import over
+from tests.tree import over, parsed
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("app", "objectmorpher_core", "packaging", "research")
@@ -24,7 +24,7 @@ def name_of(path: Path) -> str:
 
 
 def calls(path: Path) -> Iterator[tuple[str, ast.Call]]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Call):
             yield ast.unparse(node.func), node
 
@@ -36,7 +36,7 @@ def given(call: ast.Call, name: str) -> str | None:
 
 def uses(path: Path) -> set[str]:
     """Modules of RUNNING that a file imports, and what it uses of them."""
-    tree, found = ast.parse(path.read_text(encoding="utf-8")), set()
+    tree, found = parsed(path), set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {a.name.split(".")[0] for a in node.names} & RUNNING
@@ -70,6 +70,6 @@ def test_numpy_and_torch_read_numbers_only(path: Path) -> None:
 def test_what_comes_from_the_wire_is_not_the_pipes() -> None:
     """The server's messages are decoded by `message.py`, which knows no pickle."""
     for path in (ROOT / "app" / "objectmorpher" / "server").glob("*.py"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         modules = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
         assert not any(m is not None and m.endswith("wire") for m in modules), path.name

@@ -16,7 +16,7 @@ import pytest
 
 from objectmorpher_core import models
 from objectmorpher_core.base.files import OutputError, write_all
-from tests.tree import PYTHONPATH
+from tests.tree import PYTHONPATH, parsed
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -82,7 +82,7 @@ def test_text_files_name_their_encoding() -> None:
     """Without it Windows writes code page 1252."""
     found = []
     for path in SOURCES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         own = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
         for node in ast.walk(tree):
             is_own = isinstance(node, ast.Call) and getattr(node.func, "id", "") in own

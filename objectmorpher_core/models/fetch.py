@@ -7,7 +7,6 @@ renamed. Whatever else was written is removed, also after a failure or a cancel.
 from __future__ import annotations
 
 import hashlib
-import http.client
 import importlib.util
 import logging
 import os
@@ -16,8 +15,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import urllib.error
-import urllib.request
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,12 +53,15 @@ def fetch_mirrored(wanted: Weight, target: Path, progress: Progress) -> bool:
 
     Its hash is for the caller to check. Raises OSError where the disk is full. `Cancelled` passes.
     """
+    from http.client import HTTPException
+    from urllib.error import URLError
+
     for address in addresses():
         try:
             if _copy(f"{address}/{wanted.file}", wanted, target, progress):
                 return True
             reason = "it has another size"
-        except (urllib.error.URLError, http.client.HTTPException, TimeoutError) as error:
+        except (URLError, HTTPException, TimeoutError) as error:
             reason = str(error)
         log.info("%s does not come from %s: %s", wanted.id, address, reason)
     return False
@@ -69,8 +69,10 @@ def fetch_mirrored(wanted: Weight, target: Path, progress: Progress) -> bool:
 
 def _copy(address: str, wanted: Weight, target: Path, progress: Progress) -> bool:
     """Write what `address` answers to `target`; no more of it than the weight has."""
+    from urllib.request import urlopen
+
     count = 0
-    with urllib.request.urlopen(address, timeout=WAIT) as answer, target.open("wb") as file:
+    with urlopen(address, timeout=WAIT) as answer, target.open("wb") as file:
         while count <= wanted.size and (block := answer.read(MIRROR_BLOCK)):
             file.write(block)
             count += len(block)

@@ -25,9 +25,7 @@ from collections.abc import Callable
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
-from urllib.error import HTTPError
 from urllib.parse import quote
-from urllib.request import Request, urlopen
 
 PART = ".part"
 # No room; a quota that is used up; a disk or a limit that takes no larger file.
@@ -102,6 +100,8 @@ def _names(repository: str, revision: str, patterns: list[str]) -> list[str]:
 
 def _plan_plainly(request: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """As `_plan`, of files of one commit whose hashes are known."""
+    from urllib.request import Request, urlopen
+
     base = os.environ.get("HF_ENDPOINT", "https://huggingface.co").rstrip("/")
     files, sources = {}, {}
     for name in request["files"]:
@@ -117,6 +117,8 @@ def _get_plainly(url: str, file: Any, size: int) -> None:
     """Writes the rest of a file from where `file` ends."""
     if file.tell() >= size:
         return
+    from urllib.request import Request, urlopen
+
     request = Request(url, headers={"Range": f"bytes={file.tell()}-"})
     with urlopen(request, timeout=WAIT) as answer:
         if file.tell() and answer.status != 206:
@@ -202,6 +204,8 @@ def _kind_of(error: Exception) -> tuple[str, str]:
     """What the Hub's library means by an exception."""
     if isinstance(error, OSError) and error.errno in FULL:
         return "full", ""
+    from urllib.error import HTTPError
+
     if isinstance(error, HTTPError):
         return {404: ("revision", ""), 401: ("repository", "")}.get(error.code, ("network", ""))
     try:

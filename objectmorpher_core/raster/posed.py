@@ -73,6 +73,7 @@ class RestSplats:
         # The photo's part ends where the motion stretches it too much: here everywhere.
         other.zoom = frozen(np.full(len(self), ENDLESS))
         other.is_textured, other.sides = False, None
+        other.__dict__.pop("side_blocks", None)  # of the invented pictures, if they were asked for
         blocks = self.blocks.copy()
         table = np.zeros((blocks.shape[0] * LANES, 4))
         table[: len(self)] = np.column_stack([gaussians.colors, gaussians.opacities])

@@ -134,7 +134,8 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         s[FACING * LANES + k] = cosine
         s[SMALLEST * LANES + k] = area / largest * j / zoom
         s[ASIDE * LANES + k] = is_aside
-        s[o + p.Z * LANES] -= is_aside * ahead
+        z = s[o + p.Z * LANES]
+        s[o + p.Z * LANES] = max(z - is_aside * ahead, 0.5 * z)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)

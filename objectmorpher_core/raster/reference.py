@@ -113,7 +113,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         centre=centre,
         conic=np.stack([conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1]], axis=1),
         extent=extent,
-        depth=means[:, 2] - aside * RULES.ahead * splats.gap,
+        depth=np.maximum(means[:, 2] - aside * RULES.ahead * splats.gap, means[:, 2] / 2),
         slope=(covariance_z[:, None] @ inverse)[:, 0],
         shift=look - unmoved,
         shift_slope=a - ratio * np.eye(2),

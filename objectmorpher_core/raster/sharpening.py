@@ -23,7 +23,9 @@ Box = tuple[int, int, int, int]
 
 R, G, B, A, SHARE, SX, SY, SEEN = range(8)  # columns of a coarse pixel
 LEAST_ALPHA = np.float32(0.02)  # with which a pixel's map counts
+INNER = np.float32(0.97)  # alpha inside the object
 LEAST_SHOWN = np.float32(1e-3)  # alpha, of which a share can be told
+MOST_SLOPE = 6.0  # change of the map, x the step of a coarse px: with more it is torn there
 ROUNDS = 2  # px by which the map is continued, so that it can be interpolated at the edge
 PARTS = 4  # pieces of the picture for each thread
 FULL = np.float32(255.0)
@@ -49,7 +51,7 @@ def sharpen(
     invented is the share of a pixel that shows the object, but nothing of the photo; None unless
     `is_marked`.
     """
-    coarse, ends = _packed(picture)
+    coarse, ends = _packed(picture, MOST_SLOPE * factor / zoom)
     height, width = box[3] - box[1], box[2] - box[0]
     rgba = np.zeros((height, width), "<i4")
     invented = np.zeros((height, width) if is_marked else (0, 0), np.uint8)
@@ -72,14 +74,17 @@ def sharpen(
     return rgba.view(np.uint8).reshape(height, width, 4), invented if is_marked else None
 
 
-def _packed(picture: Picture3D) -> tuple[F32, I32]:
+def _packed(picture: Picture3D, limit: float) -> tuple[F32, I32]:
     """(h, w, 8) columns as above, the map continued around the object, and (h, 2) its ends.
 
-    Those are of each row the first px that shows something, and the one after the last.
+    Those are of each row the first px that shows something, and the one after the last. Where the
+    map changes by more than `limit` photo px from one px to the next, the photo meets an invented
+    picture: no look-up between both makes sense, and the coarse colours are shown.
     """
     coarse = np.empty((*picture.alpha.shape, 8), np.float32)
     ends = np.empty((len(coarse), 2), np.int32)
     _pack(picture.color, picture.alpha, picture.from_photo, picture.shift, coarse, ends)
+    _leave_out_tears(coarse, ends, np.float32(limit * limit))
     _continue(coarse, ends)
     return coarse, ends
 
@@ -96,6 +101,27 @@ def _pack(color, alpha, from_photo, shift, coarse, ends):
             p[SEEN] = ONE if a > LEAST_ALPHA and from_photo[y, x] > ZERO else ZERO
             if a > ZERO:
                 ends[y, 0], ends[y, 1] = min(ends[y, 0], x), x + 1
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
+def _leave_out_tears(coarse, ends, limit):
+    """Takes the map from both px between which it changes by more than the root of `limit`."""
+    height = len(coarse)
+    for y in range(height):
+        for x in range(ends[y, 0], ends[y, 1]):
+            p = coarse[y, x]
+            if p[SEEN] == ZERO:
+                continue
+            for k in range(2):  # to the right, and below
+                i, j = min(y + k, height - 1), x + 1 - k
+                if j < ends[y, 1] and coarse[i, j, SEEN] > ZERO:
+                    dx, dy = coarse[i, j, SX] - p[SX], coarse[i, j, SY] - p[SY]
+                    if dx * dx + dy * dy > limit:
+                        p[SEEN], coarse[i, j, SEEN] = TWO, TWO
+    for y in range(height):
+        for x in range(ends[y, 0], ends[y, 1]):
+            if coarse[y, x, SEEN] == TWO:
+                coarse[y, x, SEEN], coarse[y, x, SHARE] = ZERO, ZERO
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=EXACT)
@@ -153,7 +179,7 @@ def _sharpen(
             r, g, b, a, share, shift_x, shift_y, _ = between(row, one, two, shares[x])
             if is_marked:
                 invented[y, x] = np.uint8(np.int32((ONE - share) * a * FULL + HALF))
-            texel, alpha = (ZERO, ZERO, ZERO, ZERO), ZERO
+            texel, alpha, rest = (ZERO, ZERO, ZERO, ZERO), ZERO, ONE - share
             if share > ZERO:
                 u = left + np.float32(x) * step + scale * shift_x
                 v = top + np.float32(y) * step + scale * shift_y
@@ -163,5 +189,7 @@ def _sharpen(
                     share_x, share_y = u - np.float32(column), v - np.float32(line)
                     texel = four_texels(texels, at, stride, share_x, share_y)
                     alpha = texel[3] * min(TWO * a, ONE) * share
+            if a > INNER:  # no edge of the cut-out: what is not found there has its coarse colour
+                rest = ONE - alpha
             over = texel[0], texel[1], texel[2], ONE
-            rgba[y, x] = bytes_over(over, alpha, (r, g, b, a), ONE - share)
+            rgba[y, x] = bytes_over(over, alpha, (r, g, b, a), rest)

@@ -12,7 +12,6 @@ from hands import Hands
 
 SAMPLE = "rocket.jpg"
 SIZE = (640, 427)  # px of it
-ROCKET = (320.0, 250.0)  # px, on it
 TOP, ASIDE = (321.0, 195.0), (362.0, 202.0)  # px, from where to where it is dragged
 
 
@@ -25,10 +24,6 @@ class Step:
     act: Callable[[Hands], None]
 
 
-def _select(hands: Hands) -> None:
-    hands.click(*hands.on_photo(*ROCKET, SIZE))
-
-
 def _bend(hands: Hands) -> None:
     hands.drag(hands.on_photo(*TOP, SIZE), hands.on_photo(*ASIDE, SIZE))
 
@@ -39,8 +34,6 @@ def _choose(label: str) -> Callable[[Hands], None]:
 
 STEPS = (
     Step("Rocket", "Click this sample", _choose("Rocket")),
-    Step("Click an object in the photo", "Click the rocket", _select),
-    Step("Lift object", "Click this button", _choose("Lift object")),
     Step("Drag a point on the object", "Drag the rocket by its upper end to the right", _bend),
     Step("Export photo…", "Click this button", _choose("Export photo…")),
     Step("Export rocket-edited.jpg", "Click this button", _choose("Export rocket-edited.jpg")),

@@ -19,6 +19,9 @@ from objectmorpher import __version__
 from objectmorpher.cli import parser as cli
 from objectmorpher_core.pictures.image import read_picture
 from tests import shapes
+from tests.tree import over
+
+pytestmark = pytest.mark.usefixtures("lifted_once")
 
 ROOT = Path(__file__).parents[2]
 MASK = shapes.mask("ellipse")
@@ -64,14 +67,14 @@ EDITS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", EDITS)
+@over("name", EDITS)
 def test_the_command_line_gives_the_same_bytes(folder, name):
     edited, said = EDITS[name]
     edited(_edit()).render().save("api.png")
     assert Path("api.png").read_bytes() == _cli(*said)
 
 
-@pytest.mark.parametrize("name", EDITS)
+@over("name", EDITS)
 def test_lifting_first_changes_nothing(folder, name):
     edited, _ = EDITS[name]
     assert edited(_edit().lift()).render().encode() == edited(_edit()).render().encode()
@@ -262,7 +265,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@over("name", WRONG)
 def test_a_failure_is_one_sentence_and_writes_nothing(folder, name):
     before = sorted(folder.iterdir())
     with pytest.raises((ValueError, OSError)) as caught:

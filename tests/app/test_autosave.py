@@ -196,6 +196,7 @@ def own_data(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OBJECTMORPHER_DATA", os.environ["OBJECTMORPHER_DATA"])
 
 
+@pytest.mark.slow
 def test_a_killed_editor_loses_seconds(tmp_path: Path, own_data: None) -> None:
     document, last, _ = kill_and_read(tmp_path, 4.5)
     assert document is not None
@@ -205,7 +206,7 @@ def test_a_killed_editor_loses_seconds(tmp_path: Path, own_data: None) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", range(10))
+@pytest.mark.parametrize("run", range(4))
 def test_killed_at_any_moment_it_loses_ten_seconds_at_most(
     tmp_path: Path, own_data: None, run: int
 ) -> None:

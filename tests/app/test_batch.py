@@ -14,6 +14,8 @@ from objectmorpher.cli import parser as cli
 from objectmorpher_core.pictures.image import read_picture
 from tests import shapes
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
 QUICK = {"mask": "mask.png", "gaussians": 300, "inpaint": "telea"}

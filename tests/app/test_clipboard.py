@@ -100,6 +100,7 @@ def test_other_programs_cannot_break_it(display: str, monkeypatch: pytest.Monkey
     program.kill()
 
 
+@pytest.mark.slow
 @pytest.mark.window
 def test_the_window_copies_and_pastes(
     window_environment: dict[str, str], photo_path: Path, monkeypatch: pytest.MonkeyPatch

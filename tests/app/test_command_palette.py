@@ -65,6 +65,7 @@ def test_whatever_is_typed_finds_commands_settings_gestures_and_pages(editor: Ed
     assert palette._found(editor) == []
 
 
+@pytest.mark.slow
 @pytest.mark.window
 def test_a_command_is_found_and_run_by_typing(
     window_environment: dict[str, str], photo_path: Path

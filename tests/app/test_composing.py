@@ -68,6 +68,7 @@ def test_a_stroke_is_one_step_and_undone_as_one(bare: Editor, ball: Document) ->
     assert bare.document is ball
 
 
+@pytest.mark.slow
 def test_strokes_in_a_row_are_all_filled_in(bare: Editor, ball: Document) -> None:
     for y in (15, 40, 120):
         paint(bare, (12, y), (30, y))
@@ -83,6 +84,7 @@ def test_strokes_in_a_row_are_all_filled_in(bare: Editor, ball: Document) -> Non
     assert bare.document is ball
 
 
+@pytest.mark.slow
 def test_alt_brings_the_photo_back_at_once(bare: Editor, ball: Document) -> None:
     paint(bare, (20, 20), (40, 20))
     wait_for_repairs(bare)

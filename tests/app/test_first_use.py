@@ -11,7 +11,7 @@ from PIL import Image
 import first_use
 from hands import ROOT, Hands, opened
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 MOST = 12  # clicks and drags from the start screen to the exported photo
 AROUND = (slice(100, 280), slice(290, 420))  # rows and columns of the photo around the nose

@@ -77,6 +77,7 @@ def test_a_drag_is_one_step_with_its_background(taking: Editor, ball: Document) 
     wait_for_jobs(taking)
 
 
+@pytest.mark.slow
 def test_drags_in_a_row_add_up_and_are_forgotten_one_by_one(taking: Editor, ball: Document) -> None:
     x, y = middle(ball)
     drag(taking, (12, 12), (x, y))

@@ -393,6 +393,7 @@ def test_a_click_again_asks_for_more_or_less_around_it(editor: Editor) -> None:
     assert editor.history is not None and editor.history.undo_label == "Select the part"
 
 
+@pytest.mark.slow
 def test_masks_of_two_objects_are_painted_and_undone_each_on_its_own(editor: Editor) -> None:
     first = lift_ball(editor)
     editor.objects.start_another()

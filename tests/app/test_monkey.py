@@ -11,7 +11,7 @@ from monkey import SCREEN, prepared, rounds
 
 pytestmark = pytest.mark.window
 
-EVENTS = 400
+EVENTS = 200
 
 
 @pytest.mark.slow

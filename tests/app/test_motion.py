@@ -58,6 +58,7 @@ def moving(environment: dict[str, str], motion: str) -> dict[str, int]:
     return json.loads(result.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.window
 def test_with_reduced_motion_every_action_is_there_at_once(
     window_environment: dict[str, str],

@@ -14,6 +14,7 @@ from objectmorpher.gui.overlay.place import COLOURS
 from objectmorpher.gui.overlay.rig import HATCHES, YELLOW
 from objectmorpher.gui.widgets.theme import PALETTES, rgb
 from objectmorpher.gui.window.scenes import INPAINTED, LIFTED, REFINED
+from tests.tree import over
 
 APART = 25.0  # Delta E 1976; 2.3 is just noticed side by side, this is seen apart and in a hurry
 Mark = tuple[str, tuple[float, float, float]]  # shape, colour
@@ -56,8 +57,8 @@ TOGETHER: dict[str, dict[str, Mark]] = {  # what is seen on the photo at the sam
 }
 
 
-@pytest.mark.parametrize("sight", SIGHTS)
-@pytest.mark.parametrize("scene", TOGETHER)
+@over("sight", SIGHTS)
+@over("scene", TOGETHER)
 def test_marks_that_are_seen_together_are_told_apart(scene: str, sight: str) -> None:
     for (one, (shape, color)), (other, (its_shape, its)) in combinations(
         TOGETHER[scene].items(), 2

@@ -67,6 +67,7 @@ def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.window
 def test_the_window_sends_layers_back_and_closes(
     window_environment: dict[str, str], photo_path: Path, tmp_path: Path
@@ -130,6 +131,7 @@ def test_krita_sends_a_layer_and_shows_what_comes_back(edited: Path, tmp_path: P
     assert np.abs(pixels(edited / "shown.png") - pixels(edited / "edited.png")).max() <= 2
 
 
+@pytest.mark.slow
 def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     edited: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,6 +159,7 @@ def test_gimps_plugin_sends_a_layer_and_takes_what_comes_back(
     assert refused[0] == gimp.PDBStatusType.EXECUTION_ERROR
 
 
+@pytest.mark.slow
 def test_comfyuis_nodes_select_lift_pose_render_and_save(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
     nodes = module("comfy", PLUGINS / "comfyui" / "objectmorpher" / "__init__.py")

@@ -13,7 +13,7 @@ from objectmorpher_core.document.model import Document
 from objectmorpher_core.session.file import decode_session, save_session
 from test_window import is_red, screen_xy
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 
 def _saved(hands: Hands, path: Path, name: str) -> Document:

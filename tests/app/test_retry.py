@@ -78,6 +78,7 @@ def test_a_background_that_failed_can_be_tried_again(
     assert editor.document is not None and editor.document.plate is not None
 
 
+@pytest.mark.slow
 def test_a_background_that_was_cancelled_can_be_asked_for(editor: Editor, ball: Document) -> None:
     editor.start(edits.set_plate(ball, None))
     editor.poll()
@@ -110,6 +111,7 @@ def test_a_background_is_there_again_after_it_was_taken_off_a_moved_object(
     assert fills[1] is fills[0]
 
 
+@pytest.mark.slow
 def test_a_background_that_gave_way_to_another_is_filled_in_when_it_is_wanted_again(
     editor: Editor, ball: Document
 ) -> None:

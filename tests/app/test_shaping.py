@@ -116,6 +116,7 @@ def test_a_kind_is_a_step_the_worker_makes_it_and_a_session_keeps_it(editor: Edi
     assert thing.lifted is not None and thing.lifted.kind == "flat"
 
 
+@pytest.mark.slow
 def test_what_is_painted_nearer_comes_nearer(editor: Editor) -> None:
     lift_ball(editor)
     x, y = CENTRE

@@ -134,6 +134,7 @@ def test_a_disk_that_fills_up_spares_the_old_file_of_every_kind(
     saved_of_every_kind(target, fill)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="it has no such limit")
 def test_a_file_that_may_not_grow_spares_the_old_one_of_every_kind(folder: Path) -> None:
     saved_of_every_kind(folder, lambda room: files_of_at_most(room or SMALL))
@@ -194,6 +195,7 @@ PROGRAM = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="homes are elsewhere there")
 def test_every_home_and_language_gives_the_same_picture(folder: Path) -> None:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("LC_", "LANG", "XDG_"))}

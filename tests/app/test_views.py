@@ -24,7 +24,7 @@ from objectmorpher_core.session.file import save_session
 from shoot_views import NAMES, made_document
 from tests.tree import PYTHONPATH
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 GOLDEN = Path(__file__).parent / "golden"
 IS_MADE_ANEW = bool(os.environ.get("OBJECTMORPHER_GOLDEN"))

@@ -14,6 +14,7 @@ from PIL import Image
 
 from conftest import CENTRE, HEIGHT, PATIENCE, WIDTH
 from hands import ROOT, Hands, opened
+from tests.tree import quick
 
 pytestmark = pytest.mark.window
 
@@ -29,7 +30,7 @@ def run_app(environment: dict[str, str], *arguments: str) -> subprocess.Complete
     )
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("theme", quick(["dark", "light"], 1))
 def test_the_start_screen_is_drawn(
     window_environment: dict[str, str], tmp_path: Path, theme: str
 ) -> None:
@@ -45,7 +46,7 @@ def test_the_start_screen_is_drawn(
     assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1000  # the thumbnails
 
 
-@pytest.mark.parametrize("renderer", ["tiles", "gl"])
+@pytest.mark.parametrize("renderer", quick(["gl", "tiles"], 1))
 def test_the_photo_is_shown_as_it_is(
     window_environment: dict[str, str], photo_path: Path, tmp_path: Path, renderer: str
 ) -> None:
@@ -130,6 +131,7 @@ def test_the_whole_job_by_hand(hands: Hands, photo_path: Path, tmp_path: Path) -
     hands.wait(lambda: hands.is_accent(PRIMARY), "showing the session")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", ["ctrl+w", "ctrl+q"])
 def test_closing_asks_about_unsaved_changes(hands: Hands, keys: str) -> None:
     hands.click(*screen_xy(*CENTRE))

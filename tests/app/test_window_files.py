@@ -12,7 +12,7 @@ from conftest import CENTRE
 from hands import ROOT, Hands, opened
 from test_window import screen_xy
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 WARNING = (0xF2, 0xB8, 0x4B)
 RECOVER = (924, 152)  # the button in the first row of the start screen, one recent file listed

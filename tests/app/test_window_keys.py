@@ -10,7 +10,7 @@ from conftest import CENTRE
 from hands import opened
 from test_window import POSE_TOOL, PRIMARY, screen_xy
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 
 def test_enter_takes_every_step_and_the_title_counts_what_changed(

@@ -10,7 +10,7 @@ import hands
 from hands import Hands, opened
 from keyboard import Keys
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 SIZE = (1440, 900)  # px of the screen: 720 x 450 points
 

@@ -11,7 +11,7 @@ from hands import Hands, opened
 from objectmorpher_core import segment
 from test_window import PRIMARY, screen_xy
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 
 def brightness(hands: Hands, x: float, y: float) -> float:

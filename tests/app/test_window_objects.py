@@ -14,7 +14,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
 from objectmorpher_core.session.file import decode_session, save_session
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
 PLACE_TOOL = (10, 176)  # in the Place tool's button, beside its icon

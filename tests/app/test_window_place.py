@@ -14,7 +14,7 @@ from objectmorpher.editor.view import ToolName
 from objectmorpher.tools.gizmo import gizmo
 from objectmorpher_core.session.file import save_session
 
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 CANVAS = (48, 32, 1440 - 48 - 300, 900 - 32 - 28)  # x, y, width, height
 PRIMARY = (1160, 839)  # in the primary button, left of its label

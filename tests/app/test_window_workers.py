@@ -21,7 +21,7 @@ page = "https://example.org/terms"
 FREE = 'command = ["{python}", "-c", "raise SystemExit(9)"]\nlicence = "MIT"\n'
 BOX = "I have read and accept the Terms of Use"
 PICTURES = os.environ.get("OBJECTMORPHER_PICTURES")  # a folder to look at what was seen
-pytestmark = pytest.mark.window
+pytestmark = [pytest.mark.window, pytest.mark.slow]
 
 
 @pytest.fixture

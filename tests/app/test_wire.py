@@ -121,6 +121,7 @@ def test_a_part_of_shared_memory_is_sent_as_the_part_that_it_is(line: Line) -> N
         np.testing.assert_array_equal(line.sent(part), part)
 
 
+@pytest.mark.slow
 @needs_blocks
 def test_no_open_files_are_left(line: Line) -> None:
     before = len(os.listdir("/proc/self/fd"))

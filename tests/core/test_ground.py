@@ -19,6 +19,7 @@ from objectmorpher_core.document.placement import (
     with_centre,
 )
 from tests import shapes
+from tests.tree import over
 
 EXACT = 1e-9
 PLANE = 1e-6  # object diameters
@@ -60,8 +61,8 @@ def test_the_ground_vanishes_at_the_horizon(scene, horizon):
 
 
 @horizons
-@pytest.mark.parametrize("delta", [(0, 0), (30, 8), (-60, 40), (10, -300)])
-@pytest.mark.parametrize("away", [0.0, 0.7, -0.2])
+@over("delta", [(0, 0), (30, 8), (-60, 40), (10, -300)])
+@over("away", [0.0, 0.7, -0.2])
 def test_the_contact_stays_on_the_plane(scene, horizon, delta, away):
     hold = _hold(scene, horizon)
     placement = hold.moved(np.array(delta, float), away)

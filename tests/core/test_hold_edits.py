@@ -16,6 +16,7 @@ from objectmorpher_core.document.pose import Pose
 from objectmorpher_core.document.rig import Rig
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
+from tests.tree import quick
 
 NODES = 60
 SESSIONS = 2000
@@ -106,11 +107,13 @@ def motion(document: Document, deformer: Deformer) -> float:
     return float(np.abs(seen(deformer, now) - seen(deformer, item.pose)).max())
 
 
-@pytest.mark.parametrize("body", [False, True])
-def test_in_random_sessions_nothing_moves_but_what_is_dragged(body: bool):
+@pytest.mark.parametrize(
+    ("body", "sessions"), quick([(False, 150), (True, 40), (False, SESSIONS), (True, 200)], 2)
+)
+def test_in_random_sessions_nothing_moves_but_what_is_dragged(body: bool, sessions: int):
     random = np.random.default_rng(4)
     most = []
-    for _ in range(200 if body else SESSIONS):
+    for _ in range(sessions):
         document, deformer = opened(body)
         document = added(document, deformer, random)
         document = dragged(document, deformer, random)

@@ -22,6 +22,7 @@ from objectmorpher_core.pictures.image import (
     resized,
     to_u8,
 )
+from tests.tree import over
 
 LOSSLESS = (".png", ".tif", ".webp")
 DEEP = (".png", ".tif")
@@ -76,8 +77,8 @@ def assert_same(got: Picture, expected: Picture) -> None:
         np.testing.assert_array_equal(got.alpha, expected.alpha)
 
 
-@pytest.mark.parametrize("ending", LOSSLESS)
-@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
+@over("ending", LOSSLESS)
+@over("kind", ["rgb", "rgba", "grey", "grey alpha"])
 def test_8_bit_round_trip(ending, kind, chelsea):
     picture = pictures(chelsea[:97, :131])[kind]
     back = read_picture(encode_picture(picture, ending))
@@ -117,9 +118,9 @@ def test_other_programs_read_our_png(kind, chelsea):
         np.testing.assert_array_equal(stored[..., -1], picture.alpha)
 
 
-@pytest.mark.parametrize("kind", ["rgb", "rgba", "grey", "grey alpha"])
-@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (5, 3), (700, 411)])
-@pytest.mark.parametrize("is_deep", [False, True])
+@over("kind", ["rgb", "rgba", "grey", "grey alpha"])
+@over("shape", [(1, 1), (1, 300), (300, 1), (5, 3), (700, 411)])
+@over("is_deep", [False, True])
 def test_a_png_is_a_whole_stream_of_filtered_rows(kind, shape, is_deep):
     pixels = np.random.default_rng(0).integers(0, 256, (*shape, 3), np.uint8)
     picture = pictures(deep(pixels) if is_deep else pixels)[kind]
@@ -164,8 +165,8 @@ def test_a_grey_profile_never_reaches_a_colour_file(chelsea):
     assert read_picture(encode_picture(picture, "webp")).icc is None
 
 
-@pytest.mark.parametrize("orientation", range(1, 9))
-@pytest.mark.parametrize("kind", ["JPEG", "PNG", "TIFF", "WEBP", "PNG16", "TIFF16"])
+@over("orientation", range(1, 9))
+@over("kind", ["JPEG", "PNG", "TIFF", "WEBP", "PNG16", "TIFF16"])
 def test_orientation(orientation, kind, chelsea):
     stored = chelsea[:60, :90]
     exif = exif_block(orientation)
@@ -317,7 +318,7 @@ def bad_files(rgb: np.ndarray) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.parametrize("kind", list(bad_files(np.zeros((60, 80, 3), np.uint8))))
+@over("kind", list(bad_files(np.zeros((60, 80, 3), np.uint8))))
 def test_bad_files_give_one_sentence(kind, chelsea, capfd):
     with pytest.raises(ImageError) as caught:
         read_picture(bad_files(chelsea)[kind])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.session.tree import ArrayError, read_npy
+from tests.tree import over
 
 
 def saved(array: np.ndarray, version: tuple[int, int] | None = None) -> bytes:
@@ -19,7 +20,7 @@ def saved(array: np.ndarray, version: tuple[int, int] | None = None) -> bytes:
 THREE = saved(np.arange(3.0))
 
 
-@pytest.mark.parametrize("version", [(1, 0), (2, 0)])
+@over("version", [(1, 0), (2, 0)])
 @pytest.mark.parametrize(
     "array",
     [

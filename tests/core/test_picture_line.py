@@ -7,12 +7,13 @@ import pytest
 
 from objectmorpher.tools.pose_strokes import along_line
 from objectmorpher_core.base.camera import Camera
+from tests.tree import over
 
 CAMERA = Camera.from_fov(400, 300)
 EXACT = 1e-9
 
 
-@pytest.mark.parametrize("seed", range(20))
+@over("seed", range(20))
 def test_the_point_is_seen_where_the_place_is_nearest_to_the_line(seed: int) -> None:
     random = np.random.default_rng(seed)
     point = np.array([0.5, -0.3, 4.0]) + random.uniform(-0.4, 0.4, 3)

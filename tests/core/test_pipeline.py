@@ -24,6 +24,9 @@ from objectmorpher_core.pipeline import (
 )
 from objectmorpher_core.scripting.script import EditScript, ScriptError, script_from
 from tests import shapes
+from tests.tree import quick
+
+pytestmark = pytest.mark.usefixtures("lifted_once")
 
 MASK = shapes.mask("ellipse")
 PIXELS = shapes.picture(MASK)
@@ -46,7 +49,9 @@ KINDS = {
     "alpha": Picture(PIXELS, alpha=PIXELS[..., 1]),
     "alpha 16": Picture(PIXELS.astype(np.uint16) * 3, alpha=PIXELS[..., 1].astype(np.uint16)),
 }
-kinds = pytest.mark.parametrize("kind", KINDS)
+kinds = pytest.mark.parametrize(
+    "kind", quick(["alpha 16", "grey", "u8", "u16", "grey 16", "alpha"], 2)
+)
 
 
 @kinds
@@ -106,7 +111,7 @@ HANDLES = [
 ]
 
 
-@pytest.mark.parametrize("name", ["ellipse", "star", "parts", "frame"])
+@pytest.mark.parametrize("name", quick(["parts", "frame", "star", "ellipse"], 2))
 @pytest.mark.parametrize("handles", HANDLES, ids=range(len(HANDLES)))
 def test_a_handle_ends_under_its_target(name, handles):
     inside = shapes.mask(name)

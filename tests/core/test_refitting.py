@@ -23,6 +23,7 @@ from objectmorpher_core.segment.mask_edit import grow
 from objectmorpher_core.segment.matting.matte import REACH, band_width
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests.photos import outlined, photo
+from tests.tree import quick
 
 STEP = 2  # every second pixel of the photos
 SETTINGS = LiftSettings(count=4000)
@@ -58,7 +59,7 @@ def _posed(name: str) -> Posed:
     return Posed(document, puppet, composite(document, {0: puppet}).pixels)
 
 
-@pytest.fixture(scope="module", params=SUBJECTS)
+@pytest.fixture(scope="module", params=quick(SUBJECTS, 2))
 def posed(request) -> Posed:
     return _posed(request.param)
 
@@ -100,7 +101,7 @@ def _footprint(before: Posed, after: Document, puppet: Puppet) -> np.ndarray:
     return seen
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick(range(4), 1))
 def test_a_refined_mask_changes_nothing_but_what_it_concerns(posed, seed):
     document, camera = posed.document, posed.document.photo.camera
     old = document.objects[0]

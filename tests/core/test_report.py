@@ -15,6 +15,8 @@ from objectmorpher_core.scripting.report import STAGES, Stopwatch, peak_memory_m
 from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
+pytestmark = pytest.mark.usefixtures("lifted_once")
+
 MASK = shapes.mask("ellipse")
 KEYS = {
     "version": None,

@@ -12,6 +12,9 @@ from objectmorpher_core.pipeline import Edited, replay, run_script
 from objectmorpher_core.scripting.script import BatchItem, ScriptError, parse_scripts
 from objectmorpher_core.session.file import decode_session, encode_session
 from tests import shapes
+from tests.tree import over
+
+pytestmark = pytest.mark.usefixtures("lifted_once")
 
 PARTS = shapes.mask("parts")
 LEFT, RIGHT = PARTS.copy(), PARTS.copy()
@@ -189,7 +192,7 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", BAD)
+@over("case", BAD)
 def test_what_makes_no_sense_is_one_sentence_with_its_number(case):
     script, sentence = BAD[case]
     with pytest.raises(ScriptError) as caught:

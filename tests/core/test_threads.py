@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from objectmorpher_core.base.threads import core_count, in_threads
+from tests.tree import over
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 7, 1000])
-@pytest.mark.parametrize("parts", [1, 3])
+@over("count", [0, 1, 2, 7, 1000])
+@over("parts", [1, 3])
 def test_every_index_is_visited_once(count, parts):
     pieces: list[tuple[int, int]] = []
     in_threads(lambda first, last: pieces.append((first, last)), count, parts)

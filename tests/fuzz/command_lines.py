@@ -62,9 +62,11 @@ def values() -> dict[str, SearchStrategy[str]]:
     names = st.sampled_from(words)
     known: dict[str, SearchStrategy[str]] = {
         "X,Y": joined(2, 2), "X0,Y0,X1,Y1": joined(4, 4), "DX,DY[,DZ]": joined(2, 3),
-        "YAW,PITCH,ROLL": joined(3, 3), "X,Y:X2,Y2[,DZ]": pairs(True), "X,Y:X2,Y2[,R]": pairs(True),
+        "YAW[,PITCH,ROLL]": joined(1, 3), "POSE": names, "X,Y:X2,Y2[,DZ]": pairs(True),
+        "X,Y:X2,Y2[,R]": pairs(True),
         "NAME": names, "KIND": names, "MODE": names, "auto|yes|no": names, "auto|none": names,
-        "M.png": files, "FILE": outs, "FILE.ora": outs, "R.json": outs, "S.omorph": outs,
+        "M.png": files, "FILE": outs, "FILE.ora": outs, "FILE.glb": outs, "R.json": outs,
+        "S.omorph": outs,
         "EDIT.json": st.sampled_from(["p/script.json", "p/text.png", "p/none.json"]),
     }  # fmt: skip
     return known

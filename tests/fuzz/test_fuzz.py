@@ -13,8 +13,8 @@ from tests.fuzz.readers import by_name, readers
 
 FOUND = Path(__file__).parent / "found"  # files that once did worse
 SLOW = ("drawn-session",)  # what is drawn has to be compiled first
-EACH = 6  # files of each reader
-MANY = 40  # the same files each time: new ones are for `make fuzz`
+EACH = 3  # files of each reader
+MANY = 15  # the same files each time: new ones are for `make fuzz`
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="the limits on a process are Linux's"
@@ -29,7 +29,7 @@ def test_a_few_damaged_files_and_all_that_once_did_harm() -> None:
     tally = fuzz(names(), "fixed", EACH, 300.0, keep=None, kept=FOUND)
     assert list(tally.found) == []
     assert all(tally.files[name] == EACH for name in names())
-    assert tally.refused.total() > len(names())  # else nothing was damaged
+    assert tally.refused.total() > len(names()) / 2  # else nothing was damaged
 
 
 @pytest.mark.slow

@@ -15,31 +15,17 @@ pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="the memory of a process is measured as on Linux"
 )
 
-TRIED = (  # one of each kind, in every test run
-    "a member that nothing names", "400,000 members", "photo/photo.png inflated",
-    "photo/photo.png is noise", "plate/hole.png renamed", "objects/0/mask.png twice",
-    "arrays.npz is zeros", "all arrays grow", "objects/0/matte/alpha.npy longer",
-    "objects/0/mask.png of 240 MP", "a camera of 100 px", "thousands of bare objects",
-    "document.json goes on", "document.json is b'[[],' ...",
-)  # fmt: skip
-
-
-def test_no_attack_takes_much_more_than_the_session_as_it_was() -> None:
-    found = list(readings(session_seeds()[0], TRIED.__contains__))
-    assert [reading for reading, is_bounded in found if not is_bounded] == []
-    told = {reading.attack: reading.told for reading, _ in found}
-    assert set(told) == {"as it was", *TRIED}
-    assert told["a member that nothing names"] == "read"
-    assert "unpack from" in told["arrays.npz is zeros"]
-    assert "holds too many members" in told["400,000 members"]
-    assert "more than 9,600 px" in told["objects/0/mask.png of 240 MP"]
-
 
 @pytest.mark.slow
-def test_no_attack_at_all_does() -> None:
+def test_no_attack_takes_much_more_than_the_session_as_it_was() -> None:
     found = list(readings(session_seeds()[0]))
     assert [reading for reading, is_bounded in found if not is_bounded] == []
     assert len(found) > 100
+    told = {reading.attack: reading.told for reading, _ in found}
+    assert told["a member that nothing names"] == "read"
+    assert "unpack from" in told["arrays.npz is zeros"]
+    assert "holds too many members" in told["400,000 members"]
+    assert "more than 2 megapixels" in told["objects/0/mask.png of 240 MP"]
 
 
 def test_info_of_a_session_with_a_member_too_many(tmp_path: Path, capsys) -> None:
@@ -47,4 +33,4 @@ def test_info_of_a_session_with_a_member_too_many(tmp_path: Path, capsys) -> Non
     entries = entries_of(session_seeds()[0])
     session.write_bytes(mended([*entries, Entry("more.bin", b"", ZEROS)]))
     assert cli.main(["info", str(session)]) == 0
-    assert "- name: Cat" in capsys.readouterr().out
+    assert "- Cat: " in capsys.readouterr().out

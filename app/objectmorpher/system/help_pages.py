@@ -15,8 +15,8 @@ from .resources import resource
 
 FIRST = "tutorial"  # the page that is read first
 ORDER = (  # of docs/howto
-    "select", "bend", "place", "behind", "remove", "export", "many", "splats", "offline",
-    "accessibility", "trouble",
+    "select", "bend", "place", "behind", "remove", "export", "share", "many", "splats",
+    "offline", "accessibility", "trouble",
 )  # fmt: skip
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)(\{[^}]*\})?")
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")

@@ -48,6 +48,7 @@ def depths(editor: Editor) -> np.ndarray:
     return lifted.world_points(lifted.gaussians.means)[:, 2]
 
 
+@pytest.mark.slow
 def test_it_is_added_used_and_left_out_again(
     own_editor: Editor, network: Path, tmp_path: Path
 ) -> None:

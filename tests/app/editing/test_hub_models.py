@@ -72,6 +72,7 @@ def test_a_model_is_downloaded_and_removed(choosing: Editor, server: Hub) -> Non
     assert hub.shown("sam2").state == "missing"
 
 
+@pytest.mark.slow
 def test_a_licence_is_accepted_before_a_download(
     choosing: Editor, server: Hub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_licence_is_accepted_before_a_download(
     hub.accept(GATED, False)
 
 
+@pytest.mark.slow
 def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     choosing: Editor, tmp_path: Path
 ) -> None:
@@ -109,6 +111,7 @@ def test_a_folder_of_the_users_is_taken_by_one_of_its_files(
     assert json.loads((folder / "config.json").read_bytes()) == {"model_type": "sam2"}
 
 
+@pytest.mark.slow
 def test_a_set_is_told_for_this_machine_and_downloads_queue(choosing: Editor, server: Hub) -> None:
     offers = {offer.set.id: offer for offer in choosing.models.offers}
     assert set(offers) == set(SETS) and offers["clicks"].missing > 0

@@ -18,6 +18,7 @@ from objectmorpher.editor.view import Shown, ToolName
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement
 from objectmorpher_core.session.file import decode_session, encode_session
+from tests.tree import over
 
 
 @pytest.fixture
@@ -143,8 +144,8 @@ def three(copied: Editor) -> Editor:
     return copied
 
 
-@pytest.mark.parametrize("carried", [0, 1, 2])
-@pytest.mark.parametrize("gap", [-5, 0, 1, 2, 3, 9])
+@over("gap", [-5, 0, 1, 2, 3, 9])
+@over("carried", [0, 1, 2])
 def test_a_dragged_row_lands_above_the_row_where_the_line_is(
     three: Editor, carried: int, gap: int
 ) -> None:

@@ -21,6 +21,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Click, LiftSettings, Matte, Plate, Prompt
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment import Found
+from tests.tree import over
 
 RANDOM = np.random.default_rng(3)
 PHOTO = RANDOM.integers(0, 255, (20, 30, 3)).astype(np.uint8)
@@ -158,7 +159,7 @@ HOSTILE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@over("name", HOSTILE)
 def test_what_lies_is_refused_with_a_sentence_and_little_memory(name: str) -> None:
     tracemalloc.start()
     try:
@@ -200,7 +201,7 @@ ASKED_WRONGLY = {
 }
 
 
-@pytest.mark.parametrize("name", ASKED_WRONGLY)
+@over("name", ASKED_WRONGLY)
 def test_arguments_that_a_function_does_not_take_are_refused(name: str) -> None:
     function, arguments = ASKED_WRONGLY[name]
     with pytest.raises(MessageError):

@@ -23,6 +23,7 @@ from objectmorpher.server.message import LARGE, digest, encode
 from objectmorpher.server.running import Alone
 from objectmorpher.server.table import types
 from objectmorpher_core.base.progress import Cancelled, silent
+from tests.tree import over
 
 TOKEN = "a-token-that-is-long-enough"
 MOST = 4 << 20  # bytes of a request
@@ -157,7 +158,7 @@ def test_what_is_not_in_the_table_is_not_found(front: Front, path: str) -> None:
     assert ask(front, "POST", path, encode((), types()).body)[0] == 404
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@over("name", HOSTILE)
 def test_what_is_no_message_is_refused(front: Front, name: str) -> None:
     if len(HOSTILE[name]) <= MOST:
         before = len(served_jobs.seen)

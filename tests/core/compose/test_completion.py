@@ -20,9 +20,11 @@ from objectmorpher_core.compose.plate.structure_lines import draw_lines, find_li
 from objectmorpher_core.document.settings import Hint
 from objectmorpher_core.segment.subject import SubjectNet
 from tests import focussed
+from tests.tree import quick
 
 SIZE = 160  # px
-LEAST_BESIDE = 0.3  # x the roughness beside; was 0.11 and 0.17 with roughness in one band only
+LEAST_BESIDE = 0.22  # x the roughness beside, mean of three draws, which differ by 0.1; was 0.11
+# and 0.17 with roughness in one band only
 Y, X = np.mgrid[:SIZE, :SIZE]
 HOLE = np.hypot(X - 80, Y - 80) < 26
 
@@ -38,7 +40,7 @@ def filled(picture: np.ndarray, hole: np.ndarray = HOLE, hints: tuple[Hint, ...]
     return load("patchmatch").inpaint_from(emptied, hole, hints, silent, 1)
 
 
-@pytest.mark.parametrize("angle", [0, 25, 70, 90])
+@pytest.mark.parametrize("angle", quick([25, 0, 70, 90], 2))
 def test_an_edge_that_enters_on_two_sides_goes_on_straight(angle):
     turn = np.radians(angle)
     beside = (X - 84) * np.sin(turn) - (Y - 77) * np.cos(turn)
@@ -194,17 +196,19 @@ def test_a_texture_goes_on_as_rough_as_it_is(name):
     assert 0.8 < rough / noise(picture, (away > 64) & (away < 94)) < 1.2
 
 
-@pytest.mark.parametrize("name", ["gravel", "grass"])
+@pytest.mark.parametrize("name", quick(["gravel", "grass"], 1))
 def test_ground_that_grows_blurred_farther_off_is_no_blob(name):
     """Smooth ground far off looks like the mean of sharp ground, and must not take its place."""
     document = focussed.scene(3.0, name)
     picture, hole = document.photo.pixels, plate_cover(document)
-    result = plate_picture(replace(document, plate=build_plate(picture, hole, load("patchmatch"))))
+    plates = [build_plate(picture, hole, load("patchmatch"), seed=seed) for seed in range(3)]
+    results = [plate_picture(replace(document, plate=plate)) for plate in plates]
     rows, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
     inside = np.zeros_like(hole)
     inside[rows[0] + 8 : rows[-1] - 8, columns[0] + 6 : columns[-1] - 6] = True
     beside = np.roll(inside, 80, 1) | np.roll(inside, -80, 1)
-    assert noise(result, inside) > LEAST_BESIDE * noise(picture, beside)
+    rough = np.mean([noise(result, inside) for result in results])
+    assert rough > LEAST_BESIDE * noise(picture, beside)
 
 
 def _slant(picture: np.ndarray, where: np.ndarray) -> float:

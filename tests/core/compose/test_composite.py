@@ -20,6 +20,7 @@ from objectmorpher_core.compose.plate.plate import hole_margin
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement, Pose
 from tests import shapes
+from tests.tree import quick
 
 MOVES = {
     "moved": Placement(move=(18.0, -7.0)),
@@ -273,7 +274,7 @@ def _assert_same(result: Composite, whole: Composite) -> None:
         assert getattr(result.shares, name) == pytest.approx(share, abs=1e-6)
 
 
-@pytest.mark.parametrize("rows", [1, 64, 257, None])
+@pytest.mark.parametrize("rows", quick([1, None, 64, 257], 2))
 @pytest.mark.parametrize("edit", EDITS)
 def test_the_picture_is_the_same_however_many_rows_are_blended_at_a_time(edit, rows, monkeypatch):
     whole = _whole(edit)
@@ -283,7 +284,7 @@ def test_the_picture_is_the_same_however_many_rows_are_blended_at_a_time(edit, r
     _assert_same(result, whole)
 
 
-@pytest.mark.parametrize("height", [1, 64, 257])
+@pytest.mark.parametrize("height", quick([64, 1, 257], 1))
 @pytest.mark.parametrize("edit", EDITS)
 def test_low_strips_show_what_a_high_one_shows(edit, height, monkeypatch):
     """But for a last bit, which may depend on what part of the view the rasteriser draws."""

@@ -18,6 +18,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import DeformSettings, Document, Placement
 from objectmorpher_core.session.file import SessionError, decode_session, encode_session
 from tests import shapes
+from tests.tree import over
 
 WIDTH, HEIGHT = 320, 200  # px
 MIDDLE, RADIUS = (90.0, 100.0), 70.0  # px, of a disc
@@ -73,8 +74,8 @@ def _power(patch: np.ndarray) -> tuple[np.ndarray, float]:
     return np.array(mean), float(rest.var())
 
 
-@pytest.mark.parametrize("blur", [0.0, 0.6])
-@pytest.mark.parametrize("place", PLACES)
+@over("blur", [0.0, 0.6])
+@over("place", PLACES)
 def test_a_moved_object_is_as_noisy_as_the_photo(place, blur):
     document, puppet = _scene(blur)
     moved = edits.set_placement(document, 0, PLACES[place])

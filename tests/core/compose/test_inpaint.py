@@ -9,16 +9,18 @@ import pytest
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import BACKENDS, InpaintError, load
 from tests.core.compose import tiny_inpainters
+from tests.tree import over, quick
 
 LEARNED = tiny_inpainters.FAMILIES
 
 
-@pytest.fixture(params=BACKENDS)
-def inpainter(request, tmp_path, monkeypatch):
+@pytest.fixture(scope="module", params=quick(sorted(BACKENDS, key=lambda n: n == "pixelhacker"), 4))
+def inpainter(request, tmp_path_factory):
     """Each; those that learned something are tiny networks of random weights."""
-    if request.param in LEARNED:
-        tiny_inpainters.bring(request.param, tmp_path, monkeypatch)
-    return load(request.param)
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param in LEARNED:
+            tiny_inpainters.bring(request.param, tmp_path_factory.mktemp("tiny"), patch)
+        yield load(request.param)
 
 
 def is_trained(inpainter) -> bool:
@@ -45,7 +47,7 @@ def roughness(pixels: np.ndarray, where: np.ndarray) -> float:
     return float(np.sqrt(np.mean(cv2.Laplacian(grey, cv2.CV_32F)[where] ** 2)))
 
 
-@pytest.mark.parametrize("depth", [8, 16])
+@pytest.mark.parametrize("depth", quick([16, 8], 1))
 def test_contract(inpainter, view, hole, depth):
     pixels = view if depth == 8 else sixteen_bit(view)
     before, hole_before = pixels.copy(), hole.copy()
@@ -97,7 +99,7 @@ def test_only_a_rim_is_known(inpainter, view):
     np.testing.assert_array_equal(filled[~hole], view[~hole])
 
 
-@pytest.mark.parametrize("shape", [(1, 2), (2, 1), (3, 3), (1, 40), (9, 5)])
+@over("shape", [(1, 2), (2, 1), (3, 3), (1, 40), (9, 5)])
 def test_tiny_pictures(inpainter, view, shape):
     pixels = view[: shape[0], : shape[1]]
     hole = np.zeros(shape, bool)
@@ -158,8 +160,8 @@ def test_16_bit_gradient_shows_no_bands():
     np.testing.assert_allclose(means, ramp[90:150, 0, 0], atol=257)
 
 
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-@pytest.mark.parametrize("share", [0.0, 1.0])
+@over("kind", [np.uint8, np.uint16])
+@over("share", [0.0, 1.0])
 def test_black_and_white_stay_black_and_white(inpainter, kind, share):
     """Where OpenCV goes a level beyond white, nothing turns black."""
     if not is_trained(inpainter):

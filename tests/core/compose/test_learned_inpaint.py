@@ -21,6 +21,8 @@ from tests.core.compose import tiny_inpainters
 from tests.core.models.local_hub import serving
 from tests.core.models.small_networks import Ways
 
+pytestmark = pytest.mark.slow
+
 KEYS = Path(__file__).with_name("pixelhacker_keys.json")
 F32 = 1e-5  # sums in another order
 SUMS = 1e-4  # differences of sums of gates that reach 400

@@ -21,6 +21,7 @@ from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import cut_out
 from tests.photos import outlined, photo
 from tests.shapes import camera, png
+from tests.tree import quick
 
 HEIGHT, WIDTH = 360, 480
 MARGIN = hole_margin(WIDTH, HEIGHT)
@@ -80,7 +81,7 @@ SCENES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["foot", "rim"])
+@pytest.mark.parametrize("kind", quick(["foot", "rim"], 1))
 def test_what_a_selection_missed_is_gone_from_the_plate(kind):
     before, after = 0.0, 0.0
     for name, source, ground in SCENES:
@@ -124,6 +125,7 @@ def footless() -> Document:
     return edits.set_plate(document, build_plate(pixels, covered, compose.load("telea")))
 
 
+@pytest.mark.slow
 def test_a_ghost_goes_with_what_stands_beside_it(footless: Document):
     pixels, behind, own = _scene("patch", "astronaut", "street")
     ghosts = find_ghosts(footless, SEAM * MARGIN)

@@ -13,6 +13,7 @@ from objectmorpher_core.deform.control_points import (
     sample_control_points,
 )
 from tests import shapes
+from tests.tree import over
 
 F32 = 1e-6  # points come back as float32 of numbers below 1
 
@@ -45,7 +46,7 @@ def _plain(points: np.ndarray, count: int) -> np.ndarray:
 
 
 @clouds
-@pytest.mark.parametrize("count", [4, 150, MAX_COUNT])
+@over("count", [4, 150, MAX_COUNT])
 def test_the_blocks_choose_what_the_plain_loop_chooses(cloud, count):
     assert np.array_equal(_sample(cloud, count), _plain(cloud, min(count, len(cloud))))
 

@@ -16,6 +16,7 @@ from objectmorpher_core.deform.graph import (
 from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_core.document.rig import Seam
 from tests import shapes
+from tests.tree import over
 
 F64 = 1e-9
 FAITHFUL = DeformSettings(is_faithful=True)
@@ -89,7 +90,7 @@ def test_distances_along_the_surface_obey_the_triangle_inequality(points):
 
 
 @clouds
-@pytest.mark.parametrize("stiffness", [0.25, 1.0, 2.0])
+@over("stiffness", [0.25, 1.0, 2.0])
 def test_no_link_is_longer_than_the_radius_and_none_within_it_is_missing(points, stiffness):
     graph = build_graph(points, DeformSettings(stiffness=stiffness))
     spacing = graph.mean_spacing

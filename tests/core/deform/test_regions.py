@@ -11,6 +11,7 @@ from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObje
 from objectmorpher_core.document.pose import Base
 from objectmorpher_core.document.rig import Rig, Seam
 from tests import shapes
+from tests.tree import over
 
 EXACT = 1e-9
 BAR = shapes.capsule()
@@ -277,8 +278,8 @@ def _odd_cloud(name: str) -> F64:
     return np.concatenate([shapes.ball(100), [[500.0, 0, 0]]])  # one far away
 
 
-@pytest.mark.parametrize("name", ["line", "plane", "coincident", "four", "outlier"])
-@pytest.mark.parametrize("mode", ["default", "faithful"])
+@over("name", ["line", "plane", "coincident", "four", "outlier"])
+@over("mode", ["default", "faithful"])
 def test_odd_clouds_have_a_defined_result(name, mode):
     cloud = _odd_cloud(name)
     lifted = shapes.lifted_cloud(cloud, shapes.even(cloud, 64))

@@ -14,6 +14,7 @@ from objectmorpher_core.deform.graph import LINK_RADIUS, ControlGraph, SolidSurf
 from objectmorpher_core.document.model import DeformSettings
 from objectmorpher_research.bench.bodies import five_limbs
 from tests import shapes
+from tests.tree import over, quick
 
 FAITHFUL = DeformSettings(is_faithful=True)
 FALSE_SHARE = 0.01  # of the false links that the paper's rule keeps
@@ -248,7 +249,7 @@ def _horseshoe(count: int = GAUSSIANS) -> SolidSurface:
 
 
 @pytest.mark.parametrize("surface", [_ball(), _bar(), _horseshoe()], ids=["ball", "bar", "shoe"])
-@pytest.mark.parametrize("count", [32, 512, 2048])
+@pytest.mark.parametrize("count", quick([32, 512, 2048], 2))
 def test_an_object_without_gaps_keeps_its_links(surface, count):
     assert _kept(surface, count) > 0.998
 
@@ -259,14 +260,14 @@ def test_few_gaussians_cut_nothing(surface, count):
     assert _kept(surface(count)) > 0.998
 
 
-@pytest.mark.parametrize("gaussians", [5000, 16_000, 100_000])
+@pytest.mark.parametrize("gaussians", quick([5000, 16_000, 100_000], 2))
 def test_limbs_stay_on_the_body_they_grow_from(gaussians):
     own = five_limbs(gaussians, 4).gaussians
     assert _kept(SolidSurface(own.means, own.normals)) > 0.98
 
 
-@pytest.mark.parametrize("name", shapes.MASKS)
-@pytest.mark.parametrize("gaussians", [800, 4000])
+@over("name", shapes.MASKS)
+@pytest.mark.parametrize("gaussians", quick([800, 4000], 1))
 def test_a_lifted_silhouette_stays_in_as_many_parts(name, gaussians):
     lifted = shapes.scene(name, gaussians).lifted
     is_body = lifted.texture.solidity > 0.5

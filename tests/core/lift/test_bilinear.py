@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core.lift.relief.canvas import bilinear
+from tests.tree import over
 
 F64 = 1e-12
 RNG = np.random.default_rng(0)
@@ -20,8 +21,8 @@ def _plainly(field: np.ndarray, x: float, y: float) -> np.ndarray:
     return (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d)
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint8])
-@pytest.mark.parametrize("more", [(), (1,), (3,), (2, 2)])
+@over("dtype", [np.float32, np.float64, np.uint8])
+@over("more", [(), (1,), (3,), (2, 2)])
 def test_a_value_is_the_mean_of_four_pixels_also_beyond_the_field(dtype, more):
     field = (100 * RNG.random((7, 9, *more))).astype(dtype)
     xy = RNG.uniform(-4, 13, (200, 2))

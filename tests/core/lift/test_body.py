@@ -13,6 +13,7 @@ from objectmorpher_core.lift.relief.mirror import MirrorAxis
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder
+from tests.tree import over
 
 EXACT = 1e-9
 CAMERA = Camera.from_fov(640, 480)
@@ -54,7 +55,7 @@ def test_any_share_of_the_thickness_lies_in_proportion(name):
 
 
 @masks
-@pytest.mark.parametrize("thickness", [0.3, 1.8])
+@over("thickness", [0.3, 1.8])
 def test_the_thickness_is_what_the_user_says(name, thickness):
     one, other = _body(name), _body(name, thickness=thickness)
     xy = _inside(one)

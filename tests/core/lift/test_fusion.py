@@ -22,6 +22,7 @@ from objectmorpher_research.training import shape_eval
 from objectmorpher_research.training.shape_eval import Surfaces, score, surfaces_of, true_surfaces
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 from tests import shapes
+from tests.tree import quick
 
 KINDS = ("boxes", "lathe", "superquadrics", "creatures", "rings", "figures")
 SURE, UNSURE = 1e-3, 10.0  # crop units, expected error
@@ -58,7 +59,7 @@ def along_axis(sample: Sample) -> Surfaces:
     return Surfaces(true.front / SIDE, true.thickness / SIDE)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", quick(KINDS, 3))
 def test_the_truth_comes_through(kind):
     sample = make_sample(7, families=(kind,))
     body = body_of(sample)
@@ -70,7 +71,7 @@ def test_the_truth_comes_through(kind):
     assert after.thickness < 0.7 * before.thickness
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", quick(KINDS, 1))
 def test_without_trust_or_sureness_the_silhouette_tells(kind):
     sample = make_sample(7, families=(kind,))
     body = body_of(sample)

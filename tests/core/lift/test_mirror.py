@@ -10,6 +10,7 @@ from objectmorpher_core.base.arrays import F32
 from objectmorpher_core.document.model import Matte
 from objectmorpher_core.lift.relief.canvas import ReliefCanvas
 from objectmorpher_core.lift.relief.mirror import MirrorAxis, find_axis
+from tests.tree import over
 
 EXACT = 1e-9
 SIZE = 240  # px
@@ -40,8 +41,8 @@ def _turned(picture: F32, degrees: float) -> F32:
     )
 
 
-@pytest.mark.parametrize("degrees", [-30.0, -15.0, 0.0, 15.0, 30.0])
-@pytest.mark.parametrize("seed", range(3))
+@over("degrees", [-30.0, -15.0, 0.0, 15.0, 30.0])
+@over("seed", range(3))
 def test_a_symmetric_picture_has_its_axis(seed, degrees):
     alpha, rgb = _turned(_body(), degrees), _turned(_symmetric(_noise(seed)), degrees)
     axis = find_axis(ReliefCanvas.of(Matte(100, 50, alpha, rgb)))

@@ -150,6 +150,7 @@ def test_what_is_shifted_in_the_photo_is_shifted_in_the_world():
     assert np.abs(first.world_from_object - second.world_from_object).max() < 0.01
 
 
+@pytest.mark.slow
 def test_two_runs_give_the_same_pose():
     first, second = _found(), register(*_known())
     assert len(first.proposals) == len(second.proposals)

@@ -12,6 +12,7 @@ from objectmorpher_core.lift.relief.prism import PrismSides, find_prism
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
 from tests import shapes
 from tests.core.lift.standing_things import Box, View, cylinder, figure
+from tests.tree import over
 
 DEGREE = 1.0
 CAMERA = Camera.from_fov(640, 480)
@@ -25,7 +26,7 @@ def _sides(silhouette: ReliefSilhouette) -> PrismSides | None:
     return PrismSides.of(silhouette, float(x[np.argmax(y)]), float(y.max()))
 
 
-@pytest.mark.parametrize("pitch", [15.0, 20.0, 25.0])
+@over("pitch", [15.0, 20.0, 25.0])
 @angles
 def test_the_sides_of_a_box_tell_the_horizon_to_a_degree(pitch, angle):
     view = View(CAMERA, pitch)

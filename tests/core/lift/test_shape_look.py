@@ -96,6 +96,7 @@ def test_what_it_says_is_a_shape(net):
         assert (found.front_error > 0).all() and (found.depth_error > 0).all()
 
 
+@pytest.mark.slow
 def test_it_is_nearer_to_the_truth_than_the_silhouette(net):
     """On objects that it was not trained on; how much nearer is in the card."""
     errors = []
@@ -114,6 +115,7 @@ def test_it_is_nearer_to_the_truth_than_the_silhouette(net):
         assert np.log(error[:, 1] / error[:, 0]).mean() < np.log(0.9)
 
 
+@pytest.mark.slow
 def test_it_knows_where_it_is_wrong(net):
     """Where it expects a larger error there is one."""
     expected, own = [], []

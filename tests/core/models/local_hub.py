@@ -127,6 +127,9 @@ def _tag(name: str, data: bytes) -> str:
     return f'"{hashlib.sha1(blob).hexdigest()}"'
 
 
+POLL = 0.01  # s, in which it sees that it is to end
+
+
 @contextmanager
 def serving() -> Iterator[Hub]:
     """The server, until the block ends."""
@@ -134,7 +137,7 @@ def serving() -> Iterator[Hub]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(hub))
     server.daemon_threads = True
     hub.url = f"http://127.0.0.1:{server.server_address[1]}"
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread = threading.Thread(target=server.serve_forever, args=(POLL,), daemon=True)
     thread.start()
     yield hub
     if hub.stall is not None:

@@ -178,7 +178,7 @@ def mirror(tmp_path, monkeypatch) -> Iterator[Path]:
             """Say nothing."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
+        Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         monkeypatch.setenv("OBJECTMORPHER_MIRROR", f"http://127.0.0.1:{server.server_port}/")
         yield folder
         server.shutdown()

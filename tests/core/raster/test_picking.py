@@ -68,7 +68,7 @@ def test_the_gaussians_named_are_those_that_are_seen_there(scene, drawable):
         hit = pick(drawable, scene.texture, xy)
         assert hit is not None and len(hit.gaussians)
         seen = drawable.camera.unproject(hit.xy, hit.depth)
-        assert np.linalg.norm(splats.means[hit.gaussians[0]] - seen) < 2 * splats.rest.spacing
+        assert np.linalg.norm(splats.means[hit.gaussians[0]] - seen) < 2.5 * splats.rest.spacing
 
 
 def test_behind_a_faint_layer_the_greater_part_is_picked():

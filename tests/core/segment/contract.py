@@ -16,6 +16,7 @@ from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.document.model import BesidePrompt, Click, Prompt
 from objectmorpher_core.segment import SelectionError
 from objectmorpher_core.segment.selection import check_prompt
+from tests.tree import over
 
 SKETCH = 0.9  # IoU with outlines drawn by eye as ellipses; a patch-wide rim would lose 0.1
 
@@ -117,18 +118,16 @@ NONSENSE = {
 }
 
 
-@pytest.mark.parametrize("case", NONSENSE)
+@over("case", NONSENSE)
 def test_nonsense_is_one_sentence_with_the_values(segmenter, disc, case):
     asked, sentence = NONSENSE[case]
     with pytest.raises(SelectionError, match=sentence):
         segmenter.segment(disc, asked, None, silent)
 
 
-@pytest.mark.parametrize(
-    "shape", [(1, 1), (1, 50), (16, 16), (12, 180)], ids=lambda s: f"{s[0]}x{s[1]}"
-)
-@pytest.mark.parametrize("grain", [1, 255], ids=["one colour", "noise"])
-def test_tiny_and_empty_photos_give_a_mask_or_a_sentence(segmenter, shape, grain):
+@over("tiny", [((1, 1), 1), ((1, 50), 255), ((16, 16), 1), ((12, 180), 255)])
+def test_tiny_and_empty_photos_give_a_mask_or_a_sentence(segmenter, tiny):
+    shape, grain = tiny  # of one colour, or of noise
     image = np.random.default_rng(1).integers(0, grain, (*shape, 3), dtype=np.uint8)
     asked = prompt([(shape[1] // 2, shape[0] // 2)])
     try:

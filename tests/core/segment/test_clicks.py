@@ -19,6 +19,7 @@ from tests.core.segment.composites import composite, picture
 from tests.core.segment.simulated_user import Step, around, boundary_f, inmost, overlap, use
 from tests.core.segment.truth_masks import LATER, TRUTHS, draw_mask, truth, truth_mask
 from tests.photos import photo
+from tests.tree import over, quick
 
 HELPS = 0.01  # IoU that a click in the middle of the largest error may cost
 SPOILS = 0.003  # IoU: rounding at the edges near the click; the coin loses 0.0025
@@ -63,7 +64,7 @@ def steps(name: str) -> list[Step]:
 # The truth ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [each.name for each in (*TRUTHS, *LATER)])
+@over("name", [each.name for each in (*TRUTHS, *LATER)])
 def test_a_reference_mask_is_what_its_outline_draws(name):
     np.testing.assert_array_equal(truth_mask(name), draw_mask(name))
     assert truth_mask(name).shape == photo(truth(name).photo).shape[:2]
@@ -150,15 +151,14 @@ def test_wherever_a_later_click_is_nothing_changes_that_hangs_not_together_with_
         assert min(changes) < 0.1
 
 
-@pytest.mark.parametrize(
-    "name", ["coin", "cameraman", pytest.param("pagoda", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("name", quick(["coin", "cameraman", "pagoda"], 1))
 def test_a_click_on_a_narrow_error_spoils_nothing_beside_it(name):
     """The error is narrower than the photo's pieces, and what is right lies in the same ones."""
     ious = [step.iou for step in steps(name)]
     assert min(np.diff(ious)) > -SPOILS
 
 
+@pytest.mark.slow
 def test_a_click_into_a_gap_spares_the_parts_around_it():
     """Grass between a horse's legs, which the first answer holds, at random places of it."""
     rgb, mask = picture("horse")
@@ -174,6 +174,7 @@ def test_a_click_into_a_gap_spares_the_parts_around_it():
         assert overlap(after, mask) > overlap(before, mask) - HELPS
 
 
+@pytest.mark.slow
 def test_another_object_is_not_the_one_that_is_there_already():
     """A lemon that touches an orange: alone, a click on the lemon means both."""
     rgb, lemon = picture("lemon")
@@ -232,7 +233,7 @@ def test_nothing_outside_a_box_is_chosen_and_a_box_is_enough():
     assert overlap(found, mask) > 0.85
 
 
-@pytest.mark.parametrize("name", ["spoon", "helmet", "cat"])
+@pytest.mark.parametrize("name", quick(["spoon", "helmet", "cat"], 2))
 def test_clicks_correct_what_a_box_means_and_do_not_begin_anew(name):
     photo_name, mask = truth(name).photo, truth_mask(name)
     box = around(mask)
@@ -319,6 +320,7 @@ def test_how_sure_it_is_costs_nothing_after_the_mask():
     np.testing.assert_array_equal(reading.segment(asked).mask, found.mask)
 
 
+@pytest.mark.slow
 def test_a_click_on_an_encoded_photo_is_much_faster_than_encoding():
     start = time.process_time()
     fresh = dino().encode(photo("coins"), silent)

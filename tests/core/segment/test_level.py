@@ -12,6 +12,7 @@ from objectmorpher_core import segment
 from objectmorpher_core.base.progress import silent
 from objectmorpher_core.document.model import LEVELS, Click, Prompt
 from objectmorpher_core.pictures.image import read_picture
+from tests.tree import quick
 
 SAMPLES = Path(__file__).parents[3] / "assets" / "samples"
 PLACES = {
@@ -48,11 +49,12 @@ def check_nested(masks: list[np.ndarray], name: str) -> None:
     assert not (whole & ~group).any()
 
 
-@pytest.mark.parametrize("name", PLACES)
+@pytest.mark.parametrize("name", quick(PLACES, 2))
 def test_a_part_is_in_its_object_and_the_object_in_its_group(name):
     check_nested(levels("grabcut", name), name)
 
 
+@pytest.mark.slow
 def test_so_it_is_by_tokens():
     check_nested(levels("dino", "flower"), "flower")
 

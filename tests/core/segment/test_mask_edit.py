@@ -20,6 +20,7 @@ from objectmorpher_core.segment.mask_edit import (
     smooth,
 )
 from tests import shapes
+from tests.tree import over
 
 LARGE = (4000, 6000)  # px: the photo that times are asked of
 MOST_SECONDS = 6.0  # of the process, for each; on an idle core it is less than half
@@ -127,8 +128,8 @@ def test_inverting_twice_changes_nothing():
         np.testing.assert_array_equal(invert(invert(selection)), selection)
 
 
-@pytest.mark.parametrize("name", shapes.MASKS)
-@pytest.mark.parametrize("px", [1, 6, 300])
+@over("name", shapes.MASKS)
+@over("px", [1, 6, 300])
 def test_a_soft_edge_has_its_half_line_on_the_edge(name, px):
     mask = shapes.mask(name)
     np.testing.assert_array_equal(is_selected(feather(mask, px)), mask)

@@ -25,6 +25,7 @@ from tests.core.models.small_networks import in_ways
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import ellipses, overlap, prompt
+from tests.tree import over, quick
 
 LAYOUTS = ("sam", "pixels", "efficient")
 F32 = 1e-4  # logits of two ways to the same network
@@ -52,7 +53,9 @@ def cache(tmp_path_factory):
         yield
 
 
-@pytest.fixture(scope="module", params=[*tiny_sams.FAMILIES, *(f"onnx {n}" for n in LAYOUTS)])
+@pytest.fixture(
+    scope="module", params=[*quick(tiny_sams.FAMILIES, 1), *(f"onnx {n}" for n in LAYOUTS)]
+)
 def segmenter(request, cache, tmp_path_factory):
     """A SAM of each family; of random weights the first whose answers are no specks."""
     kind, _, layout = request.param.partition(" ")
@@ -104,7 +107,7 @@ def test_progress_grows_to_the_end(segmenter, disc):
     assert seen == sorted(seen) and seen[-1] == 1
 
 
-@pytest.mark.parametrize("step", range(1, 6))
+@over("step", range(1, 6))
 def test_it_can_be_cancelled_at_each_step(segmenter, disc, step):
     calls = 0
 
@@ -157,6 +160,7 @@ def opened(family: str, folder: Path, seed: int = 0):
     return open_network(models.use_folder(family, at).model), tiny_sams.tiny(family, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", tiny_sams.FAMILIES)
 def test_what_was_saved_is_loaded_and_asked_as_transformers_would(own_cache, family, picture):
     needs_torch()
@@ -223,6 +227,7 @@ def test_sam_sees_and_answers_as_by_its_own_processor(own_cache, picture):
         assert np.abs(large - masks[k].numpy()).max() < SUB_PIXEL * np.ptp(logits[k]) + F32
 
 
+@pytest.mark.slow
 def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
     needs_torch()
     at = tiny_sams.write("sam2", own_cache / "sam2")
@@ -237,6 +242,7 @@ def test_the_trackers_for_videos_hold_the_same_network(own_cache, picture):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", tiny_sams.FAMILIES)
 def test_short_numbers_encode_nearly_the_same(own_cache, family, picture):
     needs_torch()
@@ -475,6 +481,7 @@ def test_files_that_are_no_sam_are_one_sentence(own_cache, picture):
         segment.load("sam-onnx").encode(picture, silent)
 
 
+@pytest.mark.slow
 def test_memory_that_runs_out_is_followed_by_the_next_tier(own_cache, picture, caplog):
     needs_torch()
     import torch

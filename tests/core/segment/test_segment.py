@@ -16,6 +16,7 @@ from objectmorpher_core.segment import SelectionError
 from tests.core.segment.contract import *  # noqa: F403
 from tests.core.segment.contract import SKETCH, ellipses, overlap, prompt
 from tests.photos import photo
+from tests.tree import quick
 
 RESIZED = 0.97  # IoU of a photo's mask with the mask of the photo at another size
 RAGGED = 1.08  # outline's length over its smoothed one; a staircase of patches is 1.3 and more
@@ -47,7 +48,7 @@ def loaded(name: str) -> segment.Segmenter:
     return segment.load(name)
 
 
-@pytest.fixture(scope="module", params=segment.BACKENDS)
+@pytest.fixture(scope="module", params=quick(sorted(segment.BACKENDS), 2))
 def segmenter(request):
     """Every backend that can run here."""
     backend = loaded(request.param)
@@ -191,6 +192,7 @@ def test_a_negative_click_takes_away_just_the_helmet(dino, embeddings, astronaut
     assert overlap(gone, ellipses(astronaut.shape, (390, 440, 112, 96))) > 0.8  # cut by the frame
 
 
+@pytest.mark.slow
 def test_a_second_positive_click_adds_what_it_is_on(dino, embeddings, chelsea):
     head = [(250, 150), (40, 270, False)]
     first = dino.segment(chelsea, prompt(head), embeddings("chelsea"), silent)

@@ -78,6 +78,7 @@ def test_convert_writes_a_mesh_in_the_colours_of_the_gaussians(tmp_path: Path) -
     assert np.abs(cloud.colors - np.clip(unit * 0.5 + 0.5, 0, 1)).mean() < 0.02
 
 
+@pytest.mark.slow
 def test_a_session_becomes_a_mesh_with_the_photo_on_it(tmp_path: Path) -> None:
     """The front shows the photo where the photo shows the object, whatever was done to it."""
     photo = Path(commands.__file__).parents[3] / "assets" / "samples" / "flower.jpg"

@@ -18,6 +18,7 @@ from objectmorpher_core.splat_files.splats.ply import (
     encode_ply,
 )
 from tests.core.splat_files.clouds import gaussians
+from tests.tree import over
 
 F32 = 2e-6  # relative; a value goes through a float32 logarithm or logit of size up to 14
 
@@ -77,8 +78,8 @@ def test_none_and_extremes():
     np.testing.assert_allclose(back.opacities, [0, 1], atol=F32)
 
 
-@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@over("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+@over("degree", [0, 1, 2, 3])
 def test_files_of_other_programs(kind, degree):
     """Any order of properties, any degree, doubles, extra properties, elements on both sides."""
     cloud = gaussians()
@@ -167,7 +168,7 @@ def test_harmonics_of_the_third_degree_never_lie_in_memory_together():
     assert peak < 2.5 * own + 40e6 < len(data) + 40e6
 
 
-@pytest.mark.parametrize("name", SURFEL)
+@over("name", SURFEL)
 def test_a_missing_property_is_named(name):
     columns = stored(gaussians())
     if name == "x":
@@ -182,7 +183,7 @@ def test_a_missing_property_is_named(name):
         decode_ply(foreign_file(columns, "ascii", {}))
 
 
-@pytest.mark.parametrize(
+@over(
     "spoil",
     [
         lambda data: b"",

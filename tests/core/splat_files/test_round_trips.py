@@ -12,6 +12,7 @@ from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.splat_files import FORMATS, SplatFileError, ending_of, read
 from objectmorpher_core.splat_files import encode as encode_file
 from tests.core.splat_files.clouds import gaussians, matched, turn_between
+from tests.tree import over
 
 F32 = 2e-6  # relative; a value goes through a float32 logarithm or logit of size up to 14
 
@@ -45,7 +46,7 @@ def there_and_back(cloud: Gaussians, ending: str) -> Gaussians:
 
 
 @formats
-@pytest.mark.parametrize("count", [1, 2, 255, 256, 257, 3000])
+@over("count", [1, 2, 255, 256, 257, 3000])
 def test_every_value_comes_back_to_the_precision_of_the_format(ending, count):
     cloud = gaussians(count)
     back = matched(there_and_back(cloud, ending), cloud)
@@ -107,7 +108,7 @@ def test_extreme_values_survive_or_are_bounded(ending):
 
 
 @formats
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@over("scale", [1e-3, 1.0, 1e3])
 def test_the_size_of_the_object_does_not_matter(ending, scale):
     cloud = gaussians(300)
     large = replace(

@@ -26,6 +26,8 @@ from objectmorpher_research.evaluation.pairs import find_pairs
 from tests.photos import photo
 from tests.research.evaluation.measures.random_weights import random_state
 
+pytestmark = pytest.mark.slow
+
 torch = pytest.importorskip("torch")
 nn = torch.nn
 F32 = 1e-4  # relative, of sums of some thousand products

@@ -19,6 +19,7 @@ from objectmorpher_research.study.pages import Pages, study_of
 from objectmorpher_research.study.server import MOST_BODY, StudyServer
 from objectmorpher_research.study.store import StudyStore, read_participants
 from tests.research.study.study_set import METHODS, SIZE, made, save, small, write_set
+from tests.tree import over
 
 JSON = {"Content-Type": "application/json"}
 
@@ -138,7 +139,7 @@ def test_a_whole_study(served, folder):
     assert person.is_finished and (folder / "study" / "answers.csv").is_file()
 
 
-@pytest.mark.parametrize(
+@over(
     "path",
     [
         "/../../../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/picture/../../../etc/passwd",
@@ -187,7 +188,7 @@ def test_what_is_refused(served, folder, method, path, body, headers, status):
     assert ask(served, "GET", "/").status == 200
 
 
-@pytest.mark.parametrize(
+@over(
     "said",
     [
         {"item": 1, "ratings": [1, 2, 3], "seconds": 1},

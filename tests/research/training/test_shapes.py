@@ -10,6 +10,7 @@ from objectmorpher_research.training.shapes.distance import distance, lowest, tr
 from objectmorpher_research.training.shapes.families import FAMILIES
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 from objectmorpher_research.training.shapes.solid import THINNEST, PrimitiveBuilder, Solid, turned
+from tests.tree import over
 
 SIDE = 56  # px of samples here
 SEEDS = range(5)
@@ -21,7 +22,7 @@ def samples() -> dict[str, list[Sample]]:
     return {name: [make_sample(s, SIDE, (name,)) for s in SEEDS] for name in FAMILIES}
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@over("name", FAMILIES)
 def test_one_seed_makes_one_sample(name: str, samples: dict[str, list[Sample]]) -> None:
     again = make_sample(3, SIDE, (name,))
     for field in ("rgb", "mask", "front", "thickness", "depth", "normal", "edge", "part"):
@@ -29,7 +30,7 @@ def test_one_seed_makes_one_sample(name: str, samples: dict[str, list[Sample]]) 
     assert (samples[name][2].rgb != samples[name][3].rgb).any()
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@over("name", FAMILIES)
 def test_the_object_is_seen_and_measured(name: str, samples: dict[str, list[Sample]]) -> None:
     for seed, sample in zip(SEEDS, samples[name], strict=True):
         mask = sample.mask
@@ -47,7 +48,7 @@ def test_the_object_is_seen_and_measured(name: str, samples: dict[str, list[Samp
         assert ((sample.normal * rays).sum(-1)[mask] < 1e-3).all()  # towards the camera
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@over("name", FAMILIES)
 def test_normals_are_those_of_the_front(name: str, samples: dict[str, list[Sample]]) -> None:
     angles = np.concatenate([_angles(sample) for sample in samples[name]])
     assert len(angles) > 50
@@ -179,7 +180,7 @@ def _without_balls(solid: Solid) -> Solid:
     return solid._replace(bounds=bounds, balls=balls)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@over("name", FAMILIES)
 def test_balls_hold_their_parts(name: str) -> None:
     for seed in range(8):
         rng = np.random.default_rng([seed, 5])
@@ -193,7 +194,7 @@ def test_balls_hold_their_parts(name: str) -> None:
                 assert distance(*place, alone, False)[0] > 0
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@over("name", FAMILIES)
 def test_balls_only_save_time(name: str) -> None:
     """What they let pass by would have changed nothing, nor may a ray step over a surface."""
     for seed in range(4):

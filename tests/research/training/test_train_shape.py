@@ -53,6 +53,7 @@ def test_the_truth_has_no_loss_but_what_cannot_be_known(arrays):
     assert float(losses(wrong, batch)["all"]) > float(parts["all"]) + 0.1
 
 
+@pytest.mark.slow
 def test_it_learns(arrays):
     torch.manual_seed(0)
     net, batch = ShapeNet(), batch_of(arrays, np.random.default_rng(0))
@@ -137,6 +138,7 @@ def test_training_goes_on_from_exported_weights(tmp_path):
         weights_of(path, other)
 
 
+@pytest.mark.slow
 def test_one_command_trains_and_tells_how_well(arrays, tmp_path, monkeypatch, capsys):
     pytest.importorskip("onnx")
     from objectmorpher.cli.parser import main

@@ -8,10 +8,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from objectmorpher_core import model_sets, models
+from objectmorpher_core import models
 from objectmorpher_core.base.installation import is_frozen
 from objectmorpher_core.base.progress import Progress
-from objectmorpher_core.model_sets import SetOffer
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, registry
 
 from ...system.texts import t
@@ -21,11 +20,16 @@ from ..feedback import Action
 from .methods import Workers
 
 if TYPE_CHECKING:
+    from objectmorpher_core.model_sets import SetOffer
+
     from ..state import EditorState
     from ..tasks import Tasks
     from .methods import Methods
     from .shaping import Shaping
 
+    Looked = tuple[
+        tuple[CacheState, ...], tuple[Added, ...], tuple[HubState, ...], tuple[SetOffer, ...]
+    ]
 
 DOWNLOAD, LOOK, FORGET = "download", "look at models", "forget segmenter"  # kinds of what runs
 ADD = "add model"  # likewise
@@ -140,7 +144,9 @@ class Models:
         """Gets all that is missing of a set; the user has clicked the button that says so."""
 
         def fetch(progress: Progress) -> Path:
-            model_sets.get_set(offer, progress)
+            from objectmorpher_core.model_sets import get_set
+
+            get_set(offer, progress)
             return models.folder()
 
         self.run(offer.set.id, offer.set.id, fetch)
@@ -208,11 +214,6 @@ class Models:
         )  # fmt: skip
 
 
-Looked = tuple[
-    tuple[CacheState, ...], tuple[Added, ...], tuple[HubState, ...], tuple[SetOffer, ...]
-]
-
-
 def _looked() -> Looked:
     several = tuple(models.look_hub(model.id) for model in models.hub_models())
     single = tuple(state for state in models.verify() if state.weight.category == "edit")
@@ -221,8 +222,10 @@ def _looked() -> Looked:
 
 def _offers() -> tuple[SetOffer, ...]:
     """None where the environment asks for a device that is not there."""
+    from objectmorpher_core.model_sets import offers
+
     try:
-        return model_sets.offers()
+        return offers()
     except models.ModelError:
         return ()
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from imgui_bundle import ImVec2, imgui
 
-from objectmorpher_core.model_sets import SetOffer
 from objectmorpher_core.models import Added, CacheState, HubState
 
 from ...editor.editor import Editor
@@ -27,6 +28,9 @@ from ..widgets.widgets import (
     rule,
     tooltip,
 )
+
+if TYPE_CHECKING:
+    from objectmorpher_core.model_sets import SetOffer
 
 WIDTH = 560.0  # points
 BUTTON = 120.0

@@ -10,6 +10,7 @@ from skimage import data
 from objectmorpher_core.compose.refine import RefineError
 from objectmorpher_core.compose.refine.alignment import MOST_LEFT, align, measure
 from objectmorpher_core.compose.refine.refinement import check
+from tests.tree import quick
 
 PHOTOS = {"cat": data.chelsea, "coffee": data.coffee, "rocket": data.rocket}
 
@@ -39,7 +40,7 @@ def unit(pixels: np.ndarray) -> np.ndarray:
     return pixels.astype(np.float32) / 255
 
 
-@pytest.mark.parametrize("name", PHOTOS)
+@pytest.mark.parametrize("name", quick(PHOTOS, 1))
 @pytest.mark.parametrize(("x", "y", "scale"), [
     (0.0, 0.0, 1.0), (0.2, -0.1, 1.0), (2.0, 1.3, 1.0), (-10.0, 7.0, 1.0), (0.0, 0.0, 1.03),
     (3.0, -4.0, 0.97),

@@ -27,6 +27,8 @@ from objectmorpher_core.models import ModelError, ledger
 from tests import photos
 from tests.core.models.small_networks import Ways
 
+pytestmark = pytest.mark.slow
+
 IDS = {"qwen": "qwen-image-edit-2511", "klein": "flux2-klein-4b"}
 KINDS = {"qwen": "QwenImageEditPlusPipeline", "klein": "Flux2KleinPipeline"}
 

@@ -30,6 +30,8 @@ from objectmorpher_core.scripting.runner import RefineOptions, coarse_edit
 from objectmorpher_core.scripting.script import script_from
 from tests import shapes
 
+pytestmark = pytest.mark.slow
+
 INSIDE = shapes.mask("ellipse")
 FLAT = np.full((*INSIDE.shape, 3), 128, np.uint8)
 

@@ -20,6 +20,7 @@ from objectmorpher_core.lift.workers import process as worker_process
 from objectmorpher_core.lift.workers.file import read_worker, worker_names
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import photos
+from tests.tree import quick
 
 CARD = Path(__file__).parents[4] / "packaging" / "workers" / "card"
 HELP = f"import sys, os, json, time; sys.path.insert(0, {str(CARD.parent)!r})\nimport worker_job\n"
@@ -116,7 +117,7 @@ def test_what_a_worker_does_wrong_is_one_sentence(folder, subject, script, sente
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("how", ["timeout", "cancel", "success"])
+@pytest.mark.parametrize("how", quick(["timeout", "cancel", "success"], 1))
 def test_the_whole_group_ends_with_the_worker(folder, subject, tmp_path, how):
     child = f"import time; time.sleep(2); open({str(tmp_path / 'alive')!r}, 'w')"
     wait = WROTE if how == "success" else "time.sleep(60)"

@@ -20,6 +20,8 @@ from objectmorpher_core.segment.matting.matte import build_matte
 from objectmorpher_core.splat_files import read
 from tests import photos
 
+pytestmark = pytest.mark.slow
+
 WORKERS = Path(__file__).parents[4] / "packaging" / "workers"
 PUBLISHED = Path(__file__).parent / "published"
 NAMES = sorted(at.parent.name for at in WORKERS.glob("*/worker.toml"))

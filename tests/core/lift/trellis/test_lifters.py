@@ -19,6 +19,8 @@ from objectmorpher_core.segment.matting.matte import build_matte
 from tests.core.lift.trellis import tiny_trellis
 from tests.core.lift.trellis.test_cupid_lifter import CUPID_PARTS, SHARED_PARTS
 
+pytestmark = pytest.mark.slow
+
 WORKERS = Path(__file__).parents[4] / "packaging" / "workers"
 NAMES = (*lift.BACKENDS, "card")
 SETTINGS = LiftSettings(count=1500)

@@ -30,6 +30,8 @@ from objectmorpher_research.evaluation.pairs import find_pairs
 from tests.photos import photo
 from tests.research.evaluation.measures.random_weights import random_state
 
+pytestmark = pytest.mark.slow
+
 F32 = 1e-4  # relative, of sums of some thousand products
 SMALL = 96  # px
 CLASSES = {"chelsea": {281, 282, 285}, "coffee": {967, 968, 504}}  # of ImageNet: cats, cups

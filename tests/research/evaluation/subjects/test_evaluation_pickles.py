@@ -14,6 +14,7 @@ import pytest
 
 from objectmorpher_research.evaluation.error import EvaluationError
 from objectmorpher_research.evaluation.subjects.plain_pickle import read_plain
+from tests.tree import over
 
 META = {
     "prompt": "a photo of a cat, ünïcode",
@@ -42,8 +43,8 @@ def test_plain_values_come_back_in_every_protocol(protocol):
     assert found == expected
 
 
-@pytest.mark.parametrize("kind", ["u1", "i8", ">f4", "f8", "b1", ">i2"])
-@pytest.mark.parametrize("is_fortran", [False, True])
+@over("kind", ["u1", "i8", ">f4", "f8", "b1", ">i2"])
+@over("is_fortran", [False, True])
 def test_arrays_keep_their_numbers(kind, is_fortran):
     values = (np.arange(24).reshape(2, 3, 4) % 2 * 100).astype(kind)
     array = np.asfortranarray(values) if is_fortran else values
@@ -83,7 +84,7 @@ def test_whatever_else_a_pickle_holds_is_refused(value, protocol, tmp_path):
     assert not mark.exists()
 
 
-@pytest.mark.parametrize(
+@over(
     "data",
     [
         b"", b"nothing", b"\x80\x04.", b".", b"N", b"(.", b"}(K\x01.", b"\x80\x04]q\x00h\x05.",

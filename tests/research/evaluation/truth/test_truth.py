@@ -26,6 +26,7 @@ from objectmorpher_research.evaluation.truth.running import CaseJob, CaseRow, ru
 from objectmorpher_research.evaluation.truth.scores import PSNR_CAP, TruthScore, score
 from objectmorpher_research.evaluation.truth.solids import MAKERS, make
 from objectmorpher_research.evaluation.truth.tables import as_csv, build_table
+from tests.tree import over, quick
 
 EXACT = 1e-9
 PIXEL = 0.02  # px, a warp's points from where they must be: they are held by stiff springs
@@ -54,7 +55,7 @@ def test_there_are_enough_cases_of_every_kind():
     assert {wanted.motion.category for wanted in CASES} == set(PLAN)
 
 
-@pytest.mark.parametrize("name", sorted(MAKERS))
+@over("name", sorted(MAKERS))
 def test_solids_are_closed_and_face_outwards(name):
     solid = make(name)
     a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
@@ -66,7 +67,7 @@ def test_solids_are_closed_and_face_outwards(name):
     assert (counts == 2).mean() > 0.9  # but for the rims of flat sides, which have two normals
 
 
-@pytest.mark.parametrize("category", sorted(CATEGORIES))
+@pytest.mark.parametrize("category", quick(sorted(CATEGORIES), 3))
 def test_photo_mask_truth_and_plate_agree(category):
     case = make_case(CATEGORIES[category])
     outside, inside = case.region == 0, case.region > 0
@@ -90,6 +91,7 @@ def test_the_same_seed_makes_the_same_case(crate):
     assert wanted_cases(1)[0].setting != CASES[0].setting
 
 
+@pytest.mark.slow
 def test_an_edit_that_moves_nothing_gives_the_photo(still):
     case, chain = still
     assert np.array_equal(case.truth, case.photo)
@@ -175,6 +177,7 @@ def test_the_best_similarity_is_found_again():
     assert found.shift == pytest.approx([5, -7])
 
 
+@pytest.mark.slow
 def test_a_warp_along_a_turn_is_that_turn(still):
     case, chain = still
     matte, _ = chain.lift()
@@ -194,6 +197,7 @@ def test_a_warp_along_a_turn_is_that_turn(still):
     assert apart.mean() < 1
 
 
+@pytest.mark.slow
 def test_more_iterations_come_nearer_to_the_settled_pose():
     case = make_case(CATEGORIES["limb"])
     chain = Chain(case.photo, case.mask, case.camera)
@@ -208,6 +212,7 @@ def _job(folder, crate, *names: str) -> CaseJob:
     return CaseJob(folder, (crate[0],), tuple(METHODS[name] for name in names), 0)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_it_was(tmp_path, crate):
     first = run_photo(_job(tmp_path, crate, "nothing"))
     path = tmp_path / "cases" / crate[0].name / "nothing.json"

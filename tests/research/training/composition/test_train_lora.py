@@ -43,6 +43,8 @@ from objectmorpher_research.training.composition.train_lora import Course, Train
 from objectmorpher_research.training.composition.triplet_folder import triplets_in  # noqa: E402
 from tests.core.compose.refine import tiny_pipelines  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 IDS = {"qwen": "qwen-image-edit-2511", "klein": "flux2-klein-4b"}
 PROGRAM = Path(__file__).with_name("train_in_process.py")
 F32 = 1e-5

