@@ -1,7 +1,7 @@
 """A lifted object whose mask was refined: its cut-out and its shape follow, in place.
 
 What the refinement does not concern stays as it is, so that nothing moves that the artist did not
-touch: see `lift.refit` for the shape, and `compose.repair` for the background.
+touch. The background follows in `compose.repair`.
 """
 
 from __future__ import annotations
