@@ -23,8 +23,7 @@ from .base.files import read_input, write_all
 from .base.progress import Bar, Progress, as_progress
 from .base.quoting import named, shown
 from .document.model import Document
-from .pictures.image import encode_mask
-from .pictures.in_memory import array_of, encode_array, encode_pil, pil_of
+from .pictures.image import array_of, encode_array, encode_mask, encode_pil, pil_of
 from .pipeline import Edited, continue_script, lift_first, open_photo, select
 from .pipeline import replay as replay_document
 from .scripting.animation import Clip, frames

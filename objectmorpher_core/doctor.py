@@ -145,7 +145,7 @@ def _lifting() -> StageReport:
     name = getattr(lifter, "name", next(n for n in lift.BACKENDS if n not in dict(absent)))
     if name != "relief":
         return StageReport("lift", name, "it is here", absent)
-    has_shape = models.path("dinov2-vits14") is not None and models.shipped.is_shipped()
+    has_shape = models.path("dinov2-vits14") is not None and models.is_shipped()
     depth = depth_look.installed()
     has_depth = depth is not None
     parts = ["the silhouette's body"]

@@ -36,7 +36,7 @@ from .document.model import (
     Prompt,
 )
 from .document.settings import Hint
-from .lift.registration.importing import ImportTarget, Source, place_import, register_file
+from .lift.registration.imported import ImportTarget, Source, place_import, register_file
 from .pictures.image import ImageError, Picture, read_mask, read_picture, to_u8
 from .raster.posed import PosedSplats
 from .scripting import runner

@@ -115,7 +115,7 @@ def _pose_seldom(thing: EditObject, puppet: Puppet) -> None:
 
 def _register(document: Document, thing: EditObject) -> None:
     """The object as if it came out of a file: looked for in every way it can stand, and refined."""
-    from .lift.registration.importing import ImportTarget, place_import
+    from .lift.registration.imported import ImportTarget, place_import
     from .lift.registration.placement import Registrar
     from .lift.registration.search import search
     from .lift.registration.sketch import even_surfels, own_frame

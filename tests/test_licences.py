@@ -17,6 +17,8 @@ sys.path.append(str(ROOT / "packaging"))
 
 import licences  # noqa: E402
 
+from objectmorpher.gui.widgets import theme  # noqa: E402
+
 GCC = re.compile(r"GCC RUNTIME LIBRARY EXCEPTION", re.I)
 
 
@@ -61,8 +63,9 @@ def test_every_font_and_photo_that_is_bundled_is_listed() -> None:
     for photo in (ROOT / "assets" / "samples").iterdir():
         assert f"samples/{photo.name}" in told
         assert re.search(rf"^\|[^|]*\b{named.get(photo.stem, photo.stem)}\b", fonts, re.M), photo
-    for font in (ROOT / "assets" / "fonts").glob("*.[ot]tf"):
-        assert f"fonts/{font.name}" in told
+    for font in (theme.REGULAR, theme.BOLD, theme.ICONS):
+        assert font.is_file(), "imgui-bundle comes with it"
+        assert font.name in told
         assert re.match(r"[A-Z][a-z]+", font.stem)[0].lower() in fonts, font  # type: ignore[index]
 
 

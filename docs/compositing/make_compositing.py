@@ -1,6 +1,6 @@
 """Writes docs/compositing/README.md: what happens to light, shadow and background.
 
-python docs/compositing/make_compositing.py [places|focus|shadows|photos|reflections|plates]
+python docs/compositing/make_compositing.py [places|focus|shadows|photos|plates]
 
 With a section's name only that section is made anew.
 """
@@ -22,7 +22,6 @@ import lights  # noqa: E402
 import places  # noqa: E402
 import plate_times  # noqa: E402
 import plates  # noqa: E402
-import reflections  # noqa: E402
 import shadows  # noqa: E402
 from meshes import fetched  # noqa: E402
 from page import (  # noqa: E402
@@ -39,13 +38,11 @@ from page import (  # noqa: E402
     write_page,
 )
 from photos import shadow_pictures  # noqa: E402
-from reflection_page import REFLECTION, reflection_section  # noqa: E402
 from solids import SOLIDS  # noqa: E402
 
 SHOWN = {("ball", "left", "yaw 35"), ("duck", "above", "pitch 25"), ("figure", "left", "yaw -35"),
          ("box", "left", "yaw -35")}  # fmt: skip
 FOCUS_SHOWN = 3.0  # px
-REFLECTIONS_SHOWN = 0.2  # of the light
 GRAINS = ("x 2.2", "x 0.6", "half a pixel")
 QUALITY = 88
 TILE, WIDE, PHOTO = 200, 280, 400  # px
@@ -73,21 +70,12 @@ def main() -> None:
     if sys.argv[1:] == ["shadows"]:
         page = FOLDER / "README.md"
         before, _, rest = page.read_text(encoding="utf-8").partition(SHADOW.partition("\n")[0])
-        after = rest[rest.index(REFLECTION.partition("\n")[0]) :]
+        after = rest[rest.index(PLATE.partition("\n")[0]) :]
         shaded = _shaded(fetched())
         page.write_text(f"{before}{shadow_section(shaded)}\n{after}", encoding="utf-8")
         return
     if sys.argv[1:] == ["photos"]:
         _write("photos.jpg", shadow_pictures(), PHOTO)
-        return
-    if sys.argv[1:] == ["reflections"]:
-        page = FOLDER / "README.md"
-        text, title = page.read_text(encoding="utf-8"), REFLECTION.partition("\n")[0]
-        before, _, after = text.partition(PLATE.partition("\n")[0])
-        page.write_text(
-            before.split(title)[0] + _reflections() + PLATE.partition("\n")[0] + after,
-            encoding="utf-8",
-        )
         return
     meshes = fetched()
     turned = [case for name in SOLIDS for case in lights.measured(name, meshes)]
@@ -105,7 +93,6 @@ def main() -> None:
         grains.found_on_photos(),
         *_focus(),
         shaded,
-        _reflections(),
         *_plates(),
     )
     (FOLDER / "README.md").write_text(write_page(measures), encoding="utf-8")
@@ -130,15 +117,6 @@ def _focus() -> tuple[list[focus.Focussed], list[focus.Sharp]]:
     shown = [c for c in cases if c.far == FOCUS_SHOWN and c.ratio == max(focus.RATIOS)]
     _write("focus.jpg", [[p[90:330, 160:420] for p in c.pictures] for c in shown], WIDE)
     return cases, focus.on_photos()
-
-
-def _reflections() -> str:
-    """Their section; some are drawn to reflections.jpg."""
-    cases = reflections.measured()
-    shown = [case for case in cases if case.is_found and case.strength > REFLECTIONS_SHOWN]
-    rows = [[p[60:490, 40:470] for p in case.pictures] for case in shown[:8]]
-    _write("reflections.jpg", [a + b for a, b in zip(rows[::2], rows[1::2], strict=True)])
-    return reflection_section(cases, reflections.imagined())
 
 
 def _plates() -> tuple[dict[str, dict[str, plates.Filled]], list[plate_times.Taken]]:

@@ -133,6 +133,11 @@ shadow is its outline, beside itself; where its hard edge is, and how dark it is
 for px.
 
 ![Photos with the shadow, without it, and with the thing moved and its new shadow](photos.jpg)
+
+Reflections on a table or water are not looked for. A mirror image fitted to the photo took 29 of 36
+off the ground that were made as light adds up, but of seven things in photographs that have a
+reflection it found none: waves, grass and the side that the photo does not show. The brush (B) is
+for them.
 """
 PLATE = """## The background
 
@@ -155,7 +160,9 @@ Holes in photos that none of the above are of (PSNR, SSIM, HED):
 Ours searches a small picture, from coarse to fine, and takes the detail from the photo. Straight
 edges that enter a hole on two sides go on through it, and the subject of the photo (as U²-Net-p
 sees it; without its weights, colours that do not occur around the hole) is an unlikely source, so
-that hair does not grow over the wall (*flag and wall*). What patches say of large areas is one of
+that hair does not grow over the wall (*flag and wall*). Without the
+edges that go on, the eight holes lose 0.4 dB and the ten 0.1; without the subject, the eight lose
+0.4 and the ten nothing. What patches say of large areas is one of
 many answers: the colours of these are drawn a third of the way to the smooth mean of what is
 around, edges and detail stay. It does not understand what it copies:
 variants, the brush, and *Take from here* (Shift+B, or `--fill-from`) are for that. PatchMatch is
@@ -185,7 +192,6 @@ class Measures:
     focussed: list[Focussed]
     sharp: list[Sharp]
     shaded: list[Shaded]
-    reflections: str  # the section
     filled: dict[str, dict[str, Filled]]
     taken: list[Taken]
 
@@ -200,7 +206,6 @@ def write_page(measures: Measures) -> str:
             GRAIN.format(table=_grain_table(measures.grained), found=_found_table(measures.found)),
             focus_section(measures.focussed, measures.sharp).rstrip("\n") + "\n",
             shadow_section(measures.shaded),
-            measures.reflections.rstrip("\n") + "\n",
             plate_section(measures.filled, measures.taken),
         ]
     )

@@ -13,9 +13,8 @@ from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.deform.arap import ArapSolver, iterate
 from objectmorpher_core.deform.binding import bind
 from objectmorpher_core.deform.deformer import FAITHFUL_ITERATIONS, Deformer, Strain, measure_strain
-from objectmorpher_core.deform.faithful_skinning import skin_faithful
 from objectmorpher_core.deform.graph import build_graph
-from objectmorpher_core.deform.skinning import Motion, Skinned
+from objectmorpher_core.deform.skinning import Motion, Skinned, skin_faithful
 from objectmorpher_core.document.model import DeformSettings, Handle, LiftedObject, Pose
 
 REPEATS = 5

@@ -33,7 +33,7 @@ Made by `python docs/registration/make_pairs.py`: {count} made-up objects of `tr
 with other lamps and another backdrop. It is lifted out of one photo (**B**), its other side and its
 depths guessed, and registered to the other (**A**); each pair both ways. *error*: the turn between
 the pose found and the true one, degrees. *outline and colours*: the search alone; *details*: with
-matches of SIFT (`objectmorpher_core/lift/registration/matches.py`): that is `--poses own`.
+matches of SIFT (`objectmorpher_core/lift/registration/sketch.py`): that is `--poses own`.
 *score* is that of the pose as the registration with details rates it. No constant was chosen on
 these pairs.
 

@@ -48,6 +48,9 @@ in errors, of either kind where there are both, at least 2 px deep. (A part is c
 *part*.) *Worse* is a click that costs more than {worse:.2f} of IoU. LIKELY_GONE, LIKELY_ADDED and
 the weights of the confidence were chosen on the half that was seen, and not on the held out one.
 *Before* is the same artist on the program before corrections were weighed by their like.
+What a walk from the click reaches was one more region until it was found to gain nothing: over
+these 45 things, clicked in the middle, the IoU after two, three and six clicks was 0.842, 0.880
+and 0.918 with it, and is 0.841, 0.881 and 0.922 without (in no figure below).
 """
 
 

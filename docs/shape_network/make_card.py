@@ -18,7 +18,7 @@ import numpy as np
 
 from objectmorpher_core.lift.crop import Crop, planes_of
 from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
-from objectmorpher_core.models import shipped
+from objectmorpher_core.models import registry
 from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shapes.sample import Sample, make_sample
 
@@ -44,8 +44,8 @@ sure (`--trust`, or Trust in the Shape panel; at 0 the silhouette alone tells th
 where DINOv2's weights are not there).
 
 - **What it is**: a U-Net of {parameters:.1f} million parameters,
-  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision), SHA-256
-  `{sha256}`.
+  `objectmorpher_core/models/shape.onnx`, {size:.1f} MB (weights in half precision, of 8 binary
+  digits), SHA-256 `{sha256}`.
 - **Licence**: Apache-2.0 as the program. It was trained from nothing on pictures that the program
   draws itself; nobody's weights are in it. At work it reads DINOv2 ViT-S/14's tokens (Apache-2.0).
 - **Training**: `objectmorpher train shape --folder F --samples {samples} --passes {passes:g}`:
@@ -104,7 +104,7 @@ def main() -> None:
     told = json.loads(FIGURES.read_text(encoding="utf-8"))
     _draw_samples(FOLDER / "samples.jpg")
     (FOLDER / "curve.svg").write_text(_curve(told["curve"], told["steps"]), encoding="utf-8")
-    plan, weights = told["plan"], shipped.shape_network()
+    plan, weights = told["plan"], registry.shape_network()
     assert told["sha256"] == hashlib.sha256(weights).hexdigest(), "the figures are of other weights"
     text = TEXT.format(
         parameters=told["parameters"] / 1e6, size=len(weights) / 1e6, sha256=told["sha256"],
@@ -169,7 +169,7 @@ def _curve(curve: list[dict[str, float]], steps: int) -> str:
 
 def _draw_samples(path: Path) -> None:
     """Photo; front, true and found; normals, true and found; edges found. Two samples in a row."""
-    net, tokens = ShapeModel(shipped.shape_network()), dino_tokens.shared()
+    net, tokens = ShapeModel(registry.shape_network()), dino_tokens.shared()
     rows = []
     for seed in UNSEEN:
         sample = make_sample(seed)

@@ -16,7 +16,7 @@ from pathlib import Path
 import platformdirs
 
 BUILD = "build.txt"  # in an installer's copy: a name of all its sources
-LOCATOR = "objectmorpher_core.base.kernel_cache.InstalledLocator"
+LOCATOR = "objectmorpher_core.base.kernel_files.InstalledLocator"
 KERNELS = "OBJECTMORPHER_KERNELS"  # environment variable: where compiled kernels are kept
 
 

@@ -89,7 +89,7 @@ class Composite:
     stack: tuple[Moved, ...]  # back to front: what was drawn, also what rests near what moved
     box: Box | None = None  # of the photo, outside which nothing was looked at; None: all of it
     weights: F32 | None = None  # (h, w) of the box, how much of the edit is shown; if asked for
-    shadow: int = 0  # px of `changed` that no object reaches: shadows, reflections and repairs
+    shadow: int = 0  # px of `changed` that no object reaches: shadows and repairs
 
     @property
     def moved(self) -> tuple[Moved, ...]:

@@ -22,10 +22,9 @@ from ..document.rig import Rig
 from .anderson import Anderson
 from .arap import TOLERANCE, ArapSolver, Minimum, iterate, minimise
 from .binding import Binding, bind
-from .faithful_skinning import skin_faithful
 from .graph import ControlGraph, build_graph
 from .hold import Frozen, Grasp, HandleRows, Start, other_sides, stiffened
-from .skinning import Motion, Skin, Skinned, skin
+from .skinning import Motion, Skin, Skinned, skin, skin_faithful
 from .surface_links import SolidSurface
 
 FAITHFUL_ITERATIONS = 3  # paper 3.2.2

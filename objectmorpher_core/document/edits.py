@@ -164,7 +164,7 @@ def refit(
 
     Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
     """
-    from ..lift.carrying import refitted
+    from ..lift.refitting import refitted
     from .edge_edits import decontaminated
 
     item, camera = document.objects[k], document.photo.camera
@@ -196,7 +196,7 @@ def reshape(
     document: Document, k: int, matte: Matte, lifted: LiftedObject, shape: LiftSettings
 ) -> Document:
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
-    from ..lift.carrying import carried_over
+    from ..lift.refitting import carried_over
     from .edge_edits import decontaminated
 
     changed = carried_over(document.objects[k], matte, lifted, shape)
@@ -206,7 +206,7 @@ def reshape(
 
 def set_thickness(document: Document, k: int, thickness: float) -> Document:
     """Object `k` as thick as `thickness` times what its silhouette says; no pose."""
-    from ..lift.relief.rethicken import with_thickness
+    from ..lift.relief.thickness import with_thickness
 
     item = document.objects[k]
     if item.lifted is None or item.matte is None:

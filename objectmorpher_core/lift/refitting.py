@@ -1,7 +1,7 @@
 """A lifted object whose mask was refined: its cut-out and its shape follow, in place.
 
 What the refinement does not concern stays as it is, so that nothing moves that the artist did not
-touch: see `lift.refit` for the shape, and `compose.repair` for the background.
+touch. The background follows in `compose.repair`.
 """
 
 from __future__ import annotations
@@ -10,21 +10,275 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
 from .. import compose
-from ..base.arrays import F32, Mask, Selection
+from ..base.arrays import F32, F64, Mask, Selection
+from ..base.camera import Camera
 from ..base.pixels import crop
 from ..base.progress import Progress, part, silent
+from ..base.rotations import matrices_from_quats, quats_from_matrices
 from ..compose.plate.plate import plate_cover
 from ..compose.plate.repair import Uncovering, refitted_plate
-from ..document.model import Document, LiftedObject, LiftSettings, Matte, Plate
+from ..deform.control_points import MIN_COUNT, with_more_points
+from ..document.gaussians import Gaussians
+from ..document.model import (
+    Document,
+    EditObject,
+    Handle,
+    LiftedObject,
+    LiftSettings,
+    Matte,
+    PhotoTexture,
+    Placement,
+    Plate,
+)
+from ..document.pose import Pose
 from ..segment.mask_edit import as_coverage, is_selected
 from ..segment.matting.matte import REACH, band_width, cut_out
-from . import LiftSubject, load
-from .refit import refitted_shape
-from .registration.imported import rematted
-from .registration.importing import ImportTarget
+from . import LiftError, LiftSubject, load
+from .registration.imported import ImportTarget, rematted
 from .relief.spreading import BRIM
+
+# The transfer of an object's edits to another shape of the same picture.
+#
+# A shape that is lifted anew, or made thicker, is seen at the same places of the photo: a handle
+# takes hold of what is seen there now, on the same side, and is dragged as far. So does each region
+# of the rig. A shape that was refitted to a refined mask has the old one's surface and control
+# points wherever the mask did not change: there pose and placement go over as they are.
+
+GUIDES = 4  # old control points that tell where a new one goes
+HANDLE_STILL_THERE = (
+    2.0  # x spacing of the Gaussians: a handle that is farther off has lost its surface
+)
+OTHER_SIDE = 1e6  # px: the far side of the object is farther than anything on the near one
+
+
+def carried_over(
+    item: EditObject, matte: Matte, lifted: LiftedObject, shape: LiftSettings
+) -> EditObject:
+    """`item` with another lift of the same mask; no pose: it has to be solved anew.
+
+    Of two handles that would share a control point the later one is gone.
+    """
+    changed = item.with_lifted(matte, lifted, shape)
+    old = item.lifted
+    if old is None:
+        return changed
+    handles: list[Handle] = []
+    for handle in item.handles:
+        moved = _carried(handle, old, lifted)
+        if all(other.control_point != moved.control_point for other in handles):
+            handles.append(moved)
+    before = KDTree(_seen_at(old, old.control_points))
+    nearest = np.asarray(before.query(_seen_at(lifted, lifted.control_points))[1])
+    rig = item.rig.moved_to(nearest)
+    if rig.shifts is not None:
+        rig = replace(rig, shifts=rig.shifts * (old.scale / lifted.scale))
+    return replace(changed, handles=tuple(handles), rig=rig)
+
+
+def refitted(item: EditObject, matte: Matte, lifted: LiftedObject, camera: Camera) -> EditObject:
+    """`item` in its refitted shape; a handle on what is no part of it any more is gone.
+
+    `camera` is the photo's.
+    """
+    old = item.lifted
+    assert old is not None, "only a lifted object is refitted"
+    rest = lifted.control_points.astype(np.float64)
+    gaps, nearest = KDTree(old.control_points).query(rest, k=min(GUIDES, len(old.control_points)))
+    gaps, nearest = gaps.reshape(len(rest), -1), nearest.reshape(len(rest), -1)
+    return replace(
+        item, matte=matte, contaminated=None, lifted=lifted, shaped=None,
+        handles=_held(item.handles, lifted), rig=item.rig.moved_to(nearest[:, 0]),
+        pose=None if item.pose is None else _pose_of(rest, old, item.pose, gaps, nearest),
+        placement=_same_motion(item.placement, old, lifted, camera),
+    )  # fmt: skip
+
+
+def _held(handles: tuple[Handle, ...], lifted: LiftedObject) -> tuple[Handle, ...]:
+    """The handles whose surface is still there, each with a control point of its own."""
+    surface, nodes = KDTree(lifted.body.means), KDTree(lifted.control_points)
+    held: list[Handle] = []
+    for handle in handles:
+        index = int(nodes.query(handle.point)[1])
+        is_there = surface.query(handle.point)[0] <= HANDLE_STILL_THERE * lifted.spacing
+        if is_there and all(other.control_point != index for other in held):
+            held.append(replace(handle, control_point=index))
+    return tuple(held)
+
+
+def _pose_of(
+    rest: F64, old: LiftedObject, pose: Pose, gaps: np.ndarray, nearest: np.ndarray
+) -> Pose:
+    """The pose of control points at `rest` (M, 3), as their `nearest` (M, G) old ones move.
+
+    One that was there before is exactly where it was; `gaps` (M, G) object units.
+    """
+    weights = 1.0 / np.maximum(gaps, 1e-9) ** 2
+    weights /= weights.sum(1, keepdims=True)
+    turns = pose.rotations[nearest]
+    offsets = rest[:, None] - old.control_points[nearest]
+    led = (turns @ offsets[..., None])[..., 0] + pose.points[nearest]
+    points = (weights[..., None] * led).sum(1)
+    quats = quats_from_matrices(pose.rotations)[nearest]
+    quats *= np.where((quats * quats[:, :1]).sum(2, keepdims=True) < 0, -1.0, 1.0)
+    mean = (weights[..., None] * quats).sum(1)
+    rotations = matrices_from_quats(mean / np.linalg.norm(mean, axis=1, keepdims=True))
+    is_old = gaps[:, 0] == 0
+    points[is_old] = pose.points[nearest[is_old, 0]]
+    rotations[is_old] = pose.rotations[nearest[is_old, 0]]
+    return Pose(points, rotations)
+
+
+def _same_motion(
+    placement: Placement, old: LiftedObject, new: LiftedObject, camera: Camera
+) -> Placement:
+    """The placement that moves `new`, whose centre is elsewhere, as it moved `old`."""
+    if placement.is_identity:
+        return placement
+    motion = placement.matrix(old, camera)
+    target = motion[:3, :3] @ new.centre + motion[:3, 3]
+    across, down = camera.project(target) - camera.project(new.centre)
+    depth = (target[2] - new.centre[2]) / (new.diameter * new.scale)
+    return replace(placement, move=(float(across), float(down)), depth=float(depth))
+
+
+def _carried(handle: Handle, old: LiftedObject, new: LiftedObject) -> Handle:
+    """`handle` of the old shape on the new one, dragged as far in the world."""
+    ratio = old.scale / new.scale
+    i = int(_nearest(old, handle.point[None])[0])
+    gaps = _seen_at(new, new.gaussians.means) - _seen_at(old, handle.point[None])
+    j = int((gaps**2).sum(1).argmin())
+    point = new.gaussians.means[j] + (handle.point - old.gaussians.means[i]) * ratio
+    index = int(((new.control_points - point) ** 2).sum(1).argmin())
+    dragged = (handle.target - handle.point) * ratio
+    return replace(handle, control_point=index, point=point, target=point + dragged)
+
+
+def _nearest(lifted: LiftedObject, points: np.ndarray) -> np.ndarray:
+    """Index (n,) of the Gaussian nearest to each of the points (n, 3), object frame."""
+    return np.asarray(KDTree(lifted.gaussians.means).query(points)[1])
+
+
+def _seen_at(lifted: LiftedObject, points: np.ndarray) -> F64:
+    """(n, 3) px of the photo in which points (n, 3) are seen, and which side they are on."""
+    i = _nearest(lifted, points)
+    is_front = (lifted.texture.visibility > 0.5) & (lifted.texture.solidity > 0.5)
+    return np.column_stack([lifted.texture.u0[i], OTHER_SIDE * is_front[i]]).astype(np.float64)
+
+
+# A lifted shape refitted to a refined mask, in place.
+#
+# Lifting anew would draw every Gaussian and control point anew, and with them what is posed by
+# them. So the shape of the refined mask takes the old one's place only about where the mask
+# changed: there its Gaussians slide along their rays of the photo until both middle sheets meet.
+
+MEETING = 3.0  # x reach: how far beyond it the two middle sheets are compared
+NEIGHBOURS = 16  # places of comparison that a Gaussian's slide is the mean of
+COMPARED = 4000  # Gaussians that are compared at most
+STILL_THERE = 2.0  # x spacing: a control point that is farther off has lost its surface
+
+
+def refitted_shape(
+    old: LiftedObject, fresh: LiftedObject, changed: Mask, reach: float
+) -> LiftedObject:
+    """`old` with the Gaussians of `fresh` within `reach` px of what `changed` (H, W) of its mask.
+
+    Both were lifted from one photo, by a lifter that knows a middle sheet. Control points stay
+    where their surface does. Raises LiftError where too little is left.
+    """
+    assert old.middle is not None and fresh.middle is not None, "a relief has a middle sheet"
+    away = cv2.distanceTransform((~changed).astype(np.uint8), cv2.DIST_L2, 5)
+    from_change = [_at(away, lifted.texture.u0) for lifted in (old, fresh)]
+    stays, comes = from_change[0] >= reach, from_change[1] < reach
+    meeting = np.flatnonzero(stays & (from_change[0] < MEETING * reach))
+    slide = _slide(old, fresh, meeting if len(meeting) else np.flatnonzero(stays), comes)
+    added, middle = _slid(fresh, comes, slide, old)
+    kept = old.gaussians.select(stays)
+    gaussians = Gaussians(
+        *(
+            np.concatenate([getattr(kept, name), getattr(added, name)])
+            for name in ("means", "quats", "scales", "opacities", "colors")
+        )
+    )
+    textures = (old.texture, stays), (fresh.texture, comes)
+    texture = PhotoTexture(
+        *(
+            np.concatenate([getattr(part, name)[chosen] for part, chosen in textures])
+            for name in ("u0", "visibility", "solidity")
+        )
+    )
+    lifted = replace(
+        old, gaussians=gaussians, texture=texture,
+        sides=None if old.sides is None else old.sides.select(stays).followed_by(int(comes.sum())),
+        middle=np.concatenate([old.middle[stays], middle]),
+    )  # fmt: skip
+    return with_control_points(lifted, old.control_points)
+
+
+def with_control_points(lifted: LiftedObject, points: F32) -> LiftedObject:
+    """`lifted` with those `points` (M, 3) that its surface still has, and more where it is new."""
+    body = lifted.body
+    if len(body) < MIN_COUNT:
+        raise LiftError(f"the object has {len(body)} Gaussians left, too few to be moved")
+    off = KDTree(body.means).query(points)[0]
+    gap = float(np.median(KDTree(points).query(points, k=2)[0][:, 1]))
+    kept = points[off <= max(STILL_THERE * lifted.spacing, 0.5 * gap)]
+    more = with_more_points(kept, body.means, gap)
+    if len(more) < MIN_COUNT:
+        raise LiftError("too little of the object is left to be moved")
+    return replace(lifted, control_points=more)
+
+
+def _at(field: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """`field` (H, W) at photo px (N, 2), clamped to the photo."""
+    height, width = field.shape
+    column, row = np.floor(xy).astype(int).T
+    return field[row.clip(0, height - 1), column.clip(0, width - 1)]
+
+
+def _slide(old: LiftedObject, fresh: LiftedObject, compared: np.ndarray, comes: np.ndarray) -> F64:
+    """(n,) world units in depth from the middle sheet of `fresh` to that of `old`.
+
+    Of the Gaussians of `fresh` that come: as it is at those of `old` that are `compared`, nearby.
+    """
+    assert old.middle is not None and fresh.middle is not None
+    wanted = fresh.texture.u0[comes].astype(np.float64)
+    if not len(compared):
+        return np.zeros(len(wanted))
+    compared = compared[:: len(compared) // COMPARED + 1]
+    at = old.texture.u0[compared].astype(np.float64)
+    near = KDTree(fresh.texture.u0).query(at)[1]
+    own = fresh.middle[near].astype(np.float64)
+    depth = own[:, 0] + (own[:, 1:] * (at - fresh.texture.u0[near])).sum(1)
+    difference = old.middle[compared, 0] - depth
+    count = min(NEIGHBOURS, len(at))
+    gaps, near = KDTree(at).query(wanted, k=count)
+    gaps, near = gaps.reshape(-1, count), near.reshape(-1, count)
+    weights = 1.0 / np.maximum(gaps, 0.5)
+    return (weights * difference[near]).sum(1) / weights.sum(1)
+
+
+def _slid(
+    fresh: LiftedObject, comes: np.ndarray, slide: F64, old: LiftedObject
+) -> tuple[Gaussians, F32]:
+    """The Gaussians of `fresh` that come, in the frame of `old`, and their middle sheet (n, 3).
+
+    Neither frame is turned against the world.
+    """
+    assert fresh.middle is not None
+    gaussians, middle = fresh.gaussians.select(comes), fresh.middle[comes].astype(np.float64)
+    world = fresh.world_points(gaussians.means.astype(np.float64))
+    ratio = (1.0 + slide / world[:, 2])[:, None]
+    sizes = gaussians.scales * (ratio * fresh.scale / old.scale)
+    moved = replace(
+        gaussians, means=old.object_points(world * ratio).astype(np.float32),
+        scales=sizes.astype(np.float32),
+    )  # fmt: skip
+    middle[:, 0] += slide
+    return moved, middle.astype(np.float32)
+
 
 BLEND = 2.0  # x band: over so much the old cut-out goes over into the new one
 

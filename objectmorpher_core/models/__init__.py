@@ -1,13 +1,23 @@
 """Learned weights: a registry, a verified cache on disk, and how to fill it.
 
 Nothing here is needed to run: every stage has a weight-free backend. Four kinds: single files out
-of Python wheels (`fetch.py`), files that the user brings (`added.py`, and `published.py` for the
-official networks of measures), and models of several files from the Hugging Face Hub or from a
-folder of the user's (`hub.py`).
+of Python wheels (`fetch.py`), files that the user brings (`added.py`; the official
+networks of measures are among them), and models of several files from the Hugging Face Hub or from
+a folder of the user's (`hub.py`).
 """
 
-from . import shipped
-from .added import KINDS, Added, add, added, remove
+from .added import (
+    KINDS,
+    Added,
+    TrunkState,
+    add,
+    add_trunk,
+    added,
+    look_trunk,
+    remove,
+    remove_trunk,
+    trunk_folder,
+)
 from .fetch import OFFLINE, CacheState, fetch, folder, look, path, remove_weight, verify
 from .hub import (
     EXTRA,
@@ -25,7 +35,6 @@ from .hub import (
     use_folder,
     verify_hub,
 )
-from .published import TrunkState, add_trunk, look_trunk, remove_trunk, trunk_folder
 from .registry import (
     HubModel,
     ModelError,
@@ -35,6 +44,7 @@ from .registry import (
     families,
     hub_model,
     hub_models,
+    is_shipped,
     model_sets,
     trunk,
     trunks,
@@ -69,6 +79,7 @@ __all__ = [
     "hub_model",
     "hub_models",
     "installed",
+    "is_shipped",
     "look",
     "look_hub",
     "look_trunk",
@@ -80,7 +91,6 @@ __all__ = [
     "remove_hub",
     "remove_trunk",
     "remove_weight",
-    "shipped",
     "trunk",
     "trunk_folder",
     "trunks",

@@ -10,11 +10,96 @@ https://github.com/microsoft/onnxruntime/blob/main/docs/Privacy.md
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+# Gives an ONNX file other inputs and outputs, without the `onnx` package.
+#
+# A file is one protobuf message: ModelProto.graph is field 7, and GraphProto's input, output and
+# value_info are fields 11, 12 and 13 (onnx.proto3, IR version 3 and later). We copy everything else
+# as it is. onnxruntime then infers the shapes anew and drops the nodes that nothing needs.
+
+GRAPH, INPUT, OUTPUT, VALUE_INFO = 7, 11, 12, 13  # field numbers
+VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5  # wire types
+FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type = FLOAT
+
+
+def with_interface(model: bytes, images: str, *outputs: str) -> bytes:
+    """`model` with the one input `images`, (n, c, h, w) of any size, and the `outputs`.
+
+    `images` is the name of the model's input, `outputs` are those of any tensors inside: float32.
+    """
+    sizes = b"".join(bytes_field(1, bytes_field(2, axis)) for axis in (b"n", b"c", b"h", b"w"))
+    tensor = bytes_field(1, FLOAT + bytes_field(2, sizes))
+    view = memoryview(model)
+    parts: list[bytes | memoryview] = []
+    for number, start, payload, end in _fields(view):
+        if number != GRAPH:
+            parts.append(view[start:end])
+            continue
+        graph = view[payload:end]
+        body: list[bytes | memoryview] = [
+            graph[a:b] for n, a, _, b in _fields(graph) if n not in (INPUT, OUTPUT, VALUE_INFO)
+        ]
+        body.append(bytes_field(INPUT, bytes_field(1, images.encode()) + bytes_field(2, tensor)))
+        body += [bytes_field(OUTPUT, bytes_field(1, name.encode())) for name in outputs]
+        parts += [_head(GRAPH, sum(map(len, body))), *body]
+    return b"".join(parts)  # the weights are copied here, once
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, int, int, int]]:
+    """(field number, start, start of its payload, end) of every field of a message."""
+    at = 0
+    while at < len(message):
+        start = at
+        key, at = _varint(message, at)
+        payload = at
+        if key & 7 == VARINT:
+            _, at = _varint(message, at)
+        elif key & 7 == BYTES:
+            size, payload = _varint(message, at)
+            at = payload + size
+        elif key & 7 in (EIGHT_BYTES, FOUR_BYTES):
+            at += 8 if key & 7 == EIGHT_BYTES else 4
+        else:
+            raise ValueError(f"not an ONNX file: wire type {key & 7} at byte {start}")
+        yield key >> 3, start, payload, at
+
+
+def _varint(message: memoryview, at: int) -> tuple[int, int]:
+    """A number in base 128, low digits first, and where it ends."""
+    value = shift = 0
+    while True:
+        digit = message[at]
+        at += 1
+        value |= (digit & 127) << shift
+        shift += 7
+        if digit < 128:
+            return value, at
+
+
+def bytes_field(number: int, payload: bytes) -> bytes:
+    """A field of bytes, text or another message."""
+    return _head(number, len(payload)) + payload
+
+
+def _head(number: int, size: int) -> bytes:
+    """What stands before so many bytes of a field."""
+    return as_varint(number << 3 | BYTES) + as_varint(size)
+
+
+def as_varint(value: int) -> bytes:
+    """A number that is not negative."""
+    digits = bytearray()
+    while True:
+        value, digit = value >> 7, value & 127
+        digits.append(digit | (128 if value else 0))
+        if not value:
+            return bytes(digits)
+
 
 TELEMETRY_OFF = "ORT_DISABLE_TELEMETRY"
 WATCH_EVERY = 0.02  # s

@@ -9,6 +9,22 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, TypeVar
 
+# The program's own weights, which come with it (docs/shape_network).
+
+PACKAGE, SHAPE = "objectmorpher_core.models", "shape.onnx"
+TOKENS = "dinov2-vits14"  # the weight whose tokens the shape network reads
+
+
+def is_shipped() -> bool:
+    """Whether the shape network came with this installation."""
+    return files(PACKAGE).joinpath(SHAPE).is_file()
+
+
+def shape_network() -> bytes:
+    """The shape network, an ONNX file. Raises FileNotFoundError."""
+    return files(PACKAGE).joinpath(SHAPE).read_bytes()
+
+
 LicenceKind = Literal["permissive", "non-commercial", "gated"]
 Category = Literal["edit", "evaluation"]  # what a weight is for
 HUB = "https://huggingface.co"  # where a model's own page is, for people

@@ -15,8 +15,8 @@ from . import rules as p
 from . import tile_memory as m
 from .bell import bell
 from .binning import TILE
+from .compositing import look_up
 from .intrinsics import fetch
-from .look_up import look_up
 from .rules import HALF, ONE, ZERO
 
 STEP = 2  # px between nodes

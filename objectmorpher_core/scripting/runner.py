@@ -19,9 +19,8 @@ from ..compose.order import reordered
 from ..compose.plate.plate import build_plate, plate_cover
 from ..compose.refine import refinement
 from ..compose.refine.refinement import CoarseEdit
-from ..compose.shadow.old_reflection import OldReflection
 from ..compose.shadow.old_shadow import OldShadow, traceless_plate
-from ..compose.shadow.old_traces import OldTraces, find_old_traces
+from ..compose.shadow.shadow_fit import find_old_shadow
 from ..deform.puppet import Puppet, puppet_of
 from ..document import edits
 from ..document.model import (
@@ -280,7 +279,7 @@ def ordered(document: Document, others: Others) -> Document:
     return replace(document, objects=objects)
 
 
-# What a script's objects leave behind: the plate of all, their old shadows and reflections.
+# What a script's objects leave behind: the plate of all, and their old shadows.
 
 USUAL_HINT = 0.03  # x the photo's diagonal, radius of a hint that says none
 
@@ -304,22 +303,24 @@ def with_plate(
     Those of the numbers in `casting` take their own shadow along.
 
     An object that has left its place takes its shadow off the ground, where that is sure. It, and
-    every copy of it that is elsewhere, throws one like it. Its reflection goes, and none is drawn.
+    every copy of it that is elsewhere, throws one like it.
     """
     document = edits.set_hints(document, _hints(script, document.photo.size))
     covered, pixels = plate_cover(document), document.photo.pixels
-    gone: list[OldShadow | OldReflection] = []
+    gone: list[OldShadow] = []
     notes: list[str] = []
     for matte in _distinct(document, casting):
         alike = [k for k in casting if document.objects[k].matte is matte]
-        old = find_old_traces(pixels, matte, covered)
+        old = find_old_shadow(pixels, matte, covered)
+        if old is None:
+            continue
         for k in alike:
-            if old.shadow is not None and document.objects[k].is_visible:
-                document = edits.set_shadow(document, k, old.shadow.shadow)
+            if document.objects[k].is_visible:
+                document = edits.set_shadow(document, k, old.shadow)
         has_gone = not any(o.matte is matte and not has_left(o) for o in document.objects)
         if has_gone:
-            gone += old.found
-        notes += _notes(document.objects[alike[0]], old, has_gone)
+            gone.append(old)
+        notes.append(_note(document.objects[alike[0]], has_gone))
     inpainter = compose.load(script.inpaint)
     if gone:
         plate = traceless_plate(
@@ -330,17 +331,12 @@ def with_plate(
     return LeftBehind(edits.set_plate(document, plate), tuple(notes))
 
 
-def _notes(item: EditObject, old: OldTraces, has_gone: bool) -> list[str]:
-    """What becomes of an object's traces in the photo, and how to refuse."""
+def _note(item: EditObject, has_gone: bool) -> str:
+    """What becomes of an object's shadow in the photo, and how to refuse."""
+    goes = "goes along with it" if item.is_visible else "is removed with it"
+    goes = goes if has_gone else "is thrown by its copies, too"
     refuse = "shadow none leaves the ground as it is in the photo"
-    notes = []
-    if old.shadow is not None:
-        goes = "goes along with it" if item.is_visible else "is removed with it"
-        goes = goes if has_gone else "is thrown by its copies, too"
-        notes.append(f"the shadow found beside {item.name} {goes}; {refuse}")
-    if old.reflection is not None and has_gone:
-        notes.append(f"the reflection found below {item.name} is removed; {refuse}")
-    return notes
+    return f"the shadow found beside {item.name} {goes}; {refuse}"
 
 
 def has_left(item: EditObject) -> bool:

@@ -28,7 +28,7 @@ class TokenNet:
 
     def __init__(self, threads: int = 0) -> None:
         """`threads` of one run; 0: one a core. Raises ModelError without the weights."""
-        from ..models.onnx_graph import with_interface
+        from ..models.onnx_session import with_interface
 
         path = models.path(WEIGHT)
         if path is None:

@@ -14,7 +14,6 @@ from ..base.limits import FILE_BYTES as MAX_BYTES
 from ..base.quoting import named
 from ..document.gaussians import Gaussians
 from .limits import SplatFileError
-from .splats.axes import half_turned
 from .splats.compressed_ply import (
     decode_compressed,
     encode_compressed,
@@ -22,7 +21,7 @@ from .splats.compressed_ply import (
     read_compressed,
 )
 from .splats.ply import decode_ply, encode_ply, is_mere_points, read_ply
-from .splats.ply_table import read_header
+from .splats.ply_table import half_turned, read_header
 from .splats.point_cloud import read_points
 from .splats.splat import decode_splat, encode_splat
 from .splats.spz import decode_spz, encode_spz

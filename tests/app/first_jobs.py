@@ -28,7 +28,7 @@ from objectmorpher_core.document.model import (
     Matte,
     Placement,
 )
-from objectmorpher_core.lift.registration.importing import ImportTarget
+from objectmorpher_core.lift.registration.imported import ImportTarget
 from objectmorpher_core.segment.mask_edit import feather
 from objectmorpher_core.splat_files import encode
 from tests.core.lift import registered

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from hands import opened
-from objectmorpher.commands import COMMANDS
-from objectmorpher.commands.settings import SETTINGS
+from objectmorpher.commands import COMMANDS, SETTINGS
 from objectmorpher.editor.editor import Editor
 from objectmorpher.gui.dialogs.popups.palette import CommandPalette
 from objectmorpher.system.help_pages import FIRST, ORDER, Kind, blocks_of, pages

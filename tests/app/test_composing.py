@@ -26,7 +26,6 @@ from objectmorpher_core.document.settings import (
 )
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from strokes import press, stroke
-from tests.reflected import mirrored, photo_with
 from tests.shadowed import inside, photo_of, thrown
 from tests.shapes import png
 
@@ -255,27 +254,7 @@ def test_where_no_shadow_is_sure_it_is_said_and_nothing_changes(editor: Editor) 
     wait_for_jobs(editor)
     assert editor.document is document
     assert editor.message is not None
-    assert editor.message.text.startswith("No clear shadow or reflection")
-
-
-@pytest.mark.slow
-def test_its_reflection_in_the_photo_goes_and_none_is_drawn(editor: Editor) -> None:
-    document = lifted_of(photo_with(mirrored()))
-    editor.start(document)
-    run(editor, "take_shadow")
-    wait_for_jobs(editor)
-    assert editor.document is document
-    editor.composing.accept_shadow()
-    assert editor.history is not None
-    assert editor.history.undo_label == "Remove old reflection"
-    assert editor.object is not None and editor.object.shadow.strength == 0
-    assert editor.document is not None
-    own = (mirrored()[..., 3] > 0.5) & ~plate_cover(document)
-    bare = photo_with(None).astype(float)
-    left, was = (np.abs(plate_picture(d) - bare)[own].mean() for d in (editor.document, document))
-    assert left < 0.5 * was
-    editor.undo()
-    assert editor.document is document
+    assert editor.message.text.startswith("No clear shadow")
 
 
 def test_what_has_not_moved_keeps_its_shadow(editor: Editor, ball: Document) -> None:

@@ -21,7 +21,7 @@ from tests.photos import outlined
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "howto").glob("*.md"))]
 RUN = ("edit", "select", "replay", "convert", "batch", "share")
-# A shadow or a reflection that goes along, and a turn that shows much of what is invented.
+# A shadow that goes along, and a turn that shows much of what is invented.
 EXPECTED = re.compile(r"goes along with it|is removed|is guesswork")
 TWO = {
     "photo": "flower.jpg", "click": [[300, 190]], "move": [-60, 0],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher.gui.widgets.fade import FADE, Fades
+from objectmorpher.gui.widgets.panes import FADE, Fades
 
 CAT, DOG = object(), object()
 EXACT = 1e-9

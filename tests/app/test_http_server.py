@@ -11,7 +11,7 @@ from http import HTTPStatus
 
 import pytest
 
-from objectmorpher.server.http import Handler, HttpServer, Refusal
+from objectmorpher.server.front import Handler, HttpServer, Refusal
 
 MOST = 3 << 10  # bytes of a request
 CONNECTIONS = 2

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objectmorpher.worker import shared_memory, wire
+from objectmorpher.worker import wire
 from objectmorpher.worker.wire import KEPT, LARGE, PipeReader, PipeWriter
 from objectmorpher_core.base.arrays import frozen
 
@@ -91,7 +91,7 @@ def test_one_message_may_hold_more_than_is_remembered(line: Line) -> None:
 
 
 def huge(value: int) -> np.ndarray:
-    array = np.full((2, shared_memory.LEAST // 8), float(value))
+    array = np.full((2, wire.LEAST // 8), float(value))
     array.setflags(write=False)
     return array
 
@@ -103,11 +103,11 @@ needs_blocks = pytest.mark.skipif(sys.platform != "linux", reason="shared memory
 def test_what_is_shared_goes_back_as_the_same_memory(line: Line) -> None:
     first = line.sent([huge(1), "small"])
     there = frozen(first[0])  # as the document holds it
-    assert shared_memory.block_of(there.data) is not None
+    assert wire.block_of(there.data) is not None
     back = Line()
     again = back.sent({"image": there})["image"]
     np.testing.assert_array_equal(again, huge(1))
-    one, other = (shared_memory.block_of(a.data) for a in (there, again))
+    one, other = (wire.block_of(a.data) for a in (there, again))
     assert one is not None and other is not None
     assert os.fstat(one.descriptor).st_ino == os.fstat(other.descriptor).st_ino
     assert not again.flags.writeable
@@ -116,7 +116,7 @@ def test_what_is_shared_goes_back_as_the_same_memory(line: Line) -> None:
 
 @needs_blocks
 def test_a_part_of_shared_memory_is_sent_as_the_part_that_it_is(line: Line) -> None:
-    whole = line.sent(np.arange(shared_memory.LEAST / 4).reshape(2, -1))
+    whole = line.sent(np.arange(wire.LEAST / 4).reshape(2, -1))
     for part in (whole[1], whole[:, :-1], np.asfortranarray(whole), whole.T):
         np.testing.assert_array_equal(line.sent(part), part)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from objectmorpher_core.base.distances import distance_inside
+from objectmorpher_core.base.poisson_disk import distance_inside
 
 
 def test_distances_are_those_of_the_definition():

@@ -16,7 +16,7 @@ from objectmorpher_core.document import edits
 from objectmorpher_core.document.edits import EditError
 from objectmorpher_core.document.model import Document, LiftSettings, Placement, Prompt
 from objectmorpher_core.lift.refitting import Lifted, background_of, refit
-from objectmorpher_core.lift.registration.importing import ImportTarget
+from objectmorpher_core.lift.registration.imported import ImportTarget
 from objectmorpher_core.pictures.image import Picture, encode_picture
 from objectmorpher_core.pipeline import lift_mask, make_plate, open_photo
 from objectmorpher_core.segment.mask_edit import grow

@@ -16,7 +16,7 @@ import numpy as np
 
 from objectmorpher.editor.export_plan import ExportPlan, What
 from objectmorpher.editor.settings import Settings, read_settings, write_settings
-from objectmorpher.server.tokens import TokenError, read_token, write_token
+from objectmorpher.server.address import TokenError, read_token, write_token
 from objectmorpher.worker.export_functions import write_export
 from objectmorpher_core.base.files import write_all, write_new
 from objectmorpher_core.base.progress import silent

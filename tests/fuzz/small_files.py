@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from objectmorpher.editor.settings import Settings, read_settings, write_settings
+from objectmorpher.server.address import TokenError, check_token, read_token
 from objectmorpher.server.message import MessageError, decode, encode
 from objectmorpher.server.table import table, types
-from objectmorpher.server.tokens import TokenError, check_token, read_token
 from objectmorpher.worker.job_functions import BackendChoice, Cut
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.model import Click, LiftSettings, Plate, Prompt

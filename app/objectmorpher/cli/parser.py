@@ -17,10 +17,19 @@ from typing import Any
 from objectmorpher_core.base.quoting import count_range, reason
 
 from .. import __version__
-from .command_parser import MISUSED, Parser, completed_files, misspelt_command
+from .command_parser import (
+    MISUSED,
+    RESEARCH,
+    Parser,
+    Subcommand,
+    add_subcommands,
+    completed_files,
+    lazily,
+    misspelt_command,
+    research_commands,
+)
 from .options import RENDERERS, WindowOptions
 from .ray import add_ray
-from .subcommands import RESEARCH, Subcommand, add_subcommands, lazily, research_commands
 from .terminal import FAILURES, PROGRAM, failure_sentence, is_librarys
 
 SAMPLE = "assets/samples/coffee.jpg"
@@ -226,7 +235,7 @@ def _add_edit(parser: argparse.ArgumentParser) -> None:
     add("--key", action="append", type=_key, metavar="POSE",
         help="a further pose for --video keys, such as 'turn=-20 handle=X,Y:X2,Y2'")  # fmt: skip
     add("--shadow", metavar="auto|none",
-        help="auto (default): its shadow goes along, its reflection is erased")  # fmt: skip
+        help="auto (default): its shadow in the photo goes along")  # fmt: skip
     add(
         "--remove",
         action="store_true",
@@ -483,7 +492,7 @@ SUBCOMMANDS = (
     ),
     Subcommand(
         "doctor", "show what runs on this machine, and what would help", _add_doctor,
-        lazily("doctor", "run_doctor"),
+        lazily("commands", "run_doctor"),
     ),
     Subcommand(
         "plugin", "install the plug-in for Krita, GIMP or ComfyUI",

@@ -45,9 +45,9 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 
 def run_serve(options: argparse.Namespace) -> None:
     """Serves until it is interrupted or ended."""
-    from ..server.alone import Alone
     from ..server.cluster import Cluster, ClusterPlan
     from ..server.front import Front, RequestLimits
+    from ..server.running import Alone
     from ..server.table import table
     from ..system.logs import show_log
     from ..worker.stages import STAGES
@@ -106,7 +106,7 @@ def _greet(url: str, token: str | None, options: argparse.Namespace) -> None:
 
 def _token(path: Path | None) -> tuple[str, bool]:
     """The token, and whether it was made just now."""
-    from ..server.tokens import VARIABLE, check_token, make_token, read_token, write_token
+    from ..server.address import VARIABLE, check_token, make_token, read_token, write_token
 
     if path is not None:
         if kept := read_token(path):

@@ -6,15 +6,39 @@ from ..editor.editor import Editor
 from ..editor.tasks import SELECT
 from ..editor.view import ToolName
 from ..system.texts import t
-from . import compose, edit, files, look, objects, place, pose, select, window
+from . import compose, edit, look, objects, place, pose, select
 from .command import Command
+
+# Which settings there are, by the command that brings them into view: for the command palette.
+#
+# English keys of texts, as the panels have them; a test checks that each is one.
+
+SETTINGS: dict[str, tuple[str, ...]] = {
+    "preferences": ("Theme", "Text size", "Language", "Motion", "File dialogs", "Long jobs"),
+    "select": ("Select by", "Keep in front"),
+    "mask": ("Brush", "Radius", "Hardness", "Distance", "Edge", "Decontaminate", "Depth", "Hidden"),
+    "pose": (
+        "Rigidity", "What stays", "Symmetry", "Drag the mirrored point too", "Rotation ring (R)",
+        "Anchors", "Regions", "Influence of the handle", "Strain", "Softness", "Stiffness", "Turn",
+    ),
+    "place": ("Move over the ground",),
+    "look": (
+        "Thickness", "Learned shape", "It stands in the photo", "Use the depth model", "Zoom",
+        "Before and after",
+    ),
+    "compose": (
+        "Show it alone", "Shadow", "Strength", "Length", "Contact", "Ground", "Light", "Blend",
+        "Network", "Amount",
+    ),
+}  # fmt: skip
+
 
 __all__ = [
     "COMMANDS", "GROUPS", "Command", "keys_of", "next_step", "run", "take_next_step", "why_not",
 ]  # fmt: skip
 
 GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of shortcuts
-    "File": files.COMMANDS,
+    "File": edit.FILE_COMMANDS,
     "Edit": edit.COMMANDS,
     "Select": select.COMMANDS,
     "Objects": objects.COMMANDS,
@@ -22,7 +46,7 @@ GROUPS: dict[str, dict[str, Command]] = {  # by the titles of the table of short
     "Place": place.COMMANDS,
     "Look": look.COMMANDS,
     "Compose": compose.COMMANDS,
-    "Window": window.COMMANDS,
+    "Window": edit.WINDOW_COMMANDS,
 }
 COMMANDS: dict[str, Command] = {
     name: command for group in GROUPS.values() for name, command in group.items()

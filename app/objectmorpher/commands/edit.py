@@ -1,21 +1,59 @@
-"""Steps back and forth, tools, and what belongs to no tool."""
+"""Commands that belong to no tool: files, steps back and forth, tools, panels and dialogs."""
 
 from __future__ import annotations
 
 from ..editor.editor import Editor
 from ..editor.export_plan import What
-from ..editor.view import ToolName
+from ..editor.filing import Dialog
+from ..editor.view import Popup, ToolName
 from ..tools import navigate
 from .command import (
     Command,
     Reason,
+    asks_for,
     never,
     no_lift,
     no_photo,
     no_redo,
     no_selection,
     no_undo,
-)  # fmt: skip
+)
+
+# Panels and dialogs.
+
+
+def _toggle(popup: Popup) -> Command:
+    def run(editor: Editor) -> None:
+        editor.view.popup = None if is_on(editor) else popup
+
+    def is_on(editor: Editor) -> bool:
+        return editor.view.popup is popup
+
+    return Command(popup.value, _KEYS.get(popup, ""), run, never, is_on)
+
+
+_KEYS = {Popup.PALETTE: "Ctrl+K", Popup.SHORTCUTS: "F1", Popup.PREFERENCES: "Ctrl+,"}
+
+WINDOW_COMMANDS: dict[str, Command] = {popup.name.lower(): _toggle(popup) for popup in Popup}
+
+
+# Opening, saving, exporting.
+
+FILE_COMMANDS: dict[str, Command] = {
+    "open": Command("Open…", "Ctrl+O", asks_for(Dialog.OPEN), never),
+    "save": Command("Save session", "Ctrl+S", lambda e: e.filing.save()),
+    "save_as": Command("Save session as…", "Ctrl+Shift+S", asks_for(Dialog.SAVE)),
+    "export": Command("Export photo…", "Ctrl+E", lambda e: e.exporting.open()),
+    "send_back": Command(
+        "Send back",
+        "Ctrl+Enter",
+        lambda e: e.exporting.send_back(e.quit),
+        lambda e: no_photo(e) or e.exporting.why_not_back,
+    ),
+    "close": Command("Close", "Ctrl+W", lambda e: e.filing.guard(e.close)),
+    "models": Command("Models…", "", lambda e: e.models.open(), never),
+    "quit": Command("Quit", "Ctrl+Q", lambda e: e.filing.guard(e.quit), never),
+}
 
 
 def _tool(tool: ToolName, keys: str, why_not: Reason) -> Command:

@@ -89,7 +89,7 @@ class Refits:
 
     def _ask(self, document: Document, k: int) -> None:
         from objectmorpher_core.lift.refitting import Lifted, background_of
-        from objectmorpher_core.lift.registration.importing import ImportTarget
+        from objectmorpher_core.lift.registration.imported import ImportTarget
 
         editor, item, photo = self._editor, document.objects[k], document.photo
         assert item.mask is not None and item.lifted is not None

@@ -9,7 +9,7 @@ from objectmorpher_core import warm_up as core
 
 from ..canvas.shape import build_shape, rehearse
 from ..render import flattening
-from ..render.view_depths import near_to_far
+from ..render.splat_pass import near_to_far
 
 
 def warm_up() -> None:

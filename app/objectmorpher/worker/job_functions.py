@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from objectmorpher_core.document.gaussians import Gaussians
     from objectmorpher_core.document.settings import Refined, Shadow
     from objectmorpher_core.lift.refitting import Background, Lifted, Refitted
-    from objectmorpher_core.lift.registration.importing import Import, ImportTarget
+    from objectmorpher_core.lift.registration.imported import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
     from objectmorpher_core.models import Added
     from objectmorpher_core.pipeline import Reading
@@ -182,7 +182,7 @@ def import_object(
     path: Path, scene: ImportTarget, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """An object's file registered to the photo, and in the best pose textured with it."""
-    from objectmorpher_core.lift.registration.importing import Source, place_import, register_file
+    from objectmorpher_core.lift.registration.imported import Source, place_import, register_file
 
     try:
         found = register_file(Source(path), scene, part(progress, 0.0, 0.8), seed)
@@ -199,7 +199,7 @@ def place_object(
     scene: ImportTarget, gaussians: Gaussians, proposal: Proposal, seed: int, progress: Progress
 ) -> tuple[Matte, LiftedObject]:
     """An object's Gaussians in a proposed pose, textured with the photo."""
-    from objectmorpher_core.lift.registration.importing import place_import
+    from objectmorpher_core.lift.registration.imported import place_import
 
     return place_import(scene, gaussians, proposal, progress, seed)
 
@@ -208,7 +208,7 @@ def fit_object(
     scene: ImportTarget, gaussians: Gaussians, start: np.ndarray, seed: int, progress: Progress
 ) -> tuple[Import, Matte, LiftedObject]:
     """The best pose near `start` (4, 4 world from object), textured with the photo."""
-    from objectmorpher_core.lift.registration.importing import fit_near, place_import
+    from objectmorpher_core.lift.registration.imported import fit_near, place_import
 
     found = fit_near(scene, gaussians, start, part(progress, 0.0, 0.5), seed)
     rest = part(progress, 0.5, 1.0)
@@ -314,26 +314,26 @@ class Cutout:
 
 def take_shadow(
     cutout: Cutout, choice: BackendChoice, progress: Progress
-) -> tuple[Shadow | None, Plate] | None:
-    """A shadow like the object's in the photo, and the background without that and its reflection.
+) -> tuple[Shadow, Plate] | None:
+    """A shadow like the object's in the photo, and the background without it.
 
-    None where neither is sure; a background alone where no shadow is.
+    None where none is sure.
     """
     from objectmorpher_core import compose
     from objectmorpher_core.compose.shadow.old_shadow import traceless_plate
-    from objectmorpher_core.compose.shadow.old_traces import find_old_traces
     from objectmorpher_core.compose.shadow.shadow_evidence import LIKELY
+    from objectmorpher_core.compose.shadow.shadow_fit import find_old_shadow
 
     progress(0.0, "")
-    old = find_old_traces(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
-    if not old.found:
+    old = find_old_shadow(cutout.pixels, cutout.matte, cutout.covered, cutout.ground, LIKELY)
+    if old is None:
         return None
     inpainter = compose.load(choice.backend, bool(choice.hints))
     step = part(progress, 0.1, 1.0)
     plate = traceless_plate(
-        cutout.pixels, cutout.covered, old.found, inpainter, step, choice.seed, choice.hints
+        cutout.pixels, cutout.covered, [old], inpainter, step, choice.seed, choice.hints
     )
-    return (None if old.shadow is None else old.shadow.shadow), plate
+    return old.shadow, plate
 
 
 def cut_edit(document: Document, progress: Progress) -> CoarseEdit:

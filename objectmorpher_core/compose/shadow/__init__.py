@@ -1,1 +1,1 @@
-"""Shadows and reflections: new ones that are cast, old ones that are taken away."""
+"""Shadows: new ones that are cast, old ones that are taken away."""

@@ -20,9 +20,201 @@ from ...document.settings import Hint, Shadow
 from .. import Inpainter
 from ..plate.plate import Box, build_plate, cut, hole_margin, overlap
 from ..silhouette import cells_bounds, sampled
-from . import shadow_edge
-from .old_reflection import OldReflection, without_reflection
 from .shadow import GAMMA
+
+# Across a shadow's edge: lit ground there looks as beside it, at every distance from the edge.
+#
+# What was found of a shadow is on a grid, and its edge in the photo has a width, a tint and the
+# camera's own sharpening, which dividing by it leaves as a line where the shadow ended. All of them
+# depend on how far from the edge one is, and hardly on where along it (Shor and Lischinski 2008):
+# so the lit picture is averaged along the edge, at each distance from it, and given the light of
+# the ground beyond. What is averaged over some length of an edge is its light, not the ground's
+# texture.
+
+HALF = 0.5  # of the light that is missing near by: there the edge is
+NEAR_BY = 4.0  # cells, over which that is told
+FAR = 4.0  # cells: the ground beyond is lit as it should be
+ALONG = 3.0  # cells, over which one averages along the edge
+FIRST, GROWTH = 1.0, 1.5  # px between distances at the edge, and x from each to the next
+LEAST = np.float32(1e-3)  # of the px around, that must be at a distance for its light to be told
+MOST = 1.6  # x, that any light is changed by
+FEW, MANY = 3.0, 12.0  # px per cell, of a coarser picture on which something is told
+SMALL = 12.0  # px: a wider blur is one of a smaller picture
+DIM = -3.2  # natural logarithm of light, from which a dark ground shows what it looks like
+DIM_OVER = 0.5  # cells, over which that is told
+LIT = 0.05  # natural logarithm of missing light, from which ground is not lit
+CONTINUED = (2.0, 4.0, 8.0, 16.0)  # cells; each weighs a hundredth of the one before
+ROOM = 0.7  # cells, over which ground is not lit more than it usually is
+FINE_EDGE = 0.15  # cells, over which the dark of a px is told
+DARK, LEFT = 1.1, 0.5  # natural logarithm of light that lacks in all, and after it was given back
+LOOKS = 12.0  # cells, as far as all this looks around the shadow
+MOST_TINT = 0.4  # of what is missing, that a colour may lack more or less
+SHOWS = -3.0  # natural logarithm of light, from which it has a colour that is to be told
+OFF = 0.1  # natural logarithm: so much is usual that the light was told wrong by
+SEEN_EDGE = 0.02  # natural logarithm of light: less is no shadow
+
+
+def usual_light(light: F32, missing: F32, free: Mask, pitch: float) -> F32:
+    """(h, w) natural logarithm of the light of lit ground, continued from where it is seen."""
+    height, width = light.shape
+    weight = (free & (missing < LIT)).astype(np.float32)
+    scale = min(FEW / pitch, 1.0)
+    small = _shrunk(weight, scale)
+    values = _shrunk(light * weight, scale)
+    total, mean = np.zeros_like(small), np.zeros_like(small)
+    for k, cells in enumerate(CONTINUED):
+        share, sigma = np.float32(100.0**-k), cells * pitch * scale
+        total += share * cv2.GaussianBlur(small, (0, 0), sigma)
+        mean += share * cv2.GaussianBlur(values, (0, 0), sigma)
+    known = float(np.median(light[weight > 0])) if weight.any() else 0.0
+    usual = ((mean + 1e-9 * known) / (total + 1e-9)).astype(np.float32)
+    return np.asarray(cv2.resize(usual, (width, height)), np.float32)
+
+
+def widely_blurred(picture: F32, sigma: float) -> F32:
+    """(h, w) or (h, w, 3) blurred by `sigma` px; where that is much, by way of a smaller one."""
+    scale = min(SMALL / sigma, 1.0)
+    blurred = cv2.GaussianBlur(_shrunk(picture, scale), (0, 0), sigma * scale)
+    return np.asarray(cv2.resize(blurred, picture.shape[1::-1]), np.float32)
+
+
+def _shrunk(picture: F32, scale: float) -> F32:
+    """A picture (h, w) or (h, w, 3) so much smaller."""
+    height, width = picture.shape[:2]
+    size = max(round(width * scale), 1), max(round(height * scale), 1)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def bounded(missing: F32, light: F32, usual: F32, pitch: float) -> F32:
+    """Return the missing light, bounded by the usual light of the ground.
+
+    No shadow leaves more light than falls beside it.
+    """
+    blurred = widely_blurred(light, ROOM * pitch)
+    return np.asarray(np.minimum(missing, np.maximum(usual - blurred, 0)), np.float32)
+
+
+def is_dim(light: F32, pitch: float) -> Mask:
+    """(h, w) where so little light is left that it shows nothing of the ground."""
+    return np.asarray(widely_blurred(light, DIM_OVER * pitch) < DIM, np.bool_)
+
+
+def too_dark(missing: F32, light: F32, usual: F32, pitch: float) -> Mask:
+    """(h, w) where a shadow's core is nearer to black than what was found of it says.
+
+    There the ground, with that light given back, is still much darker than where it is lit.
+    """
+    fine = widely_blurred(light, max(FINE_EDGE * pitch, 0.7))
+    dark = usual - fine
+    is_dark = ((missing > SEEN_EDGE) & (dark > DARK)).astype(np.uint8)
+    is_dark = cv2.morphologyEx(is_dark, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, labels = cv2.connectedComponents(is_dark)
+    core = np.unique(labels[(missing > DARK) & (is_dark > 0)])  # not a dark thing beside it
+    return np.isin(labels, core[core > 0]) & (dark - missing > LEFT)
+
+
+def tinted(colours: F32, missing: F32, free: Mask, pitch: float) -> F32:
+    """(3,) what is missing of each colour for each that is missing in all: the sky is bluer.
+
+    Told by lit ground, continued into the shadow, which light of another colour is left in.
+    """
+    deep = float(missing.max(initial=0))
+    core = free & (missing > HALF * deep) & (missing > SEEN_EDGE) & (colours.mean(-1) > SHOWS)
+    if not core.any() or not (free & (missing < LIT)).any():
+        return np.ones(3, np.float32)
+    lacking = np.stack(
+        [
+            np.median((usual_light(part, missing, free, pitch) - part)[core])
+            for part in np.moveaxis(colours, -1, 0)
+        ]
+    )
+    other = (lacking - lacking.mean()) / float(np.median(missing[core]))
+    return np.asarray(1 + np.clip(other, -MOST_TINT, MOST_TINT), np.float32)
+
+
+def evened(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
+    """The picture `lit` (h, w, 3) in [0, 1] without a line where its shadow ended.
+
+    `missing` (h, w) natural logarithm of the light that it was given, `free` (h, w) where the
+    ground is seen, `pitch` px per cell of what the shadow was found on. In a large photo all
+    this is as coarse as MANY px per cell: so are its edges.
+    """
+    height, width = missing.shape
+    scale = min(MANY / pitch, 1.0)
+    small, gap, seen = (_shrunk(p, scale) for p in (lit, missing, free.astype(np.float32)))
+    factor = _factor(small, gap, seen > 1 - HALF, pitch * scale)
+    factor = cv2.resize(factor, (width, height))
+    return np.asarray(np.clip(lit * factor, 0, 1), np.float32)
+
+
+def _factor(lit: F32, missing: F32, free: Mask, pitch: float) -> F32:
+    """(h, w, 3) what `evened` multiplies light by."""
+    away = _from_edge(missing, pitch)
+    far, sigma = FAR * pitch, ALONG * pitch
+    beyond = free & (away > far) & (away < 3 * far)
+    factor = np.ones_like(lit)
+    if not beyond.any():
+        return factor
+    usual = _mean(lit, beyond.astype(np.float32), 2 * sigma)
+    stops = _stops(far)
+    for low, middle, high in zip(stops, stops[1:], stops[2:], strict=False):
+        share = np.minimum((away - low) / (middle - low), (high - away) / (high - middle))
+        share = np.clip(share, 0, 1)
+        weight = np.where(free, share, 0).astype(np.float32)
+        if not weight.any():
+            continue
+        known = widely_blurred(weight, sigma)
+        sure = known / (known + LEAST) * _trust(lit, usual, beyond, (high - low) / 2, sigma)
+        ratio = usual / np.maximum(_mean(lit, weight, sigma), 1e-3)
+        factor += (share * sure)[..., None] * (np.clip(ratio, 1 / MOST, MOST) - 1)
+    return factor
+
+
+def _trust(lit: F32, usual: F32, beyond: Mask, width: float, sigma: float) -> float:
+    """How much the mean of a strip along the edge tells of its light, and not of the ground.
+
+    As much as lit ground itself varies over pieces as large tells of the ground.
+    """
+    side = float(np.sqrt(width * 2 * np.sqrt(np.pi) * sigma / (4 * np.pi)))
+    grey = np.where(beyond, lit.mean(-1), 0).astype(np.float32)
+    share = cv2.GaussianBlur(beyond.astype(np.float32), (0, 0), side)
+    mean = cv2.GaussianBlur(grey, (0, 0), side) / np.maximum(share, 1e-6)
+    off = np.log(np.maximum(mean, 1e-3) / np.maximum(usual.mean(-1), 1e-3))[beyond]
+    return OFF**2 / (OFF**2 + float((off**2).mean()))
+
+
+def _from_edge(missing: F32, pitch: float) -> F32:
+    """(h, w) px from the edge, less than 0 in the shadow; all 0 where there is none."""
+    height, width = missing.shape
+    scale = min(FEW / pitch, 1.0)
+    side = 2 * round(NEAR_BY * pitch * scale) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    deepest = cv2.resize(cv2.dilate(_shrunk(missing, scale), kernel), (width, height))
+    is_shade = missing > np.maximum(HALF * deepest, SEEN_EDGE)
+    if not is_shade.any() or is_shade.all():
+        return np.zeros_like(missing)
+    outside, inside = (
+        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
+        for part in (~is_shade, is_shade)
+    )
+    return np.asarray(np.where(is_shade, 0.5 - inside, outside - 0.5), np.float32)
+
+
+def _stops(far: float) -> list[float]:
+    """Distances from the edge, px, close together where it is, and as far as `far`."""
+    steps, at = [0.0], FIRST
+    while at < far:
+        steps.append(at)
+        at *= GROWTH
+    return [-2 * far, *(-step for step in reversed(steps[1:])), *steps, far]
+
+
+def _mean(picture: F32, weight: F32, sigma: float) -> F32:
+    """(h, w, 3) the mean of what has a weight (h, w) around each px."""
+    share = widely_blurred(weight, sigma)
+    total = widely_blurred(picture * weight[..., None], sigma)
+    return np.asarray(total / np.maximum(share, 1e-6)[..., None], np.float32)
+
 
 LOST = 1.1  # natural logarithm of missing light, from which the ground is invented
 SEEN = 1 / 512  # of encoded light: less is no shadow
@@ -75,7 +267,7 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
     Where a hard edge tells how dark it is, ground that is darker still shows enough.
     """
     height, width = pixels.shape[:2]
-    around = _grown(old.bounds(width, height), shadow_edge.LOOKS * old.pitch, width, height)
+    around = _grown(old.bounds(width, height), LOOKS * old.pitch, width, height)
     part = pixels[around[1] : around[3], around[0] : around[2]]
     free = sampled(old.free, (old.left, old.top), old.pitch, around) > MOSTLY
     colours = np.log(unit_pixels(part) ** np.float32(GAMMA) + np.float32(BLACK))
@@ -83,17 +275,17 @@ def _lifted(pixels: Pixels, old: OldShadow, box: Box) -> tuple[Pixels, Mask, Mas
     light = np.asarray(cv2.transform(colours, THIRDS), np.float32)
     found = old.missing(around)
     missing, is_told = _hard_edged(_sharpened(found, light, old), light, old, free)
-    usual = shadow_edge.usual_light(light, missing, free, old.pitch)
-    bounded = shadow_edge.bounded(missing, light, usual, old.pitch)
-    missing = np.asarray(np.where(is_told, missing, bounded), np.float32)
+    usual = usual_light(light, missing, free, old.pitch)
+    within = bounded(missing, light, usual, old.pitch)
+    missing = np.asarray(np.where(is_told, missing, within), np.float32)
     dim, black = (
-        (found > LOST) & shadow_edge.is_dim(light, old.pitch),
-        shadow_edge.too_dark(missing, light, usual, old.pitch),
+        (found > LOST) & is_dim(light, old.pitch),
+        too_dark(missing, light, usual, old.pitch),
     )
     is_lost = np.where(is_told, False, dim | black)
-    tint = shadow_edge.tinted(colours, missing, free & ~is_lost, old.pitch)
+    tint = tinted(colours, missing, free & ~is_lost, old.pitch)
     lit = unit_pixels(part) * np.exp(missing[..., None] * (tint / np.float32(GAMMA)))
-    lit = shadow_edge.evened(lit, missing, free & ~is_lost, old.pitch)
+    lit = evened(lit, missing, free & ~is_lost, old.pitch)
     change = cv2.absdiff(lit, unit_pixels(part))
     is_changed = np.maximum(np.maximum(change[..., 0], change[..., 1]), change[..., 2]) > SEEN / 2
     result = np.where(is_changed[..., None], pixels_from_unit(lit, pixels.dtype), part)
@@ -140,12 +332,12 @@ def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tupl
     levels = []
     for side in sides:
         weight = side.astype(np.float32)
-        near = shadow_edge.widely_blurred(weight, WIDE * old.pitch)
-        total = shadow_edge.widely_blurred(light * weight, WIDE * old.pitch)
+        near = widely_blurred(weight, WIDE * old.pitch)
+        total = widely_blurred(light * weight, WIDE * old.pitch)
         usual = np.float32(np.median(light[side]))  # where none of it is near
         levels.append((total + LEAST_SIDE * usual) / (near + LEAST_SIDE))
     step = levels[0] - levels[1]
-    fine = shadow_edge.widely_blurred(light, max(FINE * old.pitch, 0.5))
+    fine = widely_blurred(light, max(FINE * old.pitch, 0.5))
     into = (levels[0] - fine) / np.maximum(step, HARD)
     into = np.clip((into - SURE_EDGE[0]) / (SURE_EDGE[1] - SURE_EDGE[0]), 0, 1)
     is_told = (step > HARD) & (missing > 0)
@@ -158,7 +350,7 @@ def _hard_edged(missing: F32, light: F32, old: OldShadow, is_free: Mask) -> tupl
 def traceless_plate(
     pixels: Pixels,
     covered: Mask,
-    traces: Sequence[OldShadow | OldReflection],
+    shadows: Sequence[OldShadow],
     inpainter: Inpainter,
     progress: Progress = silent,
     seed: int = 0,
@@ -166,22 +358,16 @@ def traceless_plate(
 ) -> Plate:
     """Build the plate of the photo in full light: shadows beside objects go as well.
 
-    Reflections are taken off, too. There it is painted, as by hand: shown wherever something has
-    moved. Where it is so dark that the photo shows little of the ground, and where that mirrors an
-    object in a way that is not known, it is invented.
+    There it is painted, as by hand: shown wherever something has moved. Where it is so dark that
+    the photo shows little of the ground, it is invented.
     """
     height, width = covered.shape
     lit = pixels.copy()
     is_changed, lost = np.zeros_like(covered), np.zeros_like(covered)
-    traces = sorted(traces, key=lambda old: isinstance(old, OldShadow))  # what is added goes first
-    shades = [old.bounds(width, height) for old in traces]
-    for old, shade in zip(traces, shades, strict=True):
+    shades = [old.bounds(width, height) for old in shadows]
+    for old, shade in zip(shadows, shades, strict=True):
         part = (slice(shade[1], shade[3]), slice(shade[0], shade[2]))
-        if isinstance(old, OldShadow):
-            lit[part], is_other, is_lost = _lifted(lit, old, shade)
-        else:
-            is_lost = old.lost(shade)
-            lit[part], is_other = without_reflection(lit, old, shade)
+        lit[part], is_other, is_lost = _lifted(lit, old, shade)
         is_changed[part] |= is_other
         lost[part] |= is_lost
     lost &= ~covered

@@ -20,7 +20,6 @@ from ...base.pixels import unit_pixels
 from ...document.model import Matte
 from ...document.settings import MOST_SHADOW, Shadow
 from .old_shadow import BLACK, FROM_ABOVE, OldShadow
-from .robust_fit import regressed
 from .shadow import DARKEST, GAMMA
 from .shadow_evidence import (
     CORE,
@@ -30,11 +29,11 @@ from .shadow_evidence import (
     Surroundings,
     TriedShadow,
     fitted,
+    regressed,
     score,
     taken,
 )
-from .shadow_flat import Flat, lie
-from .shadow_shear import stand
+from .shadow_shear import Flat, lie, stand
 
 SHEET_GROUND = 30.0  # degrees: a silhouette alone is told no ground
 CELLS = 64  # along the object's longer side

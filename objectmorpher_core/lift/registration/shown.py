@@ -9,14 +9,13 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask
 from ...base.camera import Camera
-from ...base.distances import distance_inside
 from ...base.pixels import crop
-from ...base.poisson_disk import thin_to_spacing
+from ...base.poisson_disk import distance_inside, thin_to_spacing
 from ...document.model import LiftedObject, Matte
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats
 from ...raster.texture import build_levels
-from ..relief.bilinear import bilinear
+from ..relief.canvas import bilinear
 from ..relief.spreading import BRIM, OVERSAMPLING, PACKING
 
 LONGEST = 1024  # px, longer side of the picture whose depths tell what hides what

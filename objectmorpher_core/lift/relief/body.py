@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import F64
 from ...base.camera import Camera
 from ...document.model import LiftSettings
-from .bilinear import bilinear
+from .canvas import bilinear
 from .cuts import Behind, Cuts, Overlaps, overlaps_of
 from .mirror import MirrorAxis
 from .prism import Prism

@@ -14,8 +14,7 @@ import numpy as np
 
 from ...base.arrays import F32, F64, Mask, frozen
 from ...base.kernel_files import numba
-from .bilinear import bilinear
-from .canvas import ReliefCanvas
+from .canvas import ReliefCanvas, bilinear
 from .mirror import MirrorAxis
 from .silhouette import ReliefSilhouette
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64, I64, Mask
-from ...base.distances import nearest_in
+from ...base.poisson_disk import nearest_in
 from .integration import CLOSE, ROUNDS, solved
 
 STEEP = 1.5  # height per length across, from which a front may be cut

@@ -18,8 +18,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import spsolve
 
 from ...base.arrays import F32, F64, Mask
-from .bilinear import bilinear
 from .body import ReliefBody
+from .canvas import bilinear
 from .silhouette import ReliefSilhouette
 
 RIM = (

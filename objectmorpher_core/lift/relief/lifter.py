@@ -25,9 +25,8 @@ from ...segment.matting.matte import band_width
 from .. import LiftError, LiftSubject
 from ..shapes import Recognised, completed, flattened, laid, recognised, rims_of, rounded
 from . import shape_look
-from .bilinear import bilinear
 from .body import MIDDLE, ReliefBody
-from .canvas import ReliefCanvas
+from .canvas import ReliefCanvas, bilinear
 from .colours import FINENESS, Colouring, colouring
 from .depth_look import Look, look
 from .depth_prior import follow

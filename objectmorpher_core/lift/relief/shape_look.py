@@ -16,7 +16,7 @@ import numpy as np
 from ... import models
 from ...base.arrays import F32, Mask, Pixels
 from ...base.camera import Camera
-from ...models import shipped
+from ...models import registry
 from ...models.onnx_session import open_session
 from ...segment import dino_tokens
 from ..crop import Crop, planes_of
@@ -69,9 +69,9 @@ def look(pixels: Pixels, mask: Mask, camera: Camera) -> SeenShape | None:
 
 def missing() -> str | None:
     """Return what the look needs and does not find here, as one sentence."""
-    if models.path(shipped.TOKENS) is None:
-        return f"the model {shipped.TOKENS} is not here: `objectmorpher models get`"
-    return None if shipped.is_shipped() else "the shape network is missing from this installation"
+    if models.path(registry.TOKENS) is None:
+        return f"the model {registry.TOKENS} is not here: `objectmorpher models get`"
+    return None if registry.is_shipped() else "the shape network is missing from this installation"
 
 
 class ShapeModel:
@@ -108,7 +108,7 @@ class _Memory:
             if self._last is not None and self._last[0] == digest:
                 return self._last[1]
             if self._net is None:
-                self._net = ShapeModel(shipped.shape_network())
+                self._net = ShapeModel(registry.shape_network())
             tokens = dino_tokens.shared().inner_tokens(rgb)
             found = self._net.look(planes_of(rgb, seen, crop.tangents), tokens, seen, crop)
             self._last = digest, found

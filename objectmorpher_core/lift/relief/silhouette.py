@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 
 from ...base.arrays import F64, Mask
-from ...base.distances import distance_inside
 from ...base.kernel_files import numba
+from ...base.poisson_disk import distance_inside
 from ...segment.matting.matte import extended_mask, frame_extension
-from .bilinear import bilinear
+from .canvas import bilinear
 
 GRID = 256  # cells on the longer side of the box
 FINENESS = 4.0  # px to a cell, at least, at which the outline is looked at

@@ -9,15 +9,13 @@ import numpy as np
 
 from ...base.arrays import F64
 from ...base.camera import Camera
-from ...base.distances import nearest_in
+from ...base.poisson_disk import nearest_in
 from ..relief.shape_look import SeenShape
 from ..relief.silhouette import ReliefSilhouette
-from .boxes import fit_box
+from .boxes import fit_box, fit_flat
 from .drawing import Mesh, RayGrid, drawn
 from .evidence import Evidence, Misfit
-from .flats import fit_flat
-from .rings import fit_ring
-from .round import fit_ellipsoid, fit_revolution
+from .round import fit_ellipsoid, fit_revolution, fit_ring
 
 SHEET = 0.012  # x extent: half of a flat thing's thickness
 REACH = 0.03  # x extent, over which a shape gives way to what sticks out beside it

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from ...base.arrays import F64, I64, U8, Mask, Pixels
 from ...base.camera import Camera
-from ...base.distances import nearest_in
+from ...base.poisson_disk import nearest_in
 from ...pictures.image import to_u8
 from .. import LiftSubject
 from ..relief.body import ReliefBody

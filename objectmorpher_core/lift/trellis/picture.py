@@ -11,8 +11,8 @@ from PIL import Image
 
 from ...base.arrays import F32, F64
 from ...document.model import Matte
+from ...models.depth_torch import open_net
 from ...models.registry import ModelError
-from ...models.transformers_net import open_net
 from .. import LiftError
 
 if TYPE_CHECKING:

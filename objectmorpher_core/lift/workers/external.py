@@ -33,9 +33,8 @@ from ..registration.imported import lift_imported
 from ..registration.placement import Hints, Proposal, Registrar, register
 from ..registration.view import Target
 from ..trellis.camera import pose_in
-from .answer import VERSION, WRONG, check_similarity, read_told
 from .file import LiftWorker, read_worker
-from .process import run_worker
+from .process import VERSION, WRONG, check_similarity, read_told, run_worker
 
 log = logging.getLogger(__name__)
 OBJECT, SEEN = "object", "object.json"  # what a worker leaves

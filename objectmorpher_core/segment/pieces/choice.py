@@ -4,8 +4,7 @@ Regions grow around the click; the best has strong contrast across its outline, 
 subject map, leaves the photo's frame free, and has the click near its middle. A first click on a
 part means the whole; a correction means the part around it that the outline got wrong. What a
 correction means may show better from the other side: what grows around a click that says the
-contrary may have the clearer outline, and the rest is meant. Or it is as far as a walk from the
-clicks gets that may end at any step, where the answer before is trusted (Grady 2005).
+contrary may have the clearer outline, and the rest is meant.
 """
 
 from __future__ import annotations
@@ -33,8 +32,6 @@ LARGER_FINE = 0.3  # and there are many small things in a window that stand out
 SHARP_WHOLE = 6.0  # exponent: how much more a better region is likely to be meant than another
 SHARP_PART = 20.0
 SHARP_CORRECTION = 6.0
-TRUST = (0.1, 0.01, 0.001)  # in the answer before, x a walk's ease between like neighbours: decades
-KNOWN = 1e4  # the same of a click: a walk that comes there ends
 LIKELY_GONE = 1.0  # exponent: how much what a click takes away is background by its like's vote
 LIKELY_ADDED = 0.25  # the same of what a click adds, which may be like nothing selected so far
 ALL_OF_IT = 0.05  # contrast, in place of an outline's, of all that a correction can reach
@@ -154,7 +151,7 @@ def choose(ground: PieceGround, prompt: Prompt) -> PieceChoice:
 
 def correct(ground: PieceGround, ask: Correction) -> PieceChoice:
     """The part of the pieces it may change that a click on a wrong place means."""
-    regions = [*_parts(ground, ask), *_left_over(ground, ask), *_reached(ground, ask)]
+    regions = [*_parts(ground, ask), *_left_over(ground, ask)]
     if ask.guess is not None:
         regions.append(_guessed(ground, ask, ask.guess))
     regions = _likeliest(ground.pieces, regions, SHARP_CORRECTION)
@@ -219,23 +216,6 @@ def _left_over(ground: PieceGround, ask: Correction) -> list[PieceRegion]:
             rest = touching(pieces, free & ~pieces.region(growth, k), alone)
             if not rest[list(others)].any():
                 regions.append(_rated(ground, ask, rest))
-    return regions
-
-
-def _reached(ground: PieceGround, ask: Correction) -> list[PieceRegion]:
-    """The allowed pieces from which a walk is likelier to end at the click than to stay.
-
-    What is not allowed is, but for what a box leaves out, already what the click says: it draws.
-    """
-    pieces, piece = ground.pieces, ask.piece(ground)
-    alone, free = only(pieces, piece), ask.free(ground)
-    regions = []
-    for trust in TRUST:
-        wrong, right = np.where(free, 1e-9, trust), np.where(free, trust, 1e-9)
-        right[list(ask.others(ground))] = KNOWN
-        wrong[piece], right[piece] = KNOWN, 1e-9
-        found = ((pieces.walk_home(wrong, right) > 0.5) & free) | alone
-        regions.append(_rated(ground, ask, touching(pieces, found, alone)))
     return regions
 
 

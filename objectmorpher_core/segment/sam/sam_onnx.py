@@ -18,7 +18,7 @@ from ...base.arrays import F32, RGB
 from ...models import HubModel, ModelError
 from ...models.onnx_session import open_session
 from ...models.weight_folder import check_folder
-from .network import CORNER, GROUND, NOTHING, OBJECT, OTHER_CORNER, Asked, Masks, normalized
+from .view import CORNER, GROUND, NOTHING, OBJECT, OTHER_CORNER, Asked, Masks, normalized
 
 SIDE = 1024  # px, where the file does not say
 LOW = 256  # px of logits, likewise

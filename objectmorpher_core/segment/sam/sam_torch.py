@@ -19,7 +19,7 @@ from ...base.arrays import F32, RGB
 from ...models import HubModel, ModelError, device, ledger
 from ...models.plans import Need, Plan
 from ...models.weight_folder import CONFIG, count_parameters, stamp
-from .network import Asked, Masks, normalized
+from .view import Asked, Masks, normalized
 
 HALF = np.full(3, 0.5, np.float32)  # SAM 3's mean and deviation
 CLASSES = {"sam": "SamModel", "sam2": "Sam2Model", "sam3": "Sam3TrackerModel"}

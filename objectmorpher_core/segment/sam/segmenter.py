@@ -26,9 +26,7 @@ from ..selection import (
     keep_touched,
 )
 from ..subject import SubjectNet, subject_guess
-from .frame import Box, SamFrame
-from .network import SamNetwork
-from .view import Encoded, SamAnswer, SamView, inside_box
+from .view import Box, Encoded, SamAnswer, SamFrame, SamNetwork, SamView, inside_box
 
 WITHOUT_GPU = 110  # millions of parameters; a larger SAM takes minutes a photo on a CPU
 SMALL = 0.4  # x longer side of the photo: a smaller thing is looked at once more

@@ -8,16 +8,130 @@ that a click decodes once.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import cv2
 import numpy as np
+from PIL import Image
 
-from ...base.arrays import F32, RGB, Mask
+from ...base.arrays import F32, F64, RGB, Mask
 from ...document.model import Click, Prompt
 from ..matting.edges import enlarge, sharpen_band
 from ..pieces.view import steps_of
-from .frame import Box, SamFrame
-from .network import Asked, Masks, SamNetwork
+
+# The common part of every SAM: a picture encoded once, and masks decoded for each prompt.
+
+OBJECT, GROUND, CORNER, OTHER_CORNER, NOTHING = 1, 0, 2, 3, -1  # labels of SAM's points
+MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # ImageNet's, of RGB in [0, 1]
+DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A prompt in px of the network's square; a pixel's centre is at its number + 0.5."""
+
+    points: F64  # (n, 2)
+    is_object: Mask  # (n,) else it is what is not the object
+    box: F64 | None = None  # (4,) x0, y0, x1, y1
+    logits: F32 | None = None  # (low, low) the answer before this, to be told better
+
+
+@dataclass(frozen=True, eq=False)
+class Masks:
+    """The candidates for a prompt."""
+
+    logits: F32  # (k, low, low), positive inside
+    scores: F32  # (k,) overlap (IoU) with the right mask that the network expects
+
+
+class SamNetwork(Protocol):
+    """A model. Opening it is costly, so that happens at the first picture."""
+
+    side: int  # px of the square that it sees
+    low: int  # px of the square of logits
+    is_padded: bool
+
+    def encode(self, picture: RGB) -> tuple[F32, ...]:
+        """Features of a picture (h, w, 3), at most `side` px each way. Raises ModelError."""
+        ...
+
+    def decode(self, features: tuple[F32, ...], asked: Asked, is_several: bool) -> Masks:
+        """Three masks, or the one where the prompt leaves no choice. Raises ModelError."""
+        ...
+
+
+def normalized(picture: RGB, side: int, mean: F32 = MEAN, deviation: F32 = DEVIATION) -> F32:
+    """(1, 3, side, side) of a picture (h, w, 3); what it leaves empty is 0."""
+    pixels = np.zeros((1, 3, side, side), np.float32)
+    height, width = picture.shape[:2]
+    scaled = (picture.astype(np.float32) / 255 - mean) / deviation
+    pixels[0, :, :height, :width] = scaled.transpose(2, 0, 1)
+    return pixels
+
+
+# The place of a photo, or of a crop of it, in the square picture that a SAM sees.
+#
+# SAM (Kirillov et al. 2023) keeps the proportions and leaves the square's right or bottom empty;
+# SAM 2 and 3 (Ravi et al. 2024) stretch. Masks come back as a small square of logits in the same
+# frame.
+
+Box = tuple[int, int, int, int]  # left, top, right, bottom px of the photo
+
+
+@dataclass(frozen=True)
+class SamFrame:
+    """A box of the photo in a square of `side` px."""
+
+    box: Box
+    side: int
+    is_padded: bool  # proportions are kept; else it is stretched
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height px that the box takes up in the square."""
+        width, height = self.box[2] - self.box[0], self.box[3] - self.box[1]
+        if not self.is_padded:
+            return self.side, self.side
+        scale = self.side / max(width, height)
+        return max(1, int(width * scale + 0.5)), max(1, int(height * scale + 0.5))
+
+    @property
+    def scale(self) -> F64:
+        """(2,) px of the square for a px of the photo, across and down."""
+        width, height = self.box[2] - self.box[0], self.box[3] - self.box[1]
+        return np.array(self.size) / (width, height)
+
+    def picture(self, rgb: RGB) -> RGB:
+        """The box of a photo (H, W, 3) at its size in the square, as the SAMs were trained.
+
+        Pillow's triangle filter widens when it shrinks, as cv2's bilinear does not.
+        """
+        left, top, right, bottom = self.box
+        crop = Image.fromarray(np.ascontiguousarray(rgb[top:bottom, left:right]))
+        return np.asarray(crop.resize(self.size, Image.Resampling.BILINEAR), np.uint8)
+
+    def points(self, photo: F64) -> F64:
+        """(n, 2) px of the photo in px of the square; a pixel's centre is at its number + 0.5."""
+        return (np.asarray(photo, np.float64).reshape(-1, 2) - self.box[:2]) * self.scale
+
+    def unfold(self, logits: F32, size: tuple[int, int]) -> F32:
+        """(h, w) logits (n, n) of the square as those of the box, at `size` (width, height) px."""
+        if self.is_padded:
+            square = cv2.resize(logits, (self.side, self.side), interpolation=cv2.INTER_LINEAR)
+            logits = np.asarray(square[: self.size[1], : self.size[0]], np.float32)
+        return np.asarray(cv2.resize(logits, size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+    def fold(self, logits: F32, size: int) -> F32:
+        """(size, size) logits of the square that are `logits` (h, w) in the box; else very low."""
+        inner = cv2.resize(logits, self.size, interpolation=cv2.INTER_LINEAR)
+        square = np.full((self.side, self.side), EMPTY, np.float32)
+        square[: self.size[1], : self.size[0]] = inner
+        low = cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA)
+        return np.asarray(low, np.float32)
+
+
+EMPTY = -10.0  # logit of what is surely not the object
+
 
 REMEMBERED = 16  # answers of a photo
 WORK_SIDE = 1536  # px of a photo in which the edge is found; a larger one follows by its own edges

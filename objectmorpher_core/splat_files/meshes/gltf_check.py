@@ -8,17 +8,78 @@ import io
 import json
 import struct
 import warnings
+from collections.abc import Iterator
+from pathlib import Path, PureWindowsPath
 from typing import Any
+from urllib.parse import unquote
 
+from ...base.limits import MESH_ASSET as MAX_ASSET
 from ...base.limits import MESH_DEPTH as MAX_DEPTH
 from ...base.limits import MESH_JSON as MAX_JSON
 from ...base.limits import MESH_NODES as MAX_NODES
 from ...base.limits import MESH_TRIANGLES as MAX_TRIANGLES
 from ...base.limits import MESH_VERTICES as MAX_VERTICES
 from ...base.limits import TEXTURE_SIDE as MAX_SIDE
-from ...base.quoting import counted, shown
+from ...base.quoting import counted, named, shown
 from ..limits import SplatFileError
-from .folder import MeshFolder
+
+# The files beside a mesh: its textures and buffers, never one of another folder or the net.
+
+
+class MeshFolder:
+    """Resolves the names in a mesh file, as trimesh asks for them.
+
+    A name that leads out of the folder is refused, unless a file of that name lies in the folder:
+    material files often carry whole paths of the machine that they were made on. What was
+    refused or missing is remembered, since a loader may go on without.
+    """
+
+    def __init__(self, mesh: Path) -> None:
+        self._folder = mesh.resolve().parent
+        self.refused: list[str] = []
+        self.missing: list[str] = []
+
+    def get(self, name: str) -> bytes:
+        """The bytes of the file. Raises SplatFileError."""
+        path = self.find(name)
+        if path.stat().st_size > MAX_ASSET:
+            raise SplatFileError(f"{named(path.name)} is larger than {MAX_ASSET >> 20} MiB")
+        return path.read_bytes()
+
+    def find(self, name: str) -> Path:
+        """Return the path of the file. Raises SplatFileError."""
+        name = str(name).strip()
+        is_outside = "://" in name
+        for candidate in () if is_outside else (name, unquote(name), PureWindowsPath(name).name):
+            try:
+                path = (self._folder / candidate).resolve()
+                if not path.is_relative_to(self._folder):
+                    is_outside = True
+                elif path.is_file():
+                    return path
+            except (OSError, ValueError):  # a name that no file system takes
+                continue
+        if is_outside:
+            self.refused.append(name)
+            raise SplatFileError(f"the mesh names a file outside its folder: {name[:80]!r}")
+        self.missing.append(name)
+        raise SplatFileError(f"a file that the mesh names is missing: {name[:80]!r}")
+
+    def __getitem__(self, name: str) -> bytes:
+        return self.get(name)
+
+    def __contains__(self, name: str) -> bool:
+        try:
+            return self.find(name).is_file()
+        except SplatFileError:
+            return False
+
+    def keys(self) -> Iterator[str]:
+        return (path.name for path in self._folder.iterdir() if path.is_file())
+
+    def namespaced(self, namespace: str) -> MeshFolder:
+        return self
+
 
 ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # by componentType
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}

@@ -20,10 +20,8 @@ from ...base.arrays import F64, U8
 from ...base.limits import MESH_BYTES as MAX_MESH
 from ...document.gaussians import Gaussians
 from ..limits import GREATEST, SplatFileError
-from ..splats.axes import HALF_TURN, QUARTER_TURN, turned
-from ..splats.ply_table import read_header
-from .folder import MeshFolder
-from .gltf_check import MAX_SIDE, MAX_TRIANGLES, check_gltf
+from ..splats.ply_table import HALF_TURN, QUARTER_TURN, read_header, turned
+from .gltf_check import MAX_SIDE, MAX_TRIANGLES, MeshFolder, check_gltf
 from .sampling import sample_surface
 from .surface import WORKING, Look, Texture, TriangleMesh, linear_from_srgb
 

@@ -17,7 +17,7 @@ from ...base.poisson_disk import OPPOSED, thin_to_spacing
 from ...base.rotations import matrices_from_quats, quats_along, quats_from_matrices
 from ...document.gaussians import Gaussians
 from ..limits import SplatFileError
-from ..splats.outside import sides
+from ..splats.objects import sides
 from .surface import Spots, TriangleMesh, srgb_from_linear
 
 OVERSAMPLING = 20  # spots a Gaussian: fewer leave gaps

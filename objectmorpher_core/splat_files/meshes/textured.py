@@ -18,8 +18,8 @@ from ...deform.puppet import Puppet
 from ...document.gaussians import Gaussians
 from ...document.model import EditObject, Matte
 from ...pictures.image import Picture, at_most, encode_picture, to_u8
-from ..splats.axes import HALF_TURN
 from ..splats.objects import facing_outwards, thinnest_last
+from ..splats.ply_table import HALF_TURN
 from .meshing import surface_of
 from .surface import linear_from_srgb
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from objectmorpher.cli.subcommands import Subcommand, lazily
+from objectmorpher.cli.command_parser import Subcommand, lazily
 
 BENCH = Subcommand(
     "bench", "measure, on objects it makes itself", lazily("bench", "add_bench", __name__),

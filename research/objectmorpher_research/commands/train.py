@@ -9,8 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from objectmorpher.cli.command_parser import Subcommand, add_subcommands
 from objectmorpher.cli.ray import add_ray, check_ray
-from objectmorpher.cli.subcommands import Subcommand, add_subcommands
 from objectmorpher.cli.terminal import UsageError, progress_bar
 from objectmorpher_core.base.files import write_all
 

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
 from objectmorpher.server.address import LOOPBACK
-from objectmorpher.server.http import Handler, HttpServer, Refusal
+from objectmorpher.server.front import Handler, HttpServer, Refusal
 
 from ..evaluation.error import EvaluationError
 from .pages import Pages, QuestionError

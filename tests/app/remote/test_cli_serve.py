@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from objectmorpher.cli.parser import main
-from objectmorpher.server.address import Address, Server
+from objectmorpher.server.address import Address, Server, read_token
 from objectmorpher.server.client import hello
-from objectmorpher.server.tokens import read_token
 
 ROOT = Path(__file__).parents[3]
 

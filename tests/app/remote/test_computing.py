@@ -20,11 +20,19 @@ from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.computing import ADDRESS, TOKEN_FILE
 from objectmorpher.editor.settings import HERE, SERVER, Settings, read_settings, write_settings
-from objectmorpher.server.address import Address, AddressError, Server
+from objectmorpher.server.address import (
+    Address,
+    AddressError,
+    Server,
+    TokenError,
+    is_same,
+    make_token,
+    read_token,
+    write_token,
+)
 from objectmorpher.server.client import call
 from objectmorpher.server.front import Front
 from objectmorpher.server.table import table
-from objectmorpher.server.tokens import TokenError, is_same, make_token, read_token, write_token
 from objectmorpher.worker import job_functions
 from objectmorpher_core.base.arrays import frozen
 from objectmorpher_core.base.camera import Camera

@@ -17,10 +17,10 @@ from test_message import HOSTILE
 
 from objectmorpher.server import client
 from objectmorpher.server.address import Address, ServedError, Server, ServerLost
-from objectmorpher.server.alone import Alone
 from objectmorpher.server.client import hello
 from objectmorpher.server.front import Front, RequestLimits
 from objectmorpher.server.message import LARGE, digest, encode
+from objectmorpher.server.running import Alone
 from objectmorpher.server.table import types
 from objectmorpher_core.base.progress import Cancelled, silent
 from tests.tree import over

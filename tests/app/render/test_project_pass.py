@@ -138,7 +138,7 @@ def test_rows_come_in_the_order_that_is_given(project_pass):
 
 @pytest.mark.parametrize("motion", ["none", "given", "skin"])
 def test_depths_are_those_that_the_rasterisers_sort_by(motion):
-    from objectmorpher.render.view_depths import near_to_far, view_depths
+    from objectmorpher.render.splat_pass import near_to_far, view_depths
 
     if motion == "given":
         splats, _ = shapes.random_splats(0, "classic", False)

@@ -11,8 +11,8 @@ from objectmorpher.canvas.frame import build_frame, drawn_order
 from objectmorpher.commands import COMMANDS, next_step, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import STEEPEST, Shown, ToolName
-from objectmorpher.tools.look_tool import LookTool
 from objectmorpher.tools.pointer import TURN_SPEED
+from objectmorpher.tools.registry import LookTool
 from objectmorpher_core.base.rotations import turn_matrix
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Document, Placement

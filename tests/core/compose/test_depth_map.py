@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objectmorpher_core.compose.depth_map import depth_map, nearness
 from objectmorpher_core.document import edits
 from objectmorpher_core.document.model import Placement
+from objectmorpher_core.scripting.outputs import depth_map, nearness
 from tests import shapes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.compose.shadow.shadow_edge import evened, tinted
+from objectmorpher_core.compose.shadow.old_shadow import evened, tinted
 
 SIDE = 240
 PITCH = 4.0  # px per cell

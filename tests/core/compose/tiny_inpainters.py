@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from objectmorpher_core import models
-from objectmorpher_core.models.onnx_graph import as_varint, bytes_field
+from objectmorpher_core.models.onnx_session import as_varint, bytes_field
 from tests.core.models.small_networks import floats, integer, integers, model, node
 
 FAMILIES = ("pixelhacker", "lama", "migan")

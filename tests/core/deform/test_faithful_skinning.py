@@ -6,9 +6,8 @@ import numpy as np
 
 from objectmorpher_core.base.rotations import matrices_from_quats, quats_from_matrices, turn_matrix
 from objectmorpher_core.deform.binding import Binding, bind
-from objectmorpher_core.deform.faithful_skinning import skin_faithful, stretches
 from objectmorpher_core.deform.graph import ControlGraph, build_graph
-from objectmorpher_core.deform.skinning import Motion, Skinned
+from objectmorpher_core.deform.skinning import Motion, Skinned, skin_faithful, stretches
 from tests import shapes
 
 F64 = 1e-9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.lift.relief.bilinear import bilinear
+from objectmorpher_core.lift.relief.canvas import bilinear
 from tests.tree import over
 
 F64 = 1e-12

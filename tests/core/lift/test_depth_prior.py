@@ -17,8 +17,8 @@ from objectmorpher_core.lift.relief.body import BACK, FRONT, MIDDLE, ReliefBody
 from objectmorpher_core.lift.relief.depth_look import box_around
 from objectmorpher_core.lift.relief.depth_prior import NetworkDepth, align, follow, membrane
 from objectmorpher_core.lift.relief.lifter import ReliefLifter
-from objectmorpher_core.lift.relief.rethicken import with_thickness
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
+from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment.matting.matte import build_matte
 from tests import shapes

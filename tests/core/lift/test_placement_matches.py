@@ -10,8 +10,9 @@ import pytest
 
 from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.rotations import matrix_from_vector
-from objectmorpher_core.lift.registration.matches import LEAST, NEAR, Matches, alike
 from objectmorpher_core.lift.registration.placement import Hints, Registrar, register
+from objectmorpher_core.lift.registration.sketch import LEAST, Matches, alike
+from objectmorpher_core.lift.registration.sketch import NEAR_MATCH as NEAR
 from tests.core.lift import registered
 from tests.core.lift.registered import CAMERA, Body, Scene
 

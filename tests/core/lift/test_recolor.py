@@ -10,7 +10,7 @@ from objectmorpher_core.base.arrays import F64
 from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.document.gaussians import Gaussians
 from objectmorpher_core.document.model import LiftedObject, Matte, PhotoTexture
-from objectmorpher_core.lift.registration.recolor import CARRIED, NEAREST, recolored
+from objectmorpher_core.lift.registration.imported import CARRIED, NEAREST, recolored
 
 SIZE = 200  # px
 CAMERA = Camera.from_fov(SIZE, SIZE, 45)

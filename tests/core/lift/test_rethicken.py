@@ -12,7 +12,7 @@ from objectmorpher_core.base.camera import Camera
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import DeformSettings, LiftedObject, LiftSettings, Placement
 from objectmorpher_core.lift import LiftError
-from objectmorpher_core.lift.relief.rethicken import with_thickness
+from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.raster import tiles
 from tests import shapes

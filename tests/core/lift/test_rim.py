@@ -3,8 +3,8 @@
 import numpy as np
 import shapes
 
-from objectmorpher_core.lift.relief.rim import rim_lines
 from objectmorpher_core.lift.relief.silhouette import ReliefSilhouette
+from objectmorpher_core.lift.relief.spreading import rim_lines
 
 
 def test_a_line_runs_on_the_outline_whichever_way_it_goes_round():

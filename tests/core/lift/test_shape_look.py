@@ -15,7 +15,7 @@ from objectmorpher_core.lift.crop import Crop, planes_of
 from objectmorpher_core.lift.relief import shape_look
 from objectmorpher_core.lift.relief.fusion import fused
 from objectmorpher_core.lift.relief.shape_look import SeenShape, ShapeModel
-from objectmorpher_core.models import shipped
+from objectmorpher_core.models import registry
 from objectmorpher_core.pipeline import lift_mask
 from objectmorpher_core.segment import dino_tokens
 from objectmorpher_research.training.shape_eval import (
@@ -37,7 +37,7 @@ MOST = 12e6  # bytes
 def net() -> ShapeModel:
     if (reason := shape_look.missing()) is not None:
         pytest.skip(reason)
-    return ShapeModel(shipped.shape_network())
+    return ShapeModel(registry.shape_network())
 
 
 @cache
@@ -51,9 +51,9 @@ def seen(net: ShapeModel, one: Sample) -> SeenShape:
     return net.look(planes_of(one.rgb, one.mask, one.tangents), tokens, one.mask, crop)
 
 
-@pytest.mark.skipif(not shipped.is_shipped(), reason="no shape network ships yet")
+@pytest.mark.skipif(not registry.is_shipped(), reason="no shape network ships yet")
 def test_the_weights_are_those_of_the_card():
-    weights = shipped.shape_network()
+    weights = registry.shape_network()
     told = json.loads((CARD / "figures.json").read_text(encoding="utf-8"))
     digest = hashlib.sha256(weights).hexdigest()
     assert told["sha256"] == digest

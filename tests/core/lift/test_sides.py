@@ -12,8 +12,8 @@ from scipy.spatial import KDTree
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
 from objectmorpher_core.document.model import DeformSettings, LiftedObject, Placement
-from objectmorpher_core.lift.relief.rethicken import with_thickness
 from objectmorpher_core.lift.relief.sides import with_sides
+from objectmorpher_core.lift.relief.thickness import with_thickness
 from objectmorpher_core.raster import reference, tiles
 from objectmorpher_core.raster.posed import RestSplats
 from objectmorpher_core.raster.reference_layers import Picture3D

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from objectmorpher_core.models.onnx_graph import as_varint, bytes_field
+from objectmorpher_core.models.onnx_session import as_varint, bytes_field
 from objectmorpher_core.models.plans import Plan
 
 FLOAT = b"\x08\x01"  # TypeProto.Tensor.elem_type, and TensorProto.data_type in field 2

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objectmorpher_core.models.onnx_graph import as_varint, bytes_field, with_interface
-from objectmorpher_core.models.onnx_session import open_session
+from objectmorpher_core.models.onnx_session import (
+    as_varint,
+    bytes_field,
+    open_session,
+    with_interface,
+)
 
 
 def value(name: str, *sizes: int) -> bytes:
@@ -46,7 +50,7 @@ def test_bytes_that_are_no_onnx_file_are_refused():
 
 @pytest.mark.parametrize("number", [0, 1, 127, 128, 300, 2**31, 97_447_603])
 def test_numbers_survive_their_encoding(number):
-    from objectmorpher_core.models.onnx_graph import _varint
+    from objectmorpher_core.models.onnx_session import _varint
 
     encoded = as_varint(number)
     assert _varint(memoryview(encoded), 0) == (number, len(encoded))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from objectmorpher.cli import parser as cli
 from objectmorpher_core import models
-from objectmorpher_core.models import published
+
+added = import_module("objectmorpher_core.models.added")  # the package has a function of that name
 
 CONTENT = b"the numbers of a network"
 BEGINS = "47424a56"  # of its SHA-256
@@ -40,23 +42,23 @@ def test_every_official_name_tells_eight_digits_of_its_hash():
 def test_what_a_name_says_is_compared_with_the_file(tmp_path, known):
     path = tmp_path / known.files[0]
     path.write_bytes(CONTENT)
-    published.check_published(known, path)
+    added.check_published(known, path)
     path.write_bytes(CONTENT + b" and more")
     with pytest.raises(models.ModelError, match=rf"SHA-256 starts with \w{{8}}, not {BEGINS}$"):
-        published.check_published(known, path)
+        added.check_published(known, path)
 
 
 def test_a_file_is_kept_under_its_published_name(tmp_path, known, cache, monkeypatch):
-    monkeypatch.setattr(published, "trunk", lambda id: known)
+    monkeypatch.setattr(added, "trunk", lambda id: known)
     (tmp_path / "download (1).pth").write_bytes(CONTENT)
-    state = published.add_trunk("small", tmp_path / "download (1).pth")
+    state = added.add_trunk("small", tmp_path / "download (1).pth")
     assert state.state == "ok" and state.path == cache / known.files[0]
     assert state.path.read_bytes() == CONTENT
     state.path.write_bytes(b"something else")
-    found = published.look_trunk("small")
+    found = added.look_trunk("small")
     assert found.state == "damaged" and BEGINS in found.reason
-    published.remove_trunk("small")
-    assert published.look_trunk("small").state == "missing"
+    added.remove_trunk("small")
+    assert added.look_trunk("small").state == "missing"
     assert list(cache.iterdir()) == [] and (tmp_path / "download (1).pth").exists()
 
 

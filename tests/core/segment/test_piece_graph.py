@@ -7,7 +7,7 @@ import scipy.sparse as sparse
 from scipy.sparse.csgraph import connected_components
 
 from objectmorpher_core.base.arrays import Sparse
-from objectmorpher_core.segment.pieces import graph as piece_graph
+from objectmorpher_core.segment.pieces import pieces as piece_graph
 from objectmorpher_core.segment.pieces.features import (
     DISTRUST,
     LIKE_COLOR,

@@ -19,10 +19,8 @@ from objectmorpher_core.document.model import Click, Prompt
 from objectmorpher_core.models import ModelError, device, ledger
 from objectmorpher_core.models.plans import Plan
 from objectmorpher_core.segment import SelectionError
-from objectmorpher_core.segment.sam.frame import SamFrame
-from objectmorpher_core.segment.sam.network import Asked, Masks
 from objectmorpher_core.segment.sam.segmenter import Sam, open_network
-from objectmorpher_core.segment.sam.view import at_level
+from objectmorpher_core.segment.sam.view import Asked, Masks, SamFrame, at_level
 from tests.core.models.small_networks import in_ways
 from tests.core.segment import tiny_sams
 from tests.core.segment.contract import *  # noqa: F403

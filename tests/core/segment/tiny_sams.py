@@ -139,7 +139,7 @@ def _encoder(layout: str) -> bytes:
     """Colours in [0, 1], (1, 3, LOW, LOW)."""
     from onnx import TensorProto, helper
 
-    from objectmorpher_core.segment.sam.network import DEVIATION, MEAN
+    from objectmorpher_core.segment.sam.view import DEVIATION, MEAN
 
     def node(kind: str, given: list[str], out: str, **more: Any) -> Any:
         return helper.make_node(kind, given, [out], **more)

@@ -13,7 +13,7 @@ import zstandard
 
 from objectmorpher_core.splat_files import FORMATS, SplatFileError, read
 from objectmorpher_core.splat_files.splats.ply import READ
-from objectmorpher_core.splat_files.splats.spz_container import HEADER
+from objectmorpher_core.splat_files.splats.spz import HEADER
 from tests.core.splat_files.clouds import gaussians
 from tests.core.splat_files.refusal import measured, refusal
 

@@ -11,8 +11,13 @@ import pytest
 import zstandard
 
 from objectmorpher_core.document.gaussians import Gaussians
-from objectmorpher_core.splat_files.splats.spz import decode_spz, encode_spz
-from objectmorpher_core.splat_files.splats.spz_container import HEADER, SpzParts, unpack
+from objectmorpher_core.splat_files.splats.spz import (
+    HEADER,
+    SpzParts,
+    decode_spz,
+    encode_spz,
+    unpack,
+)
 from tests.core.splat_files.clouds import gaussians, matched
 
 HALF = np.sqrt(0.5)

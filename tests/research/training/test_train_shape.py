@@ -127,7 +127,7 @@ def test_training_goes_on_from_exported_weights(tmp_path):
     again = weights_of(path, ShapeNet())
     for name, value in net.state_dict().items():
         if value.is_floating_point():
-            assert torch.allclose(again[name], value, rtol=1e-3, atol=1e-3), name
+            assert torch.allclose(again[name], value, rtol=4e-3, atol=1e-3), name
     state = train_shape._State.resumed(tmp_path, train_shape.TrainingPlan(), again)
     assert torch.equal(state.net.state_dict()["tokens.weight"], again["tokens.weight"])
     with pytest.raises(ValueError, match="all families"):

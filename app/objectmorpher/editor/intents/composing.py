@@ -43,13 +43,13 @@ FILLING, RESTORING = (0x5A, 0xA9, 0xFF), (0xFF, 0xFF, 0xFF)  # a stroke's colour
 
 
 @dataclass(frozen=True, eq=False)
-class TraceOffer:
-    """An object's shadow and reflection in the photo, which it could take along."""
+class ShadowOffer:
+    """An object's shadow in the photo, which it could take along."""
 
     document: Document  # in which they were looked for
     k: int
-    shadow: Shadow | None  # None: there is only a reflection
-    plate: Plate  # without either
+    shadow: Shadow
+    plate: Plate  # without it
 
     @cached_property
     def outlined(self) -> Mask:
@@ -79,7 +79,7 @@ class Composing:
         self._is_restoring = False
         self._waiting: list[Stroke] = []  # painted, not filled in yet; the first is asked for
         self._compared: tuple[Plate, Document] | None = None  # a variant that is looked at
-        self._offer: TraceOffer | None = None  # found in the photo, not taken along yet
+        self._offer: ShadowOffer | None = None  # found in the photo, not taken along yet
 
     def forget(self) -> None:
         """Another document is opened."""
@@ -362,7 +362,7 @@ class Composing:
             self._editor.commit(t("Add shadow") if is_new else t("Remove shadow"))
 
     def take_shadow(self) -> None:
-        """Looks for its shadow and its reflection in the photo, and outlines what it finds.
+        """Looks for its shadow in the photo, and outlines what it finds.
 
         Nothing changes before `accept_shadow`; `refuse_shadow`, or any other edit, ends the offer.
         """
@@ -377,35 +377,30 @@ class Composing:
         covered = editor.derived.hidden(document)
         cutout = job_functions.Cutout(document.photo.pixels, item.matte, covered, ground)
 
-        def accept(answer: tuple[Shadow | None, Plate] | None) -> None:
+        def accept(answer: tuple[Shadow, Plate] | None) -> None:
             if answer is None:
-                editor.say(
-                    t("No clear shadow or reflection was found · Press B to paint it out by hand")
-                )
+                editor.say(t("No clear shadow was found · Press B to paint it out by hand"))
                 return
             shadow, plate = answer
-            if shadow is not None and is_known:
+            if is_known:
                 shadow = replace(shadow, ground=told)
             self._ready.append(
-                lambda: self._show_offer(masks, TraceOffer(document, k, shadow, plate))
+                lambda: self._show_offer(masks, ShadowOffer(document, k, shadow, plate))
             )
 
         editor.jobs.start(
-            t("Looking for its shadow and reflection"), job_functions.take_shadow, cutout,
+            t("Looking for its shadow"), job_functions.take_shadow, cutout,
             self._choice(document.plate.seed + 1), done=accept, failed=editor.complain_of,
             kind=SHADOW,
         )  # fmt: skip
 
-    def _show_offer(self, masks: tuple[Mask | None, ...], offer: TraceOffer) -> None:
+    def _show_offer(self, masks: tuple[Mask | None, ...], offer: ShadowOffer) -> None:
         editor, document = self._editor, self._editor.committed
         if document is None or not same(masks, _masks(document)):
             return
         self._offer = replace(offer, document=document)
         self._choose_tool(ToolName.COMPOSE)  # which outlines it
-        if offer.shadow is None:
-            text = t("What is outlined is its reflection, and would be taken off the background")
-        else:
-            text = t("What is outlined is its shadow, and would go along")
+        text = t("What is outlined is its shadow, and would go along")
         editor.say(text, Action(t("Leave it in the photo"), self.refuse_shadow))
 
     def accept_shadow(self) -> None:
@@ -414,11 +409,8 @@ class Composing:
         if offer is None:
             return
         changed = edits.set_plate(offer.document, offer.plate)
-        if offer.shadow is None:
-            self._editor.apply(t("Remove old reflection"), changed)
-        else:
-            changed = edits.set_shadow(changed, offer.k, offer.shadow)
-            self._editor.apply(t("Shadow as in the photo"), changed)
+        changed = edits.set_shadow(changed, offer.k, offer.shadow)
+        self._editor.apply(t("Shadow as in the photo"), changed)
         self._editor.message = None
 
     def refuse_shadow(self) -> None:
@@ -427,7 +419,7 @@ class Composing:
         self._editor.message = None
 
     @property
-    def offer(self) -> TraceOffer | None:
+    def offer(self) -> ShadowOffer | None:
         """What would be taken along, as long as the document is the one in which it was found."""
         offer, editor = self._offer, self._editor
         if offer is None or offer.document is not editor.document or offer.k != editor.current:

@@ -113,7 +113,7 @@ class Computing:
 
     def set_token(self, token: str) -> None:
         """Keeps the token in a file that only its owner may read."""
-        from ...server.tokens import TokenError, write_token
+        from ...server.address import TokenError, write_token
 
         token = token.strip()
         try:
@@ -163,8 +163,7 @@ class Computing:
             self._tasks.read_photo(is_quiet=True)
 
     def _understood(self, address: str, token: str) -> Server | None:
-        from ...server.address import Address, AddressError, Server
-        from ...server.tokens import TokenError, check_token
+        from ...server.address import Address, AddressError, Server, TokenError, check_token
 
         try:
             return Server(Address.of(address), check_token(token))
@@ -185,7 +184,7 @@ def _token_path() -> Path:
 
 def _stored_token() -> str:
     """The environment's, or the file's; "" where there is none that can be used."""
-    from ...server.tokens import VARIABLE, TokenError, read_token
+    from ...server.address import VARIABLE, TokenError, read_token
 
     if given := os.environ.get(VARIABLE):
         return given

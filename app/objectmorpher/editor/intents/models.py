@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from objectmorpher_core import models
 from objectmorpher_core.base.installation import is_frozen
 from objectmorpher_core.base.progress import Progress
-from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, shipped
+from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, registry
 
 from ...system.texts import t
 from ...worker import job_functions
@@ -173,8 +173,8 @@ class Models:
     @property
     def has_shape(self) -> bool:
         """Whether the shape network can look at what is lifted."""
-        is_fed = any(s.weight.id == shipped.TOKENS and s.state == "ok" for s in self.states)
-        return is_fed and shipped.is_shipped()
+        is_fed = any(s.weight.id == registry.TOKENS and s.state == "ok" for s in self.states)
+        return is_fed and registry.is_shipped()
 
     def add(self, path: Path) -> None:
         """The user's depth model, tried before it is kept."""

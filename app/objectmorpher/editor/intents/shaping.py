@@ -32,7 +32,7 @@ from ...worker import job_functions
 from ..view import Painted
 
 if TYPE_CHECKING:
-    from objectmorpher_core.lift.registration.importing import Import, ImportTarget
+    from objectmorpher_core.lift.registration.imported import Import, ImportTarget
     from objectmorpher_core.lift.registration.placement import Proposal
 
     from ..state import EditorState
@@ -306,7 +306,7 @@ class Shaping:
 
     def _scene(self) -> ImportTarget | None:
         """The photo and the mask that an object stands for."""
-        from objectmorpher_core.lift.registration.importing import ImportTarget
+        from objectmorpher_core.lift.registration.imported import ImportTarget
 
         editor, document = self._editor, self._editor.document
         thing = editor.object

@@ -11,7 +11,7 @@ from objectmorpher_core.document.model import EditObject
 
 from ...editor.view import PoseMode
 from ...tools.pose_tool import RING, RING_PART
-from ..widgets.fade import fades
+from ..widgets.panes import fades
 from ..widgets.theme import theme
 from ..window.landmarks import mark_on_canvas
 from .canvas import ACCENT, DARK, WHITE, CanvasPainter

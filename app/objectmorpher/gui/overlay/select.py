@@ -6,7 +6,7 @@ import numpy as np
 from imgui_bundle import ImVec2
 
 from ...tools.mask_tool import erases
-from ..widgets.fade import fades
+from ..widgets.panes import fades
 from ..widgets.theme import theme
 from .canvas import ACCENT, DARK, WARM, WHITE, CanvasPainter
 

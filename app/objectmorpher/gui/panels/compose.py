@@ -25,9 +25,7 @@ from ...editor.view import Composed
 from ...system.texts import sentence, t
 from ...tools.place_tool import wrapped
 from ...worker.job_functions import Variant
-from ..widgets.method_choice import draw_method
-from ..widgets.pictures import pictures
-from ..widgets.segmented import Segment, segmented
+from ..widgets.segmented import Segment, draw_method, segmented
 from ..widgets.theme import RADIUS, theme
 from ..widgets.widgets import (
     GAP,
@@ -45,12 +43,13 @@ from ..widgets.widgets import (
     heading,
     note,
     number_field,
+    pictures,
     rule,
     tooltip,
 )
 from ..window.landmarks import mark
 from .brush import draw_brush_fields, draw_radius
-from .edge import draw_decontaminate
+from .select import draw_decontaminate
 
 REFINERS = {"none": "None", "harmonise": "Harmonise"}
 DEGREES = 72.0  # points, width of the direction's field

@@ -17,11 +17,10 @@ from ..window.layout import Rect
 from .compose import draw_compose
 from .history_list import draw_history
 from .look import draw_look
-from .mask import draw_mask
 from .object_list import draw_objects
 from .place import draw_place
 from .pose import draw_pose
-from .select import draw_select
+from .select import draw_mask, draw_select
 
 
 class _Scroll:

@@ -2,17 +2,190 @@
 
 from __future__ import annotations
 
-from objectmorpher_core.document.model import EditObject
+from imgui_bundle import imgui
 
-from ...commands import run, why_not
+from objectmorpher_core.document.model import EditObject
+from objectmorpher_core.segment.mask_edit import LARGEST_REACH
+
+from ...commands import COMMANDS, run, why_not
 from ...editor.editor import Editor
-from ...editor.view import SelectMode
+from ...editor.view import Painted, SelectMode
 from ...system.texts import t
 from ..dialogs.models_dialog import draw_offer
 from ..widgets.segmented import Segment, segmented
 from ..widgets.theme import Icon
-from ..widgets.widgets import checkbox, gap, heading, note, tooltip
-from .edge import draw_command, draw_edge, draw_refinement_note
+from ..widgets.widgets import (
+    Number,
+    checkbox,
+    command_button,
+    gap,
+    half_width,
+    heading,
+    note,
+    number_field,
+    tooltip,
+)
+from .brush import draw_brush_fields, draw_radius
+
+# The parts shared by the Select and the Mask tool: the selection's edge, and its file.
+
+ICONS = {
+    "invert": Icon.INVERT, "clear": Icon.CLOSE, "grow": Icon.GROW, "shrink": Icon.SHRINK,
+    "smooth": Icon.SMOOTH, "feather": Icon.FEATHER, "fill_holes": Icon.FILL,
+    "remove_islands": Icon.BROOM, "import_mask": Icon.IMPORT, "export_mask": Icon.EXPORT,
+    "harden": Icon.IMAGE, "subject": Icon.PERSON, "import_shape": Icon.CUBE,
+}  # fmt: skip
+
+
+def draw_edge(editor: Editor) -> None:
+    """The edge's buttons and the px they work with."""
+    heading(t("Edge"))
+    reach = Number(t("Distance"), "%.1f px", 0.1, 1.0, rest=4.0, low=0.5, high=LARGEST_REACH)
+    editor.view.selecting.reach = number_field(reach, editor.view.selecting.reach).value
+    draw_pair(editor, "grow", "shrink")
+    draw_pair(editor, "smooth", "feather")
+    draw_pair(editor, "fill_holes", "remove_islands")
+    draw_command(editor, "invert")
+    if editor.masking.is_soft:
+        note(t("Part of this edge is soft by your hand, and stays as you painted it."))
+        draw_command(editor, "harden")
+    gap(12)
+    heading(t("Mask file"))
+    draw_pair(editor, "import_mask", "export_mask")
+
+
+def draw_pair(editor: Editor, left: str, right: str) -> None:
+    """Two commands side by side."""
+    draw_command(editor, left, half_width())
+    imgui.same_line()
+    draw_command(editor, right)
+
+
+def draw_command(editor: Editor, name: str, width: float = -1.0) -> None:
+    """A command as a button; `width` in points, -1 fills."""
+    label = f"{ICONS[name]}  {t(COMMANDS[name].label)}##{name}"
+    command_button(editor, name, label, width)
+    hint = _hint(name)
+    if hint and why_not(editor, name) is None:
+        tooltip(hint)
+
+
+def _hint(name: str) -> str:
+    """What a press does, where the label does not say it."""
+    hints = {
+        "grow": t("Add a rim of this many pixels"),
+        "shrink": t("Take away a rim of this many pixels"),
+        "smooth": t("Straighten the edge: teeth and specks go"),
+        "feather": t("Make the edge soft by this many pixels to each side"),
+        "fill_holes": t("Select what the selection encloses"),
+        "remove_islands": t("Take away the small pieces beside the large one"),
+        "import_shape": t("Put a 3D file (splats or a mesh) where the object is in the photo"),
+        "harden": t("Forget the softness you painted: the edge follows the photo again"),
+    }
+    return hints.get(name, "")
+
+
+def draw_decontaminate(editor: Editor) -> None:
+    """Draw how far the background's colour is taken out of the object's edge."""
+    if not editor.is_lifted:
+        note(t("Lift the object to take the background's colour out of its edge."))
+        return
+    number = Number(t("Clean"), "%.0f %%", 0.5, 10.0, 0.0, 0.0, 100.0)
+    change = number_field(number, 100 * editor.edging.decontaminate)
+    tooltip(t("Decontaminate: take the background's colour out of the object's soft edge"))
+    if change.is_changed:
+        editor.edging.preview_decontaminate(change.value / 100)
+    if change.is_done:
+        editor.commit(t("Decontaminate edge"))
+
+
+def draw_refinement_note(editor: Editor) -> None:
+    """Draw the note on what a changed selection means for the lifted object."""
+    if editor.object is not None and editor.is_lifted:
+        note(t("{name} is in 3D already. Change its outline whenever you like: its shape follows, "
+               "and its pose and place stay.", name=editor.object.name))  # fmt: skip
+
+
+# The Mask tool's settings: the brush, and the selection's edge.
+
+
+def draw_mask(editor: Editor) -> None:
+    heading(t("Brush"))
+    selecting = editor.view.selecting
+    selecting.painted = segmented("painted", _kinds(), selecting.painted)
+    selecting.is_erasing = segmented("brush", _ways(selecting.painted), selecting.is_erasing)
+    if selecting.painted is Painted.EDGE:
+        _draw_edge_brush(editor)
+        return
+    draw_brush_fields(editor)
+    if selecting.painted is not Painted.SELECTION:
+        _draw_shape_facts(editor)
+        return
+    if editor.view.brush.hardness >= 1:
+        note(t("With a fully hard brush the edge follows the photo."))
+    draw_refinement_note(editor)
+    gap(12)
+    draw_edge(editor)
+    gap(12)
+    draw_command(editor, "clear")
+
+
+def _kinds() -> tuple[Segment[Painted], ...]:
+    return (
+        Segment(Painted.SELECTION, t("Selection"), t("What belongs to the object")),
+        Segment(Painted.EDGE, t("Edge"), t("Where hair, fur or a halo need a second look")),
+        Segment(Painted.DEPTH, t("Depth"), t("Which parts of it are nearer than it looks")),
+        Segment(Painted.HIDDEN, t("Hidden"), t("Where it goes on behind something else")),
+    )
+
+
+def _ways(painted: Painted) -> tuple[Segment[bool], Segment[bool]]:
+    if painted is Painted.DEPTH:
+        return (
+            Segment(False, t("Nearer"), t("The brush brings a part nearer"), icon=Icon.UP),
+            Segment(True, t("Farther"), t("The brush pushes a part back"), icon=Icon.DOWN),
+        )
+    if painted is Painted.EDGE:
+        return (
+            Segment(False, t("Find"), t("The brush looks for the edge again"), icon=Icon.BRUSH),
+            Segment(True, t("Restore"), t("The edge is as it was found at first"), icon=Icon.ERASE),
+        )
+    if painted is Painted.HIDDEN:
+        return (
+            Segment(False, t("Paint"), t("The object goes on here, unseen"), icon=Icon.BRUSH),
+            Segment(True, t("Erase"), t("It does not go on here"), icon=Icon.ERASE),
+        )
+    return (
+        Segment(False, t("Paint"), t("The brush adds to the selection"), icon=Icon.BRUSH),
+        Segment(True, t("Erase"), t("The brush takes away from the selection"), icon=Icon.ERASE),
+    )
+
+
+def _draw_edge_brush(editor: Editor) -> None:
+    """The brush that finds an edge again, and what takes the background's colour out of it."""
+    draw_radius(editor)
+    note(t("Paint along an edge with hair, fur or a halo, wherever the object is now: it is found "
+           "again there."))  # fmt: skip
+    gap(12)
+    heading(t("Decontaminate"))
+    draw_decontaminate(editor)
+
+
+def _draw_shape_facts(editor: Editor) -> None:
+    """What the two brushes that tell about the shape are for."""
+    is_depth = editor.view.selecting.painted is Painted.DEPTH
+    if (reason := editor.shaping.why_fixed) is not None:
+        note(f"{reason}.")
+        return
+    if is_depth:
+        note(t("An arm before a body: paint it nearer. Each stroke brings it a little nearer; its "
+               "edges follow the photo's."))  # fmt: skip
+    else:
+        note(t("Paint on, where something stands before the object: it is completed there, in 3D "
+               "and in colour."))  # fmt: skip
+    if not editor.is_lifted:
+        note(t("It takes effect when you lift the object."))
+    command_button(editor, "clear_painted")
 
 
 def draw_select(editor: Editor) -> None:

@@ -4,11 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, TypeVar
 
 from imgui_bundle import ImVec2, imgui
 
 from ..window.layout import Rect
 from .theme import theme
+
+# Gradual changes, over within 120 ms; they keep the window awake no longer than that.
+
+FADE = 0.12  # s
+T = TypeVar("T")
+
+
+class Fades:
+    """Fades of things by their names. There is one instance, `fades`."""
+
+    def __init__(self) -> None:
+        self._now = self._before = 0.0  # s, of this frame and the last one
+        self._is_on = False
+        self._kept: dict[str, tuple[Any, float, float]] = {}  # thing, its share, when that was so
+        self._came: set[str] = set()  # those that are there, or coming
+        self._moving: set[str] = set()
+
+    def begin(self, now: float, is_on: bool) -> None:
+        """A frame at `now` s; where not `is_on`, everything is there or gone at once."""
+        self._before, self._now, self._is_on = self._now, now, is_on
+        # What was not asked for in the last frame is out of sight, and is not held.
+        self._kept = {n: kept for n, kept in self._kept.items() if kept[2] >= self._before}
+        self._moving.clear()
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether anything that was drawn in this frame is not yet as it will be."""
+        return bool(self._moving)
+
+    def shown(self, name: str, thing: T | None) -> tuple[T | None, float]:
+        """Return the thing to draw, `thing` or the one fading out, and its opacity in [0, 1]."""
+        before, share, since = self._kept.get(name, (None, 0.0, self._now))
+        is_coming = thing is not None
+        if is_coming and thing is not before:
+            before, share, since = thing, 0.0, self._now
+        elif is_coming != (name in self._came):  # it turns around
+            since = self._now
+        self._came = self._came | {name} if is_coming else self._came - {name}
+        way = (self._now - since) / FADE if self._is_on else 1.0
+        share = min(share + way, 1.0) if is_coming else max(share - way, 0.0)
+        if share == 0.0 and not is_coming:
+            self._kept.pop(name, None)
+            return None, 0.0
+        self._kept[name] = (before, share, self._now)
+        if share < 1.0 or not is_coming:
+            self._moving.add(name)
+        return before, share
+
+
+fades = Fades()
+
 
 TOOLS, INSPECTOR, STATUS, START = "##tools", "##inspector", "##status", "##start"  # their names
 

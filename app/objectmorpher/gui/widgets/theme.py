@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
+import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from ...system.resources import resource
-
+FONTS = Path(imgui_bundle.__file__).parent / "assets" / "fonts"  # which imgui-bundle comes with
+REGULAR, BOLD, ICONS = (
+    FONTS / "Roboto" / "Roboto-Regular.ttf",
+    FONTS / "Roboto" / "Roboto-Bold.ttf",
+    FONTS / "Font_Awesome_6_Free-Solid-900.otf",
+)
 FONT_SIZE = 16.0  # ImGui counts line height: 16 is 14-point text
 SMALL_SIZE = 14.0
 TITLE_SIZE = 28.0
@@ -160,17 +166,14 @@ def load_fonts() -> None:
     """The UI family with the icons merged in, and its bold."""
     fonts = imgui.get_io().fonts
     fonts.clear()
-    fonts.add_font_from_file_ttf(str(resource("assets/fonts/Roboto-Regular.ttf")), FONT_SIZE)
+    fonts.add_font_from_file_ttf(str(REGULAR), FONT_SIZE)
     icons = imgui.ImFontConfig()
     icons.merge_mode = True
     icons.glyph_min_advance_x = ICON_SIZE + 3
     icons.glyph_max_advance_x = ICON_SIZE + 3
     icons.glyph_offset = ImVec2(0.0, 0.5)
-    icon_file = str(resource("assets/fonts/FontAwesome6-Solid.otf"))
-    fonts.add_font_from_file_ttf(icon_file, ICON_SIZE, icons)
-    theme.bold = fonts.add_font_from_file_ttf(
-        str(resource("assets/fonts/Roboto-Bold.ttf")), FONT_SIZE
-    )
+    fonts.add_font_from_file_ttf(str(ICONS), ICON_SIZE, icons)
+    theme.bold = fonts.add_font_from_file_ttf(str(BOLD), FONT_SIZE)
 
 
 def apply(name: str, scale: float) -> None:

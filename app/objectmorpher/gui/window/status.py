@@ -12,8 +12,7 @@ from ...editor.intents.models import DOWNLOAD
 from ...system.report import without_names
 from ...system.texts import t
 from ...worker.requests import Executor, Request
-from ..widgets.fade import fades
-from ..widgets.panes import STATUS, edge, pane
+from ..widgets.panes import STATUS, edge, fades, pane
 from ..widgets.theme import Icon, theme
 from ..widgets.widgets import icon_button, small_text, tooltip
 from .landmarks import mark

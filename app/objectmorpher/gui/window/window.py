@@ -32,18 +32,17 @@ from ..dialogs.popups import Popups
 from ..dialogs.start import StartScreen
 from ..panels.inspector import draw_inspector
 from ..widgets import theme as looks
-from ..widgets.fade import fades
-from ..widgets.pictures import pictures
+from ..widgets.panes import fades
 from ..widgets.theme import theme
+from ..widgets.widgets import pictures
 from . import landmarks
-from .frame_log import FrameLog
 from .input import HELP, Input
+from .landmarks import FrameLog
 from .layout import Layout, Rect, has_panel, lay_out
-from .menu import draw_menu
+from .menu import draw_menu, draw_toolbar
 from .overlays import draw_overlays
 from .scenes import build_scene
 from .status import draw_status
-from .toolbar import draw_toolbar
 
 log = logging.getLogger(__name__)
 

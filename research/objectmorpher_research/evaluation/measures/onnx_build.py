@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from objectmorpher_core.base.arrays import F32
-from objectmorpher_core.models.onnx_graph import GRAPH, INPUT, OUTPUT, as_varint, bytes_field
+from objectmorpher_core.models.onnx_session import GRAPH, INPUT, OUTPUT, as_varint, bytes_field
 
 IR, OPSET = 7, 13  # versions that every onnxruntime of ours knows
 NODE, NAME, INITIALIZER, OPSETS = 1, 2, 5, 8  # field numbers

@@ -14,7 +14,7 @@ from typing import Any
 
 from objectmorpher_core import models
 from objectmorpher_core.models import device
-from objectmorpher_core.models.published import (
+from objectmorpher_core.models.added import (
     PLAIN,
     check_published,
     find_file,

@@ -20,12 +20,11 @@ from objectmorpher_core.base.arrays import F32, F64, frozen
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.document.model import LiftedObject
 from objectmorpher_core.lift import LiftError, LiftSubject
-from objectmorpher_core.lift.registration.matches import Matches, alike
+from objectmorpher_core.lift.registration.sketch import Matches, alike
 from objectmorpher_core.lift.registration.view import towards
-from objectmorpher_core.lift.workers.answer import WRONG, check_similarity, read_told
 from objectmorpher_core.lift.workers.external import write_job
 from objectmorpher_core.lift.workers.file import LiftWorker, read_worker, worker_names
-from objectmorpher_core.lift.workers.process import run_worker
+from objectmorpher_core.lift.workers.process import WRONG, check_similarity, read_told, run_worker
 
 from . import TrainingError
 

@@ -38,7 +38,7 @@ class QwenEdit:
 
     def encoders(self, folder: Path, device: str, number: str) -> Any:
         """See `EditModel`."""
-        from objectmorpher_core.compose.refine.qwen_processor import QwenProcessor
+        from objectmorpher_core.compose.refine.qwen import QwenProcessor
 
         processor = QwenProcessor.from_folder(folder)
         pipeline = open_pipeline(

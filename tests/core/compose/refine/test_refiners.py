@@ -22,7 +22,7 @@ from safetensors.torch import load_file
 from objectmorpher_core import models
 from objectmorpher_core.base.progress import Cancelled, silent
 from objectmorpher_core.compose import refine
-from objectmorpher_core.compose.refine import RefineError, diffusion, klein, memory
+from objectmorpher_core.compose.refine import RefineError, diffusion, klein
 from objectmorpher_core.models import ModelError, ledger
 from tests import photos
 from tests.core.models.small_networks import Ways
@@ -279,7 +279,8 @@ def test_a_picture_in_few_bits_out_of_a_gguf_file(folders, tmp_path):
 def test_four_bits_keep_the_few_layers_whole_through_which_all_goes(folders):
     """Of both networks; made by bitsandbytes on a GPU, which is not asked for here."""
     pytest.importorskip("bitsandbytes")
-    skipped = memory.quantised(("transformer",)).quant_mapping["transformer"].llm_int8_skip_modules
+    kept = diffusion.quantised(("transformer",)).quant_mapping["transformer"]
+    skipped = kept.llm_int8_skip_modules
     seen = set()
     for name, kind in (("qwen", QwenImageTransformer2DModel), ("klein", Flux2Transformer2DModel)):
         network = kind.from_pretrained(folders[name] / "transformer")

@@ -10,9 +10,8 @@ from imgui_bundle import imgui
 from ....editor.editor import Editor
 from ....editor.shortcuts import Shortcuts
 from ....editor.view import Popup
-from ...widgets.fade import fades
-from .about import draw_about
-from .help import draw_help
+from ...widgets.panes import fades
+from .help import draw_about, draw_help
 from .palette import CommandPalette
 from .preferences import ComputeFields, draw_preferences
 from .shortcuts import ShortcutsPopup

@@ -8,17 +8,16 @@ from functools import partial
 
 from imgui_bundle import ImVec2, imgui
 
-from ....commands import COMMANDS, GROUPS, keys_of, run, why_not
+from ....commands import COMMANDS, GROUPS, SETTINGS, keys_of, run, why_not
 from ....commands.gestures import GESTURES
-from ....commands.settings import SETTINGS
 from ....editor.editor import Editor
 from ....editor.view import Popup
 from ....system.help_pages import pages
 from ....system.texts import t
+from ...widgets.modal import popup
 from ...widgets.theme import theme
 from ...widgets.widgets import fitted, tooltip
 from ...window.landmarks import mark
-from .frame import popup
 
 SIZE = (600.0, 480.0)  # points
 ROW = 28.0

@@ -10,10 +10,9 @@ from ....editor.editor import Editor
 from ....editor.settings import AUTO, HERE, SERVER
 from ....system.motion import FULL, REDUCED
 from ....system.texts import languages, t
-from ...widgets.method_choice import draw_method
-from ...widgets.segmented import Segment, segmented
+from ...widgets.modal import label, popup
+from ...widgets.segmented import Segment, draw_method, segmented
 from ...widgets.widgets import FILL, button, gap, heading, note
-from .frame import label, popup
 
 SIZE = (520.0, 580.0)  # points
 WITH_SERVER = (520.0, 678.0)

@@ -11,9 +11,9 @@ from ....commands.gestures import GESTURES
 from ....editor.editor import Editor
 from ....editor.shortcuts import Shortcuts
 from ....system.texts import t
+from ...widgets.modal import popup
 from ...widgets.theme import SMALL_SIZE, Icon, theme
 from ...widgets.widgets import Emphasis, bold_text, button, small_text, tooltip
-from .frame import popup
 
 SIZE = (880.0, 720.0)  # points
 COLUMNS = 2
