@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.arrays import Mask, Selection, frozen
 from ..base.camera import Camera
+from .edge_edits import decontaminated
 from .model import (
     SELECTED,
     BesidePrompt,
@@ -165,15 +166,13 @@ def refit(
     Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
     """
     from ..lift.carrying import refitted
-    from .edge_edits import decontaminated
 
-    item, camera = document.objects[k], document.photo.camera
-    objects = tuple(
-        decontaminated(document.photo, refitted(other, matte, lifted, camera))
-        if _is_copy(other, item)
-        else other
+    item, photo = document.objects[k], document.photo
+    fitted = (
+        refitted(other, matte, lifted, photo.camera) if _is_copy(other, item) else other
         for other in document.objects
     )
+    objects = tuple(decontaminated(photo, each) for each in fitted)
     return replace(document, objects=objects, plate=plate, refined=None)
 
 
@@ -185,8 +184,6 @@ def set_lifted(
     shape: LiftSettings | None = None,
 ) -> Document:
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
-    from .edge_edits import decontaminated
-
     item = document.objects[k].with_lifted(matte, lifted, shape)
     changed = document.with_object(k, decontaminated(document.photo, item))
     return changed.with_backend("lift", lifted.backend)
@@ -197,7 +194,6 @@ def reshape(
 ) -> Document:
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
     from ..lift.carrying import carried_over
-    from .edge_edits import decontaminated
 
     changed = carried_over(document.objects[k], matte, lifted, shape)
     changed = decontaminated(document.photo, changed)
