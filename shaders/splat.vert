@@ -14,7 +14,7 @@ in vec4 p_color;
 in vec4 p_depth;
 in vec4 p_shift;
 in vec4 p_slope;
-in vec2 p_edge;
+in vec3 p_edge;
 
 uniform vec2 resolution;  // px of the target
 uniform float top;        // px of the view, the target's first row
@@ -44,7 +44,7 @@ flat out vec4 v_color;
 flat out vec4 v_depth;
 flat out vec4 v_shift;
 flat out vec4 v_slope;
-flat out vec2 v_edge;
+flat out vec3 v_edge;
 
 void main() {
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;

@@ -6,7 +6,7 @@
 
 uniform vec2 depth_range;  // world units: the object's depth, and its size
 
-out vec4 front;            // depth, shift, whether it shows the photo
+out vec4 front;            // depth, shift, see `shows`
 
 void main() {
     vec2 d = offset();
@@ -24,5 +24,5 @@ void main() {
     // Any depth has a place between 0 and 1, with most digits where the object is.
     float t = (depth - depth_range.x) / depth_range.y;
     gl_FragDepth = 0.5 + 0.5 * t / (1.0 + abs(t));
-    front = vec4(depth, shift, v_shift.z > 0.0 ? 1.0 : 0.0);
+    front = vec4(depth, shift, shows());
 }

@@ -4,6 +4,7 @@
 flat in vec4 v_depth;  // Z, ZX, ZY, excess of MAGNIFIED
 flat in vec4 v_shift;  // SX, SY, PHOTO, BODY
 flat in vec4 v_slope;  // AXX, AXY, AYX, AYY
+flat in vec3 v_edge;   // how much is not MATTED, SOLID of that; ASIDE
 
 uniform vec2 gaps;         // 1 / gap^2, 1 / texture_gap^2
 uniform float fade;        // x gap, beyond which nothing belongs to a layer
@@ -13,7 +14,7 @@ uniform float least_front;
 #include "splat_cells.glsl"
 
 uniform sampler2D cover;   // of the layer before, see splat_resolve.frag
-uniform sampler2D front0;  // depth, shift and is_photo of the nearest samples of a layer
+uniform sampler2D front0;  // depth, shift and what is shown of the nearest samples of a layer
 #endif
 #if LAYER > 1
 uniform sampler2D front1;
@@ -30,12 +31,16 @@ vec2 shift_at(vec2 d) {
     return v_shift.xy + vec2(dot(v_slope.xy, d), dot(v_slope.zw, d));
 }
 
+// 1: the photo, -1: an invented picture, 0: neither. Of alike ones the product is positive.
+float shows() {
+    return v_shift.z > 0.0 ? 1.0 - 2.0 * v_edge.z : 0.0;
+}
+
 // How much of a sample belongs to the layer of a front.
 float membership(float depth, vec2 shift, vec4 front) {
     float away = depth - front.x;
     vec2 looks = shift - front.yz;
-    float is_alike = v_shift.z > 0.0 ? front.w : 0.0;
-    float square = max(away * away * gaps.x, is_alike * dot(looks, looks) * gaps.y);
+    float square = max(away * away * gaps.x, shows() * front.w * dot(looks, looks) * gaps.y);
     float end = fade * fade;
     float t = clamp((end - square) / (end - 1.0), 0.0, 1.0);
     return t * t * (3.0 - 2.0 * t);

@@ -31,8 +31,6 @@ uniform vec2 limits;        // |x / z| and |y / z|, see posed.view_limits
 
 uniform bool has_sides;     // invented pictures; else the attributes above are none
 uniform float look_aside;   // rules.Rules
-uniform float ahead;
-uniform float near;
 uniform bool is_surface;    // rules.Splatting
 uniform float low_pass;     // its `filter`, a word that GLSL keeps for itself
 uniform bool is_compensated;
@@ -63,7 +61,7 @@ out vec4 p_color;   // RED, GREEN, BLUE, how much is not SEEN
 out vec4 p_depth;   // Z, ZX, ZY, what MAGNIFIED / sharp is more than 1
 out vec4 p_shift;   // SX, SY, PHOTO, BODY
 out vec4 p_slope;   // AXX, AXY, AYX, AYY
-out vec2 p_edge;    // how much is not MATTED, SOLID of that
+out vec3 p_edge;    // how much is not MATTED, SOLID of that; ASIDE
 
 float ramp(float value, float zero, float one) {
     float t = clamp((value - zero) / (one - zero), 0.0, 1.0);
@@ -185,11 +183,10 @@ void main() {
     p_axes = axes(vec3(fxx, sxy, fyy), fdet, cut);
     p_color = vec4(paint.rgb, 1.0 - seen);
     vec3 along_depth = motion[2] * root;
-    float depth = max(at.z - (is_aside ? ahead / near * nearest : 0.0), 0.5 * at.z);
-    p_depth = vec4(depth, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
+    p_depth = vec4(at.z, dot(along_depth, k0), dot(along_depth, k1), max(largest / sharp - 1.0, 0.0));
     p_shift = vec4(looks - photo_focal * sideways, photo, body);
     p_slope = vec4(axx, axy, ayx, ayy);
-    p_edge = vec2(1.0 - matted, solidity);
+    p_edge = vec3(1.0 - matted, solidity, is_aside ? 1.0 : 0.0);
     if (!is_there || any(isnan(p_centre)) || any(isinf(p_centre)) || any(isnan(p_axes)))
         p_kernel = vec4(1.0, 0.0, 0.0, -1.0);
 }

@@ -13,12 +13,11 @@ layout(location = 0) out vec4 sum_cover;
 layout(location = 1) out vec4 sum_place;
 layout(location = 2) out vec4 sum_photo;
 layout(location = 3) out vec4 sum_color;
-layout(location = 4) out float sum_left;
+layout(location = 4) out vec4 sum_left;
 layout(location = 5) out vec4 look;
 layout(location = 6) out vec4 cover;
 
 void main() {
-    sum_cover = sum_place = sum_photo = sum_color = look = cover = vec4(0.0);
-    sum_left = 0.0;
+    sum_cover = sum_place = sum_photo = sum_color = sum_left = look = cover = vec4(0.0);
 }
 #endif

@@ -45,7 +45,8 @@ float coverage(float total, vec2 slope) {
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 covers = texelFetch(sum_cover, pixel, 0);
-    float total = covers.x, body = covers.y, left = texelFetch(sum_left, pixel, 0).r;
+    vec4 sides = texelFetch(sum_left, pixel, 0);  // r: left; share aside, and its shift
+    float total = covers.x, body = covers.y, left = sides.r;
     if (total <= 0.0) discard;
 #ifdef IS_LAST
     if (left == 0.0) discard;  // tails only
@@ -58,14 +59,24 @@ void main() {
     bool is_photo = shown > 1e-6 * total;
     shown = is_photo ? shown : 0.0;
     float inverse = is_photo ? 1.0 / shown : 0.0;
-    vec2 shift = vec2(places.w, photos.x) * inverse;
-    vec2 at = unmoved.x * gl_FragCoord.xy + unmoved.yz + shift;
+    float own = max(shown - sides.y, 0.0), aside = sides.y * inverse;
+    bool is_own = own > 1e-6 * total, is_aside = aside > 1e-6;
+    vec2 shift = is_own ? vec2(places.w, photos.x) / own : vec2(0.0);
+    vec2 unshifted = unmoved.x * gl_FragCoord.xy + unmoved.yz, at = unshifted + shift;
     vec4 texel = vec4(0.0);
-    if (is_photo) texel = sample_photo(at, 1.0 + photos.y * inverse);
-    float seen = max(1.0 - photos.z * inverse, 0.0);
-    seen *= all(greaterThan(at, photo_box.xy)) && all(lessThan(at, photo_box.zw)) ? 1.0 : 0.0;
+    if (is_own) texel = sample_photo(at, 1.0 + photos.y * inverse);
+    float seen = is_own && all(greaterThan(at, photo_box.xy)) && all(lessThan(at, photo_box.zw)) ? 1.0 : 0.0;
+    seen *= max(1.0 - photos.z * inverse, 0.0);
     float matte = texel.a * max(1.0 - photos.w * inverse, 0.0) + colors.a * inverse;
     matte = is_photo ? matte : 0.0;
+    if (is_aside) {  // whole, and the photo counts as far as the matte has something of it
+        vec2 there = sides.zw / sides.y;
+        vec3 invented = sample_photo(unshifted + there, 1.0 + photos.y * inverse).rgb;
+        float share = is_own ? min(aside / max(matte, 1e-30), 1.0) : 1.0;
+        texel.rgb = mix(texel.rgb, invented, share);
+        seen *= min((1.0 - share) / max(1.0 - aside, 1e-6), 1.0);
+        if (!is_own) shift = there;
+    }
 
     // the layer's alpha and colour
 #ifdef IS_SURFACE

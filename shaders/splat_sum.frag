@@ -5,7 +5,6 @@
 #include "splat_layer.glsl"
 
 flat in vec4 v_color;  // RED, GREEN, BLUE, how much is not SEEN
-flat in vec2 v_edge;   // how much is not MATTED, SOLID of that
 
 uniform bool is_edged;  // rules.Splatting
 #ifndef IS_LAST
@@ -16,7 +15,8 @@ layout(location = 0) out vec4 sum_cover;  // total, body; gradient of total or l
 layout(location = 1) out vec4 sum_place;  // gradient of what ends with the surface, depth, shift x
 layout(location = 2) out vec4 sum_photo;  // shift y; excess of MAGNIFIED, not SEEN, not MATTED
 layout(location = 3) out vec4 sum_color;  // of the body; SOLID of what is not MATTED
-layout(location = 4) out float sum_left;  // for later layers; of the last one: its fronts
+layout(location = 4) out vec4 sum_left;   // for later layers; of the last one: its fronts;
+                                          // what is ASIDE, and its shift
 
 void main() {
     vec2 d = offset();
@@ -29,12 +29,12 @@ void main() {
     float photo = v_shift.z, body = v_shift.w, both = photo + body;
 #ifdef IS_LAST
     float member = share;
-    sum_left = share * alpha * both >= least_front ? 1.0 : 0.0;
+    float left = share * alpha * both >= least_front ? 1.0 : 0.0;
 #else
     vec4 begin = texelFetch(front, ivec2(gl_FragCoord.xy), 0);
     if (begin.x > 1e29) discard;  // there is no such layer
     float member = share * membership(depth, shift, begin);
-    sum_left = (share - member) * alpha * both;
+    float left = (share - member) * alpha * both;
 #endif
     alpha *= member;
     photo *= alpha;
@@ -49,7 +49,10 @@ void main() {
     sum_cover = vec4(photo + body, body, log(clear));
 #endif
     float ended = v_shift.w + (is_edged ? v_shift.z * v_edge.x * v_edge.y : 0.0);
-    sum_place = vec4(gradient * ended, (photo + body) * depth, photo * shift.x);
-    sum_photo = photo * vec4(shift.y, v_depth.w, v_color.w, v_edge.x);
+    float aside = photo * v_edge.z;
+    vec2 own = (photo - aside) * shift;
+    sum_left = vec4(left, aside, aside * shift);
+    sum_place = vec4(gradient * ended, (photo + body) * depth, own.x);
+    sum_photo = vec4(own.y, photo * vec3(v_depth.w, v_color.w, v_edge.x));
     sum_color = vec4(body * v_color.rgb, photo * v_edge.x * v_edge.y);
 }

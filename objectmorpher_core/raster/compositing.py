@@ -19,9 +19,11 @@ LEAST_PHOTO = np.float32(1e-6)  # share of a layer's alpha, below which it shows
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def composite_layer(
     s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top,
-    rules, kind,
+    rules, kind, has_sides,
 ):  # fmt: skip
     """Puts the layer behind what is there already, on the rows first..last of the tile.
+
+    `has_sides`: some of it shows invented pictures.
 
     Returns the first row, and the last + 1, in which a further layer may be seen.
     """
@@ -30,6 +32,14 @@ def composite_layer(
         start, end = m.strip_pixels(strip, first, last)
         _settle(s, start, end, edged)
     look_up(s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top)
+    if has_sides:
+        for strip in range(m.STRIPS):
+            _set_aside(s, *m.strip_pixels(strip, first, last))
+        look_up(
+            s, left, top, columns, first, last, view, photo, texels, shapes, crop_left, crop_top
+        )
+        for strip in range(m.STRIPS):
+            _mix_sides(s, *m.strip_pixels(strip, first, last))
     visible, opaque = np.float32(rules.visible), np.float32(rules.opaque)
     for strip in range(m.STRIPS):
         start, end = m.strip_pixels(strip, first, last)
@@ -66,14 +76,64 @@ def _settle(s, start, end, edged):
         is_photo = shown > LEAST_PHOTO * total
         inverse = ONE / max(shown, TINY)
         inverse = inverse if is_photo else ZERO
-        s[m.IS_PHOTO + k] = ONE if is_photo else ZERO
-        s[m.SHX + k] *= inverse
-        s[m.SHY + k] *= inverse
+        own = max(shown - s[m.SIDE + k], ZERO)  # that is no invented picture
+        is_own = own > LEAST_PHOTO * total
+        looks = ONE / max(own, TINY)
+        looks = looks if is_own else ZERO
+        s[m.IS_PHOTO + k] = ONE if is_own else ZERO
+        s[m.SHX + k] *= looks
+        s[m.SHY + k] *= looks
+        s[m.SIDE + k] *= inverse
         s[m.MAG + k] = ONE + s[m.MAG + k] * inverse
         s[m.MATTES + k] = max(ONE - s[m.MATTES + k] * inverse, ZERO)  # not below 0 by rounding
         s[m.BODY_CLEAR + k] += edged * (s[m.BODIED + k] + s[m.SOLIDS + k] - s[m.BODY_CLEAR + k])
         s[m.SOLIDS + k] *= inverse
         s[m.SEES + k] = max(ONE - s[m.SEES + k] * inverse, ZERO)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _set_aside(s, start, end):
+    """Keeps what was found of the photo, and has the invented pictures looked up next.
+
+    SIDE is their share, SIDE_X and SIDE_Y where they are looked at; both are straight afterwards.
+    """
+    for k in range(start, end):
+        shown = max(s[m.TOTAL + k] - s[m.BODIED + k], ZERO)
+        share = s[m.SIDE + k]
+        is_there = share > LEAST_PHOTO
+        inverse = ONE / max(share * shown, TINY)
+        inverse = inverse if is_there else ZERO
+        s[m.P_R + k], s[m.P_G + k] = s[m.T_R + k], s[m.T_G + k]
+        s[m.P_B + k], s[m.P_A + k] = s[m.T_B + k], s[m.T_A + k]
+        s[m.P_WITHIN + k], s[m.P_SHOWN + k] = s[m.WITHIN + k], s[m.IS_PHOTO + k]
+        x, y = s[m.SHX + k], s[m.SHY + k]
+        s[m.SHX + k], s[m.SHY + k] = s[m.SIDE_X + k] * inverse, s[m.SIDE_Y + k] * inverse
+        s[m.SIDE_X + k], s[m.SIDE_Y + k] = x, y
+        s[m.IS_PHOTO + k] = ONE if is_there else ZERO
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _mix_sides(s, start, end):
+    """Mixes what both have shown; where the photo is shown at all, it says where a pixel looks.
+
+    The photo counts as far as the matte has something of it, invented pictures are whole.
+    """
+    for k in range(start, end):
+        own, is_there = s[m.P_SHOWN + k], s[m.IS_PHOTO + k]
+        side = s[m.SIDE + k] * is_there
+        matte = s[m.P_A + k] * s[m.MATTES + k] + s[m.SOLIDS + k]
+        share = min(side / max(matte, TINY), ONE)
+        share = share if own > ZERO else is_there
+        rest = own * (ONE - share)
+        s[m.SEES + k] *= min((ONE - share) / max(ONE - side, LEAST_PHOTO), ONE)
+        s[m.T_R + k] = share * s[m.T_R + k] + rest * s[m.P_R + k]
+        s[m.T_G + k] = share * s[m.T_G + k] + rest * s[m.P_G + k]
+        s[m.T_B + k] = share * s[m.T_B + k] + rest * s[m.P_B + k]
+        s[m.T_A + k] = s[m.P_A + k]
+        s[m.SHX + k] += own * (s[m.SIDE_X + k] - s[m.SHX + k])
+        s[m.SHY + k] += own * (s[m.SIDE_Y + k] - s[m.SHY + k])
+        s[m.WITHIN + k] = own * s[m.P_WITHIN + k]
+        s[m.IS_PHOTO + k] = max(own, is_there)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)

@@ -37,8 +37,7 @@ OUT = skinning.ROWS  # then the columns of the results,
 VOLUME = OUT + p.SPAN  # |det F|,
 FACING = VOLUME + 1  # cosine of the normal,
 SMALLEST = VOLUME + 2  # and the smaller magnification
-ASIDE = VOLUME + 3  # whether it looks into an invented picture
-ROWS = VOLUME + 4
+ROWS = VOLUME + 3
 ENDLESS = 1e30
 
 
@@ -81,7 +80,6 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         shape = _shape(s, rest, base, k, screen, rules)
         _put_shape(s, k, rest[base + OPACITY * LANES + k], screen, kind, shape)
         place, j, f, a, b, _, (ixx, ixy, iyy), _ = shape
-        ahead = screen[2] / rules.near * rules.ahead
         r, u = base + k, base + k + U0 * LANES
         # normals turn with the cofactors of F; W turns them and the way to the camera alike
         k0, k1, k2 = _cross(f[1], f[2]), _cross(f[2], f[0]), _cross(f[0], f[1])
@@ -121,9 +119,7 @@ def project_textured(s, rest, base, sides, aside, screen, rules, kind):
         s[VOLUME * LANES + k] = abs(determinant)
         s[FACING * LANES + k] = cosine
         s[SMALLEST * LANES + k] = area / largest * j / zoom
-        s[ASIDE * LANES + k] = is_aside
-        z = s[o + p.Z * LANES]
-        s[o + p.Z * LANES] = max(z - is_aside * ahead, 0.5 * z)
+        s[o + p.ASIDE * LANES] = is_aside
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)
@@ -201,7 +197,7 @@ def weigh_textured(s, rest, base, scale, rules, kind):
             photo = ramp(stretch, rules.streak_end, rules.streak_start)
             matted = ramp(stretch, rules.matte_end, rules.matte_start)
         matted *= seen if kind.is_edged else ramp(turned, rules.turned_end, rules.turned_start)
-        if s[ASIDE * LANES + k] > 0.0:
+        if s[o + p.ASIDE * LANES] > 0.0:
             matted = seen = 0.0
         elif kind.has_colors:
             photo *= seen

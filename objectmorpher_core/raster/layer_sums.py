@@ -19,11 +19,22 @@ from .rules import LAYERS, ONE, THREE, TWO, ZERO
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _member(depth, x, y, is_alike, limits):
-    """How much a sample belongs to the layer of a front, from which it is so far: see `rules`."""
+    """How much a sample belongs to the layer of a front, from which it is so far: see `rules`.
+
+    `is_alike`: > 0 where both show the photo, or both an invented picture: see `_shows`.
+    """
     looks = is_alike * (x * x + y * y) * limits.per_texture_gap
     away = max(depth * depth * limits.per_gap, looks)
     t = min(max((limits.end - away) * limits.fall, ZERO), ONE)
     return t * t * (THREE - TWO * t)
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def _shows(g):
+    """1: the photo, -1: an invented picture, 0: neither. Of alike ones the product is positive."""
+    if g[p.PHOTO] > ZERO:
+        return ONE - TWO * g[p.ASIDE]
+    return ZERO
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -41,7 +52,7 @@ def _take_layer(s, at, count, g, dx0, dy0, before, limits):
     """Takes from m.SHARE what belongs to the layer `before`, on some rows of a strip."""
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
-    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
+    is_photo = _shows(g)
     row = np.uint64(before + 1) * m.FRONT + at
     for k in range(count):
         dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
@@ -63,7 +74,10 @@ def _alpha(weight, distance, limits):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
 def _put(s, k, alpha, gx, gy, both, photo, depth, x, y):
-    """Adds a sample to the sums of pixel k; `gx`, `gy`: how its alpha falls."""
+    """Adds a sample to the sums of pixel k; `gx`, `gy`: how its alpha falls.
+
+    `photo`: share of it that shows the photo itself; `add_aside` adds what is invented.
+    """
     s[m.ALPHA + k] = alpha
     s[m.SLOPE_X + k] = gx
     s[m.SLOPE_Y + k] = gy
@@ -86,8 +100,9 @@ def add(s, spans, g, dx0, dy0, layer, limits):
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
     qxy = qxx * tilt
-    weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
-    is_photo = ONE if photo > ZERO else ZERO
+    weight, both = g[p.WEIGHT], g[p.PHOTO] + g[p.BODY]
+    photo = (ONE - g[p.ASIDE]) * g[p.PHOTO]
+    is_photo = _shows(g)
     is_first = ONE if layer == 0 else ZERO
     is_last = ONE if layer == LAYERS - 1 else ZERO
     for at, count in spans:
@@ -121,7 +136,8 @@ def add_all(s, spans, g, dx0, dy0, limits):
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
     qxy = qxx * tilt
-    weight, photo, both = g[p.WEIGHT], g[p.PHOTO], g[p.PHOTO] + g[p.BODY]
+    weight, both = g[p.WEIGHT], g[p.PHOTO] + g[p.BODY]
+    photo = (ONE - g[p.ASIDE]) * g[p.PHOTO]
     for at, count in spans:
         for k in range(count):
             dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
@@ -149,6 +165,20 @@ def add_more(s, spans, g, limits):
             s[m.SEES + at + k] += alpha * unseen
             s[m.BGX + at + k] -= s[m.SLOPE_X + at + k] * edged
             s[m.BGY + at + k] -= s[m.SLOPE_Y + at + k] * edged
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
+def add_aside(s, spans, g, dx0, dy0):
+    """Add where in an invented picture a Gaussian looks."""
+    photo, sx, sy = g[p.PHOTO], g[p.SX], g[p.SY]
+    axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
+    for at, count in spans:
+        for k in range(count):
+            dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
+            shown = s[m.ALPHA + at + k] * photo
+            s[m.SIDE + at + k] += shown
+            s[m.SIDE_X + at + k] += shown * (sx + axx * dx + axy * dy)
+            s[m.SIDE_Y + at + k] += shown * (sy + ayx * dx + ayy * dy)
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath=FAST)
@@ -189,7 +219,7 @@ def first_front(s, spans, g, dx0, dy0):
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy, limit = g[p.QXX], g[p.TILT], g[p.RYY], g[p.FRONT]
-    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
+    is_photo = _shows(g)
     for at, count in spans:
         for k in range(count):
             dx, dy = dx0 + s[m.STEP_X + at + k], dy0 + s[m.STEP_Y + at + k]
@@ -206,7 +236,7 @@ def next_front(s, spans, g, dx0, dy0, limits):
     z, zx, zy, sx, sy = g[p.Z], g[p.ZX], g[p.ZY], g[p.SX], g[p.SY]
     axx, axy, ayx, ayy = g[p.AXX], g[p.AXY], g[p.AYX], g[p.AYY]
     qxx, tilt, ryy = g[p.QXX], g[p.TILT], g[p.RYY]
-    is_photo = ONE if g[p.PHOTO] > ZERO else ZERO
+    is_photo = _shows(g)
     weight, both = g[p.WEIGHT], g[p.PHOTO] + g[p.BODY]
     tail, most, least = limits.tail, limits.most, limits.least
     least_front = limits.least_front

@@ -32,6 +32,7 @@ SIDE_ZOOM = SIDE_U0 + 2
 SIDE_ROWS = SIDE_ZOOM + 1
 
 ENDLESS = 1e12  # px per world unit, of a photo that cannot be carried along
+UNFADED = 3.0  # x as far may the photo be drawn out, see `RestSplats.unfaded`
 BEYOND = 1.3  # x half the photo: Jacobians are taken no farther out (Kerbl et al. 2023)
 
 
@@ -81,6 +82,13 @@ class RestSplats:
         blocks[:, COLOUR:], blocks[:, OPACITY] = table[:, :3], table[:, 3]
         blocks[:, ZOOM] = ENDLESS
         other.blocks = frozen(blocks)
+        return other
+
+    def unfaded(self) -> RestSplats:
+        """Return the same object whose motion may draw the photo out threefold more."""
+        other = copy.copy(self)
+        other.zoom = frozen(self.zoom / UNFADED)
+        other.__dict__.pop("blocks", None)
         return other
 
     def brightened(self) -> RestSplats:

@@ -18,7 +18,7 @@ from ..deform.binding import LANES
 from ..deform.skinning import LINEAR, SHIFT, Skin, Skinned, skin_block
 from . import ewa
 from .posed import REST_ROWS, SIDE_ROWS, PosedSplats, view_limits
-from .rules import FRONT, PLAIN_SPAN, RULES, SPAN, SX, Z
+from .rules import ASIDE, PLAIN_SPAN, RULES, SPAN, SX, Z
 
 
 def project(
@@ -105,7 +105,7 @@ def _project(
             ewa.weigh_textured(s, rest, base, frame[12], rules, kind)
             ewa.limit(s, kind)
             ewa.limit_front(s, rules, kind)
-            ewa.write(s, rest, base, start, count, FRONT + 1, out)
+            ewa.write(s, rest, base, start, count, ASIDE + 1, out)
         else:
             ewa.project_plain(s, rest, base, screen, rules, kind)
             ewa.limit(s, kind)

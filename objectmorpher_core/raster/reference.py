@@ -16,7 +16,8 @@
 5. Within a layer the *points of the photo* are averaged, and the photo is then looked up once:
    neighbours differ by a fraction of a pixel in where they look, and a mean of positions stays
    sharp where a mean of colours would blur. Colours of what the photo does not show are averaged
-   as colours.
+   as colours. Where some Gaussians show the photo and others an invented picture of the same
+   surface, either is looked up at its own mean, and both are mixed by their shares.
 6. A layer's alpha is the matte's where the photo is carried along and the rim has not turned
    towards the camera; otherwise it ends where the kernel sum falls below a level, antialiased
    by the sum's own gradient (a surface), or is 1 - prod(1 - alpha) (other assets). Of an edged
@@ -113,7 +114,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         centre=centre,
         conic=np.stack([conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1]], axis=1),
         extent=extent,
-        depth=np.maximum(means[:, 2] - aside * RULES.ahead * splats.gap, means[:, 2] / 2),
+        depth=means[:, 2],
         slope=(covariance_z[:, None] @ inverse)[:, 0],
         shift=look - unmoved,
         shift_slope=a - ratio * np.eye(2),
@@ -125,6 +126,7 @@ def project(splats: PosedSplats, camera: Camera, photo_camera: Camera) -> Projec
         solidity=solidity,
         edged=(1 - matted) * solidity * kind.is_edged,
         seen=seen,
+        aside=aside.astype(np.float64),
         color=gaussians.colors[index].astype(np.float64),
     )
     order = np.argsort(projected.depth.astype(np.float32), kind="stable")
@@ -229,7 +231,7 @@ class _Front:
 
     depth: F64  # (h, w), inf where there is no further layer
     shift: F64  # (h, w, 2)
-    is_photo: np.ndarray  # (h, w) whether it shows the photo
+    shows: F64  # (h, w) 1: the photo, -1: an invented picture, 0: neither
 
 
 def _find_front(
@@ -238,14 +240,19 @@ def _find_front(
     """The nearest samples of those that are left: `shares` of each, (h, w) of its box."""
     shape = (camera.height, camera.width)
     depth, shift = np.full(shape, np.inf), np.zeros((*shape, 2))
-    is_photo = np.zeros(shape, bool)
+    shows = np.zeros(shape)
     for i, s in there:
         alpha = shares[i] * s.alpha * (p.photo[i] + p.body[i])
         nearer = (alpha >= RULES.least_front) & (s.depth < depth[s.window])
         depth[s.window] = np.where(nearer, s.depth, depth[s.window])
         shift[s.window] = np.where(nearer[..., None], s.shift, shift[s.window])
-        is_photo[s.window] = np.where(nearer, p.photo[i] > 0, is_photo[s.window])
-    return _Front(depth, shift, is_photo)
+        shows[s.window] = np.where(nearer, _shows(p, i), shows[s.window])
+    return _Front(depth, shift, shows)
+
+
+def _shows(p: Projected, i: int) -> float:
+    """1: the photo, -1: an invented picture, 0: neither."""
+    return float(p.photo[i] > 0) * (1 - 2 * float(p.aside[i]))
 
 
 def _membership(
@@ -257,7 +264,8 @@ def _membership(
     away = np.where(there, np.abs(s.depth - np.where(there, depth, 0)) / splats.gap, 1e9)
     if p.photo[i] > 0:
         looks = np.linalg.norm(s.shift - shift, axis=-1) / splats.texture_gap
-        away = np.where(front.is_photo[s.window], np.maximum(away, looks), away)
+        is_alike = front.shows[s.window] * _shows(p, i) > 0
+        away = np.where(is_alike, np.maximum(away, looks), away)
     return smoothstep(away**2, RULES.fade**2, 1.0)
 
 

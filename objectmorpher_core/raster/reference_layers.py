@@ -46,6 +46,7 @@ class Projected:
     solidity: F64  # (N,) alpha of the photo part where it is not
     edged: F64  # (N,) share of the photo part that ends with the surface, as bodies do
     seen: F64  # (N,) 1 = the photo part was visible in the photo
+    aside: F64  # (N,) 1 = the photo part is an invented picture
     color: F64  # (N, 3)
 
 
@@ -73,6 +74,8 @@ class Sums:
         self.body_clear = np.ones((height, width))
         self.depth = np.zeros((height, width))
         self.shift = np.zeros((height, width, 2))
+        self.side = np.zeros((height, width))  # of the photo part, what is invented
+        self.side_shift = np.zeros((height, width, 2))
         self.matted = np.zeros((height, width))
         self.unmatted = np.zeros((height, width))  # solidity of the part that is not matted
         self.magnified = np.zeros((height, width))
@@ -94,7 +97,10 @@ class Sums:
         self.clear[at] *= 1 - np.minimum(alpha * both, 1)
         self.body_clear[at] *= 1 - np.minimum(body, 1)
         self.depth[at] += alpha * both * s.depth
-        self.shift[at] += photo[..., None] * s.shift
+        aside = photo * p.aside[i]
+        self.shift[at] += (photo - aside)[..., None] * s.shift
+        self.side[at] += aside
+        self.side_shift[at] += aside[..., None] * s.shift
         self.matted[at] += photo * p.matted[i]
         self.unmatted[at] += photo * (1 - p.matted[i]) * p.solidity[i]
         self.magnified[at] += photo * max(p.magnified[i] / RULES.sharp, 1.0)
@@ -128,15 +134,23 @@ class ReferenceComposite:
         photo = np.maximum(total - body, 0)
         is_photo = photo > 1e-6 * total
         weight = np.maximum(photo, 1e-30)
-        shift = layer.shift[at] / weight[:, None]
-        ratio = self.photo_camera.focal / self.camera.focal
-        xy = np.stack([at[1], at[0]], 1) + 0.5 - [self.camera.cx, self.camera.cy]
-        look = xy * ratio + [self.photo_camera.cx, self.photo_camera.cy] + shift
-        look = np.where(is_photo[:, None], look, 0)
+        side = np.where(is_photo, layer.side[at] / weight, 0)
+        own = np.maximum(photo - layer.side[at], 0)
+        is_own, is_side = own > 1e-6 * total, side > 1e-6
+        shift = layer.shift[at] / np.maximum(own, 1e-30)[:, None]
+        aside = layer.side_shift[at] / np.maximum(layer.side[at], 1e-30)[:, None]
         lod = np.log2(np.maximum(layer.magnified[at] / weight, 1.0))
+        look = self._looks(at, shift, is_own)
         sample = sample_texture(self.texture, look, lod)
+        sample[~is_own, 3] = 0.0
+        invented = sample_texture(self.texture, self._looks(at, aside, is_side), lod)[:, :3]
         matte = (sample[:, 3] * layer.matted[at] + layer.unmatted[at]) / weight
         matte = np.where(is_photo, matte, 0.0)
+        # The photo counts as far as the matte has something of it, invented pictures are whole.
+        share = np.where(is_own, np.minimum(side * is_side / np.maximum(matte, 1e-30), 1), is_side)
+        sample[:, :3] += share[:, None] * (invented - sample[:, :3])
+        shift = np.where(is_own[:, None], shift, aside)
+        visible = np.minimum((1 - share) / np.maximum(1 - side, 1e-6), 1) * layer.seen[at]
         if self.is_surface:
             whole = _coverage(total, np.linalg.norm(layer.slope[at], axis=1))
             slope = np.linalg.norm(layer.ended_slope[at], axis=1)
@@ -149,8 +163,8 @@ class ReferenceComposite:
             shown + body, 1e-30
         )[:, None]
         size = np.array([self.photo_camera.width, self.photo_camera.height])
-        within = ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
-        seen = within * layer.seen[at] / weight * shown / np.maximum(shown + body, 1e-30)
+        within = is_own & ((look > 0) & (look < size)).all(1)  # elsewhere the texture is made up
+        seen = within * visible / weight * shown / np.maximum(shown + body, 1e-30)
         distance = np.linalg.norm(shift - self.last_shift[at], axis=1)
         same = smoothstep(distance, RULES.apart, RULES.same_point)
         share = np.where(is_photo, photo / total, 0.0)
@@ -169,6 +183,13 @@ class ReferenceComposite:
         self.color[at] += through[:, None] * mixed
         self.from_photo[at] += through * seen
         self.alpha[at] += through
+
+    def _looks(self, at: tuple[np.ndarray, ...], shift: F64, is_there: np.ndarray) -> F64:
+        """(n, 2) px of the photo that is shown at pixels `at` with a `shift` (n, 2), else 0."""
+        ratio = self.photo_camera.focal / self.camera.focal
+        xy = np.stack([at[1], at[0]], 1) + 0.5 - [self.camera.cx, self.camera.cy]
+        look = xy * ratio + [self.photo_camera.cx, self.photo_camera.cy] + shift
+        return np.where(is_there[:, None], look, 0)
 
     def picture(self) -> Picture3D:
         """Return the picture of all layers so far."""

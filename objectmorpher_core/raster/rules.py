@@ -96,9 +96,7 @@ class Rules(NamedTuple):
 
     # Where an invented picture shows the surface, too, it takes the photo's place from this ratio
     # of the cosines on: of the normal with the way to the photo's camera, to that now.
-    look_aside: float = 0.3
-    # It lies so much nearer, x the object's gap: two pictures of one surface meet along a line.
-    ahead: float = 0.1
+    look_aside: float = 0.4  # = streak_start: nothing of the photo has faded before
 
     # Stretch: smallest magnification of the photo by the motion, 1 at rest. Below streak_start
     # the photo's pixels begin to show as streaks, below streak_end they are not used.
@@ -203,6 +201,7 @@ MAGNIFIED = 21  # photo px per view px, the larger
 PHOTO, BODY = 22, 23  # shares of alpha that show the photo, and its own colour
 SEEN, MATTED, SOLID = 24, 25, 26
 FRONT = 27  # q up to which it can be a layer's front
+ASIDE = 28  # 1: what it shows is in an invented picture
 SPAN = 32  # numbers of a row: two lines of the processor's cache
 PLAIN_SPAN = 16  # of one that has no photo: one line
 

@@ -22,6 +22,7 @@ from .layer_sums import (
     FAR,
     add,
     add_all,
+    add_aside,
     add_body,
     add_more,
     first_front,
@@ -100,9 +101,10 @@ def _draw_tile(
     _clear(s, m.OPEN, m.OPEN + m.ALL, ONE)
     x0, y0 = np.float32(left), np.float32(top)
     first, last = 0, rows  # that are not finished
-    count = len(members)
+    count, aside = len(members), ZERO
     for n in range(count):
         room[n] = members[n]
+        aside += projected[members[n], p.ASIDE]
     for layer in range(LAYERS):
         _clear(s, m.TOTAL, m.CLEAR, ZERO)
         _clear(s, m.CLEAR, m.BODY_CLEAR + m.ALL, ONE)
@@ -119,7 +121,7 @@ def _draw_tile(
         count = kept
         first, last = composite_layer(
             s, layer, left, top, columns, first, last, view, photo, texels, shapes, crop_left,
-            crop_top, rules, kind,
+            crop_top, rules, kind, aside > ZERO,
         )  # fmt: skip
         if is_one or first >= last:
             return
@@ -167,6 +169,8 @@ def _is_one_layer(projected, members, x0, y0, limits):
     limit = np.float32(0.25)
     for i in members:
         g = projected[i]
+        if g[p.ASIDE] != a[p.ASIDE]:  # what they show cannot be compared
+            return False
         low, high = max(x0, g[p.CX] - g[p.EX]), min(x0 + size, g[p.CX] + g[p.EX])
         x, wide = HALF * (low + high), HALF * max(high - low, ZERO)
         low, high = max(y0, g[p.CY] - g[p.EY]), min(y0 + size, g[p.CY] + g[p.EY])
@@ -218,6 +222,8 @@ def _draw(s, g, x0, y0, first, last, layer, is_one, limits, is_front):
         is_changed = (g[p.MATTED] < ONE) | (g[p.SEEN] < ONE)
         if is_changed or g[p.MAGNIFIED] > limits.sharp:
             add_more(s, spans, g, limits)
+        if g[p.ASIDE] > ZERO:
+            add_aside(s, spans, g, dx, dy)
     if g[p.BODY] > ZERO:
         add_body(s, spans, g)
     if not limits.is_surface:

@@ -37,9 +37,10 @@ SUMS = 4 * LAYERS
 (
     TOTAL, BODIED, GX, GY, BGX, BGY, DEPTH, SHX, SHY, MAG, SEES, MATTES, SOLIDS, R, G, B,
     LEFT,  # what belongs to later layers
+    SIDE, SIDE_X, SIDE_Y,  # what shows invented pictures, and where in them
     CLEAR, BODY_CLEAR,
-) = _rows(SUMS, 19)  # fmt: skip
-RESULTS = SUMS + 19
+) = _rows(SUMS, 22)  # fmt: skip
+RESULTS = SUMS + 22
 
 # What has been composited, and what the next layer has to know of it.
 (
@@ -56,7 +57,9 @@ T_R, T_G, T_B, T_A, IS_PHOTO, WITHIN, SHARE, ALPHA, SLOPE_X, SLOPE_Y, STEP_X, ST
     ROOM, 12
 )
 COLUMN, LINE, TX, TY, WX0, WX1, WX2, WX3, WY0, WY1, WY2, WY3 = _rows(ROOM + 12, 12)
-ROWS = ROOM + 24
+# The photo's texels and whether it is shown, while those of the invented pictures are looked up.
+P_R, P_G, P_B, P_A, P_WITHIN, P_SHOWN = _rows(ROOM + 24, 6)
+ROWS = ROOM + 30
 
 
 @numba.njit(nogil=True)

@@ -13,13 +13,13 @@ import numpy as np
 
 from ..base.arrays import F64
 from .posed import PosedSplats
-from .rules import RULES
 
 SIGNS = ("fine", "look closely", "guesswork")
 # Chosen on four solids (box, mug, duck, ring), of which a risk of 0.25 is a free shape's at 20
 # degrees and one of 0.5 is beyond 35.
 LIMITS = (0.25, 0.5)  # risk, from which on the second and the third are said
 RECOGNISED = 0.5  # x the risk, of a thing that was recognised as a plain shape
+EDGE_ON = 0.3  # ratio of the cosines then and now, below which the photo showed too little of it
 UNSAID = 0.1  # x its size, the error of a shape of which nobody said how sure it is
 ENOUGH = 2000  # Gaussians that are asked
 FROM_FILE = "imported"  # the backend of such objects
@@ -56,7 +56,7 @@ def trust_in(splats: PosedSplats) -> Trust:
     area = np.maximum(cosines, 0)
     # What was seen from nearly edge on is not known, either.
     is_seen = lifted.texture.visibility[few] > 0
-    is_seen &= rest.cosines[few] >= RULES.look_aside * cosines
+    is_seen &= rest.cosines[few] >= EDGE_ON * cosines
     total = max(float(area.sum()), 1e-9)
     invented = float(area[~is_seen].sum()) / total
     # A depth that is wrong shows as far as its line of sight is seen from the side now.

@@ -233,7 +233,7 @@ CELL = 16  # px, of which one texel says whether anything is left for the next l
 class LayerTargets:
     """Targets as large as a band of the picture: a canvas of any size needs no more memory.
 
-    232 bytes a pixel.
+    244 bytes a pixel.
     """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]) -> None:
@@ -244,7 +244,7 @@ class LayerTargets:
         texture, build = self._texture, context.framebuffer
         self._depth = context.depth_renderbuffer(size)
         self.fronts = [texture(4) for _ in range(LAYERS - 1)]
-        self.sums = [texture(4) for _ in range(4)] + [texture(1)]
+        self.sums = [texture(4) for _ in range(5)]
         self.color, self.detail, self.median = texture(4), texture(4), texture(4)
         # what a layer has to know of the one before: two sets in turn
         self.looks, self.covers = [texture(4) for _ in range(2)], [texture(4) for _ in range(2)]

@@ -26,7 +26,7 @@ from .shaders import buffer_layout, build_feedback, set_uniforms
 
 PLAIN: Columns = (("p_centre", "4f"), ("p_kernel", "4f"), ("p_axes", "4f"), ("p_color", "4f"))
 LAYERED: Columns = (
-    *PLAIN, ("p_depth", "4f"), ("p_shift", "4f"), ("p_slope", "4f"), ("p_edge", "2f"),
+    *PLAIN, ("p_depth", "4f"), ("p_shift", "4f"), ("p_slope", "4f"), ("p_edge", "3f"),
 )  # fmt: skip
 
 GEOMETRY = (("place", "4f"), ("quat", "4f"), ("size", "4f"), ("normal", "4f"), ("look", "3f"))

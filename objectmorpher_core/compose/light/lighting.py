@@ -28,6 +28,7 @@ from .harmonize import NEUTRAL, Gain, at_strength, light_gain, light_map
 from .noise import Noise, find_noise
 from .relight import Relit, relight
 
+MARGIN = 16  # px around the cut-out that have its colours, not those of invented pictures
 CAST = 40_000  # Gaussians, of which a shadow is made
 
 
@@ -56,12 +57,25 @@ def object_texture(matte: Matte, lifted: LiftedObject | None) -> TextureLevels:
     (x0, y0, x1, y1), (height, width) = matte.box, sides.pixels.shape[:2]
     left, top = min(x0, sides.left), min(y0, sides.top)
     shape = max(y1, sides.top + height) - top, max(x1, sides.left + width) - left
-    foreground, alpha = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
-    at = slice(sides.top - top, None), slice(sides.left - left, None)
-    foreground[at][:height, :width] = sides.pixels / np.float32(255)
+    # All around them their colours go on: no look-up ever meets what is not the object.
+    above, before = sides.top - top, sides.left - left
+    foreground = cv2.copyMakeBorder(
+        sides.pixels / np.float32(255), above, shape[0] - above - height,
+        before, shape[1] - before - width, cv2.BORDER_REPLICATE,
+    )  # fmt: skip
+    alpha = np.zeros(shape, np.float32)
     at = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
-    foreground[at], alpha[at] = matte.foreground, matte.alpha
-    return build_levels(foreground, alpha, left, top)
+    alpha[at] = matte.alpha
+    near = min(MARGIN, max(sides.top - y1, 0))
+    around = (
+        slice(max(y0 - top - near, 0), y1 - top + near),
+        slice(max(x0 - left - near, 0), x1 - left + near),
+    )
+    own = cv2.copyMakeBorder(matte.foreground, near, near, near, near, cv2.BORDER_REPLICATE)
+    first = max(near - (y0 - top), 0), max(near - (x0 - left), 0)
+    size = foreground[around].shape
+    foreground[around] = own[first[0] :, first[1] :][: size[0], : size[1]]
+    return build_levels(np.asarray(foreground, np.float32), alpha, left, top)
 
 
 class Lighting:

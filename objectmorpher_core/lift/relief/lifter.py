@@ -127,7 +127,7 @@ class ReliefLifter:
                 body = replace(body, doubt=seen.doubt)
                 rims = rims_of(seen, camera) if settings.kind == "auto" else []
                 # An egg that lies as a plate does looks like one, and is rarer.
-                if len(rims) > 1 or (rims and rims[0].is_steep):
+                if rims and rims[0].is_steep:  # what faces the camera may be a flower
                     body = laid(body, rims, seen, subject, settings.thickness)
                 else:
                     body = _recognised(body, seen, camera, settings)

@@ -14,12 +14,13 @@ from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
 from ...base.arrays import F32, F64, U8, Mask
 from ...base.camera import Camera
 from ...base.progress import silent
 from ...base.threads import in_threads
-from ...compose.light.lighting import estimate_light, object_texture
+from ...compose.light.lighting import estimate_light
 from ...compose.plate.completion import complete, shrunk, smooth
 from ...compose.plate.patch_detail import with_detail
 from ...compose.plate.sources import Guide
@@ -27,19 +28,24 @@ from ...compose.plate.structure_lines import find_lines
 from ...document.model import LiftedObject, Matte, Placement, Sides
 from ...raster import tiles
 from ...raster.posed import PosedSplats, RestSplats, projection_jacobians
+from ...raster.reference_layers import Picture3D
 from ...raster.rules import RULES
-from ...raster.texture import TextureLevels
+from ...raster.texture import build_levels
 from .colours import fill_in
 
 AWAY = 55.0  # degrees: sides that a turn by half as much shows are seen about as much from ahead
 TURNS = ((AWAY, 0.0, 0.0), (-AWAY, 0.0, 0.0), (0.0, AWAY, 0.0), (0.0, -AWAY, 0.0))
+# Ratio of the cosines then and now, down to which the photo goes on beyond where it is shown, so
+# that both agree where they meet: of a turn by 17 degrees and more.
+PINNED = 0.2
 FACING = 0.3  # cosine of a normal with the way to the camera, from which a picture shows it well
 FARTHEST = -0.75  # cosine with the way to the photo's camera, beyond which it is the back
 LONGEST = 400.0  # px, longer side of the object in a picture
 SEARCH = 9_000  # px of the small picture in which patches are looked for
 LEAST = 40  # px of a hole, or of what is around it
 SURE = 0.95  # alpha, and the share of the photo in it, from which a pixel is known
-EDGE = 2  # px of what is known beside a hole that are filled anew: they hold what is behind
+HALF = 0.5  # alpha of the matte, to which its own colours are sure enough; of a share, likewise
+EDGE = 1  # px of what is known beside a hole that are filled anew: they are mixed with it
 RIM = 4  # small px of the object's edge that are no source, for what is beyond is in their patches
 STRANGE = 20_000.0  # squared levels that they cost
 FAR = 1_500.0  # squared levels that a source costs ...
@@ -48,6 +54,8 @@ ELSEWHERE = 300.0  # squared levels that one in the photo costs
 KEPT = 0.85  # share of the coarse colours of a side that stays
 COARSE = 5.0  # small px, of what is coarse
 BRIGHTEST = 0.4  # logarithm, by which a side is brighter or darker than the colours it has
+APART = 3.0  # x spacing, between Gaussians on two pictures: there are plain colours
+MOST_TONED = 25.0  # levels, by which a side's tone follows the photo's where they meet
 GAP = 32  # px between the matte and the pictures, and between them
 
 
@@ -83,25 +91,48 @@ class _View:
         """(N, 2) px of the picture."""
         return np.asarray(self.camera.project(self.places), np.float64)
 
-    def drawn(self, rest: RestSplats, texture: TextureLevels, photo: Camera) -> _Picture:
-        """What the photo tells of this view; `rest` has the colours of what it does not."""
+    def drawn(self, rest: RestSplats, matte: Matte, photo: Camera) -> _Picture:
+        """What the photo tells of this view; `rest` has the colours of what it does not.
+
+        The outline is the surface's own, and the photo is not faded where it is drawn out.
+        """
         lifted = rest.lifted
-        carried = np.where(self.is_aside(rest), 0.0, lifted.texture.visibility)
+        gaussians, texture = lifted.gaussians, lifted.texture
+        carried = np.where(self.is_aside(rest, PINNED), 0.0, texture.visibility)
         own = replace(
             lifted, splatting="edged solid",
-            texture=replace(lifted.texture, visibility=carried.astype(np.float32)),
+            gaussians=replace(gaussians, opacities=gaussians.opacities * lifted.is_body),
+            texture=replace(texture, visibility=carried.astype(np.float32)),
         )  # fmt: skip
-        splats = PosedSplats(RestSplats(own, photo), None, self.motion)
-        picture = tiles.render(splats, texture, self.camera, photo)
-        brighter = tiles.render(splats.brightened(), texture, self.camera, photo)
+        splats = PosedSplats(RestSplats(own, photo).unfaded(), None, self.motion)
+        whole = np.ones(matte.alpha.shape, np.float32)
+        levels = build_levels(matte.foreground, whole, matte.left, matte.top)
+        picture = tiles.render(splats, levels, self.camera, photo)
+        brighter = tiles.render(splats.brightened(), levels, self.camera, photo)
         invented = (brighter.color - picture.color).mean(-1)  # beyond the frame nothing is, too
         straight = picture.color / np.maximum(picture.alpha, 1e-6)[..., None]
         is_known = (picture.alpha > SURE) & (invented < 1 - SURE)
-        return _Picture(straight.clip(0, 1), picture.alpha > 0.5, is_known, picture.depth)
+        looks = self._looks(picture, photo)
+        at = (looks - [matte.left, matte.top] - 0.5).astype(np.float32)
+        is_known &= cv2.remap(matte.alpha, at[..., 0], at[..., 1], cv2.INTER_LINEAR) > HALF
+        across, down = np.gradient(looks, axis=1), np.gradient(looks, axis=0)
+        area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
+        is_clear = area * (self.camera.focal / photo.focal) ** 2 > RULES.look_aside
+        return _Picture(
+            straight.clip(0, 1), picture.alpha > 0.5, is_known, is_known & is_clear, picture.depth
+        )
 
-    def is_aside(self, rest: RestSplats) -> Mask:
-        """(N,) which Gaussians the photo does not show well enough for this view."""
-        return rest.cosines < RULES.look_aside * self.cosines
+    def _looks(self, picture: Picture3D, photo: Camera) -> F64:
+        """(h, w, 2) px of the photo that each px of a picture of this view shows."""
+        height, width = picture.alpha.shape
+        xy = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1) + 0.5
+        own = self.camera
+        xy = (xy - [own.cx, own.cy]) * photo.focal / own.focal + [photo.cx, photo.cy]
+        return xy + picture.shift
+
+    def is_aside(self, rest: RestSplats, ratio: float) -> Mask:
+        """(N,) which Gaussians faced the photo's camera less than `ratio` x this view's."""
+        return rest.cosines < ratio * self.cosines
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +140,7 @@ class _Picture:
     colors: F32  # (h, w, 3) straight, in [0, 1]; coarse where nothing is known
     is_object: Mask  # (h, w)
     is_known: Mask  # (h, w)
+    is_clear: Mask  # (h, w) of that, what is not so drawn out that it would be seen elsewhere
     depth: F32  # (h, w) world units
 
 
@@ -144,17 +176,19 @@ class _Side:
 def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0) -> LiftedObject:
     """`lifted` with pictures of what the photo's `camera` does not see of it."""
     rest = RestSplats(replace(lifted, sides=None), camera)
-    texture = object_texture(matte, None)
     lit = _lit(rest, matte, camera)
     views = [_View.of(rest, camera, turn) for turn in TURNS]
     best = np.argmax([view.cosines for view in views], axis=0)
     is_side = lifted.is_body & (rest.cosines > FARTHEST)
-    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, texture, camera)
+    front = _View.of(rest, camera, (0.0, 0.0, 0.0)).drawn(lit, matte, camera)
     sides: list[_Side] = []
     for k, view in enumerate(views):
-        wanted = (best == k) & (view.cosines > FACING) & view.is_aside(rest) & is_side
+        wanted = (
+            (best == k) & (view.cosines > FACING) & view.is_aside(rest, RULES.look_aside) & is_side
+        )
         if wanted.sum() >= 3:
-            sides.append(_side(view, np.flatnonzero(wanted), lit, texture, camera))
+            sides.append(_side(view, np.flatnonzero(wanted), lit, matte, camera))
+    sides = _apart(sides, lifted.world_points(rest.means), APART * rest.spacing)
     filled: list[U8 | None] = [None] * len(sides)
 
     def fill(first: int, last: int) -> None:
@@ -163,6 +197,22 @@ def with_sides(lifted: LiftedObject, matte: Matte, camera: Camera, seed: int = 0
 
     in_threads(fill, len(sides), parts=len(sides))
     return _carried(lifted, sides, filled, (matte.left, matte.box[3] + GAP))
+
+
+def _apart(sides: list[_Side], places: F64, gap: float) -> list[_Side]:
+    """The sides without what is nearer than `gap` to a larger one; Gaussians lie at `places`.
+
+    No pixel shows two pictures at once: a mean of places in both would be a place in neither.
+    """
+    taken, kept = np.zeros(len(places), bool), {}
+    for k in sorted(range(len(sides)), key=lambda k: -len(sides[k].index)):
+        index = sides[k].index
+        if taken.any():
+            nearest, _ = KDTree(places[taken]).query(places[index], distance_upper_bound=gap)
+            index = index[np.isinf(nearest)]
+        taken[index] = True
+        kept[k] = replace(sides[k], index=index)
+    return [kept[k] for k in range(len(sides))]
 
 
 def _carried(
@@ -202,11 +252,9 @@ def _lit(rest: RestSplats, matte: Matte, photo: Camera) -> RestSplats:
     return RestSplats(own, photo)
 
 
-def _side(
-    view: _View, wanted: np.ndarray, rest: RestSplats, texture: TextureLevels, photo: Camera
-) -> _Side:
+def _side(view: _View, wanted: np.ndarray, rest: RestSplats, matte: Matte, photo: Camera) -> _Side:
     """What a view shows of the `wanted` Gaussians."""
-    picture = view.drawn(rest, texture, photo)
+    picture = view.drawn(rest, matte, photo)
     xy = view.xy[wanted]
     is_seen = _is_seen(xy, view.places[wanted, 2], picture, rest.spacing)
     wanted, xy = wanted[is_seen], xy[is_seen]
@@ -259,16 +307,40 @@ def _filled(side: _Side, front: _Picture, seed: int) -> U8 | None:
     whole &= ~known
     small, share = shrunk(levels, (~whole).astype(np.float32), size)
     guess = smooth(small, (share >= 0.5).astype(np.float32))
-    unlikely = _unlikely(known, share < 0.5, round(width * scale))
+    unlikely = _unlikely(known & picture.is_clear, share < 0.5, round(width * scale))
     guide = Guide(unlikely, find_lines(guess, share < 0.5))
     completion = complete(small, share, guide, seed, silent)
     coarse = np.asarray(cv2.resize(levels, size, interpolation=cv2.INTER_AREA), np.float32)
     change = cv2.GaussianBlur(coarse - completion.colors, (0, 0), COARSE)
-    colors = np.where(completion.hole[..., None], completion.colors + KEPT * change, small)
+    sure = np.asarray(
+        cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA), np.float32
+    )
+    toned = _pinned(
+        (completion.colors + KEPT * change).astype(np.float32), completion.hole, small, sure
+    )
+    colors = np.where(completion.hole[..., None], toned, small)
     crop = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     colors = np.clip(colors, 0, 255).astype(np.float32)
     filled = with_detail(crop, whole, colors, completion.sources)
     return np.asarray(filled[: len(side.is_wanted), :width], np.uint8)
+
+
+def _pinned(colors: F32, hole: Mask, known: F32, sure: F32) -> F32:
+    """`colors` (h, w, 3) of a hole (h, w), toned near its border as what is `known` is there.
+
+    `sure` (h, w) is how much of that is known. Light and tone go on across the border so.
+    """
+    inner = hole.astype(np.float32)
+    weights = [cv2.GaussianBlur(part, (0, 0), COARSE)[..., None] for part in (inner, sure)]
+    sums = [
+        cv2.GaussianBlur(part * weight[..., None], (0, 0), COARSE)
+        for part, weight in ((colors, inner), (known, sure))
+    ]
+    own, other = (s / np.maximum(w, 1e-4) for s, w in zip(sums, weights, strict=True))
+    away = cv2.distanceTransform((sure < HALF).astype(np.uint8), cv2.DIST_L2, 5)
+    share = np.exp(-((away / (2 * COARSE)) ** 2))[..., None] * (weights[1] > 1e-3)
+    change = np.clip(other - own, -MOST_TONED, MOST_TONED)  # more is another thing's colour
+    return np.asarray(colors + share * change, np.float32)
 
 
 def _unlikely(known: Mask, hole: Mask, width: int) -> F32:

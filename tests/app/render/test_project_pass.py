@@ -24,7 +24,7 @@ pytest_plugins = ["tests.app.render.gpu"]  # the fixtures
 COLUMNS = (
     p.CX, p.CY, p.QXX, p.TILT, p.RYY, p.WEIGHT, p.CUT, p.FRONT, None, None, None, None,
     p.RED, p.GREEN, p.BLUE, p.SEEN, p.Z, p.ZX, p.ZY, p.MAGNIFIED, p.SX, p.SY, p.PHOTO, p.BODY,
-    p.AXX, p.AXY, p.AYX, p.AYY, p.MATTED, p.SOLID,
+    p.AXX, p.AXY, p.AYX, p.AYY, p.MATTED, p.SOLID, p.ASIDE,
 )  # fmt: skip
 USED = [k for k, column in enumerate(COLUMNS) if column is not None]
 AXES, EXTENT_SLACK = slice(8, 12), 0.02  # px, see splat_project.vert
@@ -43,7 +43,7 @@ def project_pass(context):
 
 def by_gpu(project_pass, splats: PosedSplats, camera, order=None) -> F32:
     instances = project_pass.draw(splats, camera, shapes.camera(), order)
-    width = 30 if order is None else 16
+    width = len(COLUMNS) if order is None else 16
     return np.frombuffer(instances.read(), np.float32).reshape(-1, width)
 
 

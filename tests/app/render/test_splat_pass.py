@@ -208,16 +208,19 @@ def test_what_is_not_drawn_any_more_is_released(context):
 
 
 def test_a_photo_too_large_for_the_driver_is_halved(context, caplog):
+    from objectmorpher.render.layered_pass import _padded
     from objectmorpher.render.splat_pass import SplatPass
 
     scene = shapes.scene("ellipse", 2000)
     splats = scene.puppet.posed(None, Placement())
+    levels = scene.texture.levels
+    enough = max(_padded(levels[0], len(levels)))
     smaller = scene.camera.windowed(0, 0, 40, 30, 0.25)  # where the full size is not looked at
     view = (splats, scene.texture, smaller, scene.camera)
-    own = SplatPass(context, most_texture=max(scene.texture.levels[0].shape[:2]) + 64)
+    own = SplatPass(context, most_texture=enough)
     assert difference(own, *view) <= REST
     assert not caplog.text
-    own = SplatPass(context, most_texture=max(scene.texture.levels[0].shape[:2]) - 1)
+    own = SplatPass(context, most_texture=enough - 1)
     assert np.abs(rendered(own, *view) - specified(*view)).mean() <= 0.5 / 255
     assert "1/2 of the photo's detail" in caplog.text
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from objectmorpher_core.compose.light.lighting import object_texture
 from objectmorpher_core.deform.puppet import Puppet
@@ -14,7 +15,10 @@ from objectmorpher_core.document.model import DeformSettings, LiftedObject, Plac
 from objectmorpher_core.lift.relief.rethicken import with_thickness
 from objectmorpher_core.lift.relief.sides import with_sides
 from objectmorpher_core.raster import reference, tiles
+from objectmorpher_core.raster.posed import RestSplats
 from objectmorpher_core.raster.reference_layers import Picture3D
+from objectmorpher_core.raster.rules import RULES
+from objectmorpher_core.raster.texture import sample_texture
 from objectmorpher_core.raster.trust import trust_in
 from tests import shapes
 
@@ -32,6 +36,17 @@ def scene() -> shapes.Scene:
     inside = (x - 120) ** 2 + (y - 100) ** 2 < 80**2
     pixels = np.where(inside[..., None], grain, 0.2).clip(0, 1)
     return shapes.lifted_scene((255 * pixels).astype(np.uint8), inside, 4000)
+
+
+@pytest.fixture(scope="module")
+def vase() -> shapes.Scene:
+    """A vase with stripes around it, which go on behind as they are in front."""
+    y, x = np.mgrid[:240, :200] + 0.5
+    half = np.interp(y, [20, 80, 150, 220], [34, 28, 62, 44])
+    inside = (np.abs(x - 100) < half) & (y > 20) & (y < 220)
+    stripes = np.array([(226, 84, 48), (244, 214, 150)])[(y / 16).astype(int) % 2]
+    pixels = np.where(inside[..., None], stripes, (0, 0, 0))
+    return shapes.lifted_scene(pixels.astype(np.uint8), inside, 4000)
 
 
 def _drawn(scene: shapes.Scene, lifted: LiftedObject, place: Placement) -> Picture3D:
@@ -57,6 +72,45 @@ def test_a_newly_shown_side_is_as_rough_as_the_object_itself(scene):
     # Nothing of it counts as the photo's, and the outline is what it was.
     assert pictures[1].from_photo[new].mean() < 0.1
     assert np.abs(pictures[1].alpha - pictures[0].alpha).mean() < 0.02
+
+
+@pytest.mark.parametrize("yaw", [30.0, -30.0, 45.0])
+def test_stripes_go_on_where_the_photo_ends(vase, yaw):
+    """Half way between neighbours of which one shows the photo and one what is invented."""
+    lifted, camera = vase.lifted, vase.camera
+    place, sides = Placement(turn=(yaw, 0.0, 0.0)), lifted.sides
+    rest = RestSplats(lifted, camera)
+    assert sides is not None
+    motion = place.matrix(lifted, camera)
+    world = lifted.world_points(rest.means)
+    moved = world @ motion[:3, :3].T + motion[:3, 3]
+    cosines = -((rest.normals @ motion[:3, :3].T) * moved).sum(1) / np.linalg.norm(moved, axis=1)
+    is_shown = lifted.is_body & (cosines > 0.15)
+    aside = is_shown & (sides.zoom > 0) & (rest.cosines < RULES.look_aside * cosines)
+    i = np.flatnonzero(aside)
+    own = np.flatnonzero(is_shown & ~aside & (lifted.texture.visibility > 0))
+    gap, nearest = map(np.asarray, KDTree(world[own]).query(world[i]))
+    is_near = gap < 1.5 * rest.spacing
+    i, j = i[is_near], own[nearest[is_near]]
+    assert len(i) > 30
+    middle = 0.5 * (world[i] + world[j])
+    there = sides.at[i] + np.einsum("nij,nj->ni", sides.slopes[i], middle - world[i])
+    finest = np.zeros(len(i))
+    photo = sample_texture(vase.texture, camera.project(middle), finest)[:, :3]
+    invented = sample_texture(vase.texture, there, finest)[:, :3]
+    misfit = np.abs(photo - invented).mean(1)
+    assert misfit.mean() < 13 / 255 and np.median(misfit) < 5 / 255
+    assert (misfit > 40 / 255).mean() < 0.11  # on another stripe
+
+
+def test_nothing_but_the_object_can_be_looked_up(vase):
+    """Neither between the pictures, nor beside them, nor from the photo's background."""
+    darkest = 84 / 255  # of the green of the darker stripe
+    assert vase.texture.levels[0][..., 1].min() > 0.4 * darkest
+    for turn in ((30, 0, 0), (-60, 20, 0), (0, 40, 0), (0, -40, 0), (80, -30, 10)):
+        picture = _drawn(vase, vase.lifted, Placement(turn=turn))
+        inner = cv2.erode((picture.alpha > 0.99).astype(np.uint8), np.ones((3, 3))) > 0
+        assert picture.color[inner, 1].min() > 0.4 * darkest
 
 
 def test_at_rest_nothing_of_it_is_seen(scene):
