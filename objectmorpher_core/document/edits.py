@@ -169,8 +169,8 @@ def refit(
 
     item, photo = document.objects[k], document.photo
     fitted = (
-        refitted(other, matte, lifted, photo.camera) if _is_copy(other, item) else other
-        for other in document.objects
+        refitted(each, matte, lifted, photo.camera) if _is_copy(each, item) else each
+        for each in document.objects
     )
     objects = tuple(decontaminated(photo, each) for each in fitted)
     return replace(document, objects=objects, plate=plate, refined=None)
@@ -184,9 +184,8 @@ def set_lifted(
     shape: LiftSettings | None = None,
 ) -> Document:
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
-    item = document.objects[k].with_lifted(matte, lifted, shape)
-    changed = document.with_object(k, decontaminated(document.photo, item))
-    return changed.with_backend("lift", lifted.backend)
+    item = decontaminated(document.photo, document.objects[k].with_lifted(matte, lifted, shape))
+    return document.with_object(k, item).with_backend("lift", lifted.backend)
 
 
 def reshape(
@@ -195,8 +194,8 @@ def reshape(
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
     from ..lift.carrying import carried_over
 
-    changed = carried_over(document.objects[k], matte, lifted, shape)
-    changed = decontaminated(document.photo, changed)
+    item = carried_over(document.objects[k], matte, lifted, shape)
+    changed = decontaminated(document.photo, item)
     return document.with_object(k, changed).with_backend("lift", lifted.backend)
 
 
