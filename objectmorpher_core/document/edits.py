@@ -148,10 +148,8 @@ def _with_mask(
     # The plate and the refinement stay, too, until the shape is refitted; copies stay copies.
     outline = {name: getattr(changed, name) for name in ("mask", "coverage", "shaped", "mixed")}
     objects = (replace(o, **outline) if _is_copy(o, item) else o for o in document.objects)
-    document = replace(document, objects=tuple(objects))
-    return replace(
-        document, objects=tuple(changed if i == k else o for i, o in enumerate(document.objects))
-    )
+    kept = tuple(changed if i == k else other for i, other in enumerate(objects))
+    return replace(document, objects=kept)
 
 
 def _is_copy(other: EditObject, item: EditObject) -> bool:
