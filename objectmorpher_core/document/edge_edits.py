@@ -12,7 +12,6 @@ import numpy as np
 
 from ..base.arrays import F32, U8, Mask, frozen
 from ..base.pixels import crop
-from .edits import EditError, change_mask
 from .model import Document, EditObject, Matte, Photo
 from .settings import Refined
 
@@ -22,6 +21,8 @@ def set_edge(document: Document, k: int, coverage: U8, mixed: Mask) -> Document:
 
     See `segment.matting.repair.brush_edge`.
     """
+    from .edits import change_mask
+
     changed = change_mask(document, k, coverage)
     own, kept = changed.objects[k], frozen(mixed) if mixed.any() else None
     objects = (replace(o, mixed=kept) if o.mask is own.mask else o for o in changed.objects)
@@ -35,6 +36,8 @@ def set_decontaminate(
 
     `spill`: what `spill_of` gives for its matte as it was found, where that is known already.
     """
+    from .edits import EditError
+
     item = document.objects[k]
     if not 0 <= amount <= 1:
         raise EditError(f"a decontamination of {amount:g} is not between 0 and 1")

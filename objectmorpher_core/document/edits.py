@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.arrays import Mask, Selection, frozen
 from ..base.camera import Camera
+from .edge_edits import decontaminated
 from .model import (
     SELECTED,
     BesidePrompt,
@@ -147,10 +148,8 @@ def _with_mask(
     # The plate and the refinement stay, too, until the shape is refitted; copies stay copies.
     outline = {name: getattr(changed, name) for name in ("mask", "coverage", "shaped", "mixed")}
     objects = (replace(o, **outline) if _is_copy(o, item) else o for o in document.objects)
-    document = replace(document, objects=tuple(objects))
-    return replace(
-        document, objects=tuple(changed if i == k else o for i, o in enumerate(document.objects))
-    )
+    kept = tuple(changed if i == k else other for i, other in enumerate(objects))
+    return replace(document, objects=kept)
 
 
 def _is_copy(other: EditObject, item: EditObject) -> bool:
@@ -165,15 +164,13 @@ def refit(
     Handles, pose, rig and placement go over to it. `plate`: the background that goes with it.
     """
     from ..lift.refitting import refitted
-    from .edge_edits import decontaminated
 
-    item, camera = document.objects[k], document.photo.camera
-    objects = tuple(
-        decontaminated(document.photo, refitted(other, matte, lifted, camera))
-        if _is_copy(other, item)
-        else other
-        for other in document.objects
+    item, photo = document.objects[k], document.photo
+    fitted = (
+        refitted(each, matte, lifted, photo.camera) if _is_copy(each, item) else each
+        for each in document.objects
     )
+    objects = tuple(decontaminated(photo, each) for each in fitted)
     return replace(document, objects=objects, plate=plate, refined=None)
 
 
@@ -185,11 +182,8 @@ def set_lifted(
     shape: LiftSettings | None = None,
 ) -> Document:
     """The 3D shape of object `k`, made as `shape` says; its handles and pose are gone."""
-    from .edge_edits import decontaminated
-
-    item = document.objects[k].with_lifted(matte, lifted, shape)
-    changed = document.with_object(k, decontaminated(document.photo, item))
-    return changed.with_backend("lift", lifted.backend)
+    item = decontaminated(document.photo, document.objects[k].with_lifted(matte, lifted, shape))
+    return document.with_object(k, item).with_backend("lift", lifted.backend)
 
 
 def reshape(
@@ -197,10 +191,9 @@ def reshape(
 ) -> Document:
     """Another 3D shape of object `k`, made as `shape` says; handles and rig go over, no pose."""
     from ..lift.refitting import carried_over
-    from .edge_edits import decontaminated
 
-    changed = carried_over(document.objects[k], matte, lifted, shape)
-    changed = decontaminated(document.photo, changed)
+    item = carried_over(document.objects[k], matte, lifted, shape)
+    changed = decontaminated(document.photo, item)
     return document.with_object(k, changed).with_backend("lift", lifted.backend)
 
 
