@@ -79,10 +79,15 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def half(device: Device) -> Number:
-    """The better of the short numbers: bfloat16 has float32's range."""
+    """The better of the short numbers: bfloat16 has float32's range.
+
+    Both are of one size: memory can be planned where PyTorch is not installed yet.
+    """
+    if device != "cuda" or not has_torch():
+        return "float16"
     import torch
 
-    return "bfloat16" if device == "cuda" and torch.cuda.is_bf16_supported() else "float16"
+    return "bfloat16" if torch.cuda.is_bf16_supported() else "float16"
 
 
 def empty_cache(device: Device) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tqdm
 from PIL import Image, ImageCms, ImageShow
 
 import objectmorpher_core as om
@@ -180,6 +179,7 @@ def test_progress_is_a_function_or_a_bar(folder):
     for told in (lifting, rendering):
         assert told[-1][0] == 1 and len(told) > 2
         assert all(0 <= fraction <= 1 and note for fraction, note in told)
+    tqdm = pytest.importorskip("tqdm")
     for total in (None, 1.0, 7):
         with tqdm.tqdm(total=total, file=io.StringIO()) as bar:
             lifted.turn(20).render(bar)
