@@ -93,12 +93,12 @@ def test_the_whole_job_by_keyboard_alone(hands: Hands, photo_path: Path, tmp_pat
     keys.press("ctrl+e")
     exported = tmp_path / "edited.png"
     keys.wait("Cancel")
-    keys.reach("JPEG")
-    keys.press("Return")  # it chooses, and does not export yet
-    keys.wait("Export ball-edited.jpg")
-    keys.reach("PNG", by="Left")
-    keys.press("Return")
-    keys.wait("Export ball-edited.png")
+    for by, format, ending in (("Down", "JPEG", "jpg"), ("Up", "PNG", "png")):
+        keys.reach("PNG" if format == "JPEG" else "JPEG")
+        keys.press("Return")  # the list of formats unfolds
+        keys.reach(format, by=by)
+        keys.press("Return")  # it chooses, and does not export yet
+        keys.wait(f"Export ball-edited.{ending}")
     assert not list(photo_path.parent.glob("*-edited*"))
     keys.reach("Name", by="shift+Tab")
     keys.press("ctrl+a")

@@ -209,11 +209,14 @@ def _choice(name: str, choices: Sequence[tuple[T, str, str | None]], chosen: T) 
     found = None
     imgui.set_next_item_width(FILL)
     preview = next(shown for value, shown, _ in choices if value == chosen)
-    if imgui.begin_combo(f"##{name}", preview):
+    is_open = imgui.begin_combo(f"##{name}", preview)
+    mark(preview)
+    if is_open:
         for value, shown, reason in choices:
             flags = imgui.SelectableFlags_.disabled if reason else imgui.SelectableFlags_.none
             if imgui.selectable(shown, value is chosen, flags)[0]:
                 found = value
+            mark(shown)
             if reason:
                 tooltip(reason)
         if imgui.is_key_pressed(imgui.Key.escape):

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 WIDTH = 560.0  # points
 BUTTON = 120.0
-AROUND = 200.0  # what of the window's height the rows leave to title, button and surroundings
+AROUND = 240.0  # what of the window's height the rows leave to title, button and surroundings
 ABOUT = (
     "Everything works without them. What you download stays on this computer, and no photo ever "
     "leaves it."
