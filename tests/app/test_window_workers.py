@@ -65,7 +65,7 @@ def test_a_worker_is_named_in_preferences_and_chosen(
 def test_a_licence_is_accepted_by_its_box_and_the_worker_lifts(hands: Hands, workers: Path) -> None:
     hands.choose("Menu: Window")
     hands.choose("Models…")
-    hands.wait(lambda: "Use a file…" in hands.places(), "listing the models")
+    hands.wait(lambda: "Download" in hands.places(), "listing the models")
     x0, y0, x1, _ = hands.area("Close")
     hands.xdotool("mousemove", round((x0 + x1) / 2) - 150, round(y0) - 200)
     hands.xdotool("click", "--repeat", 80, "--delay", 20, 5)  # to the list's end
