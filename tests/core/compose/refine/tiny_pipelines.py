@@ -117,9 +117,9 @@ def write_klein(at: Path) -> Path:
             num_attention_heads=2, joint_attention_dim=48, axes_dims_rope=[4] * 4,
             timestep_guidance_channels=16, guidance_embeds=False,
         ),
-        "vae": AutoencoderKLFlux2(
-            block_out_channels=(4,), down_block_types=("DownEncoderBlock2D",),
-            up_block_types=("UpDecoderBlock2D",), layers_per_block=1, latent_channels=1,
+        "vae": AutoencoderKLFlux2(  # eight pixels a side in one, as the published: of a megapixel
+            block_out_channels=(4,) * 4, down_block_types=("DownEncoderBlock2D",) * 4,
+            up_block_types=("UpDecoderBlock2D",) * 4, layers_per_block=1, latent_channels=1,
             norm_num_groups=1, use_quant_conv=False, use_post_quant_conv=False,
         ),
         "text_encoder": Qwen3ForCausalLM(config),
