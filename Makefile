@@ -57,9 +57,7 @@ TORCH ?= torch==2.13.0
 BESIDE := 'torchmetrics>=1.6' # others' measures, to compare ours with
 test-models: .make/models
 	@$(COMPILE)
-	for part in tests/app tests/core tests/research; do # apart: some have a conftest.py of their own
-	    $(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart' $$part --include='test_*.py' | sort)
-	done
+	$(PYTEST) -m "slow or not slow" $(ARGS) $$(grep -rlE '[^-]torch|transformers|diffusers|huggingface_hub|peft|onnx|"ray"|ray_apart' tests --include='test_*.py' | sort)
 
 .make/models: .make/test
 	@$(PIP) install -q '$(TORCH)' $(BESIDE) -e '.[dev,models,research,cluster]' -e research

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import wait_until
+from ball import wait_until
 from edit_until_killed import base_document, step_document
 from hands import ROOT
 from objectmorpher.editor.autosave import recovery_root

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from conftest import PATIENCE
-from hands import ROOT
+from hands import PATIENCE, ROOT
 from tests.tree import PYTHONPATH
 
 TOO_SMALL = "500x320x2"  # less than the window allows: the last line has no room for its sentence

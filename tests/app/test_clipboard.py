@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import HEIGHT, WIDTH
+from ball import HEIGHT, WIDTH
 from hands import Hands, opened, x_display
 from objectmorpher.system import clipboard
 from objectmorpher.system.clipboard import ClipboardError, x11

@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from conftest import PATIENCE, wait_for_jobs
+from ball import wait_for_jobs
+from hands import PATIENCE
 from objectmorpher.canvas.blend import CELL
 from objectmorpher.canvas.frame import build_frame
 from objectmorpher.canvas.layer import CanvasLayer

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import PATIENCE
-from hands import ROOT
+from hands import PATIENCE, ROOT
 from objectmorpher.editor.settings import AUTO, read_settings
 from objectmorpher.system.motion import FULL, REDUCED, MotionPreference
 from tests.tree import PYTHONPATH

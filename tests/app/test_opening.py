@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from conftest import CENTRE, open_file, wait_for_jobs, wait_until
+from ball import CENTRE, open_file, wait_for_jobs, wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.recovery import Left
 from objectmorpher.editor.settings import Backends

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import wait_until
+from ball import wait_until
 from edit_until_killed import base_document, step_document
 from objectmorpher.editor.autosave import LOCK, recovery_root
 from objectmorpher.editor.editor import Editor

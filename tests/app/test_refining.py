@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import wait_until
+from ball import wait_until
 from objectmorpher.commands import COMMANDS, run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName

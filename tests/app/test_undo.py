@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from conftest import PATIENCE, wait_for_jobs
-from hands import ROOT
+from ball import wait_for_jobs
+from hands import PATIENCE, ROOT
 from objectmorpher.commands import COMMANDS, GROUPS, run, why_not
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.view import ToolName

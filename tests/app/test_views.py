@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageChops
 
-from conftest import PATIENCE
-from hands import ROOT, Hands, opened
+from hands import PATIENCE, ROOT, Hands, opened
 from objectmorpher_core.session.file import save_session
 from shoot_views import NAMES, made_document
 from tests.tree import PYTHONPATH

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import CENTRE, HEIGHT, PATIENCE, WIDTH
-from hands import ROOT, Hands, opened
+from ball import CENTRE, HEIGHT, WIDTH
+from hands import PATIENCE, ROOT, Hands, opened
 from tests.tree import quick
 
 pytestmark = pytest.mark.window

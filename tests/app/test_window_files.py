@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import CENTRE
+from ball import CENTRE
 from hands import ROOT, Hands, opened
 from test_window import screen_xy
 

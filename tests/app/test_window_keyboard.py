@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import CENTRE, WIDTH
+from ball import CENTRE, WIDTH
 from hands import Hands, opened
 from keyboard import Keys
 from test_window import POSE_TOOL, PRIMARY

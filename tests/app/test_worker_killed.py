@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import job_functions
-from conftest import wait_for_jobs, wait_until
+from ball import wait_for_jobs, wait_until
 from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.tasks import READ, WRITE

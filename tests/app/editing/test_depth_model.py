@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import CENTRE, open_file, run, wait_for_jobs
+from ball import CENTRE, open_file, wait_for_jobs
 from objectmorpher.cli import parser as cli
+from objectmorpher.commands import run
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.filing import Dialog
 from objectmorpher.editor.settings import Settings

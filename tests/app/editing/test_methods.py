@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from conftest import wait_until
+from ball import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Backends, Settings
 from objectmorpher_core import compose, segment

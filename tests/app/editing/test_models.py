@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import wait_until
+from ball import wait_until
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.intents.models import NAMES
 from objectmorpher.editor.settings import Settings

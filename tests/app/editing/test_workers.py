@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import wait_until
+from ball import wait_until
 from objectmorpher.cli.parser import main
 from objectmorpher.editor.editor import Editor
 from objectmorpher.editor.settings import Settings
