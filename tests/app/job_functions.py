@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -36,6 +37,13 @@ def wait(seconds: float, progress: Progress) -> str:
         progress(1 - left / seconds, "waiting")
         time.sleep(0.02)
     return "waited"
+
+
+def prefix(progress: Progress) -> str:
+    """The environment that the worker runs in, and whether it has PyTorch."""
+    import torch
+
+    return f"{sys.prefix} {torch.__version__}"
 
 
 def hang(seconds: float, progress: Progress) -> str:

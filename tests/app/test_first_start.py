@@ -103,6 +103,10 @@ def test_the_name_of_a_build_is_of_all_its_sources(tmp_path, change: str) -> Non
 
 
 def test_what_an_installed_copy_is_told_to_do_is_possible(monkeypatch) -> None:
-    assert installation.extra("models").startswith("pip ")
+    monkeypatch.delenv("APPIMAGE", raising=False)
+    assert installation.extra("models") == "objectmorpher models setup"
+    monkeypatch.setenv("APPIMAGE", "/opt/ObjectMorpher.AppImage")
+    assert installation.extra("models") == "/opt/ObjectMorpher.AppImage models setup"
+    assert installation.extra("research").startswith("pip ")
     monkeypatch.setattr(sys, "frozen", True, raising=False)
-    assert installation.extra("models").startswith("pipx ")
+    assert installation.extra("research").startswith("pipx ")

@@ -41,8 +41,6 @@ from .terminal import PROGRAM, UsageError, progress_bar
 
 # `objectmorpher doctor`: what each stage would use on this machine, and what would help.
 
-ANOTHER = "Another copy, with it, is made by the commands below; or a server of yours has it."
-
 
 def run_doctor(options: argparse.Namespace) -> None:
     """`objectmorpher doctor [--json]`"""
@@ -65,7 +63,10 @@ def run_doctor(options: argparse.Namespace) -> None:
         f"  models are kept in {models.folder()}, {machine.disk / 2**30:.0f} GB free",
     ]
     if installation.is_frozen():
-        lines += ["", f"An installer brought this copy: PyTorch cannot be added to it. {ANOTHER}"]
+        told = (
+            f"An installer brought this copy: `{models.EXTRA}` adds PyTorch beside it, or a server"
+        )
+        lines += ["", f"{told} of yours has it."]
     for stage in stages:
         lines += ["", f"{stage.name}: {stage.uses}, {stage.why}"]
         lines += [f"  not {name}: {reason}" for name, reason in stage.others]

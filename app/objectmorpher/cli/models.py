@@ -18,7 +18,7 @@ THERE = {"ok": "installed", "missing": "not installed", "damaged": "damaged"}
 
 
 def run_models(options: argparse.Namespace) -> None:
-    """`objectmorpher models list|get|path|verify|add|remove`"""
+    """`objectmorpher models list|get|path|verify|add|remove|setup`"""
     action, id = options.action, options.id
     if (action == "add") != (options.file is not None):
         raise UsageError(
@@ -27,7 +27,9 @@ def run_models(options: argparse.Namespace) -> None:
         )
     if options.is_offline:
         os.environ[models.OFFLINE] = "1"
-    if action == "add":
+    if action == "setup":
+        _set_up(options)
+    elif action == "add":
         _add(id, options.file, options.is_converted)
     elif action == "remove":
         _remove(id or "")
@@ -114,6 +116,34 @@ def _get_set(id: str, options: argparse.Namespace) -> None:
     _write(f"{id}: {models.folder()}")
 
 
+def _set_up(options: argparse.Namespace) -> None:
+    """The environment that holds PyTorch: made, brought up to date, or removed."""
+    from objectmorpher_core.base import learned
+    from objectmorpher_core.models import environment, torch_build
+
+    if options.is_undone:
+        size = environment.unmake()
+        _write(f"removed {learned.folder()}, {_size(size)}")
+        return
+    if options.id:
+        raise UsageError(f"models setup takes no name such as {options.id!r}")
+    if options.wheels and not options.wheels.is_dir():
+        raise UsageError(f"{options.wheels} is no folder")
+    build = torch_build.build_for(torch_build.this_machine(), options.build or "")
+    plan = environment.plan(build, options.wheels)
+    told = f"PyTorch in the build {build.name}, because {build.why}"
+    if plan.wheels is None:
+        told += f": about {plan.download / 1e9:.1f} GB to download"
+        told += f" and {plan.disk / 1e9:.1f} GB in {plan.folder}"
+        told += f", in {plan.minutes} minutes at 80 Mbit/s"
+    else:
+        told += f": from {plan.wheels} into {plan.folder}"
+    _consent(told, "PyTorch", options.is_agreed, "install")
+    with progress_bar("Installing PyTorch") as progress:
+        made = environment.make(plan, progress)
+    _write(f"PyTorch {made.torch}: {plan.folder}, {_size(made.size)}")
+
+
 def _ask(model: HubModel, is_agreed: bool) -> None:
     """The user's consent to a download. Raises UsageError without it."""
     told = f"{model.id}: {_size(model.size)} from {model.home}, licence {model.licence}"
@@ -122,17 +152,17 @@ def _ask(model: HubModel, is_agreed: bool) -> None:
     _consent(told, model.id, is_agreed)
 
 
-def _consent(told: str, id: str, is_agreed: bool) -> None:
+def _consent(told: str, id: str, is_agreed: bool, verb: str = "download") -> None:
     """The user's word on what is told. Raises UsageError without it."""
     if is_agreed:
         sys.stderr.write(f"{told}\n")
         return
     if not sys.stdin.isatty():
-        raise UsageError(f"{told}; to download it add --yes")
-    sys.stderr.write(f"{told}. Download it? [y/N] ")
+        raise UsageError(f"{told}; to {verb} it add --yes")
+    sys.stderr.write(f"{told}. {verb.capitalize()} it? [y/N] ")
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise UsageError(f"{id} was not downloaded")
+        raise UsageError(f"{id} was not {verb}ed")
 
 
 def _look(action: str, id: str | None) -> None:
@@ -245,7 +275,7 @@ def _columns(id: str, size: str, licence: str, there: str, purpose: str) -> str:
     return f"{id:<{WIDE}}{size:>10}  {licence:<{NARROW}} {there:<14} {purpose}"
 
 
-def _size(count: int) -> str:
+def _size(count: float) -> str:
     """Bytes for people."""
     if count < 5e4:
         return f"{count / 1e3:.0f} kB"

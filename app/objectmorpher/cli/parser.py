@@ -364,9 +364,12 @@ def _add_warm_up(parser: argparse.ArgumentParser) -> None:
 
 def _add_models(parser: argparse.ArgumentParser) -> None:
     parser.description = "Manages learned weights: those to be fetched and your own."
-    actions = ("list", "get", "path", "verify", "add", "remove")
+    actions = ("list", "get", "path", "verify", "add", "remove", "setup")
     parser.add_argument(
-        "action", choices=actions, help="path: print where it is; add: add one of your own"
+        "action",
+        choices=actions,
+        help="path: print where it is; add: add one of your own;"
+        " setup: install PyTorch, which most models need",
     )
     parser.add_argument("id", nargs="?", help="a name of the list; default all")
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE",
@@ -383,6 +386,12 @@ def _add_models(parser: argparse.ArgumentParser) -> None:
         help="for add pixelhacker: extract the weights from its pickle files")  # fmt: skip
     add("--offline", dest="is_offline", action="store_true",
         help="download nothing; also by OBJECTMORPHER_OFFLINE=1")  # fmt: skip
+    add = parser.add_argument_group("setup").add_argument
+    add("--build", metavar="NAME",
+        help="PyTorch's build, such as cu128; default: what this machine can run")  # fmt: skip
+    add("--from", dest="wheels", type=Path, metavar="FOLDER",
+        help="take all packages from the wheels in a folder, without a network")  # fmt: skip
+    add("--undo", dest="is_undone", action="store_true", help="remove what setup has installed")
 
 
 def _add_doctor(parser: argparse.ArgumentParser) -> None:

@@ -19,9 +19,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from objectmorpher_core.base import learned
 from objectmorpher_core.base.progress import Cancelled
 
 from ..system.logs import crash_folder, note_crashes
+from .apart import ApartProcess, Flag
 from .job_error import JobError
 from .requests import Executor, Request
 from .wire import Connection, PipeReader, PipeWriter
@@ -43,16 +45,22 @@ class Worker:
     def __init__(self, warm: tuple[str, ...], wake: Callable[[], None]) -> None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        # Without a lock: one that the process took with it when it was ended would stop us, too.
-        self.stop: Any = context.RawValue("b", 0)
         self.has_answered = False
         self.answers: queue.SimpleQueue[tuple[str, int, Any]] = queue.SimpleQueue()
         self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.process = context.Process(
-            target=_work, args=(theirs, self.stop, warm, crash_folder()), daemon=True,
-            name="objectmorpher-worker",
-        )  # fmt: skip
-        self.process.start()
+        self.stop: Any
+        self.process: Any
+        if (command := learned.apart()) is not None:
+            self.stop = Flag()
+            self.process = ApartProcess(command, theirs, self.stop, warm)
+        else:
+            # Without a lock: one that the process took with it when it was ended would stop us.
+            self.stop = context.RawValue("b", 0)
+            self.process = context.Process(
+                target=work, args=(theirs, self.stop, warm, crash_folder()), daemon=True,
+                name="objectmorpher-worker",
+            )  # fmt: skip
+            self.process.start()
         theirs.close()
         self._connection = ours
         self._wake = wake
@@ -242,7 +250,7 @@ class Jobs(Executor):
         self._send_next()
 
 
-def _work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Path | None) -> None:
+def work(connection: Connection, stop: Any, warm: tuple[str, ...], crashes: Path | None) -> None:
     """The worker's main loop; ends with the pipe."""
     _lower_priority()
     if crashes is not None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from objectmorpher_core import models
-from objectmorpher_core.base.installation import is_frozen
+from objectmorpher_core.base import learned
 from objectmorpher_core.base.progress import Progress
 from objectmorpher_core.models import Added, CacheState, HubModel, HubState, Weight, registry
 
@@ -288,10 +288,6 @@ class HubModels:
     def why_not(self, model: HubModel) -> str | None:
         """Why it cannot be downloaded now."""
         if model.family not in NO_TORCH and not has_torch():
-            if is_frozen():
-                return t(
-                    "Nothing can be added to this copy; another: {command}", command=models.EXTRA
-                )
             return t("Needs PyTorch: {command}", command=models.EXTRA)
         if not self.accepts(model):
             return t("Accept its licence first")
@@ -323,5 +319,6 @@ class HubModels:
 
 
 def has_torch() -> bool:
-    """Whether networks of PyTorch's can run; nothing is imported for that."""
-    return find_spec("torch") is not None and find_spec("transformers") is not None
+    """Whether networks of PyTorch's can run, here or apart; nothing is imported for that."""
+    is_here = find_spec("torch") is not None and find_spec("transformers") is not None
+    return is_here or learned.apart() is not None
